@@ -1,0 +1,31 @@
+"""What can go wrong, each as one line that says what, where and what to do."""
+
+from __future__ import annotations
+
+
+class ScaraIdentError(Exception):
+    """The data or the model cannot give what was asked (exit status 1)."""
+
+    exit_status = 1
+
+
+class UsageError(ScaraIdentError):
+    """The command was called in a way it does not understand (exit status 2)."""
+
+    exit_status = 2
+
+
+class RobotError(ScaraIdentError):
+    """A robot description that cannot be used."""
+
+
+class RecordingError(ScaraIdentError):
+    """A recording that cannot be used."""
+
+
+class RegressorMismatch(ScaraIdentError):
+    """A batch kernel that does not reproduce Pinocchio's regressor."""
+
+
+class EstimationError(ScaraIdentError):
+    """An estimate that the information at hand does not allow."""
