@@ -21,9 +21,9 @@ from scara_ident.robot import Robot
 # Pinocchio's order of the ten parameters of a body.
 BODY_PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 BODY_UNITS = ("kg", "kg m", "kg m", "kg m", *("kg m^2",) * 6)
-# Order in which columns are offered: proximal bodies first, inertia before first moments before mass, so that
+# Order in which columns are offered: proximal bodies first, first moments before inertia before mass, so that
 # what a distal body shares with a proximal one is regrouped into the proximal one, as in Gautier's rules.
-BODY_PREFERENCE = (4, 5, 7, 6, 8, 9, 1, 2, 3, 0)
+BODY_PREFERENCE = (1, 2, 3, 4, 5, 7, 6, 8, 9, 0)
 # A column whose part outside the span of those kept is smaller than this share of it is regrouped. It sits
 # above what a URDF loses by writing 1.5708 for pi/2 (4e-6) and far above rounding (1e-13).
 RANK_TOLERANCE = 2e-5
@@ -50,8 +50,8 @@ class BaseParameters:
     absent : tuple of int
         Standard parameters that never enter the torque.
     approximate : tuple of (int, float)
-        Standard parameters regrouped although a small share of their column, given here, is independent:
-        usually an angle in the URDF with few digits.
+        Standard parameters regrouped or left out although a small share of their column, given here, is
+        independent: usually an angle in the URDF with few digits.
     reduction : ndarray, shape (n,)
         Reductions, to write armatures as rotor inertias.
     """
@@ -160,7 +160,7 @@ def base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int = 0) 
     """
     n = robot.n
     p = 11 * n
-    names = [f"{text[0]}{i + 1}{text[1:]}" for i in range(n) for text in BODY_PARAMETERS]
+    names = [_numbered(text, i + 1) for i in range(n) for text in BODY_PARAMETERS]
     names += [f"Ia{i + 1}" for i in range(n)]
     units = list(BODY_UNITS) * n + [_armature_unit(robot, i) for i in range(n)]
 
@@ -171,7 +171,8 @@ def base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int = 0) 
     columns = _random_columns(robot, seed, samples=max(40, 4 * p)) * scale
     size = np.linalg.norm(columns, axis=0)
     largest = size.max(initial=0.0)
-    absent = [k for k in range(p) if size[k] <= EXACT_TOLERANCE * largest]
+    absent = [k for k in range(p) if size[k] <= RANK_TOLERANCE * largest]
+    weak = [(k, float(size[k] / largest)) for k in absent if size[k] > EXACT_TOLERANCE * largest]
     order = [10 * i + k for i in range(n) for k in BODY_PREFERENCE]
     if rotor_inertia:
         order += list(range(10 * n, p))
@@ -183,7 +184,6 @@ def base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int = 0) 
 
     kept: list[int] = []
     basis = np.zeros((columns.shape[0], 0))
-    weak: list[tuple[int, float]] = []
     dependent: list[int] = []
     for k in order:
         if k in absent:
@@ -219,6 +219,11 @@ def base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int = 0) 
     )
 
 
+def _numbered(text: str, body: int) -> str:
+    # m2, mx2, I2zz: the body's number follows the symbol of the quantity.
+    return text.replace("I", f"I{body}") if "I" in text else f"{text}{body}"
+
+
 def _armature_unit(robot: Robot, joint: int) -> str:
     return "kg" if robot.prismatic[joint] else "kg m^2"
 
@@ -242,7 +247,7 @@ def _random_columns(robot: Robot, seed: int, samples: int) -> NDArray[np.float64
     q = stroke * rng.uniform(-1.0, 1.0, (n, samples))
     v = unit * rate * rng.uniform(-1.0, 1.0, (n, samples))
     a = unit * rate**2 * rng.uniform(-1.0, 1.0, (n, samples))
-    regressor = standard_regressor(robot, q, v, a) / unit[:, :, None] * 1.0
+    regressor = standard_regressor(robot, q, v, a) / np.where(robot.prismatic, 1.0, length)[:, None, None]
     return np.ascontiguousarray(regressor.transpose(2, 0, 1)).reshape(samples * n, -1)
 
 

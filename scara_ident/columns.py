@@ -1,0 +1,232 @@
+"""Columns of numbers out of a Parquet or CSV file, and back, with every fault said in one line."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.errors import RecordingError
+
+if TYPE_CHECKING:
+    import polars as pl
+
+SUFFIXES = (".parquet", ".csv")
+# What loggers and spreadsheets write where there is no number.
+MISSING = ["NA", "N/A", "n/a", "na", "null", "None", "-"]
+SEPARATORS = ",;\t"
+
+
+def column_names(path: Path) -> tuple[str, ...]:
+    """List the columns of a file without reading its rows.
+
+    Parameters
+    ----------
+    path : Path
+        A ``.parquet`` or ``.csv`` file.
+
+    Returns
+    -------
+    tuple of str
+        Names as they stand in the file, without surrounding blanks.
+
+    Raises
+    ------
+    RecordingError
+        The file is missing, may not be read, is empty, is of another kind, is damaged, or names a column twice.
+    """
+    import polars as pl
+
+    check_suffix(path)
+    try:
+        with path.open("rb") as file:
+            if not file.read(1):
+                raise RecordingError(f"{path}: the file is empty; record it again")
+            if path.suffix.lower() == ".csv":
+                names = [name.strip() for name in _csv_header(path)]
+            else:
+                file.seek(0)
+                names = list(pl.read_parquet_schema(file))
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+    except UnicodeDecodeError as error:
+        raise RecordingError(f"{path}: not a text file in UTF-8; save the CSV again in UTF-8") from error
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+        raise _damaged(path, error) from error
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise RecordingError(f"{path}: column {twice[0]!r} stands in the header twice; rename one of them")
+    return tuple(names)
+
+
+def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    """Read some columns of a file as float64, and only those.
+
+    Parameters
+    ----------
+    path : Path
+        A file whose ``column_names`` contain all `names`.
+    names : sequence of str
+        Columns to read.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (N,)
+        NaN where the file has no value.
+
+    Raises
+    ------
+    RecordingError
+        A text or a date where a number belongs (column, row, value), or a damaged file.
+    """
+    import polars as pl
+
+    try:
+        if path.suffix.lower() == ".csv":
+            frame = _read_csv(path, names)
+        else:
+            frame = pl.read_parquet(path, columns=list(names), glob=False, hive_partitioning=False)
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
+        raise _damaged(path, error) from error
+    return {name: _numbers(path, frame[name]) for name in names}
+
+
+def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
+    """Write columns to a file, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        File to write; Parquet or CSV by its suffix. An existing file is replaced.
+    columns : mapping of str to ndarray, shape (N,)
+        Columns in the order in which they are to stand.
+
+    Raises
+    ------
+    RecordingError
+        Another suffix, or a folder that is missing, full or not to be written to.
+    """
+    import polars as pl
+
+    check_suffix(path)
+    frame = pl.DataFrame(dict(columns))
+    # In the same folder, so that the replacement is one step of the file system.
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        try:
+            with partial.open("wb") as file:
+                if path.suffix.lower() == ".csv":
+                    frame.write_csv(file)
+                else:
+                    frame.write_parquet(file)
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
+
+
+def check_suffix(path: Path) -> None:
+    """Refuse a file that is neither Parquet nor CSV by its suffix."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise RecordingError(f"{path}: suffix {path.suffix!r} is not known; a recording is a .parquet or .csv file")
+
+
+def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
+    import polars as pl
+
+    raw = {name.strip(): name for name in _csv_header(path) if name.strip() in names}
+    separator = _separator(path)
+    decimal_comma = separator == ";" and _has_decimal_comma(path)
+    try:
+        frame = pl.read_csv(
+            path,
+            columns=list(raw.values()),
+            schema_overrides={name: pl.Float64 for name in raw.values()},
+            separator=separator,
+            decimal_comma=decimal_comma,
+            null_values=MISSING,
+            glob=False,
+        )
+    except pl.exceptions.ComputeError:
+        # Something is not a number: read the words themselves, so that it can be named.
+        _refuse_long_rows(path, separator)
+        frame = pl.read_csv(
+            path,
+            columns=list(raw.values()),
+            infer_schema=False,
+            separator=separator,
+            null_values=MISSING,
+            glob=False,
+        )
+        if decimal_comma:
+            frame = frame.with_columns(pl.all().str.replace(",", ".", literal=True))
+    return frame.rename({file_name: name for name, file_name in raw.items()})
+
+
+def _numbers(path: Path, series: pl.Series) -> NDArray[np.float64]:
+    import polars as pl
+
+    if series.dtype == pl.String:
+        words = series.str.strip_chars()
+        numbers = words.cast(pl.Float64, strict=False)
+        bad = (numbers.is_null() & words.is_not_null() & (words != "")).arg_true()
+        if len(bad):
+            row = int(bad[0])
+            raise RecordingError(
+                f"{path}: column {series.name!r}, row {row + 1}: {series[row]!r} is not a number"
+                f"{_and_more(len(bad))}; correct it or leave it empty"
+            )
+        series = numbers
+    elif not series.dtype.is_numeric():
+        hint = "time in seconds" if series.name == "time" else "numbers"
+        raise RecordingError(f"{path}: column {series.name!r} holds {series.dtype}; it must hold {hint}")
+    return series.cast(pl.Float64).to_numpy()
+
+
+def _csv_header(path: Path) -> list[str]:
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        for line in file:
+            if line.strip():
+                separator = max(SEPARATORS, key=line.count)
+                return next(csv.reader([line], delimiter=separator))
+    return []
+
+
+def _separator(path: Path) -> str:
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        header = next((line for line in file if line.strip()), "")
+    return max(SEPARATORS, key=header.count)
+
+
+def _has_decimal_comma(path: Path) -> bool:
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        lines = (line for line in file if line.strip())
+        next(lines, "")
+        return "," in next(lines, "")
+
+
+def _refuse_long_rows(path: Path, separator: str) -> None:
+    with path.open(encoding="utf-8-sig", newline="", errors="replace") as file:
+        rows = (row for row in csv.reader(file, delimiter=separator) if row)
+        width = len(next(rows, []))
+        for number, row in enumerate(rows, 1):
+            if len(row) > width:
+                raise RecordingError(
+                    f"{path}: row {number} has {len(row)} values for {width} columns; correct or remove it"
+                )
+
+
+def _damaged(path: Path, error: BaseException) -> RecordingError:
+    kind = path.suffix.lower().lstrip(".")
+    reason = (str(error).strip() or type(error).__name__).splitlines()[0]
+    return RecordingError(f"{path}: not a whole {kind} file ({reason}); copy or record it again")
+
+
+def _and_more(count: int) -> str:
+    return f" (and {count - 1} more)" if count > 1 else ""

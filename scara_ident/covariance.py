@@ -1,0 +1,113 @@
+"""Standard deviations that stay honest when residuals are correlated in time.
+
+Residuals of a low-passed 1 kHz recording are not independent, so the textbook covariance promises too much. Here
+rows are taken in blocks of time, long against the memory of the filter; blocks are nearly independent whatever
+happens inside them. Their scores give the cluster-robust covariance with the bias-reduced residuals of Bell and
+McCaffrey (2002), unbiased for white residuals, and neighbouring blocks are weighted in by Bartlett's kernel (Newey
+and West 1987). All of it follows from the triangular factors of the blocks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.information import Information
+
+Array = NDArray[np.float64]
+
+# With fewer blocks than this many per parameter the matrix of scores is too noisy to stand for itself.
+BLOCKS_PER_PARAMETER = 2.5
+# Leverage above which a block fixes a direction alone, so that its residual says nothing about it.
+FULL_LEVERAGE = 1.0 - 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """Covariance of an estimate and how it was found.
+
+    Attributes
+    ----------
+    matrix : ndarray, shape (p, p)
+    kind : {"block", "pooled block"}
+        ``block``: every direction from the scatter of its own scores. ``pooled block``: few blocks, so the
+        shape of white residuals with a size from the scatter of all scores together.
+    blocks : int
+        Number of blocks.
+    """
+
+    matrix: Array
+    kind: str
+    blocks: int
+
+
+def block_covariance(inverse: Array, value: Array, sequences: Sequence[Sequence[Information]]) -> Covariance:
+    """Covariance of a least-squares estimate from blocks of rows.
+
+    Parameters
+    ----------
+    inverse : ndarray, shape (p, p)
+        Inverse of ``W.T @ W`` of all rows (and of a prior, if there is one).
+    value : ndarray, shape (p,)
+        The estimate.
+    sequences : sequence of sequence of Information
+        For every recording its blocks in order of time; rows weighted as in the estimate.
+
+    Returns
+    -------
+    Covariance
+    """
+    root = _square_root(inverse)
+    count = sum(len(blocks) for blocks in sequences)
+    kind = "block" if count >= BLOCKS_PER_PARAMETER * root.shape[1] else "pooled block"
+    if kind == "pooled block":
+        return Covariance(_pooled(root, value, sequences), kind, count)
+    meat = np.zeros((root.shape[1], root.shape[1]))
+    for blocks in sequences:
+        before = None
+        for block in blocks:
+            score = _score(block, root, value, reduced=True)
+            meat += np.outer(score, score)
+            if before is not None:
+                meat += 0.5 * (np.outer(score, before) + np.outer(before, score))
+            before = score
+    return Covariance(root @ meat @ root.T, kind, count)
+
+
+def _pooled(root: Array, value: Array, sequences: Sequence[Sequence[Information]]) -> Array:
+    # White residuals of variance s^2 leave scores of total power s^2 sum tr(H (1 - H)) with the leverages H.
+    power, expected = 0.0, 0.0
+    for blocks in sequences:
+        for block in blocks:
+            score = _score(block, root, value, reduced=False)
+            half = block.regressor_factor @ root
+            leverage = np.linalg.svd(half, compute_uv=False) ** 2
+            power += float(score @ score)
+            expected += float(np.sum(leverage * np.clip(1.0 - leverage, 0.0, None)))
+    size = power / expected if expected > 1e-9 else np.inf
+    return size * root @ root.T if np.isfinite(size) else np.full((len(value), len(value)), np.inf)
+
+
+def _score(block: Information, root: Array, value: Array, *, reduced: bool) -> Array:
+    """Score of a block in the directions of ``root``, with residuals freed of the bias of fitting."""
+    residual = block.projected_torque - block.regressor_factor @ value
+    half = block.regressor_factor @ root
+    if not reduced:
+        return np.asarray(half.T @ residual)
+    left, singular, right = np.linalg.svd(half, full_matrices=False)
+    leverage = singular**2
+    free = leverage < FULL_LEVERAGE
+    factor = np.where(free, singular / np.sqrt(np.where(free, 1.0 - leverage, 1.0)), 0.0)
+    return np.asarray(right.T @ (factor * (left.T @ residual)))
+
+
+def _square_root(matrix: Array) -> Array:
+    """Return L with ``L @ L.T`` equal to a positive semidefinite matrix, without its null directions."""
+    size = np.sqrt(np.clip(np.diag(matrix), 0.0, None))
+    size[size == 0.0] = 1.0
+    values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
+    kept = values > values[-1] * len(values) * np.finfo(float).eps
+    return np.asarray(size[:, None] * vectors[:, kept] * np.sqrt(values[kept]))

@@ -1,0 +1,7 @@
+"""Estimators: evidence in, estimate out; one function and one file each."""
+
+from scara_ident.estimators.estimate import Estimate, JointError
+from scara_ident.estimators.least_squares import ols, wls
+from scara_ident.estimators.recursive import History, rls
+
+__all__ = ["Estimate", "History", "JointError", "ols", "rls", "wls"]

@@ -1,0 +1,85 @@
+"""Ordinary and weighted least squares."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.covariance import block_covariance
+from scara_ident.estimators.estimate import Estimate, pooled_information, weighted_blocks
+from scara_ident.evidence import Evidence
+from scara_ident.information import Information, merge
+from scara_ident.model import TorqueModel
+
+Array = NDArray[np.float64]
+
+
+def ols(model: TorqueModel, evidence: Sequence[Evidence]) -> Estimate:
+    """Estimate by ordinary least squares: every sample of every joint counts the same.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    evidence : sequence of Evidence
+        One per recording.
+
+    Returns
+    -------
+    Estimate
+
+    Raises
+    ------
+    EstimationError
+        If there is no evidence.
+    """
+    return least_squares(model, evidence, np.ones(model.robot.n), "ols")
+
+
+def wls(model: TorqueModel, evidence: Sequence[Evidence], noise: Array | None = None) -> Estimate:
+    """Estimate by least squares with each joint's rows divided by its noise.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    evidence : sequence of Evidence
+    noise : ndarray, shape (n,), optional
+        Standard deviation of each joint's torque, from repetitions; by default the residual of `ols` within
+        the band.
+
+    Returns
+    -------
+    Estimate
+    """
+    if noise is None:
+        noise = residual_noise(ols(model, evidence), evidence)
+    return least_squares(model, evidence, 1.0 / noise, "wls")
+
+
+def residual_noise(estimate: Estimate, evidence: Sequence[Evidence]) -> Array:
+    """Return the rms residual of each joint within the band, shape (n,); 1 for a joint without rows."""
+    n = estimate.model.robot.n
+    rms = np.ones(n)
+    for j in range(n):
+        rows = merge(item.joint(j) for item in evidence)
+        if rows.rows:
+            # An exact fit would give an infinite weight; rounding is the floor.
+            rms[j] = max(rows.rms(estimate.value), 1e-12 * max(rows.torque_rms, np.finfo(float).tiny))
+    return rms
+
+
+def least_squares(
+    model: TorqueModel, evidence: Sequence[Evidence], weights: Array, method: str, prior: Information | None = None
+) -> Estimate:
+    """Least squares with a weight per joint and, if given, rows of a prior."""
+    information = pooled_information(evidence, weights)
+    if prior is not None:
+        information = merge([information, prior])
+    solution = information.solve()
+    spread = block_covariance(information.inverse(), solution.value, weighted_blocks(evidence, weights))
+    covariance = spread.matrix.copy()
+    covariance[np.diag_indices_from(covariance)] = np.where(solution.undetermined, np.inf, np.diag(covariance))
+    return Estimate(
+        model, method, solution.value, covariance, solution.undetermined, information, weights, spread.kind
+    )

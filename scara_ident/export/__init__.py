@@ -1,0 +1,1 @@
+"""The identified robot in the formats of other programs."""

@@ -1,0 +1,237 @@
+"""What rows of a linear model say about its parameters: the triangular factor of [regressor | torque].
+
+For rows ``W`` and right-hand side ``u``, the factor R of the QR decomposition of ``[W | u]`` is a sufficient
+statistic: every least-squares quantity of any sub-model follows from R and the number of rows. Factors of
+different rows merge by one more QR of the factors put on top of each other, exactly and in any order. An empty
+factor is the recursion's infinite initial covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Rows a QR takes at a time: small panels stay in cache, and LAPACK does not thread them.
+PANEL_ROWS = 512
+# Directions whose singular value, with columns scaled to unit length, is below this share of the largest are
+# not determined: half the digits of a double.
+UNDETERMINED = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """Triangular factor of ``[W | u]`` with its number of rows.
+
+    Attributes
+    ----------
+    factor : ndarray, shape (p + 1, p + 1)
+        Upper triangular; ``factor.T @ factor`` equals ``[W | u].T @ [W | u]``.
+    rows : float
+        Number of rows (of equal weight 1) that it stands for.
+    """
+
+    factor: Array
+    rows: float
+
+    @staticmethod
+    def empty(parameters: int) -> Information:
+        """Return the information of no rows: nothing is known of any parameter."""
+        return Information(np.zeros((parameters + 1, parameters + 1)), 0.0)
+
+    @staticmethod
+    def prior(mean: Array, std: Array) -> Information:
+        """Return the rows that say each parameter is ``mean`` within ``std``.
+
+        Parameters
+        ----------
+        mean, std : ndarray, shape (p,)
+            Infinite std: nothing is known of that parameter.
+
+        Raises
+        ------
+        ValueError
+            If a std is not positive.
+        """
+        if np.any(~(std > 0.0)):
+            raise ValueError(f"std of a prior must be positive, found {std[~(std > 0.0)][0]:g}")
+        weight = np.where(np.isinf(std), 0.0, 1.0 / std)
+        return Information(_triangular(np.column_stack([np.diag(weight), weight * mean])), 0.0)
+
+    @property
+    def parameters(self) -> int:
+        """Number of parameters p."""
+        return self.factor.shape[1] - 1
+
+    @property
+    def regressor_factor(self) -> Array:
+        """R of the regressor alone, shape (p, p)."""
+        return self.factor[:-1, :-1]
+
+    @property
+    def projected_torque(self) -> Array:
+        """Torque seen through the regressor's range, shape (p,): the right-hand side that goes with R."""
+        return self.factor[:-1, -1]
+
+    def absorb(self, regressor: Array, torque: Array, *, decay: float = 1.0) -> Information:
+        """Return this information with more rows.
+
+        Parameters
+        ----------
+        regressor : ndarray, shape (N, p)
+        torque : ndarray, shape (N,)
+        decay : float, optional
+            Factor on what was known before, as in forgetting; 1 keeps it.
+
+        Raises
+        ------
+        ValueError
+            If the shapes do not fit.
+        """
+        if regressor.ndim != 2 or regressor.shape[1] != self.parameters or torque.shape != regressor.shape[:1]:
+            raise ValueError(
+                f"expected a regressor (N, {self.parameters}) and a torque (N,), "
+                f"found {regressor.shape} and {torque.shape}"
+            )
+        return self.absorb_columns(np.vstack([regressor.T, torque]), decay=decay)
+
+    def absorb_columns(self, columns: Array, *, decay: float = 1.0) -> Information:
+        """Return this information with more rows given as columns ``[W | u].T``, shape (p + 1, N)."""
+        factor = np.sqrt(decay) * self.factor
+        count = columns.shape[1]
+        # Equal panels, so that the last is not a sliver.
+        panels = max(1, -(-count // PANEL_ROWS))
+        bounds = np.linspace(0, count, panels + 1).astype(int)
+        factors = [_triangular(columns[:, a:b].T) for a, b in pairwise(bounds) if b > a]
+        return Information(_triangular(np.vstack([factor, *factors])), decay * self.rows + count)
+
+    def scaled(self, weight: float) -> Information:
+        """Return this information with every row multiplied by ``weight``."""
+        return Information(weight * self.factor, self.rows)
+
+    def select(self, columns: Sequence[int] | NDArray[np.intp]) -> Information:
+        """Return the information of the sub-model that has these columns only."""
+        kept = [*columns, self.parameters]
+        return Information(_triangular(self.factor[:, kept]), self.rows)
+
+    def embed(self, columns: Sequence[int] | NDArray[np.intp], parameters: int) -> Information:
+        """Return the information in a larger model whose other columns are zero on these rows."""
+        wide = np.zeros((self.parameters + 1, parameters + 1))
+        wide[:, [*columns, parameters]] = self.factor
+        return Information(_triangular(wide), self.rows)
+
+    def solve(self) -> Solution:
+        """Return the least-squares estimate and what it leaves undetermined."""
+        r = self.regressor_factor
+        size = np.linalg.norm(r, axis=0)
+        entering = size > 0.0
+        value = np.zeros(self.parameters)
+        undetermined = ~entering
+        null = np.eye(self.parameters)[:, ~entering]
+        if np.any(entering):
+            scaled = r[:, entering] / size[entering]
+            left, singular, right = np.linalg.svd(scaled)
+            known = singular > UNDETERMINED * singular[0]
+            seen = right[known].T / singular[known] @ (left[:, : len(singular)][:, known].T @ self.projected_torque)
+            value[entering] = seen / size[entering]
+            blind = right[~known].T
+            undetermined[entering] = np.linalg.norm(blind, axis=1) > np.sqrt(UNDETERMINED)
+            spread = np.zeros((self.parameters, blind.shape[1]))
+            spread[entering] = blind / size[entering][:, None]
+            null = np.column_stack([null, spread])
+        return Solution(value, undetermined, null)
+
+    def inverse(self) -> Array:
+        """Return the inverse of ``W.T @ W`` on what is determined, shape (p, p)."""
+        r = self.regressor_factor
+        size = np.linalg.norm(r, axis=0)
+        entering = size > 0.0
+        result = np.zeros((self.parameters, self.parameters))
+        if np.any(entering):
+            _, singular, right = np.linalg.svd(r[:, entering] / size[entering])
+            known = singular > UNDETERMINED * singular[0]
+            half = right[known].T / singular[known] / size[entering][:, None]
+            result[np.ix_(entering, entering)] = half @ half.T
+        return result
+
+    def residual_sum(self, value: Array | None = None) -> float:
+        """Return the sum of squared residuals of parameters, by default of the least-squares estimate."""
+        if value is None:
+            value = self.solve().value
+        return float(np.sum((self.factor[:, :-1] @ value - self.factor[:, -1]) ** 2))
+
+    def rms(self, value: Array | None = None) -> float:
+        """Return the rms residual of parameters over the rows, by default of the least-squares estimate."""
+        return float(np.sqrt(self.residual_sum(value) / self.rows)) if self.rows else 0.0
+
+    @property
+    def torque_rms(self) -> float:
+        """Rms of the torque over the rows."""
+        return float(np.linalg.norm(self.factor[:, -1]) / np.sqrt(self.rows)) if self.rows else 0.0
+
+    def log_det(self) -> float:
+        """Return ln det(W.T W), -inf where W does not have full rank (J_d of Indri et al. 2002)."""
+        singular = self._singular()
+        if singular.size == 0 or singular[-1] == 0.0:
+            return -np.inf
+        return float(2.0 * np.sum(np.log(singular)))
+
+    def condition(self) -> float:
+        """Return cond(W.T W), inf where W does not have full rank (J_k of Indri et al. 2002)."""
+        singular = self._singular()
+        if singular.size == 0 or singular[-1] == 0.0:
+            return np.inf
+        return float((singular[0] / singular[-1]) ** 2)
+
+    def _singular(self) -> Array:
+        return np.asarray(np.linalg.svd(self.regressor_factor, compute_uv=False))
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A least-squares estimate.
+
+    Attributes
+    ----------
+    value : ndarray, shape (p,)
+        Estimate; along undetermined directions the shortest one in scaled columns.
+    undetermined : ndarray of bool, shape (p,)
+        Parameters that rows leave open, alone or in a combination.
+    null : ndarray, shape (p, k)
+        A basis of the directions that change no predicted torque on these rows.
+    """
+
+    value: Array
+    undetermined: NDArray[np.bool_]
+    null: Array
+
+
+def merge(parts: Iterable[Information]) -> Information:
+    """Merge the information of different rows; the order does not matter.
+
+    Parameters
+    ----------
+    parts : iterable of Information
+        At least one, all with the same parameters.
+    """
+    items = list(parts)
+    if not items:
+        raise ValueError("nothing to merge")
+    stacked = np.vstack([item.factor for item in items])
+    return Information(_triangular(stacked), sum(item.rows for item in items))
+
+
+def _triangular(rows: Array) -> Array:
+    """Triangular factor of rows, square also where there are fewer rows than columns."""
+    size = rows.shape[1]
+    factor = np.linalg.qr(rows, mode="r")
+    if factor.shape[0] == size:
+        return np.asarray(factor)
+    full = np.zeros((size, size))
+    full[: factor.shape[0]] = factor
+    return full

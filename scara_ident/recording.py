@@ -1,0 +1,330 @@
+"""One run of one trajectory: reading, writing and gathering recordings."""
+
+from __future__ import annotations
+
+import glob
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.audit import Finding, Samples, audit
+from scara_ident.columns import SUFFIXES, column_names, read_columns, write_columns
+from scara_ident.errors import RecordingError, UsageError
+
+if TYPE_CHECKING:
+    from scara_ident.robot import Robot
+
+Array = NDArray[np.float64]
+
+OPTIONAL = ("velocity", "acceleration", "temperature")
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One run of one trajectory.
+
+    Attributes
+    ----------
+    name : str
+        Stem of the file.
+    trajectory : str
+        The stem without a trailing ``_<number>``.
+    repetition : int
+        That number, 1 where the stem has none.
+    joints : tuple of str
+        The n joints, in the robot's order.
+    time : ndarray, shape (N,)
+        Time in s, strictly increasing.
+    position : ndarray, shape (n, N)
+        Joint positions in rad or m.
+    effort : ndarray, shape (n, N), or None
+        Torque in N m or force in N on the robot's effort side, after ``effort_gain``.
+    velocity, acceleration : ndarray, shape (n, N), or None
+        As recorded, in rad/s (m/s) and rad/s^2 (m/s^2); None where they are absent for any joint.
+    temperature : ndarray, shape (n, N), or None
+        In deg C.
+    findings : tuple of Finding
+        What the audit saw in the file and did about it.
+    path : Path or None
+        The file that it was read from.
+
+    Raises
+    ------
+    RecordingError
+        If shapes disagree or time does not grow.
+    """
+
+    name: str
+    trajectory: str
+    repetition: int
+    joints: tuple[str, ...]
+    time: Array
+    position: Array
+    effort: Array | None = None
+    velocity: Array | None = None
+    acceleration: Array | None = None
+    temperature: Array | None = None
+    findings: tuple[Finding, ...] = ()
+    path: Path | None = None
+
+    def __post_init__(self) -> None:
+        source = self.path or self.name
+        shape = (len(self.joints), len(self.time))
+        for name in ("position", "effort", *OPTIONAL):
+            signal = getattr(self, name)
+            if signal is not None and np.shape(signal) != shape:
+                raise RecordingError(f"{source}: {name} has shape {np.shape(signal)}, joints and time ask for {shape}")
+        if not np.all(np.diff(self.time) > 0):
+            raise RecordingError(f"{source}: time is not strictly increasing")
+
+    @property
+    def rate(self) -> float:
+        """Median sample rate, Hz."""
+        return 1.0 / float(np.median(np.diff(self.time)))
+
+
+def split_name(stem: str) -> tuple[str, int]:
+    """Split the stem of a file into its trajectory and the number of its repetition.
+
+    Examples
+    --------
+    >>> split_name("OJD_2")
+    ('OJD', 2)
+    >>> split_name("OJD")
+    ('OJD', 1)
+    """
+    match = re.fullmatch(r"(.+)_([0-9]+)", stem)
+    return (match[1], int(match[2])) if match else (stem, 1)
+
+
+def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) -> Recording:
+    """Read a recording and audit it.
+
+    Parameters
+    ----------
+    path : path
+        A Parquet or CSV file, by its suffix.
+    robot : Robot
+        Says which joints are wanted, in which order, and what a recorded effort is worth.
+    need_effort : bool
+        Whether a file without efforts is refused. Where they are not needed, efforts are read if they are complete.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    RecordingError
+        In one line: the file, the column and row, and what to do.
+    """
+    path = Path(path)
+    names = column_names(path)
+    position = [f"{joint}.position" for joint in robot.joints]
+    effort = [f"{joint}.effort" for joint in robot.joints]
+    _refuse_missing(path, names, ["time", *position, *(effort if need_effort else ())])
+
+    optional, findings = _optional_columns(robot, names, () if need_effort else ("effort",))
+    columns = read_columns(path, ["time", *position, *(effort if need_effort else ()), *sum(optional.values(), [])])
+
+    def rows(wanted: Sequence[str]) -> Array:
+        return np.array([columns.pop(name) for name in wanted])
+
+    time = columns.pop("time")
+    samples = Samples(
+        source=str(path),
+        robot=robot,
+        time=time,
+        position=rows(position),
+        effort=rows(effort) if need_effort else None,
+        row=np.arange(1, len(time) + 1),
+    )
+    total = samples.count
+    samples, audited = audit(samples)
+    signals = {"effort": samples.effort}
+    findings += audited
+    for signal, wanted in optional.items():
+        values = rows(wanted)
+        if samples.count < total:
+            values = values[:, samples.row - 1]
+        lacking = ~np.isfinite(values)
+        if not lacking.any():
+            signals[signal] = values
+            continue
+        joint = int(np.argmax(lacking.any(axis=1)))
+        said = (
+            f"{wanted[joint]} is empty, NaN or infinite in {int(lacking[joint].sum())} of {samples.count} rows, first in "
+            f"{samples.where(int(np.argmax(lacking[joint])))}: the {signal} columns are not used"
+        )
+        findings.append(Finding("nan", said, int(lacking.sum())))
+
+    if signals["effort"] is not None:
+        signals["effort"] = signals["effort"] * robot.effort_gain[:, None]
+    trajectory, repetition = split_name(path.stem)
+    return Recording(
+        name=path.stem,
+        trajectory=trajectory,
+        repetition=repetition,
+        joints=robot.joints,
+        time=samples.time,
+        position=samples.position,
+        findings=tuple(findings),
+        path=path,
+        **signals,
+    )
+
+
+def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: bool = True) -> tuple[Recording, ...]:
+    """Read files, folders of recordings and globs.
+
+    Parameters
+    ----------
+    words : sequence of path or str
+        Each a file, a folder (its Parquet and CSV files in natural order, not those of its folders) or a glob.
+    robot : Robot
+        See `read_recording`.
+    need_effort : bool
+        See `read_recording`.
+
+    Returns
+    -------
+    tuple of Recording
+        In order of appearance, each file once.
+
+    Raises
+    ------
+    UsageError
+        A word that is no file, folder or matching glob.
+    RecordingError
+        A folder or glob without recordings, two files of one stem, or a recording that cannot be used.
+    """
+    return tuple(read_recording(path, robot, need_effort=need_effort) for path in recording_paths(words))
+
+
+def recording_paths(words: Sequence[Path | str]) -> tuple[Path, ...]:
+    """List the files that words on a command line stand for; see `read_recordings`."""
+    found: dict[Path, Path] = {}
+    stems: dict[str, Path] = {}
+    for word in words:
+        for path in _paths(str(word)):
+            real = path.resolve()
+            if real in found:
+                continue
+            if path.stem in stems:
+                raise RecordingError(
+                    f"{stems[path.stem]} and {path}: two recordings named {path.stem!r}; rename one, "
+                    "results are listed by name"
+                )
+            found[real] = stems[path.stem] = path
+    return tuple(found.values())
+
+
+def write_recording(recording: Recording, path: Path | str, *, effort_gain: Array | None = None) -> None:
+    """Write a recording to a file, whole or not at all.
+
+    Parameters
+    ----------
+    recording : Recording
+    path : path
+        Parquet or CSV, by its suffix. An existing file is replaced.
+    effort_gain : ndarray, shape (n,), optional
+        The robot's gains; efforts are divided by them, so that reading with that robot gives them back.
+
+    Raises
+    ------
+    RecordingError
+        Another suffix, or a place that cannot be written to.
+    """
+    columns = {"time": recording.time}
+    for signal in ("position", "velocity", "acceleration", "effort", "temperature"):
+        values = getattr(recording, signal)
+        if values is None:
+            continue
+        if signal == "effort" and effort_gain is not None:
+            values = values / np.asarray(effort_gain, dtype=float)[:, None]
+        columns |= {f"{joint}.{signal}": row for joint, row in zip(recording.joints, values, strict=True)}
+    write_columns(Path(path), columns)
+
+
+def _refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str]) -> None:
+    missing = [name for name in wanted if name not in names]
+    if not missing:
+        return
+    if all(_is_number(name) for name in names):
+        raise RecordingError(
+            f"{path}: the first line holds numbers; put the column names there (time, {wanted[1]}, ...)"
+        )
+    name = missing[0]
+    more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
+    ending = name.rpartition(".")[2]
+    have = [other for other in names if other.endswith(f".{ending}")] if "." in name else list(names)
+    lower = {other.lower(): other for other in names}
+    near = get_close_matches(name.lower(), lower, n=1, cutoff=0.75)
+    guess = f"is it {lower[near[0]]!r}? " if near else ""
+    kind = f"{ending} columns" if "." in name else "columns"
+    shown = ", ".join(have[:8]) + (", ..." if len(have) > 8 else "") if have else "none"
+    raise RecordingError(
+        f"{path}: no column {name!r}{more}; {guess}its {kind}: {shown}; "
+        "rename the column, or correct the joints in the robot description"
+    )
+
+
+def _optional_columns(
+    robot: Robot, names: Sequence[str], more: Sequence[str]
+) -> tuple[dict[str, list[str]], list[Finding]]:
+    columns: dict[str, list[str]] = {}
+    findings = []
+    for signal in (*more, *OPTIONAL):
+        wanted = [f"{joint}.{signal}" for joint in robot.joints]
+        absent = [name for name in wanted if name not in names]
+        if not absent:
+            columns[signal] = wanted
+        elif len(absent) < len(wanted):
+            said = f"no {', '.join(absent)} beside the other joints' {signal}: the {signal} columns are not used"
+            findings.append(Finding("missing_column", said, len(absent)))
+    return columns, findings
+
+
+def _paths(word: str) -> list[Path]:
+    path = Path(word)
+    if path.is_dir():
+        found = _in_folder(path)
+        if not found:
+            raise RecordingError(f"{path}: no .parquet or .csv file in this folder; name one that holds recordings")
+        return found
+    if path.exists():
+        return [path]
+    if not glob.has_magic(word):
+        raise UsageError(f"{word}: no such file or folder")
+    matches = [Path(match) for match in sorted(glob.glob(word, recursive=True), key=_natural)]
+    if not matches:
+        raise UsageError(f"{word}: no file matches")
+    found = []
+    for match in matches:
+        found += _in_folder(match) if match.is_dir() else [match] if match.suffix.lower() in SUFFIXES else []
+    if not found:
+        raise RecordingError(f"{word}: matches {len(matches)} files but no .parquet or .csv file")
+    return found
+
+
+def _in_folder(folder: Path) -> list[Path]:
+    files = [f for f in folder.iterdir() if f.suffix.lower() in SUFFIXES and f.is_file() and f.name[0] != "."]
+    return sorted(files, key=lambda file: _natural(file.name))
+
+
+def _natural(text: str) -> list[tuple[int, str]]:
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"([0-9]+)", text)]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

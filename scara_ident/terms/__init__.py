@@ -1,0 +1,7 @@
+"""Terms of the torque equation, one file per physical family."""
+
+from scara_ident.terms.friction import Friction, Offset
+from scara_ident.terms.rigid_body import RigidBody
+from scara_ident.terms.term import Column, Term
+
+__all__ = ["Column", "Friction", "Offset", "RigidBody", "Term"]
