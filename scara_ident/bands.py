@@ -15,18 +15,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.evidence import gather
+from scara_ident.evidence import gather_all
 from scara_ident.information import merge
 from scara_ident.model import TorqueModel
-from scara_ident.motion import Stretch, motion_of, stretches
+from scara_ident.motion import Stretch, motion_of, stretches, torque_of
 from scara_ident.recording import Recording
 
 Array = NDArray[np.float64]
 
 # The first fit uses the band that holds this share of the torque's power.
-FIRST_POWER = 0.9
+FIRST_POWER = 0.95
 # It is not narrower than this many periods in the longest recording.
 FIRST_PERIODS = 10.0
+# The fit and the choice of its band are repeated until they agree, at the most so often.
+MOST_ROUNDS = 3
 # Share of the torque's power that the motion must explain at the band's edge.
 EXPLAINED = 0.5
 # Highest band as a share of the sample rate, and of the position filter that shows where the noise begins.
@@ -75,25 +77,37 @@ def choose_bands(model: TorqueModel, recordings: Sequence[Recording]) -> BandCho
     chosen = _sample(recordings)
     parts = [part for recording in chosen for part in stretches(recording)]
     edges = _edges(parts)
-    first = _first_bands(parts, edges, model.robot.n)
-    evidence = [gather(model, recording, first) for recording in chosen]
-    value = merge(item.joint(j) for item in evidence for j in range(model.robot.n)).solve().value
+    highest = HIGHEST_BAND * min(part.rate for part in parts)
+    start = _first_bands(parts, edges, model.robot.n)
+    choice = BandChoice((max(start),) * model.robot.n, (0.0,) * model.robot.n, ())
+    for _ in range(MOST_ROUNDS):
+        before = choice.bands
+        evidence = gather_all(model, chosen, before)
+        value = merge(item.joint(j) for item in evidence for j in range(model.robot.n)).solve().value
+        choice = _explained_bands(model, parts, edges, value, start, highest)
+        if choice.bands == before:
+            break
+    return choice
 
+
+def _explained_bands(
+    model: TorqueModel, parts: Sequence[Stretch], edges: Array, value: Array, start: Sequence[float], highest: float
+) -> BandChoice:
+    """Return the bands up to which parameters explain the torque."""
     torque = np.zeros((model.robot.n, len(edges) - 1))
     error = np.zeros_like(torque)
     for part in parts:
         motion = motion_of(part, [WIDE_FILTER * part.rate] * model.robot.n)
         predicted = np.einsum("jpn,p->jn", model.regressor(motion), value)
-        assert part.torque is not None
-        torque += binned_power(part.torque, part.rate, edges)
-        error += binned_power(part.torque - predicted, part.rate, edges)
-    highest = HIGHEST_BAND * min(part.rate for part in parts)
+        recorded = torque_of(part)
+        torque += binned_power(recorded, part.rate, edges)
+        error += binned_power(recorded - predicted, part.rate, edges)
     bands, explained, notes = [], [], []
     for j, joint in enumerate(model.robot.joints):
         gain = np.cumsum(torque[j] * (1.0 - EXPLAINED) - error[j])
         best = int(np.argmax(gain))
         if gain[best] <= 0.0:
-            bands.append(min(first[j], highest))
+            bands.append(min(start[j], highest))
             explained.append(0.0)
             notes.append(
                 f"{joint}: its motion explains under half of its torque at every frequency; "
@@ -133,8 +147,7 @@ def _edges(parts: Sequence[Stretch]) -> Array:
 def _first_bands(parts: Sequence[Stretch], edges: Array, n: int) -> list[float]:
     power = np.zeros((n, len(edges) - 1))
     for part in parts:
-        assert part.torque is not None
-        power += binned_power(part.torque, part.rate, edges)
+        power += binned_power(torque_of(part), part.rate, edges)
     longest = max(len(part.time) / part.rate for part in parts)
     slowest, fastest = FIRST_PERIODS / longest, HIGHEST_BAND * min(part.rate for part in parts)
     share = np.cumsum(power, axis=1) / np.maximum(np.sum(power, axis=1, keepdims=True), np.finfo(float).tiny)

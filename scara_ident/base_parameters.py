@@ -133,7 +133,7 @@ def standard_regressor(
     return np.concatenate([bodies[:, columns], armature], axis=1)
 
 
-def base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int = 0) -> BaseParameters:
+def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int = 0) -> BaseParameters:
     """Find the base parameters of a robot.
 
     Parameters

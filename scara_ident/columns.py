@@ -186,7 +186,8 @@ def _numbers(path: Path, series: pl.Series) -> NDArray[np.float64]:
     elif not series.dtype.is_numeric():
         hint = "time in seconds" if series.name == "time" else "numbers"
         raise RecordingError(f"{path}: column {series.name!r} holds {series.dtype}; it must hold {hint}")
-    return series.cast(pl.Float64).to_numpy()
+    values: NDArray[np.float64] = series.cast(pl.Float64).to_numpy()
+    return values
 
 
 def _csv_header(path: Path) -> list[str]:

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.information import Information
+from scara_ident.information import Information, merge
 
 Array = NDArray[np.float64]
+Block = Sequence[Information]
 
 # With fewer blocks than this many per parameter the matrix of scores is too noisy to stand for itself.
 BLOCKS_PER_PARAMETER = 2.5
@@ -44,7 +45,7 @@ class Covariance:
     blocks: int
 
 
-def block_covariance(inverse: Array, value: Array, sequences: Sequence[Sequence[Information]]) -> Covariance:
+def block_covariance(inverse: Array, value: Array, sequences: Sequence[Sequence[Block]]) -> Covariance:
     """Covariance of a least-squares estimate from blocks of rows.
 
     Parameters
@@ -53,8 +54,9 @@ def block_covariance(inverse: Array, value: Array, sequences: Sequence[Sequence[
         Inverse of ``W.T @ W`` of all rows (and of a prior, if there is one).
     value : ndarray, shape (p,)
         The estimate.
-    sequences : sequence of sequence of Information
-        For every recording its blocks in order of time; rows weighted as in the estimate.
+    sequences : sequence of sequence of tuple of Information
+        For every recording its blocks in order of time, each with the rows of every joint, weighted as in the
+        estimate.
 
     Returns
     -------
@@ -62,41 +64,49 @@ def block_covariance(inverse: Array, value: Array, sequences: Sequence[Sequence[
     """
     root = _square_root(inverse)
     count = sum(len(blocks) for blocks in sequences)
-    kind = "block" if count >= BLOCKS_PER_PARAMETER * root.shape[1] else "pooled block"
-    if kind == "pooled block":
-        return Covariance(_pooled(root, value, sequences), kind, count)
+    if count < BLOCKS_PER_PARAMETER * root.shape[1]:
+        meat = _pooled(root, value, sequences)
+        return Covariance(root @ meat @ root.T, "pooled block", count)
     meat = np.zeros((root.shape[1], root.shape[1]))
     for blocks in sequences:
         before = None
         for block in blocks:
-            score = _score(block, root, value, reduced=True)
+            score = _reduced_score(merge(block), root, value)
             meat += np.outer(score, score)
             if before is not None:
                 meat += 0.5 * (np.outer(score, before) + np.outer(before, score))
             before = score
-    return Covariance(root @ meat @ root.T, kind, count)
+    return Covariance(root @ meat @ root.T, "block", count)
 
 
-def _pooled(root: Array, value: Array, sequences: Sequence[Sequence[Information]]) -> Array:
-    # White residuals of variance s^2 leave scores of total power s^2 sum tr(H (1 - H)) with the leverages H.
-    power, expected = 0.0, 0.0
-    for blocks in sequences:
-        for block in blocks:
-            score = _score(block, root, value, reduced=False)
-            half = block.regressor_factor @ root
-            leverage = np.linalg.svd(half, compute_uv=False) ** 2
-            power += float(score @ score)
-            expected += float(np.sum(leverage * np.clip(1.0 - leverage, 0.0, None)))
-    size = power / expected if expected > 1e-9 else np.inf
-    return size * root @ root.T if np.isfinite(size) else np.full((len(value), len(value)), np.inf)
+def _pooled(root: Array, value: Array, sequences: Sequence[Sequence[Block]]) -> Array:
+    """Scores as white residuals of one size per joint would have them, the size from all scores together.
+
+    White residuals of variance s^2 leave scores of total power s^2 sum tr(H (1 - H)) with the leverages H.
+    """
+    joints = len(sequences[0][0])
+    meat = np.zeros((root.shape[1], root.shape[1]))
+    for j in range(joints):
+        power, expected = 0.0, 0.0
+        product = np.zeros_like(meat)
+        for blocks in sequences:
+            for block in blocks:
+                half = block[j].regressor_factor @ root
+                score = half.T @ (block[j].projected_torque - block[j].regressor_factor @ value)
+                leverage = np.linalg.svd(half, compute_uv=False) ** 2
+                power += float(score @ score)
+                expected += float(np.sum(leverage * np.clip(1.0 - leverage, 0.0, None)))
+                product += half.T @ half
+        if np.any(product):
+            # Rows that fix the parameters without any redundancy say nothing of the noise.
+            meat += (power / expected if expected > 1e-9 else np.inf) * product
+    return meat
 
 
-def _score(block: Information, root: Array, value: Array, *, reduced: bool) -> Array:
+def _reduced_score(block: Information, root: Array, value: Array) -> Array:
     """Score of a block in the directions of ``root``, with residuals freed of the bias of fitting."""
     residual = block.projected_torque - block.regressor_factor @ value
     half = block.regressor_factor @ root
-    if not reduced:
-        return np.asarray(half.T @ residual)
     left, singular, right = np.linalg.svd(half, full_matrices=False)
     leverage = singular**2
     free = leverage < FULL_LEVERAGE

@@ -18,22 +18,23 @@ from numpy.typing import NDArray
 from scara_ident.errors import RecordingError
 from scara_ident.information import Information, merge
 from scara_ident.model import TorqueModel
-from scara_ident.motion import Motion, Stretch, differentiate, low_pass, motion_of, stretches
+from scara_ident.motion import Motion, Stretch, differentiate, low_pass, motion_of, stretches, torque_of
 from scara_ident.recording import Recording
+from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
-# Positions pass a filter twice as wide as the band, so that the columns are faithful inside it.
-POSITION_BAND = 2.0
+# Positions pass a filter three times as wide as the band: inside the band it then changes them by under 2e-4.
+POSITION_BAND = 3.0
 # Rows per period of the band that are kept: the filter lets little through above 1.25 of its cut-off.
 ROWS_PER_PERIOD = 2.5
 # Periods of the band left out at both ends of a stretch, where the filter's continuation is a guess.
 END_PERIODS = 1.0
 # A joint stands still where its speed stays below this share of its peak, or below this many standard deviations of its
-# velocity's noise, for longer than half a period of the band: friction is then anything up to Coulomb's.
-REST_SHARE = 1e-3
+# velocity's noise, for longer than this many periods of the band: friction is then anything up to Coulomb's.
+REST_SHARE = 3e-3
 REST_NOISE = 5.0
-REST_PERIODS = 0.5
+REST_PERIODS = 0.05
 # Blocks are long against the band's memory, so that scores of different blocks are nearly independent.
 BLOCK_PERIODS = 4.0
 BLOCK_SECONDS = 0.5
@@ -138,7 +139,7 @@ def gather_all(
     model: TorqueModel, recordings: Sequence[Recording], bands: Sequence[float | None]
 ) -> tuple[Evidence, ...]:
     """Make the rows of several recordings, two at a time; see `gather`."""
-    with ThreadPoolExecutor(max_workers=2) as pool:
+    with one_blas_thread(), ThreadPoolExecutor(max_workers=2) as pool:
         return tuple(pool.map(lambda recording: gather(model, recording, bands), recordings))
 
 
@@ -165,13 +166,12 @@ def rows_of(model: TorqueModel, stretch: Stretch, bands: Sequence[float | None])
     -------
     Rows
     """
-    if stretch.torque is None:
-        raise RecordingError(f"{stretch.name}: no effort was recorded; it is needed to identify")
+    torque = torque_of(stretch)
     motion = motion_of(stretch, position_cuts(stretch.rate, bands))
     regressor = model.regressor(motion)
     raw, banded = [], []
     for j, band in enumerate(bands):
-        rows = np.concatenate([regressor[j], stretch.torque[j : j + 1]])
+        rows = np.concatenate([regressor[j], torque[j : j + 1]])
         active = [*np.flatnonzero(model.pattern[j]), rows.shape[0] - 1]
         smooth = np.zeros_like(rows)
         smooth[active] = low_pass(rows[active], stretch.rate, band)

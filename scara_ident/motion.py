@@ -137,6 +137,19 @@ def _uniform(recording: Recording, start: int, stop: int, median: float) -> Stre
     return Stretch(recording.name, recording.trajectory, ideal, position, torque, float(rate))
 
 
+def torque_of(stretch: Stretch) -> Array:
+    """Return the recorded torque of a stretch, shape (n, N).
+
+    Raises
+    ------
+    RecordingError
+        If no effort was recorded.
+    """
+    if stretch.torque is None:
+        raise RecordingError(f"{stretch.name}: no effort was recorded; it is needed to identify")
+    return stretch.torque
+
+
 def low_pass(signal: Array, rate: float, cut: float | None) -> Array:
     """Low-pass a signal without phase.
 

@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -99,7 +100,7 @@ def split_name(stem: str) -> tuple[str, int]:
     >>> split_name("OJD")
     ('OJD', 1)
     """
-    match = re.fullmatch(r"(.+)_([0-9]+)", stem)
+    match = re.fullmatch(r"(.+)_([0-9]+)", stem, re.DOTALL)
     return (match[1], int(match[2])) if match else (stem, 1)
 
 
@@ -128,15 +129,16 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
     names = column_names(path)
     position = [f"{joint}.position" for joint in robot.joints]
     effort = [f"{joint}.effort" for joint in robot.joints]
-    _refuse_missing(path, names, ["time", *position, *(effort if need_effort else ())])
 
+    needed = ["time", *position, *(effort if need_effort else ())]
+    _refuse_missing(path, names, needed)
     optional, findings = _optional_columns(robot, names, () if need_effort else ("effort",))
-    columns = read_columns(path, ["time", *position, *(effort if need_effort else ()), *sum(optional.values(), [])])
+    columns = read_columns(path, [*needed, *chain.from_iterable(optional.values())])
 
     def rows(wanted: Sequence[str]) -> Array:
         return np.array([columns.pop(name) for name in wanted])
 
-    time = columns.pop("time")
+    time = np.array(columns.pop("time"))
     samples = Samples(
         source=str(path),
         robot=robot,
@@ -145,27 +147,18 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
         effort=rows(effort) if need_effort else None,
         row=np.arange(1, len(time) + 1),
     )
-    total = samples.count
     samples, audited = audit(samples)
-    signals = {"effort": samples.effort}
     findings += audited
+    signals = {"effort": samples.effort}
     for signal, wanted in optional.items():
-        values = rows(wanted)
-        if samples.count < total:
-            values = values[:, samples.row - 1]
-        lacking = ~np.isfinite(values)
-        if not lacking.any():
+        values = rows(wanted)[:, samples.row - 1] if samples.count < len(time) else rows(wanted)
+        if np.isfinite(values).all():
             signals[signal] = values
-            continue
-        joint = int(np.argmax(lacking.any(axis=1)))
-        said = (
-            f"{wanted[joint]} is empty, NaN or infinite in {int(lacking[joint].sum())} of {samples.count} rows, first in "
-            f"{samples.where(int(np.argmax(lacking[joint])))}: the {signal} columns are not used"
-        )
-        findings.append(Finding("nan", said, int(lacking.sum())))
-
+        else:
+            findings.append(_lacking(samples, signal, wanted, values))
     if signals["effort"] is not None:
         signals["effort"] = signals["effort"] * robot.effort_gain[:, None]
+
     trajectory, repetition = split_name(path.stem)
     return Recording(
         name=path.stem,
@@ -256,7 +249,7 @@ def _refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str]) -> 
     missing = [name for name in wanted if name not in names]
     if not missing:
         return
-    if all(_is_number(name) for name in names):
+    if names and all(_is_number(name) for name in names):
         raise RecordingError(
             f"{path}: the first line holds numbers; put the column names there (time, {wanted[1]}, ...)"
         )
@@ -289,6 +282,16 @@ def _optional_columns(
             said = f"no {', '.join(absent)} beside the other joints' {signal}: the {signal} columns are not used"
             findings.append(Finding("missing_column", said, len(absent)))
     return columns, findings
+
+
+def _lacking(samples: Samples, signal: str, names: Sequence[str], values: Array) -> Finding:
+    lacking = ~np.isfinite(values)
+    joint = int(np.argmax(lacking.any(axis=1)))
+    said = (
+        f"{names[joint]} is empty, NaN or infinite in {int(lacking[joint].sum())} of {samples.count} rows, "
+        f"first in {samples.where(int(np.argmax(lacking[joint])))}: the {signal} columns are not used"
+    )
+    return Finding("nan", said, int(lacking.sum()))
 
 
 def _paths(word: str) -> list[Path]:

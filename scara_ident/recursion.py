@@ -14,9 +14,9 @@ B = S(dw) + S(w) S(w), by the principle of virtual power the torque of that join
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 from scara_ident.errors import RobotError
 from scara_ident.tracing import Expr, Scalar, Trace, cos, sin
 
+Array = NDArray[np.float64]
 Vector = tuple[Scalar, Scalar, Scalar]
-Matrix = tuple[Vector, Vector, Vector]
+Jacobian = dict[int, tuple[Vector, Vector]]
 
 _ZERO: Vector = (0.0, 0.0, 0.0)
 _ROUNDING = 4 * np.finfo(np.float64).eps
@@ -59,9 +60,9 @@ class JointGeometry:
     parent: int
     velocity_index: int
     prismatic: bool
-    axis: NDArray[np.float64]
-    rotation: NDArray[np.float64]
-    offset: NDArray[np.float64]
+    axis: Array
+    rotation: Array
+    offset: Array
 
 
 def joint_geometry(model: pin.Model) -> list[JointGeometry]:
@@ -128,38 +129,38 @@ def trace_regressor(
     wanted: dict[int, list[int]] = {}
     for column in columns:
         wanted.setdefault(column // 10, []).append(column % 10)
-    still = _Body(_ZERO, _negated(_floats(gravity.angular)), _negated(_floats(gravity.linear)), {})
-    bodies = [still]
+    at_rest = _Body(_ZERO, _floats(-gravity.angular), _floats(-gravity.linear), {})
+    bodies = [at_rest]
     entries: dict[tuple[int, int], Scalar] = {}
     for index, joint in enumerate(joints):
-        state = tuple(trace.variable(joint.velocity_index + k * nv) for k in range(3))
-        body, mass_terms = _moved(bodies[joint.parent], joint, *state)
+        q, v, a = (trace.variable(joint.velocity_index + k * nv) for k in range(3))
+        body, masses = _moved(bodies[joint.parent], joint, q, v, a)
         bodies.append(body)
         parameters = wanted.get(index, [])
         if not parameters:
             continue
         for row, (z, u) in body.jacobian.items():
             for parameter in parameters:
-                entry = mass_terms[row] if parameter == 0 else _entry(parameter, body, z, u)
+                entry = masses[row] if parameter == 0 else _entry(parameter, body, z, u)
                 if isinstance(entry, Expr) or entry != 0.0:
                     entries[row, 10 * index + parameter] = entry
     return trace, entries
 
 
 class _Body:
-    """Motion of one body in the frame of its joint."""
+    """Motion of one body in the frame of its joint, and by row the axis z and the origin's velocity u."""
 
-    def __init__(self, w: Vector, dw: Vector, a: Vector, jacobian: dict[int, tuple[Vector, Vector]]) -> None:
+    def __init__(self, w: Vector, dw: Vector, a: Vector, jacobian: Jacobian) -> None:
         self.w, self.dw, self.a, self.jacobian = w, dw, a, jacobian
         (wx, wy, wz), (ax, ay, az) = w, dw
         xx, yy, zz = wx * wx, wy * wy, wz * wz
         xy, xz, yz = wx * wy, wx * wz, wy * wz
-        self.b: Matrix = (
+        self.b: tuple[Vector, Vector, Vector] = (
             (-(yy + zz), xy - az, xz + ay),
             (xy + az, -(xx + zz), yz - ax),
             (xz - ay, yz + ax, -(xx + yy)),
         )
-        # Moments per unit Ixx, Ixy, Iyy, Ixz, Iyz, Izz: what E_k dw + w x E_k w comes to.
+        # E_k dw + w x E_k w for Ixx, Ixy, Iyy, Ixz, Iyz, Izz.
         self.moments: tuple[Vector, ...] = (
             (ax, xz, -xy),
             (ay - xz, ax + yz, xx - yy),
@@ -171,39 +172,30 @@ class _Body:
 
 
 def _moved(parent: _Body, joint: JointGeometry, q: Expr, v: Expr, a: Expr) -> tuple[_Body, dict[int, Scalar]]:
-    """Return the body behind a joint, and its mass entries by row.
-
-    The mass entry u . a is formed in the parent's orientation, where a revolute joint's angle does not enter.
-    """
+    """Return the body behind a joint, and its mass entries by row."""
     axis, offset = _floats(joint.axis), _floats(joint.offset)
-    rows = parent.jacobian
-    origin = tuple(_sum(parent.a[k], _dot(parent.b[k], offset)) for k in range(3))
-    shifted = {row: _plus(u, _cross(z, offset)) for row, (z, u) in rows.items()}
+    row = joint.velocity_index
+    turn = _turn(joint, None if joint.prismatic else q)
+    origin = _plus(parent.a, _vector(_dot(b, offset) for b in parent.b))
+    moving = {j: (z, _plus(u, _cross(z, offset))) for j, (z, u) in parent.jacobian.items()}
+    jacobian = {j: (turn(z), turn(u)) for j, (z, u) in moving.items()}
+    w, dw = turn(parent.w), turn(parent.dw)
     masses: dict[int, Scalar]
-    if not joint.prismatic:
-        turn = _Turn(joint, q)
-        w0, dw0 = turn.into(parent.w), turn.into(parent.dw)
-        w = _plus(w0, _scaled(axis, v))
-        dw = _plus(_plus(dw0, _scaled(axis, a)), _scaled(_cross(w0, axis), v))
-        jacobian = {row: (turn.into(z), turn.into(shifted[row])) for row, (z, _) in rows.items()}
-        jacobian[joint.velocity_index] = (axis, _ZERO)
-        masses = {row: _dot(u, origin) for row, u in shifted.items()}
-        masses[joint.velocity_index] = 0.0
-        return _Body(w, dw, turn.into(origin), jacobian), masses
-    turn = _Turn(joint, None)
-    w, dw = turn.into(parent.w), turn.into(parent.dw)
-    b = _Body(w, dw, _ZERO, {}).b
-    travel = _scaled(axis, q)
-    coriolis = _scaled(_cross(w, axis), 2.0 * v)
-    acceleration = _plus(turn.into(origin), tuple(_dot(b[k], travel) for k in range(3)))
-    acceleration = _plus(_plus(acceleration, _scaled(axis, a)), coriolis)
-    jacobian = {}
-    for row, (z, _) in rows.items():
-        z_here = turn.into(z)
-        jacobian[row] = (z_here, _plus(turn.into(shifted[row]), _cross(z_here, travel)))
-    jacobian[joint.velocity_index] = (_ZERO, axis)
-    masses = {row: _dot(u, acceleration) for row, (_, u) in jacobian.items()}
-    return _Body(w, dw, acceleration, jacobian), masses
+    if joint.prismatic:
+        along = _scaled(axis, q)
+        centripetal = (_dot(b, along) for b in _Body(w, dw, _ZERO, {}).b)
+        coriolis = _scaled(_cross(w, axis), 2.0 * v)
+        origin = _plus(_plus(_plus(turn(origin), _vector(centripetal)), coriolis), _scaled(axis, a))
+        jacobian = {j: (z, _plus(u, _cross(z, along))) for j, (z, u) in jacobian.items()}
+        jacobian[row] = (_ZERO, axis)
+        masses = {j: _dot(u, origin) for j, (_, u) in jacobian.items()}
+        return _Body(w, dw, origin, jacobian), masses
+    # In the parent's orientation, where the joint's angle does not enter.
+    masses = {j: _dot(u, origin) for j, (_, u) in moving.items()}
+    masses[row] = 0.0
+    dw = _plus(_plus(dw, _scaled(axis, a)), _scaled(_cross(w, axis), v))
+    jacobian[row] = (axis, _ZERO)
+    return _Body(_plus(w, _scaled(axis, v)), dw, turn(origin), jacobian), masses
 
 
 def _entry(parameter: int, body: _Body, z: Vector, u: Vector) -> Scalar:
@@ -215,59 +207,121 @@ def _entry(parameter: int, body: _Body, z: Vector, u: Vector) -> Scalar:
     return _cross(body.a, z)[k] + _dot(column, u)
 
 
-class _Turn:
-    """Rotation of vectors from the parent's orientation into that of a joint.
+def _turn(joint: JointGeometry, q: Expr | None) -> Callable[[Vector], Vector]:
+    """Return the map of vectors from the parent's orientation into that of a joint.
 
-    The turn about the joint's axis is done about a coordinate axis, between two constant rotations `before` and
-    `after`; or, where it takes fewer operations a vector, as one matrix. The part of the placement that turns about
-    the axis is an addition to the angle; this is exact, and keeps a placement written with a rounded pi/2 as sparse
-    as one with the true value.
+    A constant rotation, a turn about one coordinate axis and, for an axis that is not a coordinate axis, another
+    constant rotation; or all as one matrix, where that takes fewer operations a vector. The part of the placement
+    that turns about the joint's axis is added to the angle: this is exact, and a placement written with a rounded
+    pi/2 stays as sparse as one with the true value.
+
+    Parameters
+    ----------
+    joint : JointGeometry
+    q : Expr or None
+        Angle; None for a joint that does not turn.
     """
+    if q is None:
+        constant = joint.rotation.T
+        return lambda vector: _apply(constant, vector)
+    main = int(np.argmax(np.abs(joint.axis)))
+    direction = 1.0 if joint.axis[main] > 0 else -1.0
+    align = _turn_onto(main, direction * joint.axis)
+    placement = _snap(joint.rotation @ align)
+    twist = math.atan2(*_twist(placement, main))
+    untwisted = _snap(placement @ _rotation(main, twist).T)
+    if _cost(untwisted) < _cost(placement):
+        placement = untwisted
+    else:
+        twist = 0.0
+    angle = direction * q + twist
+    c, s = cos(angle), sin(angle)
+    i, j = (main + 1) % 3, (main + 2) % 3
 
-    def __init__(self, joint: JointGeometry, q: Expr | None) -> None:
-        if q is None:
-            self.before, self.after, self.matrix, self.cosine = joint.rotation.T, np.eye(3), None, None
-            return
-        main = int(np.argmax(np.abs(joint.axis)))
-        direction = 1.0 if joint.axis[main] > 0 else -1.0
-        self.main = main
-        align = _shortest_turn(main, direction * joint.axis)
-        before = _snap(joint.rotation @ align)
-        twist = _twist(before, main)
-        if not _is_permutation(before) and twist != 0.0:
-            untwisted = _snap(before @ _rotation(main, twist).T)
-            if _cost(untwisted.T) < _cost(before.T):
-                before = untwisted
-            else:
-                twist = 0.0
-        else:
-            twist = 0.0
-        angle = direction * q + twist
-        self.cosine, self.sine = cos(angle), sin(angle)
-        self.before, self.after = before.T, align
-        # Constant, cosine and sine parts of the whole matrix.
-        middle = [np.zeros((3, 3)) for _ in range(3)]
-        i, j = (main + 1) % 3, (main + 2) % 3
-        middle[0][main, main] = 1.0
-        middle[1][i, i] = middle[1][j, j] = 1.0
-        middle[2][i, j], middle[2][j, i] = 1.0, -1.0
-        parts = [_snap(self.after @ part @ self.before) for part in middle]
-        dense = sum(np.abs(part) for part in parts)
-        self.matrix: list[Vector] | None = None
-        if _cost(np.where(dense != 0.0, 0.5, 0.0)) < _cost(self.before) + _cost(self.after) + 6:
-            terms = [[p[0] + p[1] * self.cosine + p[2] * self.sine for p in zip(*rows, strict=True)]
-                     for rows in zip(*(part.tolist() for part in parts), strict=True)]
-            self.matrix = [(x, y, z) for x, y, z in terms]
+    def in_steps(vector: Vector) -> Vector:
+        result = list(_apply(placement.T, vector))
+        x, y = result[i], result[j]
+        result[i], result[j] = c * x + s * y, c * y - s * x
+        return _apply(align, (result[0], result[1], result[2]))
 
-    def into(self, vector: Vector) -> Vector:
-        """Return `vector`, given in the parent's orientation, in the joint's."""
-        if self.matrix is not None:
-            x, y, z = self.matrix
-            return _dot(x, vector), _dot(y, vector), _dot(z, vector)
-        result = list(_apply(self.before, vector))
-        if self.cosine is not None:
-            i, j = (self.main + 1) % 3, (self.main + 2) % 3
-            x, y = result[i], result[j]
-            result[i] = self.cosine * x + self.sine * y
-            result[j] = self.cosine * y - self.sine * x
-        return _apply(self.after, (result[0], result[1], result[2]))
+    # The whole matrix is fixed + c even + s odd.
+    fixed, even, odd = (_snap(align @ part @ placement.T) for part in _turn_parts(main))
+    if _cost(placement) + _cost(align) + 6 <= _cost(np.abs(fixed) + np.abs(even) + np.abs(odd), entries=True):
+        return in_steps
+    matrix = [
+        _vector(float(fixed[k, m]) + float(even[k, m]) * c + float(odd[k, m]) * s for m in range(3)) for k in range(3)
+    ]
+    return lambda vector: _vector(_dot(row, vector) for row in matrix)
+
+
+def _turn_parts(main: int) -> tuple[Array, Array, Array]:
+    """Return the parts of a turn's transposed matrix: constant, with the cosine, with the sine."""
+    i, j = (main + 1) % 3, (main + 2) % 3
+    fixed, even, odd = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    fixed[main, main] = even[i, i] = even[j, j] = odd[i, j] = 1.0
+    odd[j, i] = -1.0
+    return fixed, even, odd
+
+
+def _rotation(main: int, angle: float) -> Array:
+    """Rotation about coordinate axis `main`."""
+    fixed, even, odd = _turn_parts(main)
+    return fixed + math.cos(angle) * even - math.sin(angle) * odd
+
+
+def _twist(rotation: Array, main: int) -> tuple[float, float]:
+    """Return sine and cosine, up to a common factor, of the part of a rotation about a coordinate axis."""
+    i, j = (main + 1) % 3, (main + 2) % 3
+    return float(rotation[j, i] - rotation[i, j]), float(rotation[i, i] + rotation[j, j])
+
+
+def _turn_onto(main: int, axis: Array) -> Array:
+    """Return a rotation that takes coordinate axis `main` to the unit vector `axis` (less than half a turn away)."""
+    start = np.eye(3)[main]
+    x, y, z = np.cross(start, axis)
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return _snap(np.eye(3) + skew + skew @ skew / (1.0 + float(start @ axis)))
+
+
+def _cost(matrix: Array, entries: bool = False) -> int:
+    """Count the operations of a product with a vector; `entries`: none of the non-zero ones is a constant."""
+    products = matrix != 0.0
+    sums = int(np.maximum(products.sum(axis=1) - 1, 0).sum())
+    return sums + int((products if entries else products & (np.abs(matrix) != 1.0)).sum())
+
+
+def _snap(values: Array) -> Array:
+    """Return numbers within rounding of 0, 1 and -1 as those, so that the tracer folds them."""
+    result = np.array(values, dtype=np.float64)
+    for number in (0.0, 1.0, -1.0):
+        result[np.abs(result - number) <= _ROUNDING] = number
+    return result
+
+
+def _vector(values: Iterable[Scalar]) -> Vector:
+    x, y, z = values
+    return x, y, z
+
+
+def _floats(values: Array) -> Vector:
+    return _vector(float(value) for value in values)
+
+
+def _dot(x: Vector, y: Vector) -> Scalar:
+    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+
+
+def _plus(x: Vector, y: Vector) -> Vector:
+    return x[0] + y[0], x[1] + y[1], x[2] + y[2]
+
+
+def _scaled(x: Vector, factor: Scalar) -> Vector:
+    return x[0] * factor, x[1] * factor, x[2] * factor
+
+
+def _cross(x: Vector, y: Vector) -> Vector:
+    return x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]
+
+
+def _apply(matrix: Array, vector: Vector) -> Vector:
+    return _vector(_dot(_floats(row), vector) for row in matrix)

@@ -1,7 +1,7 @@
 """What may be wrong with a recording, found before anything is fitted to it.
 
-Every check either leaves the samples as they are, or leaves out or mends a few and says so, or refuses the file. A check
-relies on those before it: units are judged on finite numbers in order of time, spikes on known units, and so on.
+Every check either passes the samples on, or leaves out or mends a few and says so, or refuses the file. A check relies
+on those before it: units are judged on finite numbers in order of time, spikes on known units, and so on.
 """
 
 from __future__ import annotations

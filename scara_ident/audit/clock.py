@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.audit.samples import Array, Finding, Samples, runs
+from scara_ident.audit.samples import GAP_STEPS, Array, Finding, Samples, runs, several
 
 Checked = tuple[Samples, list[Finding]]
 
 # Fifteen parameters a joint are asked of one equation a joint and sample: fewer than three equations a parameter, after
 # a filter has used up both ends, say nothing.
 MIN_SAMPLES = 50
+# No quantity that a robot records is as large, in any unit: such a number is damage, and overflows when squared.
+HUGE = 1e30
 # Rows without a number are left out up to this share of the file (or this many in a short one) ...
 MISSING_SHARE = 0.01
 MISSING_ROWS = 5
@@ -24,13 +26,11 @@ CLOCKS = (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))
 USUAL_INTERVAL = 2e-3
 # Beyond this share the clock is too coarse, and what is kept would depend on which row came first.
 REPEATED_SHARE = 0.05
-# A longer step is a gap, over which nothing is interpolated (motion.py cuts the recording there).
-GAP_STEPS = 5.0
-# A longer step, on a clock that is steadier than STEADY, is a sample lost and not a sample late.
-LOST_STEPS = 1.5
-STEADY = 0.1
-# Below this, an interval taken as constant costs less than position noise does.
-JITTER = 0.01
+# On a clock whose steps up to LATE vary by less than STEADY, a step within NEAR (three times that variation, if it is
+# more) of two or more whole steps is a sample lost; any other long step is a sample late.
+LATE, STEADY, NEAR = 1.5, 0.1, 0.1
+# Below this, taking the interval as constant misplaces a position by less than a thirtieth of what it travels a sample.
+JITTER = 0.03
 # A joint moves where its speed is above this share of its rms speed over the recording.
 MOVING = 0.2
 # Rows on either side over which that speed is taken: enough for an encoder's steps to average out.
@@ -58,10 +58,10 @@ def missing_numbers(samples: Samples) -> Checked:
     if bad is None:
         return samples, []
     column = "time"
-    worst = ~np.isfinite(samples.time)
+    worst = ~_finite(samples.time)
     for name, signal in (("position", samples.position), ("effort", samples.effort)):
         for joint, values in zip(samples.robot.joints, () if signal is None else signal, strict=False):
-            here = ~np.isfinite(values)
+            here = ~_finite(values)
             if here.sum() > worst.sum():
                 column, worst = f"{joint}.{name}", here
     total, of_worst = int(bad.sum()), int(worst.sum())
@@ -74,7 +74,7 @@ def missing_numbers(samples: Samples) -> Checked:
         samples.refuse(f"{what}: too many to leave out; record that channel, or cut the file to where it is")
     if longest > MISSING_RUN:
         samples.refuse(f"{what}, up to {longest} rows in a row; cut the file there, or fill in that channel")
-    said = f"{what}: {total} row{'s' if total > 1 else ''} left out"
+    said = f"{what}: {several(total, 'row')} left out"
     return samples.kept(~bad), [Finding("nan", said, total)]
 
 
@@ -106,7 +106,7 @@ def time_order(samples: Samples) -> Checked:
         before, here = int(back[0]), int(back[0]) + 1
         samples.refuse(
             f"time runs backwards at row {samples.row[here]}, from {samples.time[before]:.6g} s to "
-            f"{samples.time[here]:.6g} s ({len(back)} time{'s' if len(back) > 1 else ''} in all); "
+            f"{samples.time[here]:.6g} s ({several(len(back), 'time')} in all); "
             "sort the rows by time, or cut the file there"
         )
     repeated = step == 0
@@ -121,7 +121,7 @@ def time_order(samples: Samples) -> Checked:
     first = int(np.argmax(repeated)) + 1
     values = f"{others} with other values" if others else "with the same values"
     said = (
-        f"time stands still in {total} row{'s' if total > 1 else ''} ({values}), first in {samples.where(first)}: "
+        f"time stands still in {several(total, 'row')} ({values}), first in {samples.where(first)}: "
         "the first row of each time kept"
     )
     return samples.kept(np.concatenate(([True], ~repeated))), [Finding("repeated_time", said, total)]
@@ -131,32 +131,34 @@ def sampling(samples: Samples) -> Checked:
     """Say how even the clock is, where samples are lost and where the recording has gaps."""
     step = np.diff(samples.time)
     median = float(np.median(step))
+    # A step over rows that were left out is none of the clock's.
+    step = np.where(step > LATE * median, step - median * (np.diff(samples.row) - 1), step)
     gap = step > GAP_STEPS * median
-    late = step > LOST_STEPS * median
-    jitter = float(np.std(step[~late])) / median
-    lost = late & ~gap if jitter < STEADY else np.zeros_like(late)
-    if jitter >= STEADY:
-        jitter = float(np.std(step[~gap])) / median
+    late = step > LATE * median
+    unsteady = float(np.std(step[~late])) / median
+    near = np.abs(step / median - np.rint(step / median)) < max(NEAR, 3 * unsteady)
+    lost = late & ~gap & near & (unsteady < STEADY)
+    usual = step[~(gap | lost)]
+    jitter = float(np.std(usual)) / median
     found = []
     if jitter > JITTER:
-        steady = step[~(gap | lost)]
         found.append(
             Finding(
                 "jitter",
-                f"sampling interval varies by {100 * jitter:.2g} % (std), {1e3 * steady.min():.3g} to "
-                f"{1e3 * steady.max():.3g} ms about {1e3 * median:.3g} ms: the time stamps are used",
+                f"sampling interval varies by {100 * jitter:.2g} % (std), {1e3 * usual.min():.3g} to "
+                f"{1e3 * usual.max():.3g} ms about {1e3 * median:.3g} ms: the time stamps are used",
             )
         )
     if lost.any():
         count = int(np.sum(np.rint(step[lost] / median) - 1))
         first = samples.where(int(np.argmax(lost)) + 1)
-        said = f"about {count} single sample{'s' if count > 1 else ''} lost, first before {first}: interpolated"
+        said = f"about {several(count, 'single sample')} lost, first before {first}: interpolated"
         found.append(Finding("dropped", said, count))
     if gap.any():
-        count, longest = int(gap.sum()), int(np.argmax(step))
+        count, longest = int(gap.sum()), int(np.argmax(np.where(gap, step, 0)))
         missing = int(np.sum(np.rint(step[gap] / median) - 1))
         said = (
-            f"{count} gap{'s' if count > 1 else ''} in time, the longest {step[longest]:.3g} s before "
+            f"{several(count, 'gap')} in time, the longest {step[longest]:.3g} s before "
             f"{samples.where(longest + 1)}; about {missing} samples lost: the recording is cut there"
         )
         found.append(Finding("gap", said, count))
@@ -185,13 +187,13 @@ def held_rows(samples: Samples) -> Checked:
     keep = np.ones(samples.count, dtype=bool)
     found = []
     if frozen.any():
-        for first, count in zip(start[frozen], length[frozen], strict=True):
-            keep[first + 1 : first + count] = False
+        for first, rows in zip(start[frozen], length[frozen], strict=True):
+            keep[first + 1 : first + rows] = False
         count, longest = int((~keep).sum()), int(np.argmax(np.where(frozen, length, 0)))
-        lasting = samples.interval * length[longest]
         said = (
-            f"every channel stands still {int(frozen.sum())} time{'s' if frozen.sum() > 1 else ''} while the arm moves, "
-            f"longest {lasting:.2g} s from {samples.where(int(start[longest]))}: {count} rows left out"
+            f"every channel stands still {several(int(frozen.sum()), 'time')} while the arm moves, the longest "
+            f"{samples.interval * length[longest]:.2g} s from {samples.where(int(start[longest]))}: "
+            f"{several(count, 'row')} left out"
         )
         found.append(Finding("freeze", said, count))
 
@@ -211,15 +213,19 @@ def held_rows(samples: Samples) -> Checked:
 
 
 def _not_finite(samples: Samples) -> NDArray[np.bool_] | None:
-    total = samples.time.sum() + samples.position.sum()
-    if samples.effort is not None:
-        total += samples.effort.sum()
-    if np.isfinite(total):
+    """Tell which samples lack a number, shape (N,); None where all have theirs, which the extremes tell at once."""
+    signals = [samples.time, *_channels(samples)]
+    if all(signal.min() > -HUGE and signal.max() < HUGE for signal in signals):
         return None
-    bad = ~np.isfinite(samples.time) | ~np.isfinite(samples.position).all(axis=0)
-    if samples.effort is not None:
-        bad |= ~np.isfinite(samples.effort).all(axis=0)
-    return bad if bad.any() else None
+    bad = np.zeros(samples.count, dtype=bool)
+    for signal in signals:
+        bad |= ~_finite(signal)
+    return bad
+
+
+def _finite(signal: Array) -> NDArray[np.bool_]:
+    finite: NDArray[np.bool_] = np.abs(signal) < HUGE
+    return finite
 
 
 def _repeats(samples: Samples) -> NDArray[np.bool_]:
@@ -240,9 +246,10 @@ def _moving(samples: Samples, active: NDArray[np.intp], fresh: NDArray[np.intp])
     after = fresh[np.minimum(np.arange(count) + MOVING_ROWS, count - 1)]
     before = fresh[np.maximum(np.arange(count) - MOVING_ROWS, 0)]
     travel = samples.position[active][:, after] - samples.position[active][:, before]
-    speed = np.abs(travel) / (samples.time[after] - samples.time[before])
+    speed = np.abs(travel) / np.maximum(samples.time[after] - samples.time[before], samples.interval)
     moving = (speed > MOVING * np.sqrt(np.mean(speed**2, axis=1, keepdims=True))).any(axis=0)
-    return np.repeat(moving, np.diff(np.concatenate((fresh, [samples.count]))))
+    over: NDArray[np.bool_] = np.repeat(moving, np.diff(np.concatenate((fresh, [samples.count]))))
+    return over
 
 
 def _frozen(
@@ -255,7 +262,9 @@ def _frozen(
     """Tell which runs of equal rows are a stalled logger."""
     end = start + length
     last = samples.count - 1
-    long = (samples.time[np.minimum(end, last)] - samples.time[start] > FREEZE_SECONDS) & (start > 0) & (end <= last)
+    long: NDArray[np.bool_] = (
+        (samples.time[np.minimum(end, last)] - samples.time[start] > FREEZE_SECONDS) & (start > 0) & (end <= last)
+    )
     if not long.any():
         return long
     place = np.searchsorted(fresh, start)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.audit.samples import IDLE_TRAVEL, Array, Finding, Samples, joint_range, runs
+from scara_ident.audit.samples import IDLE_TRAVEL, Array, Finding, Samples, joint_range, runs, several, unit
 
 Checked = tuple[Samples, list[Finding]]
 
@@ -13,8 +13,8 @@ Checked = tuple[Samples, list[Finding]]
 STUCK_SECONDS = 0.2
 # ... and dead where it does so for this share of the recording.
 DEAD_SHARE = 0.5
-# Where more than this share of the other samples repeats the one before, the effort has no noise (a simulation, a coarse
-# converter), and a value that lasts says nothing.
+# Where more than this share of the other samples repeats the one before, the effort has no noise (a simulation, a
+# coarse converter), and a value that lasts says nothing.
 NOISELESS = 0.5
 # A saturated amplifier holds its extreme for this many samples in a row, ...
 PILE_RUN = 3
@@ -39,7 +39,8 @@ def dead_effort(samples: Samples) -> Checked:
             if not idle[joint]:
                 samples.refuse(
                     f"{name}.effort is {values[0]:g} throughout although the joint moves by "
-                    f"{np.ptp(samples.position[joint]):.3g}: a dead channel; record it again, or identify without {name}"
+                    f"{np.ptp(samples.position[joint]):.3g} {unit(samples.robot, joint)}: a dead channel; "
+                    f"record it again, or identify without {name}"
                 )
             said = f"{name}.effort is {values[0]:g} throughout, and the joint does not move: used as it is"
             found.append(Finding("dead_effort", said, samples.count))
@@ -53,7 +54,7 @@ def dead_effort(samples: Samples) -> Checked:
         if count > DEAD_SHARE * samples.count:
             samples.refuse(f"{what}, {count} of {samples.count} rows, while the joint moves; cut the file there")
         keep &= ~stuck
-        said = f"{what} while the joint moves: {count} rows left out"
+        said = f"{what} while the joint moves: {several(count, 'row')} left out"
         found.append(Finding("stuck_effort", said, count))
     return samples.kept(keep), found
 
@@ -71,12 +72,12 @@ def saturation(samples: Samples) -> Checked:
                 continue
             if not _piles_up(values, at, direction):
                 continue
-            gain = samples.robot.effort_gain[joint]
             start, _ = runs(at[1:] & at[:-1])
+            name, torque = samples.robot.joints[joint], extreme * samples.robot.effort_gain[joint]
             said = (
-                f"{samples.robot.joints[joint]}.effort stays at its extreme {extreme:.4g} for {100 * count / samples.count:.2g} % "
-                f"of the rows, first in {samples.where(int(start[0]))}: the amplifier saturates at {extreme * gain:.4g} "
-                f"{samples.robot.torque_unit(joint)}, or the log clips it; used as it is"
+                f"{name}.effort stays at its extreme {extreme:.4g} ({torque:.4g} {samples.robot.torque_unit(joint)}) "
+                f"for {100 * count / samples.count:.2g} % of the rows, first in {samples.where(int(start[0]))}: "
+                "the amplifier saturates or the log is clipped; used as it is"
             )
             found.append(Finding("saturation", said, count))
     return samples, found
@@ -102,7 +103,7 @@ def _stuck(samples: Samples, joint: int, same: NDArray[np.bool_]) -> NDArray[np.
 
 
 def _piles_up(values: Array, at: NDArray[np.bool_], direction: int) -> bool:
-    start, length = runs(at[1:] & at[:-1])
+    _, length = runs(at[1:] & at[:-1])
     if not len(length) or length.max() < PILE_RUN:
         return False
     other = values[~at]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.audit.samples import Array, Finding, Samples, joint_range, speed_limit, unit
-from scara_ident.robot import Robot
+from scara_ident.audit.samples import GAP_STEPS, Array, Finding, Samples, joint_range, several, speed_limit, unit
+
+if TYPE_CHECKING:
+    from scara_ident.robot import Robot
 
 Checked = tuple[Samples, list[Finding]]
 
@@ -65,36 +68,29 @@ def position_unit(samples: Samples) -> Checked:
         return samples, []
 
     joint = int(np.argmax(suspect))
-    column = f"{robot.joints[joint]}.position"
-    others = [f"{name}.position" for name, here in zip(robot.joints, suspect, strict=True) if here][1:]
-    also = f" (and {', '.join(others)})" if others else ""
+    values, name = samples.position[joint], unit(robot, joint)
     if beyond[joint] > 0:
-        far = samples.position[joint]
-        index = int(
-            np.argmin(far) if robot.lower[joint] - low[joint] > high[joint] - robot.upper[joint] else np.argmax(far)
-        )
-        seen = (
-            f"reaches {far[index]:.4g} in {samples.where(index)}, limits {robot.lower[joint]:.4g} to "
-            f"{robot.upper[joint]:.4g} {unit(robot, joint)}"
-        )
+        under = robot.lower[joint] - low[joint] > high[joint] - robot.upper[joint]
+        index = int(np.argmin(values) if under else np.argmax(values))
+        bounds = f"{robot.lower[joint]:.4g} to {robot.upper[joint]:.4g} {name}"
+        seen = f"reaches {values[index]:.4g} in {samples.where(index)}, limits {bounds}"
     elif haste[joint] > TOO_FAST:
-        limit = f"{robot.velocity_limit[joint]:.4g} {unit(robot, joint)}/s"
-        seen = f"moves at {speed[joint]:.4g} a second, limit {limit}"
+        seen = f"moves at {speed[joint]:.4g} a second, limit {robot.velocity_limit[joint]:.4g} {name}/s"
     else:
         seen = f"runs from {low[joint]:.6g} to {high[joint]:.6g} in whole numbers"
     if counts[joint]:
-        guess = f"it looks like encoder counts, multiply by {'2 pi' if not robot.prismatic[joint] else 'metres'} / counts per {'joint turn' if not robot.prismatic[joint] else 'travel'}"
+        full = "metres of travel" if robot.prismatic[joint] else "2 pi / counts of a joint turn"
+        guess = f"it looks like encoder counts ({'scale to' if robot.prismatic[joint] else 'multiply by'} {full})"
     else:
-        fitting = [
-            r for r in _readings(robot, joint, low[joint], high[joint]) if _fits(r, robot, joint, low, high, speed)
-        ]
+        readings = _readings(robot, joint, low[joint], high[joint])
+        fitting = [r for r in readings if _fits(r, robot, joint, low[joint], high[joint], speed[joint])]
         fitting.sort(key=lambda reading: -abs(reading.factor))
-        if fitting:
-            guess = "it looks like " + " or ".join(f"{r.name} ({r.remedy})" for r in fitting[:2])
-        else:
-            guess = "it is no unit the audit knows"
+        looks = " or ".join(f"{reading.name} ({reading.remedy})" for reading in fitting[:2])
+        guess = f"it looks like {looks}" if fitting else "it is in no unit that the audit knows"
+    others = [f"{robot.joints[k]}.position" for k in np.flatnonzero(suspect)[1:]]
+    also = f" (and {', '.join(others)})" if others else ""
     samples.refuse(
-        f"{column}{also} {seen}: {guess}; convert it to {unit(robot, joint)}, "
+        f"{robot.joints[joint]}.position{also} {seen}: {guess}; convert it to {name}, "
         f"or correct the limits in {robot.urdf.name} if they are wrong"
     )
 
@@ -102,17 +98,19 @@ def position_unit(samples: Samples) -> Checked:
 def whole_turns(samples: Samples) -> Checked:
     """Take out the jumps of an angle that is recorded within one turn."""
     step = np.diff(samples.position, axis=1)
-    wrapped = (np.abs(step) > np.pi) & ~samples.robot.prismatic[:, None]
+    # Over a gap an arm may well turn once.
+    near = np.diff(samples.time) < GAP_STEPS * samples.interval
+    wrapped = (np.abs(step) > np.pi) & near & ~samples.robot.prismatic[:, None]
     if not wrapped.any():
         return samples, []
-    turns = np.where(wrapped, np.rint(step / (2 * np.pi)), 0.0)
+    turns = np.where(wrapped, np.sign(step), 0.0)
     turns[np.abs(step - 2 * np.pi * turns) > WRAP_REST] = 0.0
     found = []
-    for joint in np.flatnonzero(turns.any(axis=1)):
+    for joint in np.flatnonzero(turns.any(axis=1)).tolist():
         first = int(np.argmax(turns[joint] != 0)) + 1
         count = int(np.count_nonzero(turns[joint]))
         said = (
-            f"{samples.robot.joints[joint]}.position jumps by a whole turn {count} time{'s' if count > 1 else ''}, "
+            f"{samples.robot.joints[joint]}.position jumps by a whole turn {several(count, 'time')}, "
             f"first in {samples.where(first)}: unwrapped"
         )
         found.append(Finding("wrapped", said, count))
@@ -120,10 +118,7 @@ def whole_turns(samples: Samples) -> Checked:
         return samples, []
     position = samples.position.copy()
     position[:, 1:] -= 2 * np.pi * np.cumsum(turns, axis=1)
-    return (
-        Samples(samples.source, samples.robot, samples.time, position, samples.effort, samples.row),
-        found,
-    )
+    return replace(samples, position=position), found
 
 
 def spikes(samples: Samples) -> Checked:
@@ -134,9 +129,9 @@ def spikes(samples: Samples) -> Checked:
     if not len(suspect):
         return samples, []
     spiked = np.zeros(samples.position.shape, dtype=bool)
-    for joint in suspect:
+    for joint in suspect.tolist():
         spiked[joint] = _stands_out(samples.position[joint], step[joint] > bound[joint], bound[joint])
-    wild = spiked.any(axis=0)
+    wild = np.asarray(spiked.any(axis=0))
     total = int(wild.sum())
     found = []
     if total:
@@ -144,12 +139,12 @@ def spikes(samples: Samples) -> Checked:
         column = f"{samples.robot.joints[joint]}.position"
         first = int(np.argmax(spiked[joint]))
         what = (
-            f"{column} has {int(spiked[joint].sum())} wild sample{'s' if spiked[joint].sum() > 1 else ''} "
+            f"{column} has {several(int(spiked[joint].sum()), 'wild sample')} "
             f"(faster than {WILD:g} times what the arm can do, and back), first in {samples.where(first)}"
         )
         if total > max(SPIKE_ROWS, SPIKE_SHARE * samples.count):
             samples.refuse(f"{what}: too many of {samples.count} to leave out; check the encoder and its cable")
-        found.append(Finding("spike", f"{what}: {total} row{'s' if total > 1 else ''} left out", total))
+        found.append(Finding("spike", f"{what}: {several(total, 'row')} left out", total))
     clean = samples.kept(~wild)
     _refuse_jump(clean)
     return clean, found
@@ -160,13 +155,16 @@ def idle_joints(samples: Samples) -> Checked:
     idle = samples.idle()
     if not idle.any():
         return samples, []
-    names = [name for name, here in zip(samples.robot.joints, idle, strict=True) if here]
-    travel = float(np.max(np.ptp(samples.position[idle], axis=1)))
-    said = (
-        f"{', '.join(names)} {'do' if len(names) > 1 else 'does'} not move (travel at most {travel:.2g} "
-        f"{unit(samples.robot, int(np.argmax(idle)))}): nothing is learnt of {'their' if len(names) > 1 else 'its'} motion"
-    )
-    return samples, [Finding("idle_joint", said, len(names))]
+    which = np.flatnonzero(idle)
+    travel = float(np.max(np.ptp(samples.position[which], axis=1)))
+    small = f"(travel at most {travel:.2g} {unit(samples.robot, int(which[0]))})"
+    if idle.all() and len(which) > 1:
+        said = f"no joint moves {small}: gravity and offsets can be learnt, nothing of motion"
+        return samples, [Finding("idle_joint", said, len(which))]
+    names = ", ".join(samples.robot.joints[k] for k in which)
+    verb, their = ("does", "its") if len(which) == 1 else ("do", "their")
+    said = f"{names} {verb} not move {small}: nothing is learnt of {their} motion"
+    return samples, [Finding("idle_joint", said, len(which))]
 
 
 def limits(samples: Samples) -> Checked:
@@ -175,20 +173,17 @@ def limits(samples: Samples) -> Checked:
     low, high = samples.position.min(axis=1), samples.position.max(axis=1)
     bounded = np.isfinite(robot.upper - robot.lower) & (robot.upper > robot.lower)
     found = []
-    for joint in np.flatnonzero(bounded):
+    for joint in np.flatnonzero(bounded).tolist():
         under, over = robot.lower[joint] - low[joint], high[joint] - robot.upper[joint]
         if max(under, over) <= OVERSHOOT * (robot.upper[joint] - robot.lower[joint]):
             continue
         values = samples.position[joint]
-        index, limit = (
-            (int(np.argmin(values)), robot.lower[joint])
-            if under > over
-            else (int(np.argmax(values)), robot.upper[joint])
-        )
+        index = int(np.argmin(values) if under > over else np.argmax(values))
+        limit = robot.lower[joint] if under > over else robot.upper[joint]
         count = int(np.count_nonzero((values < robot.lower[joint]) | (values > robot.upper[joint])))
         said = (
-            f"{robot.joints[joint]}.position reaches {values[index]:.4g} {unit(robot, joint)} in {samples.where(index)}, "
-            f"beyond the URDF's limit of {limit:.4g}: used as it is"
+            f"{robot.joints[joint]}.position reaches {values[index]:.4g} {unit(robot, joint)} in "
+            f"{samples.where(index)}, beyond the URDF's limit of {limit:.4g}: used as it is"
         )
         found.append(Finding("limits", said, count))
     return samples, found
@@ -197,7 +192,7 @@ def limits(samples: Samples) -> Checked:
 def _speed(samples: Samples) -> Array:
     """Peak speed of each joint, robust against noise and wild samples, shape (n,)."""
     rows = min(SPEED_ROWS, samples.count // 4)
-    lasting = samples.time[rows:] - samples.time[:-rows]
+    lasting = np.maximum(samples.time[rows:] - samples.time[:-rows], samples.interval)
     speed: Array = np.percentile(
         np.abs(samples.position[:, rows:] - samples.position[:, :-rows]) / lasting, FAST, axis=1
     )
@@ -211,38 +206,34 @@ def _whole(values: Array) -> bool:
 def _readings(robot: Robot, joint: int, low: float, high: float) -> list[_Reading]:
     reduction = float(robot.reduction[joint])
     degree = np.pi / 180
+    readings = []
     if robot.prismatic[joint]:
-        readings = [_Reading("millimetres", 1e-3, 0.0, "divide by 1000")]
+        readings.append(_Reading("millimetres", 1e-3, 0.0, "divide by 1000"))
     else:
-        readings = [_Reading("degrees", degree, 0.0, "multiply by pi/180")]
-        turns = (
-            round(((robot.lower[joint] + robot.upper[joint]) - (low + high)) / (4 * np.pi))
-            if np.isfinite(robot.lower[joint] + robot.upper[joint])
-            else 0
-        )
+        readings.append(_Reading("degrees", degree, 0.0, "multiply by pi/180"))
+        bounded = np.isfinite(robot.lower[joint]) and np.isfinite(robot.upper[joint])
+        away = (robot.lower[joint] + robot.upper[joint] - low - high) / 2 if bounded else 0.0
+        turns = round(away / (2 * np.pi))
         if turns:
             remedy = f"{'add' if turns > 0 else 'subtract'} {abs(turns)} x 2 pi"
             readings.append(_Reading("an angle that is whole turns off", 1.0, 2 * np.pi * turns, remedy))
     if abs(reduction) != 1.0:
-        readings.append(_Reading("the motor's angle", 1 / reduction, 0.0, f"divide by the reduction {reduction:g}"))
+        divide = f"divide by the reduction {reduction:g}"
+        readings.append(_Reading("the motor's angle", 1 / reduction, 0.0, divide))
         readings.append(
-            _Reading(
-                "the motor's angle in degrees", degree / reduction, 0.0, f"multiply by pi/180, divide by {reduction:g}"
-            )
+            _Reading("the motor's angle in degrees", degree / reduction, 0.0, f"multiply by pi/180, {divide}")
         )
-        readings.append(
-            _Reading("motor turns", 2 * np.pi / reduction, 0.0, f"multiply by 2 pi, divide by {reduction:g}")
-        )
+        readings.append(_Reading("motor turns", 2 * np.pi / reduction, 0.0, f"multiply by 2 pi, {divide}"))
     return readings
 
 
-def _fits(reading: _Reading, robot: Robot, joint: int, low: Array, high: Array, speed: Array) -> bool:
-    ends = np.array([low[joint], high[joint]]) * reading.factor + reading.offset
+def _fits(reading: _Reading, robot: Robot, joint: int, low: float, high: float, speed: float) -> bool:
+    ends = np.array([low, high]) * reading.factor + reading.offset
     slack = OUT * joint_range(robot)[joint]
     return bool(
         ends.min() >= robot.lower[joint] - slack
         and ends.max() <= robot.upper[joint] + slack
-        and speed[joint] * abs(reading.factor) <= FAST_TOO * speed_limit(robot)[joint]
+        and speed * abs(reading.factor) <= FAST_TOO * speed_limit(robot)[joint]
     )
 
 
@@ -262,11 +253,10 @@ def _wild_step(samples: Samples) -> Array:
 
 def _stands_out(values: Array, wild: NDArray[np.bool_], bound: Array) -> NDArray[np.bool_]:
     """Tell which samples lie further from their neighbours' median than the arm can go in a step."""
-    half = MEDIAN_ROWS // 2
     near = np.unique(np.flatnonzero(wild)[:, None] + np.arange(-1, 3))
     near = near[(near >= 0) & (near < len(values))]
-    window = np.clip(near[:, None] + np.arange(-half, half + 1), 0, len(values) - 1)
-    away = np.abs(values[near] - np.median(values[window], axis=1))
+    first = np.clip(near - MEDIAN_ROWS // 2, 0, len(values) - MEDIAN_ROWS)
+    away = np.abs(values[near] - np.median(values[first[:, None] + np.arange(MEDIAN_ROWS)], axis=1))
     out = np.zeros(len(values), dtype=bool)
     out[near] = away > bound[np.minimum(near, len(bound) - 1)]
     return out

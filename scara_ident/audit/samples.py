@@ -20,6 +20,10 @@ Array = NDArray[np.float64]
 IDLE_TRAVEL = 1e-3
 
 
+# A longer step in time, in median steps, is a gap, over which nothing is interpolated (motion.py cuts recordings there).
+GAP_STEPS = 5.0
+
+
 @dataclass(frozen=True, eq=False)
 class Finding:
     """Something that the audit saw, and what was done about it.
@@ -93,7 +97,8 @@ class Samples:
 
     def idle(self) -> NDArray[np.bool_]:
         """Tell which joints stand still over the whole recording, shape (n,)."""
-        return np.ptp(self.position, axis=1) < IDLE_TRAVEL * joint_range(self.robot)
+        idle: NDArray[np.bool_] = np.ptp(self.position, axis=1) < IDLE_TRAVEL * joint_range(self.robot)
+        return idle
 
 
 def joint_range(robot: Robot) -> Array:
@@ -123,6 +128,11 @@ def runs(same: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     edges = np.diff(np.concatenate(([False], same, [False])).astype(np.int8))
     start = np.flatnonzero(edges == 1)
     return start, np.flatnonzero(edges == -1) - start + 1
+
+
+def several(count: int, noun: str) -> str:
+    """Write a number and what it counts: "1 row", "3 rows"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def unit(robot: Robot, joint: int) -> str:

@@ -113,10 +113,10 @@ def pooled_information(evidence: Sequence[Evidence], weights: Array) -> Informat
     return merge(item.joint(j).scaled(float(weights[j])) for item in evidence for j in range(len(weights)))
 
 
-def weighted_blocks(evidence: Sequence[Evidence], weights: Array) -> list[list[Information]]:
-    """Return for every recording its blocks, joints merged with their weights."""
+def weighted_blocks(evidence: Sequence[Evidence], weights: Array) -> list[list[tuple[Information, ...]]]:
+    """Return for every recording its blocks, each joint's rows with its weight."""
     return [
-        [merge(block[j].scaled(float(weights[j])) for j in range(len(weights))) for block in item.blocks]
+        [tuple(part.scaled(float(weight)) for part, weight in zip(block, weights, strict=True)) for block in item.blocks]
         for item in evidence
     ]
 

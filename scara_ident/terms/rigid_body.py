@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.base_parameters import BaseParameters, base_parameters
+from scara_ident.base_parameters import BaseParameters, find_base_parameters
 from scara_ident.motion import Motion
 from scara_ident.regressor import RegressorKernel, build_kernel
 from scara_ident.robot import Robot
@@ -78,7 +78,7 @@ def rigid_body(robot: Robot, *, without: Sequence[str] = ()) -> RigidBody:
     RegressorMismatch
         If the batch kernel does not reproduce Pinocchio.
     """
-    base = base_parameters(robot)
+    base = find_base_parameters(robot)
     names, meanings = _names(robot, base)
     kept = np.array([k for k in range(base.count) if names[k] not in without], dtype=np.intp)
     standard = base.kept[kept]

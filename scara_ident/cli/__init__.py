@@ -1,0 +1,5 @@
+"""The command line ``scara-ident``; no computation lives here."""
+
+from scara_ident.cli.main import main
+
+__all__ = ["main"]

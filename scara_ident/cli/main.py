@@ -1,0 +1,87 @@
+"""The program: its commands, its errors and its exit status."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import typer
+
+from scara_ident.cli.base import base
+from scara_ident.cli.console import errors_console
+from scara_ident.cli.identify import identify
+
+from scara_ident.errors import ScaraIdentError
+
+app = typer.Typer(
+    name="scara-ident",
+    help="Identify the dynamic model of a robot arm from measured motion, and find what the model lacks.",
+    no_args_is_help=True,
+    add_completion=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from scara_ident import __version__
+
+        typer.echo(f"scara-ident {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def program(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    """Identify the dynamic model of a robot arm from measured motion, and find what the model lacks."""
+
+
+_COMMANDS: tuple[Callable[..., Any], ...] = (identify, base)
+for _command in _COMMANDS:
+    app.command()(_command)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the program; every error is one line on stderr and an exit status."""
+    sys.exit(run(sys.argv[1:] if arguments is None else arguments))
+
+
+def run(arguments: list[str]) -> int:
+    """Run the program and return its exit status: 0 done, 1 cannot be given, 2 bad usage."""
+    try:
+        result = app(args=arguments, standalone_mode=False)
+        return int(result) if isinstance(result, int) else 0
+    except ScaraIdentError as error:
+        _complain(" ".join(str(error).split()))
+        return error.exit_status
+    except typer.TyperException as error:
+        text = error.format_message()
+        # Without any word the message is the help, which keeps its lines.
+        _complain(" ".join(text.split())) if arguments else errors_console().print(text, markup=False)
+        return 2
+    except typer.Exit as error:
+        return error.exit_code
+    except (typer.Abort, KeyboardInterrupt):
+        _complain("interrupted; nothing was written")
+        return 130
+    except BrokenPipeError:
+        # The reader of our output has gone, as `| head` does.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except MemoryError:
+        _complain("out of memory; give fewer recordings at a time")
+        return 1
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        _complain(f"{where}{error.strerror or error}")
+        return 1
+
+
+def _complain(message: str) -> None:
+    errors_console().print(f"scara-ident: {message}", markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,193 @@
+"""The main job: from recordings to parameters, how sure they are, and what they predict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.bands import choose_bands
+from scara_ident.errors import UsageError
+from scara_ident.estimators import Estimate, History, JointError, ols, rls, wls
+from scara_ident.estimators.estimate import paper_criteria, pooled_information
+from scara_ident.evidence import Evidence, gather_all
+from scara_ident.model import ModelName, TorqueModel, build_model
+from scara_ident.motion import stretches
+from scara_ident.recording import Recording
+from scara_ident.repeatability import repeatability
+from scara_ident.robot import Robot
+from scara_ident.velocity import audit_velocity
+
+Array = NDArray[np.float64]
+Method = Literal["ols", "wls", "rls"]
+METHODS: tuple[str, ...] = get_args(Method)
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Everything that one identification found.
+
+    Attributes
+    ----------
+    estimate : Estimate
+    history : History or None
+        Of the recursive estimate.
+    bands : tuple of float or None
+        Low-pass on both sides of each joint's equation, Hz; None where nothing was filtered.
+    training, validation : tuple of Evidence
+        What each recording says; validation took no part in any choice.
+    noise : mapping of str to ndarray
+        Repeatability of the torque per trajectory, see `repeatability`.
+    log_det, condition : float
+        J_d and J_k of the training recordings for the paper's 2500 samples.
+    notes : tuple of str
+        What was found in the data and what was done about it.
+    """
+
+    estimate: Estimate
+    history: History | None
+    bands: tuple[float | None, ...]
+    training: tuple[Evidence, ...]
+    validation: tuple[Evidence, ...]
+    noise: Mapping[str, Array]
+    log_det: float
+    condition: float
+    notes: tuple[str, ...]
+
+    @property
+    def model(self) -> TorqueModel:
+        """The model that was fitted."""
+        return self.estimate.model
+
+    def training_errors(self) -> dict[str, tuple[JointError | None, ...]]:
+        """Return the errors on the recordings that were fitted, by recording."""
+        return {item.recording: self.estimate.errors(item) for item in self.training}
+
+    def validation_errors(self) -> dict[str, tuple[JointError | None, ...]]:
+        """Return the errors on the recordings that were not, by recording."""
+        return {item.recording: self.estimate.errors(item) for item in self.validation}
+
+
+def identify(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    *,
+    model: ModelName | TorqueModel = "complete",
+    method: Method = "ols",
+    validation: Sequence[Recording] = (),
+    bands: Sequence[float | None] | None = None,
+    progress: Callable[[str], None] = lambda step: None,
+) -> Identification:
+    """Identify a robot from recordings of its motion.
+
+    Parameters
+    ----------
+    robot : Robot
+    recordings : sequence of Recording
+        The recordings to fit.
+    model : {"complete", "reduced", "basic"} or TorqueModel, optional
+    method : {"ols", "wls", "rls"}, optional
+    validation : sequence of Recording, optional
+        Recordings that take no part in the fit nor in any choice.
+    bands : sequence of float or None, one per joint, optional
+        Low-pass on both sides of each joint's equation, Hz; chosen from the recordings by default.
+    progress : callable, optional
+        Called with the name of every step.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    UsageError
+        If there are no recordings, the method is unknown, or a recording is both fitted and held out.
+    RecordingError
+        If a recording cannot be used.
+    """
+    if not recordings:
+        raise UsageError("no recordings to identify from")
+    if method not in METHODS:
+        raise UsageError(f"method {method!r}: expected one of {', '.join(METHODS)}")
+    _check_held_out(recordings, validation)
+    equation = build_model(robot, model) if isinstance(model, str) else model
+    notes = [note for recording in (*recordings, *validation) for note in _notes(recording)]
+    if bands is None:
+        progress("choosing the bands")
+        choice = choose_bands(equation, recordings)
+        bands = choice.bands
+        notes += choice.notes
+    progress("absorbing the recordings")
+    training = gather_all(equation, recordings, bands)
+    held_out = gather_all(equation, validation, bands)
+    progress("estimating")
+    noise = repeatability(recordings)
+    history = None
+    if method == "rls":
+        estimate, history = rls(equation, training)
+    elif method == "wls":
+        estimate = wls(equation, training, _joint_noise(noise))
+    else:
+        estimate = ols(equation, training)
+    unweighted = pooled_information(training, np.ones(robot.n))
+    log_det, condition = paper_criteria(unweighted, training)
+    return Identification(
+        estimate, history, tuple(bands), training, held_out, noise, log_det, condition, tuple(notes)
+    )
+
+
+def _joint_noise(noise: Mapping[str, Array]) -> Array | None:
+    """Pool the repeatability of all trajectories; None without repetitions."""
+    if not noise:
+        return None
+    sigma = np.sqrt(np.mean([value**2 for value in noise.values()], axis=0))
+    return sigma if np.all(sigma > 0.0) else None
+
+
+def _check_held_out(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:
+    fitted = {recording.path.resolve() for recording in recordings if recording.path is not None}
+    for recording in validation:
+        if recording.path is not None and recording.path.resolve() in fitted:
+            raise UsageError(f"{recording.path}: given to fit and to validate; a validation recording must be held out")
+
+
+def _notes(recording: Recording) -> list[str]:
+    found = [f"{recording.name}: {finding.message}" for finding in recording.findings]
+    longest = max(stretches(recording), key=lambda part: len(part.time))
+    # One line for all joints that have the same trouble.
+    verdicts: dict[str, list[str]] = {}
+    for audit in audit_velocity(recording, longest):
+        verdict = audit.verdict(longest.rate)
+        if verdict is not None:
+            verdicts.setdefault(verdict, []).append(audit.joint)
+    for verdict, joints in verdicts.items():
+        found.append(f"{recording.name}: recorded velocity of {', '.join(joints)} is not used: {verdict}")
+    return found
+
+
+def undetermined(identification: Identification) -> list[str]:
+    """Return the names of the parameters that the data leave open."""
+    estimate = identification.estimate
+    return [name for name, open_ in zip(estimate.model.names, estimate.undetermined, strict=True) if open_]
+
+
+def not_told_from_zero(identification: Identification) -> list[str]:
+    """Return the names of the determined parameters that are within two standard deviations of zero."""
+    estimate = identification.estimate
+    small = (np.abs(estimate.value) < 2.0 * estimate.std) & ~estimate.undetermined
+    return [name for name, is_small in zip(estimate.model.names, small, strict=True) if is_small]
+
+
+def worst_validation(identification: Identification) -> tuple[str, str, JointError] | None:
+    """Return the held-out recording and joint with the largest relative error within the band."""
+    worst: tuple[str, str, JointError] | None = None
+    for name, errors in identification.validation_errors().items():
+        for joint, error in zip(identification.model.robot.joints, errors, strict=True):
+            if error is None or error.relative is None:
+                continue
+            if worst is None or worst[2].relative is None or error.relative > worst[2].relative:
+                worst = (name, joint, error)
+    return worst

@@ -1,0 +1,115 @@
+"""What an identification tells: the contract's JSON, and sentences for a person."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from scara_ident.estimators import JointError
+from scara_ident.estimators.estimate import PAPER_SAMPLES
+from scara_ident.evidence import Evidence
+from scara_ident.identification import Identification, not_told_from_zero, undetermined, worst_validation
+from scara_ident.robot import Robot
+
+
+def identification_dict(identification: Identification) -> dict[str, Any]:
+    """Return the content of ``identification.json``."""
+    estimate = identification.estimate
+    robot = identification.model.robot
+    return {
+        "robot": robot.name,
+        "model": identification.model.name,
+        "method": estimate.method,
+        "samples": sum(item.samples for item in identification.training),
+        "parameters": [
+            {
+                "name": column.name,
+                "joint": column.joint,
+                "value": estimate.value[k],
+                "std": estimate.std[k],
+                "unit": column.unit,
+                "meaning": column.meaning,
+                "undetermined": bool(estimate.undetermined[k]),
+            }
+            for k, column in enumerate(identification.model.columns)
+        ],
+        "std_from": estimate.std_kind,
+        "log_det": identification.log_det,
+        "condition": identification.condition,
+        "criteria_samples": PAPER_SAMPLES,
+        "band_hz": dict(zip(robot.joints, identification.bands, strict=True)),
+        "errors": {
+            "training": _errors(robot, identification.training_errors()),
+            "validation": _errors(robot, identification.validation_errors()),
+        },
+        "repeatability": {
+            trajectory: dict(zip(robot.joints, sigma, strict=True))
+            for trajectory, sigma in identification.noise.items()
+        },
+        "left_out": {
+            item.recording: _left_out(robot, item) for item in (*identification.training, *identification.validation)
+        },
+        "summary": list(sentences(identification)),
+        "notes": list(identification.notes),
+    }
+
+
+def _errors(robot: Robot, errors: Mapping[str, tuple[JointError | None, ...]]) -> dict[str, Any]:
+    return {
+        recording: {joint: _error(error) for joint, error in zip(robot.joints, found, strict=True)}
+        for recording, found in errors.items()
+    }
+
+
+def _error(error: JointError | None) -> dict[str, float | None]:
+    if error is None:
+        return {"rms": None, "relative": None, "rms_unfiltered": None, "relative_unfiltered": None}
+    return {
+        "rms": error.rms,
+        "relative": error.relative,
+        "rms_unfiltered": error.rms_unfiltered,
+        "relative_unfiltered": error.relative_unfiltered,
+    }
+
+
+def _left_out(robot: Robot, item: Evidence) -> dict[str, Any]:
+    return {
+        "ends_s": item.left_out_ends,
+        "at_rest_share": dict(zip(robot.joints, item.left_out_rest, strict=True)),
+    }
+
+
+def sentences(identification: Identification) -> tuple[str, ...]:
+    """Return the result in words: where it generalises worst, and what the data leave open."""
+    found = []
+    worst = worst_validation(identification)
+    if worst is not None:
+        recording, joint, error = worst
+        found.append(
+            f"It generalises worst to {recording}, {joint}: {error.rms:.3g} "
+            f"{_unit(identification, joint)} rms, {error.relative:.1%} of the torque."
+        )
+    else:
+        found.append("Nothing was held out: give --validate recordings to learn how well it predicts.")
+    open_ = undetermined(identification)
+    if open_:
+        found.append(
+            f"The data leave {_listed(open_)} undetermined; a motion that excites {'it' if len(open_) == 1 else 'them'} "
+            "is needed."
+        )
+    else:
+        found.append("Every parameter is determined.")
+    small = not_told_from_zero(identification)
+    if small:
+        found.append(f"Within two standard deviations of zero: {_listed(small)}.")
+    return tuple(found)
+
+
+def _listed(names: list[str], most: int = 12) -> str:
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+
+
+def _unit(identification: Identification, joint: str) -> str:
+    robot = identification.model.robot
+    return robot.torque_unit(robot.joints.index(joint))

@@ -1,0 +1,177 @@
+"""What the compiled loop integrates: the arm and its effects as plain arrays on the joint side of the gears.
+
+Rows are in Pinocchio's order of joints. Recorded-side constants are brought to the joint side with
+``torque at the joint = scale x recorded torque``, where scale is N on the motor side and 1 on the joint side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Plant(NamedTuple):
+    """Arrays of the compiled loop; see `PlantDraft` for their meaning."""
+
+    parent: NDArray[np.int64]
+    prismatic: NDArray[np.bool_]
+    rotation: Array
+    offset: Array
+    bodies: Array
+    gravity: Array
+    armature: Array
+    friction: Array
+    constant: Array
+    direction_matters: NDArray[np.bool_]
+    stribeck_amplitude: Array
+    stribeck_velocity: Array
+    asymmetry: Array
+    presliding: Array
+    warm_share: Array
+    warm_time: Array
+    position_share: Array
+    position_phase: Array
+    spring: Array
+    spring_rest: Array
+    efficiency: Array
+    elastic: NDArray[np.bool_]
+    stiffness: Array
+    damping: Array
+    width: Array
+    coupled: bool
+    coupling_viscous: Array
+    coupling_coulomb: Array
+    ripple_joint: NDArray[np.int64]
+    ripple_order: Array
+    ripple_amplitude: Array
+    ripple_phase: Array
+    vibration_joint: NDArray[np.int64]
+    vibration_frequency: Array
+    vibration_amplitude: Array
+    vibration_phase: Array
+    signed_sine: Array
+    signed_sine_of: NDArray[np.int64]
+    swinging_viscous: Array
+    swinging_viscous_of: NDArray[np.int64]
+    payload_time: float
+    bodies_after: Array
+
+
+class Sensors(NamedTuple):
+    """What the controller sees and what the drive can give."""
+
+    resolution: Array
+    shift: Array
+    eccentricity: Array
+    eccentricity_order: Array
+    eccentricity_phase: Array
+    torque_limit: Array
+
+
+@dataclass
+class PlantDraft:
+    """An arm without effects, to which effects add themselves before the loop is compiled in.
+
+    Attributes
+    ----------
+    n : int
+    scale : ndarray, shape (n,)
+        Torque at the joint per recorded torque, Pinocchio's order.
+    reduction : ndarray, shape (n,)
+        Motor angle per joint angle.
+    arrays : dict
+        Fields of `Plant`, in joint-side SI units.
+    sensors : dict
+        Fields of `Sensors`.
+    delay : ndarray, shape (n,)
+        Time by which the recorded effort lags, s.
+    gain : ndarray, shape (n,)
+        Recorded per true torque.
+    cubic : ndarray, shape (n,)
+        1/(N m)^2, on the recorded side.
+    drift : ndarray, shape (n,)
+        Rate of the recorded torque's offset, N m/s.
+    pickup : list of (int, float, float, float)
+        Joint, order per joint turn, amplitude and phase of a ripple that only the torque sensor sees.
+    """
+
+    n: int
+    scale: Array
+    reduction: Array
+    arrays: dict[str, NDArray[np.float64]]
+    sensors: dict[str, Array]
+    delay: Array
+    gain: Array
+    cubic: Array
+    drift: Array
+    pickup: list[tuple[int, float, float, float]]
+
+    def append(self, family: str, joint: int, *values: float) -> None:
+        """Append a row to ``ripple`` or ``vibration``."""
+        names = ("joint", "order" if family == "ripple" else "frequency", "amplitude", "phase")
+        for name, value in zip(names, (joint, *values), strict=True):
+            key = f"{family}_{name}"
+            self.arrays[key] = np.append(self.arrays[key], value)
+
+    def plant(self) -> Plant:
+        """Freeze the plant."""
+        a = self.arrays
+        coupled = bool(np.any(a["coupling_viscous"]) or np.any(a["coupling_coulomb"]))
+        dry = (
+            (a["friction"][:, 0] != 0.0)
+            | (a["stribeck_amplitude"] != 0.0)
+            | (a["signed_sine"] != 0.0)
+            | (a["efficiency"] < 1.0)
+        )
+        seen = np.any(a["coupling_coulomb"] != 0.0, axis=0)
+        matters = (dry & (a["presliding"] == 0.0)) | (seen & (a["presliding"] == 0.0))
+        integers = {"parent", "ripple_joint", "vibration_joint", "signed_sine_of", "swinging_viscous_of"}
+        flags = {"prismatic", "elastic"}
+        values = {}
+        for name in Plant._fields:
+            if name in ("coupled", "direction_matters", "payload_time"):
+                continue
+            kind = np.int64 if name in integers else np.bool_ if name in flags else np.float64
+            values[name] = np.ascontiguousarray(a[name], dtype=kind)
+        return Plant(
+            **values, coupled=coupled, direction_matters=matters, payload_time=float(a["payload_time"])
+        )
+
+    def sensing(self) -> Sensors:
+        """Freeze the sensors."""
+        return Sensors(**{name: np.ascontiguousarray(self.sensors[name], dtype=float) for name in Sensors._fields})
+
+
+def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
+    """Return a draft with no effect and no bodies; the arm fills in the rest."""
+    zero = np.zeros(n)
+    none = np.zeros(0)
+    per_joint = (
+        "constant stribeck_amplitude asymmetry presliding warm_share position_share position_phase spring "
+        "spring_rest elastic stiffness damping width signed_sine swinging_viscous"
+    )
+    arrays: dict[str, NDArray[np.float64]] = {name: zero.copy() for name in per_joint.split()}
+    arrays |= {name: np.ones(n) for name in ("stribeck_velocity", "warm_time", "efficiency")}
+    arrays |= {name: np.zeros((n, n)) for name in ("coupling_viscous", "coupling_coulomb")}
+    arrays |= {name: zero.copy() for name in ("signed_sine_of", "swinging_viscous_of")}
+    for family, second in (("ripple", "order"), ("vibration", "frequency")):
+        arrays |= {f"{family}_{name}": none.copy() for name in ("joint", second, "amplitude", "phase")}
+    arrays["payload_time"] = np.array(np.inf)
+    sensors = {name: zero.copy() for name in ("eccentricity", "eccentricity_order", "eccentricity_phase", "shift")}
+    return PlantDraft(
+        n=n,
+        scale=scale,
+        reduction=reduction,
+        arrays=arrays,
+        sensors=sensors,
+        delay=zero.copy(),
+        gain=np.ones(n),
+        cubic=zero.copy(),
+        drift=zero.copy(),
+        pickup=[],
+    )
