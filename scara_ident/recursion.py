@@ -14,7 +14,6 @@ B = S(dw) + S(w) S(w), by the principle of virtual power the torque of that join
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -23,7 +22,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from scara_ident.errors import RobotError
-from scara_ident.tracing import Expr, Scalar, Trace, cos, sin
+from scara_ident.tracing import Expr, Scalar, Trace, cos, sin, vanishing
 
 Array = NDArray[np.float64]
 Vector = tuple[Scalar, Scalar, Scalar]
@@ -144,7 +143,9 @@ def trace_regressor(
                 entry = masses[row] if parameter == 0 else _entry(parameter, body, z, u)
                 if isinstance(entry, Expr) or entry != 0.0:
                     entries[row, 10 * index + parameter] = entry
-    return trace, entries
+    states = np.random.default_rng(1).uniform(-2.0, 2.0, (3 * nv, 12))
+    zero = vanishing(trace, list(entries.values()), states)
+    return trace, {place: entry for (place, entry), none in zip(entries.items(), zero, strict=True) if not none}
 
 
 class _Body:
@@ -208,86 +209,22 @@ def _entry(parameter: int, body: _Body, z: Vector, u: Vector) -> Scalar:
 
 
 def _turn(joint: JointGeometry, q: Expr | None) -> Callable[[Vector], Vector]:
-    """Return the map of vectors from the parent's orientation into that of a joint.
+    """Return the map of vectors from the parent's orientation into that of a joint turned by q (None: not at all).
 
-    A constant rotation, a turn about one coordinate axis and, for an axis that is not a coordinate axis, another
-    constant rotation; or all as one matrix, where that takes fewer operations a vector. The part of the placement
-    that turns about the joint's axis is added to the angle: this is exact, and a placement written with a rounded
-    pi/2 stays as sparse as one with the true value.
-
-    Parameters
-    ----------
-    joint : JointGeometry
-    q : Expr or None
-        Angle; None for a joint that does not turn.
+    Rodrigues' formula with the placement multiplied in, so that an entry is a constant and multiples of cosine and
+    sine. That costs next to nothing over turns about coordinate axes with constant rotations between them, and a
+    placement written with a rounded pi/2 loses no zero by it.
     """
+    placement = joint.rotation.T
     if q is None:
-        constant = joint.rotation.T
-        return lambda vector: _apply(constant, vector)
-    main = int(np.argmax(np.abs(joint.axis)))
-    direction = 1.0 if joint.axis[main] > 0 else -1.0
-    align = _turn_onto(main, direction * joint.axis)
-    placement = _snap(joint.rotation @ align)
-    twist = math.atan2(*_twist(placement, main))
-    untwisted = _snap(placement @ _rotation(main, twist).T)
-    if _cost(untwisted) < _cost(placement):
-        placement = untwisted
-    else:
-        twist = 0.0
-    angle = direction * q + twist
-    c, s = cos(angle), sin(angle)
-    i, j = (main + 1) % 3, (main + 2) % 3
-
-    def in_steps(vector: Vector) -> Vector:
-        result = list(_apply(placement.T, vector))
-        x, y = result[i], result[j]
-        result[i], result[j] = c * x + s * y, c * y - s * x
-        return _apply(align, (result[0], result[1], result[2]))
-
-    # The whole matrix is fixed + c even + s odd.
-    fixed, even, odd = (_snap(align @ part @ placement.T) for part in _turn_parts(main))
-    if _cost(placement) + _cost(align) + 6 <= _cost(np.abs(fixed) + np.abs(even) + np.abs(odd), entries=True):
-        return in_steps
-    matrix = [
-        _vector(float(fixed[k, m]) + float(even[k, m]) * c + float(odd[k, m]) * s for m in range(3)) for k in range(3)
-    ]
+        return lambda vector: _vector(_dot(_floats(row), vector) for row in placement)
+    x, y, z = joint.axis
+    along = np.outer(joint.axis, joint.axis)
+    across = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+    fixed, even, odd = (_snap(part @ placement).tolist() for part in (along, np.eye(3) - along, across))
+    c, s = cos(q), sin(q)
+    matrix = [_vector(fixed[k][m] + even[k][m] * c + odd[k][m] * s for m in range(3)) for k in range(3)]
     return lambda vector: _vector(_dot(row, vector) for row in matrix)
-
-
-def _turn_parts(main: int) -> tuple[Array, Array, Array]:
-    """Return the parts of a turn's transposed matrix: constant, with the cosine, with the sine."""
-    i, j = (main + 1) % 3, (main + 2) % 3
-    fixed, even, odd = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    fixed[main, main] = even[i, i] = even[j, j] = odd[i, j] = 1.0
-    odd[j, i] = -1.0
-    return fixed, even, odd
-
-
-def _rotation(main: int, angle: float) -> Array:
-    """Rotation about coordinate axis `main`."""
-    fixed, even, odd = _turn_parts(main)
-    return fixed + math.cos(angle) * even - math.sin(angle) * odd
-
-
-def _twist(rotation: Array, main: int) -> tuple[float, float]:
-    """Return sine and cosine, up to a common factor, of the part of a rotation about a coordinate axis."""
-    i, j = (main + 1) % 3, (main + 2) % 3
-    return float(rotation[j, i] - rotation[i, j]), float(rotation[i, i] + rotation[j, j])
-
-
-def _turn_onto(main: int, axis: Array) -> Array:
-    """Return a rotation that takes coordinate axis `main` to the unit vector `axis` (less than half a turn away)."""
-    start = np.eye(3)[main]
-    x, y, z = np.cross(start, axis)
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return _snap(np.eye(3) + skew + skew @ skew / (1.0 + float(start @ axis)))
-
-
-def _cost(matrix: Array, entries: bool = False) -> int:
-    """Count the operations of a product with a vector; `entries`: none of the non-zero ones is a constant."""
-    products = matrix != 0.0
-    sums = int(np.maximum(products.sum(axis=1) - 1, 0).sum())
-    return sums + int((products if entries else products & (np.abs(matrix) != 1.0)).sum())
 
 
 def _snap(values: Array) -> Array:
@@ -321,7 +258,3 @@ def _scaled(x: Vector, factor: Scalar) -> Vector:
 
 def _cross(x: Vector, y: Vector) -> Vector:
     return x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]
-
-
-def _apply(matrix: Array, vector: Vector) -> Vector:
-    return _vector(_dot(_floats(row), vector) for row in matrix)

@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 VAR, SIN, COS, ADD, SUB, MUL, ADD_CONST, MUL_CONST = range(8)
 
 _BINARY = (ADD, SUB, MUL)
-"""Operations on two nodes; those before `MUL` in this tuple are sums."""
+"""Operations on two nodes."""
+_CANCELLED = 1e-13
+"""A sum this small, relative to its terms, is rounding."""
 
 
 class Trace:
@@ -68,10 +70,11 @@ class Expr:
         if other == 0.0:
             return self
         operation, first, second = self.trace.nodes[self.node]
-        constant = self.sign * other
+        constant: float = self.sign * other
         if operation != ADD_CONST:
             return Expr(self.trace, self.trace.node(ADD_CONST, self.node, constant), self.sign)
-        return Expr(self.trace, first, self.sign) + self.sign * (second + constant)
+        total: float = self.sign * (second + constant)
+        return Expr(self.trace, first, self.sign) + total
 
     __radd__ = __add__
 
@@ -104,7 +107,8 @@ class Expr:
             return Expr(trace, self.node, sign)
         operation, first, second = trace.nodes[self.node]
         if operation == MUL_CONST:
-            return Expr(trace, first, sign) * (second * abs(other))
+            factor: float = second * abs(other)
+            return Expr(trace, first, sign) * factor
         return Expr(trace, trace.node(MUL_CONST, self.node, abs(other)), sign)
 
     __rmul__ = __mul__
@@ -128,6 +132,50 @@ def cos(angle: Scalar) -> Scalar:
     return float(np.cos(angle))
 
 
+def vanishing(trace: Trace, values: Sequence[Scalar], inputs: Array) -> list[bool]:
+    """Tell which values are zero at all states although their expressions are not.
+
+    Tracing does not know that cos^2 + sin^2 = 1. A sum that cancels at every one of a few random states, down to
+    the rounding of its terms, cancels always: analytic functions that are not zero are zero almost nowhere.
+
+    Parameters
+    ----------
+    trace : Trace
+    values : sequence of Expr or float
+    inputs : ndarray (inputs, states)
+        Random states.
+
+    Returns
+    -------
+    list of bool
+    """
+    found: list[Array] = []
+    sizes: list[Array] = []
+    one = np.ones(inputs.shape[1])
+    for operation, first, second in trace.nodes:
+        if operation == VAR:
+            value = inputs[first]
+            size = np.abs(value)
+        elif operation in (SIN, COS):
+            value = np.sin(found[first]) if operation == SIN else np.cos(found[first])
+            size = one
+        else:
+            x, size_x = found[first], sizes[first]
+            y, size_y = (found[second], sizes[second]) if operation in _BINARY else (second, abs(second))
+            if operation in (MUL, MUL_CONST):
+                value, size = x * y, size_x * size_y
+            else:
+                value, size = (x - y if operation == SUB else x + y), size_x + size_y
+        found.append(value)
+        sizes.append(size)
+    return [
+        bool(np.all(np.abs(found[value.node]) <= _CANCELLED * sizes[value.node]))
+        if isinstance(value, Expr)
+        else value == 0.0
+        for value in values
+    ]
+
+
 @dataclass(frozen=True, eq=False)
 class Program:
     """Straight-line code that evaluates traced expressions over vectors of samples.
@@ -135,8 +183,8 @@ class Program:
     Attributes
     ----------
     evaluate : callable
-        ``evaluate(inputs, outputs, buffers)``: sequences of equally long vectors. Writes ``outputs[k]`` for every
-        target that the program was compiled for, and uses `buffers` as scratch space.
+        ``evaluate(inputs, outputs, buffers)``: rows are vectors over the samples. Writes row k of `outputs` for
+        every target k that the program was compiled for, and uses `buffers` as scratch space.
     buffers : int
         Number of scratch vectors that it needs.
     operations : int
@@ -145,7 +193,7 @@ class Program:
         The code itself.
     """
 
-    evaluate: Callable[[Sequence[Array], Sequence[Array], Sequence[Array]], None]
+    evaluate: Callable[[Array, Array, Array], None]
     buffers: int
     operations: int
     source: str
@@ -222,7 +270,7 @@ class _Emitter:
             operation, first, second = self.nodes[node]
             if wish.get(node, 1) > 0:
                 continue
-            if operation == ADD or operation == MUL:
+            if operation in (ADD, MUL):
                 for operand in (second, first):
                     if operand not in wish and self.nodes[operand][0] not in (VAR, SIN, COS):
                         wish[operand] = -1

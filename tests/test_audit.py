@@ -300,7 +300,7 @@ def test_an_arm_that_rests_between_motions_without_noise_is_not_called_held_or_f
     [
         (180 / np.pi, "degrees (multiply by pi/180)"),
         (100.0, "the motor's angle (divide by the reduction 100)"),
-        (100 * 180 / np.pi, "the motor's angle in degrees (multiply by pi/180, divide by the reduction 100)"),
+        (100 * 180 / np.pi, "the motor's degrees (multiply by pi/180, divide by the reduction 100)"),
     ],
 )
 def test_positions_in_another_unit_are_refused_with_the_unit_they_look_like(read, factor, looks):
@@ -316,7 +316,7 @@ def test_positions_in_another_unit_are_refused_with_the_unit_they_look_like(read
 def test_motor_turns_and_a_single_joint_in_degrees_are_seen(read):
     made = columns()
     made["joint2.position"] *= 100 / (2 * np.pi)
-    assert "motor turns (multiply by 2 pi" in refusal(read, made)
+    assert "the motor's turns (multiply by 2 pi" in refusal(read, made)
     made = columns()
     made["joint2.position"] *= 180 / np.pi
     message = refusal(read, made)
@@ -391,6 +391,16 @@ def test_an_angle_recorded_within_one_turn_is_unwrapped(read, robot):
     np.testing.assert_allclose(recording.position[0] - recording.position[0, 0], truth - truth[0], atol=1e-12)
 
 
+def test_over_a_gap_an_arm_may_turn(read, robot):
+    endless = replace(robot, lower=np.full(2, -np.inf), upper=np.full(2, np.inf))
+    made = columns()
+    for values in made.values():
+        values[2000:] += 6.4
+    recording = read(made, endless)
+    assert only(recording, "gap").count == 1
+    np.testing.assert_array_equal(recording.position[0], made["joint1.position"])
+
+
 # spikes and jumps
 
 
@@ -412,6 +422,24 @@ def test_wild_positions_are_seen_without_a_velocity_limit(read, robot):
     made = columns()
     made["joint1.position"][1234] = 0.0
     assert only(read(made, bare), "spike").count == 1
+
+
+def test_a_position_far_off_the_arms_own_speed_is_wild_even_where_the_limit_allows_it(read, robot):
+    fast = replace(robot, velocity_limit=np.full(2, 20.0))
+    made = columns()
+    made["joint2.position"][1234] += 0.1
+    assert only(read(made, fast), "spike").count == 1
+
+
+@pytest.mark.parametrize("limit", [3.77, np.inf])
+def test_the_flicker_of_a_coarse_encoder_is_not_wild(read, robot, limit):
+    made = columns()
+    random = np.random.default_rng(4)
+    for joint, resting in (("joint1", True), ("joint2", False)):
+        position = np.full(4000, 0.4) if resting else made[f"{joint}.position"]
+        made[f"{joint}.position"] = 0.005 * np.rint((position + 0.001 * random.standard_normal(4000)) / 0.005)
+    made["joint1.position"][::100] += 0.005
+    assert "spike" not in kinds(read(made, replace(robot, velocity_limit=np.full(2, limit))))
 
 
 def test_many_wild_positions_are_refused(read):

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.audit.samples import GAP_STEPS, Array, Finding, Samples, joint_range, several, speed_limit, unit
+from scara_ident.audit.samples import (
+    GAP_STEPS,
+    IDLE_TRAVEL,
+    Array,
+    Finding,
+    Samples,
+    joint_range,
+    several,
+    speed_limit,
+    unit,
+)
 
 if TYPE_CHECKING:
     from scara_ident.robot import Robot
@@ -28,9 +38,12 @@ OUT = 0.1
 FAST_TOO = 2.0
 # Whole numbers over a range this wide are encoder counts: as degrees they would be three turns.
 COUNTS = 1000.0
+# So many readings are named where several fit, the commonest mistakes first.
+GUESSES = 3
 # What is left of a step of about one turn, rad, when the turn is taken off; arms do less than this in a sample.
 WRAP_REST = 0.5
-# A step is wild where it takes this many times the fastest the arm can go, and this many times its larger steps.
+# A step is wild where it takes this many times the speed of the arm, and is this many times its larger steps and the
+# encoder's count; where the arm hardly moves, a tenth of its velocity limit stands in for its speed.
 WILD = 10.0
 # The larger steps: this percentile of all.
 LARGE_STEP = 90.0
@@ -79,13 +92,12 @@ def position_unit(samples: Samples) -> Checked:
     else:
         seen = f"runs from {low[joint]:.6g} to {high[joint]:.6g} in whole numbers"
     if counts[joint]:
-        full = "metres of travel" if robot.prismatic[joint] else "2 pi / counts of a joint turn"
-        guess = f"it looks like encoder counts ({'scale to' if robot.prismatic[joint] else 'multiply by'} {full})"
+        full = "the travel of a count" if robot.prismatic[joint] else "2 pi / counts of a joint turn"
+        guess = f"it looks like encoder counts (multiply by {full})"
     else:
         readings = _readings(robot, joint, low[joint], high[joint])
         fitting = [r for r in readings if _fits(r, robot, joint, low[joint], high[joint], speed[joint])]
-        fitting.sort(key=lambda reading: -abs(reading.factor))
-        looks = " or ".join(f"{reading.name} ({reading.remedy})" for reading in fitting[:2])
+        looks = " or ".join(f"{reading.name} ({reading.remedy})" for reading in fitting[:GUESSES])
         guess = f"it looks like {looks}" if fitting else "it is in no unit that the audit knows"
     others = [f"{robot.joints[k]}.position" for k in np.flatnonzero(suspect)[1:]]
     also = f" (and {', '.join(others)})" if others else ""
@@ -123,7 +135,7 @@ def whole_turns(samples: Samples) -> Checked:
 
 def spikes(samples: Samples) -> Checked:
     """Leave out single wild positions; refuse many, and positions that jump and stay."""
-    bound = _wild_step(samples)
+    bound = _wild_step(samples, _fastest(samples))
     step = np.abs(np.diff(samples.position, axis=1))
     suspect = np.flatnonzero((step > bound).any(axis=1))
     if not len(suspect):
@@ -140,7 +152,7 @@ def spikes(samples: Samples) -> Checked:
         first = int(np.argmax(spiked[joint]))
         what = (
             f"{column} has {several(int(spiked[joint].sum()), 'wild sample')} "
-            f"(faster than {WILD:g} times what the arm can do, and back), first in {samples.where(first)}"
+            f"(away and back in one step, {WILD:g} times faster than it moves), first in {samples.where(first)}"
         )
         if total > max(SPIKE_ROWS, SPIKE_SHARE * samples.count):
             samples.refuse(f"{what}: too many of {samples.count} to leave out; check the encoder and its cable")
@@ -204,26 +216,29 @@ def _whole(values: Array) -> bool:
 
 
 def _readings(robot: Robot, joint: int, low: float, high: float) -> list[_Reading]:
+    """List how else the numbers of a joint may be meant, the commonest mistakes first."""
     reduction = float(robot.reduction[joint])
     degree = np.pi / 180
     readings = []
     if robot.prismatic[joint]:
         readings.append(_Reading("millimetres", 1e-3, 0.0, "divide by 1000"))
     else:
-        readings.append(_Reading("degrees", degree, 0.0, "multiply by pi/180"))
         bounded = np.isfinite(robot.lower[joint]) and np.isfinite(robot.upper[joint])
         away = (robot.lower[joint] + robot.upper[joint] - low - high) / 2 if bounded else 0.0
         turns = round(away / (2 * np.pi))
         if turns:
             remedy = f"{'add' if turns > 0 else 'subtract'} {abs(turns)} x 2 pi"
             readings.append(_Reading("an angle that is whole turns off", 1.0, 2 * np.pi * turns, remedy))
+        readings.append(_Reading("degrees", degree, 0.0, "multiply by pi/180"))
     if abs(reduction) != 1.0:
         divide = f"divide by the reduction {reduction:g}"
-        readings.append(_Reading("the motor's angle", 1 / reduction, 0.0, divide))
-        readings.append(
-            _Reading("the motor's angle in degrees", degree / reduction, 0.0, f"multiply by pi/180, {divide}")
+        angles = (
+            ("angle", 1.0, ""),
+            ("turns", 2 * np.pi, "multiply by 2 pi, "),
+            ("degrees", degree, "multiply by pi/180, "),
         )
-        readings.append(_Reading("motor turns", 2 * np.pi / reduction, 0.0, f"multiply by 2 pi, {divide}"))
+        for kind, factor, multiply in angles:
+            readings.append(_Reading(f"the motor's {kind}", factor / reduction, 0.0, multiply + divide))
     return readings
 
 
@@ -237,18 +252,24 @@ def _fits(reading: _Reading, robot: Robot, joint: int, low: float, high: float, 
     )
 
 
-def _wild_step(samples: Samples) -> Array:
-    """Size of a step that no arm makes, shape (n, 1) or (n, N - 1)."""
+def _wild_step(samples: Samples, fastest: Array) -> Array:
+    """Size of a step that an arm of `fastest` speeds (n,) does not make, shape (n, N - 1)."""
     step = np.abs(np.diff(samples.position, axis=1))
     large = np.percentile(step, LARGE_STEP, axis=1)
+    count = np.min(step, axis=1, where=step > 0, initial=np.inf)
+    small = np.maximum(large, np.where(np.isfinite(count), count, 0.0))
     # A burst of late samples has short steps in time, but the arm had the usual time to move.
     lasting = np.maximum(np.diff(samples.time), samples.interval)
-    limit = speed_limit(samples.robot)
-    # Without a limit the arm's own speed stands in for it; a joint that rests then has no bound.
-    limit = np.where(np.isfinite(limit), limit, _speed(samples))
-    limit[limit == 0] = np.inf
-    bound: Array = WILD * np.maximum(limit[:, None] * lasting, large[:, None])
+    floor = np.maximum(WILD * small, IDLE_TRAVEL * joint_range(samples.robot))
+    bound: Array = np.maximum(WILD * fastest[:, None] * lasting, floor[:, None])
     return bound
+
+
+def _fastest(samples: Samples) -> Array:
+    """Speed of each joint in this recording, (n,), but no more than its limit and no less than a tenth of that."""
+    limit = speed_limit(samples.robot)
+    speed = _speed(samples)
+    return np.where(np.isfinite(limit), np.clip(speed, limit / WILD, limit), speed)
 
 
 def _stands_out(values: Array, wild: NDArray[np.bool_], bound: Array) -> NDArray[np.bool_]:
@@ -264,9 +285,8 @@ def _stands_out(values: Array, wild: NDArray[np.bool_], bound: Array) -> NDArray
 
 def _refuse_jump(samples: Samples) -> None:
     step = np.abs(np.diff(samples.position, axis=1))
-    bound = _wild_step(samples)
-    known = np.isfinite(speed_limit(samples.robot))
-    jump = (step > bound) & known[:, None]
+    # Of a joint without a velocity limit nobody can say what it may not do.
+    jump = step > _wild_step(samples, speed_limit(samples.robot))
     if not jump.any():
         return
     joint = int(np.argmax(jump.any(axis=1)))

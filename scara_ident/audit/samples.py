@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 IDLE_TRAVEL = 1e-3
 
 
-# A longer step in time, in median steps, is a gap, over which nothing is interpolated (motion.py cuts recordings there).
+# A longer step in time, in median steps, is a gap: nothing is interpolated over it (motion.py cuts recordings there).
 GAP_STEPS = 5.0
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.indri2002.model import LINK_LENGTH, PARAMETERS, friction
+from scara_ident.indri2002.model import LINK_LENGTH, PARAMETERS
 from scara_ident.indri2002.report import Check, inequality, information
 from scara_ident.indri2002.tables import TABLE_1, TRAJECTORIES, VELOCITY_LIMIT, table5_parameters
 
@@ -124,19 +125,32 @@ def least_friction(coefficients: NDArray[np.float64], top: float) -> tuple[float
     zero : float or None
         Speed at which it first falls below 0, rad/s; None where it does not.
     """
-    polynomial = np.polynomial.Polynomial(coefficients)
 
-    def real(roots: NDArray[np.complex128]) -> NDArray[np.float64]:
-        inside = roots[np.abs(roots.imag) < 1e-9 * (1.0 + np.abs(roots))].real
-        return inside[(inside > 0.0) & (inside < top)]
+    def at(speed: float) -> float:
+        a0, a1, a2, a3 = (float(value) for value in coefficients)
+        # Just above standstill the friction is a_0; at it, where sign is 0, it would be 0.
+        return a0 + speed * (a1 + speed * (a2 + speed * a3))
 
-    turning = real(np.asarray(polynomial.deriv().roots(), dtype=np.complex128))
-    # The friction just above standstill is a_0; sign(0) would make it 0.
-    speeds = np.concatenate([turning, [top]])
-    least = float(min(coefficients[0], *friction(speeds, coefficients)))
-    if least >= 0.0:
-        return least, None
-    if coefficients[0] < 0.0:
+    # Between these speeds the friction only rises or only falls.
+    stops = [0.0, *_turning_speeds(coefficients, top), top]
+    least = min(at(speed) for speed in stops)
+    if at(0.0) < 0.0:
         return least, 0.0
-    crossings = real(np.asarray(polynomial.roots(), dtype=np.complex128))
-    return least, float(crossings.min()) if crossings.size else top
+    for low, high in itertools.pairwise(stops):
+        if at(high) < 0.0:
+            while low < (middle := 0.5 * (low + high)) < high:
+                low, high = (low, middle) if at(middle) < 0.0 else (middle, high)
+            return least, high
+    return least, None
+
+
+def _turning_speeds(coefficients: NDArray[np.float64], top: float) -> list[float]:
+    """Speeds inside (0, top) where the slope a_1 + 2 a_2 v + 3 a_3 v^2 is 0, ascending."""
+    c, b, a = (float(k * coefficients[k]) for k in (1, 2, 3))
+    discriminant = b * b - 4.0 * a * c
+    if discriminant < 0.0:
+        return []
+    # The form that does not cancel; each root is a quotient that may be undefined.
+    q = -0.5 * (b + np.copysign(np.sqrt(discriminant), b))
+    roots = {num / den for num, den in ((q, a), (c, q)) if abs(num) < top * abs(den)}
+    return sorted(root for root in roots if root > 0.0)

@@ -107,8 +107,6 @@ def _friction(plant, room, t, theta, omega, mode, dahl, start):  # type: ignore[
             way = theta[j] - start[j]
             end = 1.0 if way > 0.0 else (-1.0 if way < 0.0 else 0.0)
             room.direction[j] = end - (end - dahl[j]) * np.exp(-abs(way) / plant.presliding[j])
-            if end == 0.0:
-                room.direction[j] = dahl[j]
         else:
             room.direction[j] = side
         f = plant.friction[j]

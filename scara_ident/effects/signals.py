@@ -1,0 +1,123 @@
+"""What effects are made of: signals of a stretch of motion, computed once for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.model import TorqueModel
+from scara_ident.motion import Motion
+from scara_ident.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """The robot, its base model and the present estimate, and how far the recordings reach.
+
+    Attributes
+    ----------
+    model : TorqueModel
+        The base model.
+    value : ndarray, shape (p,)
+        Present estimate of its parameters.
+    duration : float
+        Longest recording, s.
+    rate : float
+        Lowest sample rate, Hz.
+    band : float
+        Highest band in use, Hz.
+    travel : ndarray, shape (n,)
+        Range of each joint's position over all recordings.
+    speed : ndarray, shape (n,)
+        Largest speed of each joint over all recordings.
+    start : Mapping[str, float]
+        Time of the first sample of every recording, s.
+    """
+
+    model: TorqueModel
+    value: Array
+    duration: float
+    rate: float
+    band: float
+    travel: Array
+    speed: Array
+    start: dict[str, float]
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.model.robot
+
+    def armature(self, joint: int) -> float | None:
+        """Armature N^2 Jm of a joint where the data tell it apart from the links, else None."""
+        term = self.model.rigid_body
+        wanted = 10 * self.robot.n + joint
+        for place, k in enumerate(term.kept):
+            row = term.base.grouping[k]
+            if int(term.base.kept[k]) == wanted and np.count_nonzero(row) == 1:
+                return float(self.value[self.model.place(term)][place])
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Signals of a stretch of motion; rows are joints in the order of the robot, N samples."""
+
+    scene: Scene
+    motion: Motion
+
+    @cached_property
+    def time(self) -> Array:
+        """Seconds since the recording began, shape (N,)."""
+        return self.motion.time - self.scene.start.get(self.motion.name, float(self.motion.time[0]))
+
+    @cached_property
+    def sign(self) -> Array:
+        """Direction of motion in the drive's direction, shape (n, N)."""
+        return self.scene.robot.drive_sign[:, None] * np.sign(self.motion.v)
+
+    @cached_property
+    def predicted(self) -> Array:
+        """Recorded torque as the base model predicts it, shape (n, N)."""
+        return np.einsum("jpn,p->jn", self.scene.model.regressor(self.motion), self.scene.value)
+
+    @cached_property
+    def rigid(self) -> Array:
+        """Torque of links and rotors as the base model predicts it, recorded side, shape (n, N)."""
+        model = self.scene.model
+        term = model.rigid_body
+        return np.einsum("jpn,p->jn", term.regressor(self.motion), self.scene.value[model.place(term)])
+
+    def load(self, joint: int, armature: float | None = None) -> Array:
+        """Torque that the gear of a joint transmits, recorded side, shape (N,): rigid torque without the own rotor's.
+
+        Parameters
+        ----------
+        joint : int
+        armature : float, optional
+            N^2 Jm where the data do not tell it; by default what they tell, else its nominal value.
+        """
+        robot = self.scene.robot
+        if armature is None:
+            armature = self.scene.armature(joint)
+        if armature is None:
+            armature = float(robot.reduction[joint] ** 2 * robot.rotor_inertia[joint])
+        return self.rigid[joint] - robot.row_scale[joint] * armature * self.motion.a[joint]
+
+    @cached_property
+    def motor_turns(self) -> Array:
+        """Motor angle in rad of each joint, N q, shape (n, N)."""
+        return self.scene.robot.reduction[:, None] * self.motion.q
+
+    def row(self, joint: int, columns: Sequence[Array]) -> Array:
+        """Return columns that act on one joint, shape (n, k, N)."""
+        result = np.zeros((self.scene.robot.n, len(columns), self.motion.samples))
+        for k, column in enumerate(columns):
+            result[joint, k] = column
+        return result
