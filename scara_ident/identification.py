@@ -114,7 +114,7 @@ def identify(
         raise UsageError(f"method {method!r}: expected one of {', '.join(METHODS)}")
     _check_held_out(recordings, validation)
     equation = build_model(robot, model) if isinstance(model, str) else model
-    notes = [note for recording in (*recordings, *validation) for note in _notes(recording)]
+    notes = _notes((*recordings, *validation))
     if bands is None:
         progress("choosing the bands")
         choice = choose_bands(equation, recordings)
@@ -154,18 +154,27 @@ def _check_held_out(recordings: Sequence[Recording], validation: Sequence[Record
             raise UsageError(f"{recording.path}: given to fit and to validate; a validation recording must be held out")
 
 
-def _notes(recording: Recording) -> list[str]:
-    found = [f"{recording.name}: {finding.message}" for finding in recording.findings]
-    longest = max(stretches(recording), key=lambda part: len(part.time))
-    # One line for all joints that have the same trouble.
-    verdicts: dict[str, list[str]] = {}
-    for audit in audit_velocity(recording, longest):
-        verdict = audit.verdict(longest.rate)
-        if verdict is not None:
-            verdicts.setdefault(verdict, []).append(audit.joint)
-    for verdict, joints in verdicts.items():
-        found.append(f"{recording.name}: recorded velocity of {', '.join(joints)} is not used: {verdict}")
-    return found
+def _notes(recordings: Sequence[Recording]) -> list[str]:
+    """Return what the audits found, the same remark on many recordings in one line."""
+    found: dict[str, list[str]] = {}
+    for recording in recordings:
+        remarks = [finding.message for finding in recording.findings]
+        longest = max(stretches(recording), key=lambda part: len(part.time))
+        verdicts: dict[str, list[str]] = {}
+        for audit in audit_velocity(recording, longest):
+            verdict = audit.verdict(longest.rate)
+            if verdict is not None:
+                verdicts.setdefault(verdict, []).append(audit.joint)
+        remarks += [
+            f"recorded velocity of {', '.join(joints)} is not used: {verdict}" for verdict, joints in verdicts.items()
+        ]
+        for remark in remarks:
+            found.setdefault(remark, []).append(recording.name)
+    return [f"{_listed(names)}: {remark}" for remark, names in found.items()]
+
+
+def _listed(names: Sequence[str], most: int = 3) -> str:
+    return ", ".join(names) if len(names) <= most else f"{names[0]} and {len(names) - 1} more recordings"
 
 
 def undetermined(identification: Identification) -> list[str]:

@@ -30,8 +30,8 @@ class Information:
 
     Attributes
     ----------
-    factor : ndarray, shape (p + 1, p + 1)
-        Upper triangular; ``factor.T @ factor`` equals ``[W | u].T @ [W | u]``.
+    factor : ndarray, shape (k, p + 1)
+        Upper triangular with at most p + 1 rows; ``factor.T @ factor`` equals ``[W | u].T @ [W | u]``.
     rows : float
         Number of rows (of equal weight 1) that it stands for.
     """
@@ -70,13 +70,13 @@ class Information:
 
     @property
     def regressor_factor(self) -> Array:
-        """R of the regressor alone, shape (p, p)."""
-        return self.factor[:-1, :-1]
+        """R of the regressor alone, shape (p, p), with fewer rows where there were fewer."""
+        return self.factor[: self.parameters, :-1]
 
     @property
     def projected_torque(self) -> Array:
-        """Torque seen through the regressor's range, shape (p,): the right-hand side that goes with R."""
-        return self.factor[:-1, -1]
+        """Torque seen through the regressor's range: the right-hand side of `regressor_factor`."""
+        return self.factor[: self.parameters, -1]
 
     def absorb(self, regressor: Array, torque: Array, *, decay: float = 1.0) -> Information:
         """Return this information with more rows.
@@ -136,10 +136,10 @@ class Information:
         if np.any(entering):
             scaled = r[:, entering] / size[entering]
             left, singular, right = np.linalg.svd(scaled)
-            known = singular > UNDETERMINED * singular[0]
-            seen = right[known].T / singular[known] @ (left[:, : len(singular)][:, known].T @ self.projected_torque)
+            known = int(np.count_nonzero(singular > UNDETERMINED * singular[0]))
+            seen = right[:known].T / singular[:known] @ (left[:, :known].T @ self.projected_torque)
             value[entering] = seen / size[entering]
-            blind = right[~known].T
+            blind = right[known:].T
             undetermined[entering] = np.linalg.norm(blind, axis=1) > np.sqrt(UNDETERMINED)
             spread = np.zeros((self.parameters, blind.shape[1]))
             spread[entering] = blind / size[entering][:, None]
@@ -153,7 +153,7 @@ class Information:
         entering = size > 0.0
         result = np.zeros((self.parameters, self.parameters))
         if np.any(entering):
-            _, singular, right = np.linalg.svd(r[:, entering] / size[entering])
+            _, singular, right = np.linalg.svd(r[:, entering] / size[entering], full_matrices=False)
             known = singular > UNDETERMINED * singular[0]
             half = right[known].T / singular[known] / size[entering][:, None]
             result[np.ix_(entering, entering)] = half @ half.T
@@ -189,7 +189,10 @@ class Information:
         return float((singular[0] / singular[-1]) ** 2)
 
     def _singular(self) -> Array:
-        return np.asarray(np.linalg.svd(self.regressor_factor, compute_uv=False))
+        singular = np.zeros(self.parameters)
+        found = np.linalg.svd(self.regressor_factor, compute_uv=False)
+        singular[: len(found)] = found
+        return singular
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,11 +230,7 @@ def merge(parts: Iterable[Information]) -> Information:
 
 
 def _triangular(rows: Array) -> Array:
-    """Triangular factor of rows, square also where there are fewer rows than columns."""
-    size = rows.shape[1]
-    factor = np.linalg.qr(rows, mode="r")
-    if factor.shape[0] == size:
-        return np.asarray(factor)
-    full = np.zeros((size, size))
-    full[: factor.shape[0]] = factor
-    return full
+    """Triangular factor of rows; rows that are fewer than the columns are kept as they are."""
+    if rows.shape[0] <= rows.shape[1] and rows.shape[0] <= 1:
+        return rows
+    return np.asarray(np.linalg.qr(rows, mode="r"))

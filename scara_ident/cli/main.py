@@ -12,6 +12,7 @@ import typer
 from scara_ident.cli.base import base
 from scara_ident.cli.console import errors_console
 from scara_ident.cli.identify import identify
+from scara_ident.cli.paper import paper
 
 from scara_ident.errors import ScaraIdentError
 
@@ -42,7 +43,7 @@ def program(
     """Identify the dynamic model of a robot arm from measured motion, and find what the model lacks."""
 
 
-_COMMANDS: tuple[Callable[..., Any], ...] = (identify, base)
+_COMMANDS: tuple[Callable[..., Any], ...] = (identify, base, paper)
 for _command in _COMMANDS:
     app.command()(_command)
 

@@ -1,0 +1,9 @@
+"""All effects that the diagnosis tries, in one list."""
+
+from __future__ import annotations
+
+from scara_ident.effects.effect import Effect
+from scara_ident.effects.gear import TransmissionLoss
+from scara_ident.effects.position import Spring
+
+CATALOGUE: tuple[Effect, ...] = (TransmissionLoss(), Spring())
