@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from scara_ident.errors import RobotError
 
@@ -16,7 +16,13 @@ def _not_zero(value: float) -> float:
     return value
 
 
-Finite = Annotated[float, Field(allow_inf_nan=False, strict=False)]
+def _no_truth_value(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise ValueError("expected a number (YAML takes yes, no, on and off for truth values)")
+    return value
+
+
+Finite = Annotated[float, Field(allow_inf_nan=False, strict=False), BeforeValidator(_no_truth_value)]
 NonZero = Annotated[Finite, AfterValidator(_not_zero)]
 
 
@@ -70,7 +76,8 @@ def read_description(path: Path) -> RobotDescription:
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f", line {mark.line + 1}" if mark else ""
-        raise RobotError(f"{path}{where}: not YAML: {getattr(error, 'problem', error)}") from None
+        reason = " ".join(str(getattr(error, "problem", error)).split())
+        raise RobotError(f"{path}{where}: not YAML: {reason}") from None
     if not isinstance(content, dict):
         raise RobotError(f"{path}: expected a mapping with the key urdf, found {type(content).__name__}")
     try:

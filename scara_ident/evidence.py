@@ -103,7 +103,7 @@ def gather(model: TorqueModel, recording: Recording, bands: Sequence[float | Non
     steps = [1] * model.robot.n
     for stretch in stretches(recording):
         samples += len(stretch.time)
-        trim = _trim(stretch, bands)
+        trim = trim_of(stretch, bands)
         ends += min(2 * trim, len(stretch.time)) / stretch.rate
         if len(stretch.time) <= 2 * trim + 1:
             continue
@@ -190,7 +190,7 @@ def row_step(rate: float, band: float | None) -> int:
     return 1 if band is None else max(1, int(rate / (ROWS_PER_PERIOD * band)))
 
 
-def _trim(stretch: Stretch, bands: Sequence[float | None]) -> int:
+def trim_of(stretch: Stretch, bands: Sequence[float | None]) -> int:
     slowest = min((band for band in bands if band is not None), default=None)
     return 1 if slowest is None else max(1, int(np.ceil(END_PERIODS * stretch.rate / slowest)))
 

@@ -176,23 +176,25 @@ class Information:
 
     def log_det(self) -> float:
         """Return ln det(W.T W), -inf where W does not have full rank (J_d of Indri et al. 2002)."""
-        singular = self._singular()
-        if singular.size == 0 or singular[-1] == 0.0:
+        size = np.linalg.norm(self.regressor_factor, axis=0)
+        if not self._full_rank(size):
             return -np.inf
-        return float(2.0 * np.sum(np.log(singular)))
+        singular = np.linalg.svd(self.regressor_factor / size, compute_uv=False)
+        return float(2.0 * (np.sum(np.log(singular)) + np.sum(np.log(size))))
 
     def condition(self) -> float:
         """Return cond(W.T W), inf where W does not have full rank (J_k of Indri et al. 2002)."""
-        singular = self._singular()
-        if singular.size == 0 or singular[-1] == 0.0:
+        if not self._full_rank(np.linalg.norm(self.regressor_factor, axis=0)):
             return np.inf
+        singular = np.linalg.svd(self.regressor_factor, compute_uv=False)
         return float((singular[0] / singular[-1]) ** 2)
 
-    def _singular(self) -> Array:
-        singular = np.zeros(self.parameters)
-        found = np.linalg.svd(self.regressor_factor, compute_uv=False)
-        singular[: len(found)] = found
-        return singular
+    def _full_rank(self, size: Array) -> bool:
+        # As in `solve`: rounding leaves a zero singular value at 1e-16 of the largest, not at 0.
+        if size.size == 0 or np.any(size == 0.0):
+            return False
+        singular = np.linalg.svd(self.regressor_factor / size, compute_uv=False)
+        return bool(singular[-1] > UNDETERMINED * singular[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,10 @@ PARAMETERS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"
 _KINDS = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
 """Mass, first moment, inertia: parameters whose columns have one unit."""
 _CHUNK = 4096
+"""Samples at a time: few enough for the cache, enough to hide the cost of a call.
+
+Two threads over the chunks gain nothing at this size, since every operation takes the interpreter's lock.
+"""
 _TOLERANCE = 1e-10
 _SMALLEST_SCALE = 1e-3
 _NOTHING = 1e-9

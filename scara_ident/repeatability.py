@@ -52,7 +52,7 @@ def _scatter(group: Sequence[Recording]) -> Array | None:
         other = max(stretches(recording), key=lambda part: len(part.time))
         if abs(other.rate / first.rate - 1.0) > 1e-3:
             continue
-        shift = _shift(first.position, other.position, round(LARGEST_SHIFT * first.rate))
+        shift = alignment(first.position, other.position, round(LARGEST_SHIFT * first.rate))
         if shift is None or other.torque is None:
             continue
         aligned.append(np.roll(other.torque, shift, axis=1)[:, : first.position.shape[1]])
@@ -64,7 +64,7 @@ def _scatter(group: Sequence[Recording]) -> Array | None:
     return np.asarray(np.sqrt(np.mean(np.var(stack, axis=0, ddof=1), axis=1)))
 
 
-def _shift(reference: Array, other: Array, largest: int) -> int | None:
+def alignment(reference: Array, other: Array, largest: int) -> int | None:
     """Samples by which ``other`` must move to lie on ``reference``, None if it is another motion."""
     length = min(reference.shape[1], other.shape[1])
     if length < 4:

@@ -134,7 +134,7 @@ def load_robot(path: Path | str | None = None) -> Robot:
         return build_robot(RobotDescription(urdf=embedded_urdf(), effort_side="motor"), embedded_urdf())
     source = Path(path)
     if source.suffix.lower() in (".urdf", ".xml"):
-        return build_robot(RobotDescription(urdf=source.resolve()), source)
+        return build_robot(RobotDescription(urdf=source.resolve(), effort_side="joint"), source)
     return build_robot(read_description(source), source)
 
 
@@ -285,8 +285,9 @@ def _unknown_joint(name: str, movable: Sequence[str], tree: ElementTree.Element)
     everything = {joint.get("name"): joint.get("type") for joint in tree.findall("joint")}
     if name in everything:
         return f"a {everything[name]} joint cannot be identified; the movable joints are {_listed(movable)}"
-    near = get_close_matches(name, movable, n=1)
-    hint = f"did you mean {near[0]}?" if near else f"it has {_listed(movable)}"
+    lower = {other.lower(): other for other in movable}
+    near = get_close_matches(name.lower(), lower, n=1)
+    hint = f"did you mean {lower[near[0]]}?" if near else f"it has {_listed(movable)}"
     return f"the URDF has no such joint; {hint}"
 
 
@@ -366,7 +367,7 @@ def _actuator_numbers(tree: ElementTree.Element, urdf: Path, tags: Sequence[str]
             try:
                 found[name] = float(texts[0] or "")
             except ValueError:
-                raise RobotError(
-                    f"{urdf}: transmission of {name}: {tags[0]} is {texts[0]!r}; expected a number"
-                ) from None
+                found[name] = np.nan
+            if not np.isfinite(found[name]):
+                raise RobotError(f"{urdf}: transmission of {name}: {tags[0]} is {texts[0]!r}; expected a number")
     return found

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from scara_ident.motion import Motion
 from scara_ident.robot import Robot
+from scara_ident.terms.constraints import BrakingPolynomial, Constraint
 from scara_ident.terms.term import Column, per_speed
 
 _WORDS = ("Coulomb", "viscous", "quadratic", "cubic")
@@ -56,6 +57,20 @@ class Friction:
     def pattern(self) -> NDArray[np.bool_]:
         """Each joint's friction acts on that joint only."""
         return np.repeat(np.eye(self.robot.n, dtype=bool), len(self.powers), axis=1)
+
+    def constraints(self) -> tuple[Constraint, ...]:
+        """Return that every joint's friction brakes and leaves the motor able to reach the velocity limit."""
+        k = len(self.powers)
+        return tuple(
+            BrakingPolynomial(
+                joint=joint,
+                columns=tuple(range(i * k, (i + 1) * k)),
+                powers=self.powers,
+                speed=float(self.robot.velocity_limit[i]),
+                limit=float(self.robot.torque_limit[i]),
+            )
+            for i, joint in enumerate(self.robot.joints)
+        )
 
     def regressor(self, motion: Motion) -> NDArray[np.float64]:
         """Return the columns on a stretch of motion, shape (n, p, N)."""

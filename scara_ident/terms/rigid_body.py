@@ -12,6 +12,7 @@ from scara_ident.base_parameters import BaseParameters, find_base_parameters
 from scara_ident.motion import Motion
 from scara_ident.regressor import RegressorKernel, build_kernel
 from scara_ident.robot import Robot
+from scara_ident.terms.constraints import Constraint, RealBodies
 from scara_ident.terms.term import Column
 
 # The SCARA of Indri et al. 2002 and its P_d (equation 2), told by what the reduction finds.
@@ -47,6 +48,10 @@ class RigidBody:
     def name(self) -> str:
         """Name of the term."""
         return "rigid_body"
+
+    def constraints(self) -> tuple[Constraint, ...]:
+        """Return that the columns belong to bodies that can exist."""
+        return (RealBodies(),)
 
     def regressor(self, motion: Motion) -> NDArray[np.float64]:
         """Return the columns on a stretch of motion, shape (n, p, N), on the side of the recorded torque."""

@@ -140,6 +140,14 @@ class VirtualArm:
             raise UsageError(f"{self.robot.name} has no joint {name!r}; its joints are {', '.join(self.robot.joints)}")
         return self.robot.joints.index(name)
 
+    def link_inertia(self) -> Array:
+        """Return the diagonal of the links' mass matrix at the neutral pose, without rotors, shape (n,)."""
+        from scara_ident.virtual.spatial import mass_and_bias
+
+        zero = np.zeros(self.robot.n)
+        mass, _ = mass_and_bias(self.robot.model, self.bodies[np.argsort(self.robot.order)], zero, zero)
+        return np.asarray(np.diag(mass)[self.robot.order])
+
     def draft(self) -> PlantDraft:
         """Return the arm without effects as arrays of the loop, Pinocchio's order, joint side."""
         from scara_ident.virtual.spatial import check_against_pinocchio, turned_bodies, turned_frames

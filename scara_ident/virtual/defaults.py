@@ -21,8 +21,9 @@ STEPS_PER_JOINT_TURN = 2.0**18
 POLE = 15.0
 # Shares of a usual torque that friction and noise get on an arm of which neither is known.
 COULOMB_SHARE, VISCOUS_SHARE, NOISE_SHARE = 0.08, 0.06, 0.02
-# Rotor inertia of an arm without one: this share of the links' inertia, as strain-wave arms have.
-ROTOR_SHARE = 0.3
+# Rotor inertia of an arm without one, seen at the joint: a share of the links' inertia about it, and at wrists, which
+# hardly have any, of the largest inertia of the arm.
+ROTOR_SHARE, WRIST_SHARE = 0.3, 0.02
 USUAL_ACCELERATION = 3.0
 
 
@@ -44,7 +45,8 @@ def virtual_arm(robot: Robot | None = None) -> VirtualArm:
     robot = load_robot() if robot is None else robot
     mass, gravity = _usual(robot)
     given = robot.reduction**2 * robot.rotor_inertia
-    armature = np.where(given > 0.0, given, ROTOR_SHARE * mass)
+    largest = np.array([mass[robot.prismatic == kind].max() for kind in robot.prismatic])
+    armature = np.where(given > 0.0, given, np.maximum(ROTOR_SHARE * mass, WRIST_SHARE * largest))
     inertia = mass + armature
     scale = np.abs(robot.row_scale) * np.hypot(gravity, inertia * USUAL_ACCELERATION)
     speed = np.where(robot.prismatic, 0.3, 1.0)
@@ -100,14 +102,4 @@ def _usual(robot: Robot) -> tuple[Array, Array]:
 
 
 def _configuration(model: pin.Model, q: Array) -> Array:
-    return pin.integrate(model, pin.neutral(model), q)
-
-
-def link_inertia(arm: VirtualArm) -> Array:
-    """Return the diagonal of the links' mass matrix at the neutral pose, without rotors, shape (n,), kg m^2."""
-    from scara_ident.virtual.spatial import mass_and_bias
-
-    robot = arm.robot
-    zero = np.zeros(robot.n)
-    mass, _ = mass_and_bias(robot.model, arm.bodies[np.argsort(robot.order)], zero, zero)
-    return np.asarray(np.diag(mass)[robot.order])
+    return np.asarray(pin.integrate(model, pin.neutral(model), q))

@@ -15,9 +15,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from scara_ident.virtual.compiled import compiled
+from scara_ident.virtual.plant import Plant
 from scara_ident.virtual.spatial import dynamics
 
 Array = NDArray[np.float64]
@@ -51,8 +52,8 @@ def make_room(n: int) -> Room:
     )  # fmt: skip
 
 
-@njit(cache=True)
-def _solve(matrix, x):  # type: ignore[no-untyped-def]
+@compiled
+def _solve(matrix: Array, x: Array) -> None:
     """Solve in place by elimination with pivoting; n is the number of joints."""
     n = x.shape[0]
     for k in range(n):
@@ -78,30 +79,31 @@ def _solve(matrix, x):  # type: ignore[no-untyped-def]
         x[k] = total / matrix[k, k]
 
 
-@njit(cache=True)
-def _spring_torque(plant, j, stretch, rate):  # type: ignore[no-untyped-def]
+@compiled
+def _spring_torque(plant: Plant, j: int, stretch: float, rate: float) -> float:
     """Torque of an elastic joint; inside the clearance none, and a contact cannot pull."""
     half = 0.5 * plant.width[j]
+    damper = plant.damping[j] * rate
+    torque = 0.0
     if half == 0.0:
-        return plant.stiffness[j] * stretch + plant.damping[j] * rate
-    if stretch > half:
-        return max(0.0, plant.stiffness[j] * (stretch - half) + plant.damping[j] * rate)
-    if stretch < -half:
-        return min(0.0, plant.stiffness[j] * (stretch + half) + plant.damping[j] * rate)
-    return 0.0
+        torque = plant.stiffness[j] * stretch + damper
+    elif stretch > half:
+        torque = max(0.0, plant.stiffness[j] * (stretch - half) + damper)
+    elif stretch < -half:
+        torque = min(0.0, plant.stiffness[j] * (stretch + half) + damper)
+    return torque
 
 
-@njit(cache=True)
-def _friction(plant, room, t, theta, omega, mode, dahl, start):  # type: ignore[no-untyped-def]
+@compiled
+def _friction(
+    plant: Plant, room: Room, t: float, theta: Array, omega: Array, mode: Array, dahl: Array, start: Array
+) -> None:
     """Fill the torques that do not depend on acceleration: ``smooth``, ``dry`` and ``direction``."""
     n = theta.shape[0]
     for j in range(n):
         w = omega[j]
         speed = abs(w)
-        if plant.direction_matters[j]:
-            side = mode[j]
-        else:
-            side = 1.0 if w > 0.0 else (-1.0 if w < 0.0 else 0.0)
+        side = mode[j] if plant.direction_matters[j] else np.sign(w)
         if plant.presliding[j] > 0.0:
             # The exact solution of Dahl's equation over the way gone since the step began.
             way = theta[j] - start[j]
@@ -131,10 +133,7 @@ def _friction(plant, room, t, theta, omega, mode, dahl, start):  # type: ignore[
         for j in range(n):
             for k in range(n):
                 w = omega[k]
-                if plant.direction_matters[k]:
-                    side = mode[k]
-                else:
-                    side = 1.0 if w > 0.0 else (-1.0 if w < 0.0 else 0.0)
+                side = mode[k] if plant.direction_matters[k] else np.sign(w)
                 room.smooth[j] += plant.coupling_viscous[j, k] * w + plant.coupling_coulomb[j, k] * side
     for i in range(plant.ripple_joint.shape[0]):
         j = plant.ripple_joint[i]
@@ -145,18 +144,30 @@ def _friction(plant, room, t, theta, omega, mode, dahl, start):  # type: ignore[
         room.smooth[plant.vibration_joint[i]] += plant.vibration_amplitude[i] * np.sin(angle)
 
 
-@njit(cache=True)
-def _loss(plant, j, load, direction):  # type: ignore[no-untyped-def]
+@compiled
+def _loss(plant: Plant, j: int, load: float, direction: float) -> float:
     """Drive torque per load: 1/eta where the motor drives, eta where it is driven, in between while presliding."""
-    eta = plant.efficiency[j]
-    if eta == 1.0:
-        return 1.0
+    eta: float = plant.efficiency[j]
     share = 1.0 / eta - 1.0 if load * direction > 0.0 else eta - 1.0
     return 1.0 + share * abs(direction)
 
 
-@njit(cache=True)
-def accelerate(plant, room, t, q, v, theta, omega, mode, dahl, start, drive, a, alpha):  # type: ignore[no-untyped-def]
+@compiled
+def accelerate(
+    plant: Plant,
+    room: Room,
+    t: float,
+    q: Array,
+    v: Array,
+    theta: Array,
+    omega: Array,
+    mode: Array,
+    dahl: Array,
+    start: Array,
+    drive: Array,
+    a: Array,
+    alpha: Array,
+) -> None:
     """Fill the accelerations of links ``a`` and drives ``alpha``, and ``room.load``, at fixed modes.
 
     Parameters
@@ -203,6 +214,12 @@ def accelerate(plant, room, t, q, v, theta, omega, mode, dahl, start, drive, a, 
                     room.matrix[j, k] = m * room.mass[j, k]
                 room.matrix[j, j] += plant.armature[j]
                 a[j] = drive[j] - room.smooth[j] - room.dry[j] * room.direction[j] - m * room.bias[j]
+        for j in range(n):
+            # A held joint's acceleration is zero; without its column it comes out as exactly that.
+            if plant.direction_matters[j] and mode[j] == 0.0 and not plant.elastic[j]:
+                for k in range(n):
+                    if k != j:
+                        room.matrix[k, j] = 0.0
         _solve(room.matrix, a)
         agreed = True
         for j in range(n):
@@ -229,8 +246,21 @@ def accelerate(plant, room, t, q, v, theta, omega, mode, dahl, start, drive, a, 
             alpha[j] = rest / plant.armature[j]
 
 
-@njit(cache=True)
-def settle(plant, room, t, q, v, theta, omega, mode, dahl, drive, a, alpha):  # type: ignore[no-untyped-def]
+@compiled
+def settle(
+    plant: Plant,
+    room: Room,
+    t: float,
+    q: Array,
+    v: Array,
+    theta: Array,
+    omega: Array,
+    mode: Array,
+    dahl: Array,
+    drive: Array,
+    a: Array,
+    alpha: Array,
+) -> None:
     """Find which joints stick, and the accelerations; ``mode`` is updated.
 
     A standing joint is first held. If the friction that this takes exceeds its bound the joint is let go in that

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from scara_ident.virtual.forces import accelerate, settle
+from scara_ident.virtual.compiled import compiled
+from scara_ident.virtual.forces import Room, accelerate, settle
+from scara_ident.virtual.plant import Plant
 
 Array = NDArray[np.float64]
 
@@ -54,8 +55,8 @@ def make_stages(n: int) -> Stages:
     return Stages(*(np.zeros((4, n)) for _ in range(4)), *(np.zeros(n) for _ in range(8)))
 
 
-@njit(cache=True)
-def _runge_kutta(plant, room, x, s, t, h, drive):  # type: ignore[no-untyped-def]
+@compiled
+def _runge_kutta(plant: Plant, room: Room, x: State, s: Stages, t: float, h: float, drive: Array) -> None:
     """Fill ``s.new_*`` by one step of the classical method; stage 0 is there already."""
     n = x.q.shape[0]
     for stage in range(1, 4):
@@ -88,8 +89,8 @@ def _runge_kutta(plant, room, x, s, t, h, drive):  # type: ignore[no-untyped-def
             s.new_v[j] = s.new_omega[j]
 
 
-@njit(cache=True)
-def first_stage(plant, room, x, s, t, drive):  # type: ignore[no-untyped-def]
+@compiled
+def first_stage(plant: Plant, room: Room, x: State, s: Stages, t: float, drive: Array) -> None:
     """Fill stage 0 at the state itself, after deciding which standing joints stick."""
     n = x.q.shape[0]
     standing = False
@@ -109,8 +110,8 @@ def first_stage(plant, room, x, s, t, drive):  # type: ignore[no-untyped-def]
         )  # fmt: skip
 
 
-@njit(cache=True)
-def _first_to_stop(plant, x, s):  # type: ignore[no-untyped-def]
+@compiled
+def _first_to_stop(plant: Plant, x: State, s: Stages) -> int:
     """Return the joint whose velocity left its direction earliest in the step, by linear interpolation; -1: none."""
     first, earliest = -1, 2.0
     for j in range(x.q.shape[0]):
@@ -121,8 +122,8 @@ def _first_to_stop(plant, x, s):  # type: ignore[no-untyped-def]
     return first
 
 
-@njit(cache=True)
-def step(plant, room, x, s, t, h, drive):  # type: ignore[no-untyped-def]
+@compiled
+def step(plant: Plant, room: Room, x: State, s: Stages, t: float, h: float, drive: Array) -> int:
     """Advance the state by ``h``; stage 0 must be there. Returns the number of events.
 
     A joint that would change direction within the step is brought to the instant at which it stops (false position

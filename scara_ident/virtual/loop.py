@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from scara_ident.virtual.forces import make_room
-from scara_ident.virtual.integrate import first_stage, make_stages, make_state, step
+from scara_ident.virtual.compiled import compiled
+from scara_ident.virtual.forces import Room, make_room
+from scara_ident.virtual.integrate import Stages, State, first_stage, make_stages, make_state, step
 from scara_ident.virtual.plant import Plant, Sensors
 
 Array = NDArray[np.float64]
@@ -57,8 +57,22 @@ def make_trace(samples: int, n: int) -> Trace:
     return Trace(*(np.empty((samples, n)) for _ in range(12)))
 
 
-@njit(cache=True)
-def _track(plant, sensors, gains, room, x, s, period, substeps, reference, feed, start, controlled, out):  # type: ignore[no-untyped-def]
+@compiled
+def _track(
+    plant: Plant,
+    sensors: Sensors,
+    gains: Gains,
+    room: Room,
+    x: State,
+    s: Stages,
+    period: float,
+    substeps: int,
+    reference: Array,
+    feed: Array,
+    start: Array,
+    controlled: bool,
+    out: Trace,
+) -> int:
     samples, n = out.theta.shape
     integral = start.copy()
     drive = np.zeros(n)
@@ -186,4 +200,6 @@ def velocity_filter(rate: float, cutoff: float, damping: float = 1.0) -> Array:
     """
     c = 1.0 / np.tan(np.pi * cutoff / rate)
     a0 = c * c + 2.0 * damping * c + 1.0
-    return np.array([1.0, 2.0, 1.0, 2.0 - 2.0 * c * c, c * c - 2.0 * damping * c + 1.0]) / a0
+    b = [1.0, 2.0, 1.0]
+    a = [2.0 - 2.0 * c * c, c * c - 2.0 * damping * c + 1.0]
+    return np.array(b + a) / float(a0)

@@ -7,7 +7,7 @@ Rows are in Pinocchio's order of joints. Recorded-side constants are brought to 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,15 +132,13 @@ class PlantDraft:
         matters = (dry & (a["presliding"] == 0.0)) | (seen & (a["presliding"] == 0.0))
         integers = {"parent", "ripple_joint", "vibration_joint", "signed_sine_of", "swinging_viscous_of"}
         flags = {"prismatic", "elastic"}
-        values = {}
+        values: dict[str, Any] = {}
         for name in Plant._fields:
             if name in ("coupled", "direction_matters", "payload_time"):
                 continue
             kind = np.int64 if name in integers else np.bool_ if name in flags else np.float64
             values[name] = np.ascontiguousarray(a[name], dtype=kind)
-        return Plant(
-            **values, coupled=coupled, direction_matters=matters, payload_time=float(a["payload_time"])
-        )
+        return Plant(**values, coupled=coupled, direction_matters=matters, payload_time=float(a["payload_time"]))
 
     def sensing(self) -> Sensors:
         """Freeze the sensors."""

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numba import njit
 from numpy.typing import NDArray
 
 from scara_ident.errors import RobotError
 from scara_ident.recursion import joint_geometry
+from scara_ident.virtual.compiled import compiled
 
 Array = NDArray[np.float64]
 
@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-12
 
 
-@njit(cache=True)
-def _rotate(e, i, x, y, z):  # type: ignore[no-untyped-def]
+@compiled
+def _rotate(e: Array, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     return (
         e[i, 0] * x + e[i, 1] * y + e[i, 2] * z,
         e[i, 3] * x + e[i, 4] * y + e[i, 5] * z,
@@ -30,8 +30,8 @@ def _rotate(e, i, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
-def _rotate_back(e, i, x, y, z):  # type: ignore[no-untyped-def]
+@compiled
+def _rotate_back(e: Array, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     return (
         e[i, 0] * x + e[i, 3] * y + e[i, 6] * z,
         e[i, 1] * x + e[i, 4] * y + e[i, 7] * z,
@@ -39,8 +39,23 @@ def _rotate_back(e, i, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
-def dynamics(parent, prismatic, rotation, offset, bodies, gravity, q, v, mass, bias, e, p, state, composite):  # type: ignore[no-untyped-def]
+@compiled
+def dynamics(
+    parent: NDArray[np.int64],
+    prismatic: NDArray[np.bool_],
+    rotation: Array,
+    offset: Array,
+    bodies: Array,
+    gravity: Array,
+    q: Array,
+    v: Array,
+    mass: Array,
+    bias: Array,
+    e: Array,
+    p: Array,
+    state: Array,
+    composite: Array,
+) -> None:
     """Fill the mass matrix ``mass`` (n, n) and the bias torques ``bias`` (n,): Coriolis, centrifugal, gravity.
 
     Parameters
@@ -253,8 +268,8 @@ def check_against_pinocchio(model: pin.Model, bodies: Array, *, states: int = 3,
         torque = pin.rnea(other, data, full, v, np.zeros(model.nv))
         # Bias torques may cancel to zero; the size of what cancels is the inertia at these speeds.
         size = np.abs(expected).max()
-        worst = max(worst, np.abs(mass - expected).max() / size)
-        worst = max(worst, np.abs(bias - torque).max() / max(size, np.abs(torque).max()))
+        worst = np.maximum(worst, np.abs(mass - expected).max() / size)
+        worst = np.maximum(worst, np.abs(bias - torque).max() / max(size, np.abs(torque).max()))
     if not worst <= TOLERANCE:
         raise RobotError(
             f"{model.name}: the compiled dynamics differ from Pinocchio's by {worst:.1e} relative "
@@ -277,14 +292,7 @@ def with_bodies(model: pin.Model, bodies: Array) -> pin.Model:
 
 def configuration(model: pin.Model, q: Array) -> Array:
     """Return Pinocchio's configuration (nq,) of joint positions (n,): cosine and sine for continuous joints."""
-    result = np.empty(model.nq)
-    for joint in list(model.joints)[1:]:
-        angle = q[joint.idx_v]
-        if joint.nq == 2:
-            result[joint.idx_q : joint.idx_q + 2] = np.cos(angle), np.sin(angle)
-        else:
-            result[joint.idx_q] = angle
-    return result
+    return np.asarray(pin.integrate(model, pin.neutral(model), np.asarray(q)))
 
 
 def _onto(axis: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from difflib import get_close_matches
+from typing import Any
 
 from scara_ident.errors import UsageError
 from scara_ident.virtual.effects.drive import Spring, TorqueRipple, Vibration
@@ -88,7 +89,7 @@ def parse_effect(text: str) -> Effect:
         raise UsageError(f"effect {name!r}: no such effect; {hint}there are {', '.join(EFFECTS)}")
     kind = EFFECTS[name]
     joint: str | None = None
-    values: dict[str, float | bool] = {}
+    values: dict[str, Any] = {}
     for part in rest:
         if "=" not in part:
             if joint is not None or values or not part:
@@ -100,7 +101,7 @@ def parse_effect(text: str) -> Effect:
             if key in values:
                 raise UsageError(f"effect {text!r}: {key} is given twice")
             values[key] = _number(kind, text, key, value)
-    return kind(joint=joint, **values)  # type: ignore[arg-type]
+    return kind(joint=joint, **values)
 
 
 def _number(kind: type[Effect], text: str, key: str, value: str) -> float | bool:

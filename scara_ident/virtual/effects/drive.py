@@ -32,7 +32,7 @@ class TorqueRipple(Effect):
     sensor: bool = False
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """A share of the usual torque."""
+        """Give a share of the usual torque."""
         return {"amplitude": float(0.06 * arm.torque_scale[joint])}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
@@ -56,7 +56,7 @@ class Spring(Effect):
     rest_position: float = 0.3
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """A share of the usual torque over a radian, or over a tenth of a metre."""
+        """Give a share of the usual torque over a radian, or over a tenth of a metre."""
         way = 0.1 if arm.robot.prismatic[joint] else 1.0
         return {"stiffness": float(0.1 * arm.torque_scale[joint]) / way}
 
@@ -84,7 +84,7 @@ class Vibration(Effect):
     phase: float = 0.4
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """A share of the usual torque."""
+        """Give a share of the usual torque."""
         return {"amplitude": float(0.05 * arm.torque_scale[joint])}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:

@@ -70,7 +70,9 @@ class Effect:
             value = getattr(resolved, key)
             low, high = self.bounds.get(key, (-math.inf, math.inf))
             if not math.isfinite(value) or not low <= value <= high:
-                raise UsageError(f"{self.name}: {key} is {value:g}; expected {_range(low, high)}{_unit(self.units[key])}")
+                raise UsageError(
+                    f"{self.name}: {key} is {value:g}; expected {_range(low, high)}{_unit(self.units[key])}"
+                )
         return resolved
 
     def place(self, arm: VirtualArm) -> int:

@@ -27,7 +27,7 @@ class Stribeck(Effect):
     velocity: float = 0.1
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """Half of the Coulomb friction, or a share of the torque where there is none."""
+        """Give half of the Coulomb friction, or a share of the torque where there is none."""
         return {"amplitude": float(0.5 * arm.friction[joint, 0] or 0.05 * arm.torque_scale[joint])}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
@@ -51,7 +51,7 @@ class AsymmetricFriction(Effect):
     viscous_difference: float = BY_ARM
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """Two fifths of the viscous friction."""
+        """Give two fifths of the viscous friction."""
         return {"viscous_difference": float(0.4 * arm.friction[joint, 1] or 0.03 * arm.torque_scale[joint])}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
@@ -134,7 +134,7 @@ class FrictionCoupling(Effect):
     coulomb: float = BY_ARM
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """Small shares of the joint's own friction."""
+        """Give small shares of the joint's own friction."""
         scale = float(arm.torque_scale[joint])
         return {
             "viscous": float(0.3 * arm.friction[joint, 1] or 0.02 * scale),

@@ -42,7 +42,7 @@ class TorqueSensorNonlinearity(Effect):
     cubic: float = BY_ARM
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """A tenth at the usual torque."""
+        """Give a tenth at the usual torque."""
         return {"cubic": float(0.1 / arm.torque_scale[joint] ** 2)}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
@@ -69,7 +69,9 @@ class TorqueGainMismatch(Effect):
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Set the gain."""
         if self.joint == arm.robot.joints[0]:
-            raise UsageError(f"{self.name}: the ratio is to the first joint's scale; name a joint other than {self.joint}")
+            raise UsageError(
+                f"{self.name}: the ratio is to the first joint's scale; name a joint other than {self.joint}"
+            )
         j = self.place(arm)
         vacant(self, draft.gain[j], 1.0)
         draft.gain[j] = self.ratio
@@ -85,7 +87,7 @@ class OffsetDrift(Effect):
     rate: float = BY_ARM
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """A tenth of the usual torque in 10 s."""
+        """Give a tenth of the usual torque in 10 s."""
         return {"rate": float(0.01 * arm.torque_scale[joint])}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
@@ -111,7 +113,7 @@ class EncoderEccentricity(Effect):
     phase: float = 0.2
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """Three thousandths of a motor turn's radian."""
+        """Give three thousandths of a motor turn's radian."""
         return {"amplitude": float(0.003 / abs(arm.robot.reduction[joint]))}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:

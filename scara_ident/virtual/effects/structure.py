@@ -51,7 +51,7 @@ class PayloadChange(Effect):
     time: float = 2.0
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """A fifth of the mass of the last body, 1 kg at least."""
+        """Give a fifth of the mass of the last body, 1 kg at least."""
         return {"mass": float(max(0.2 * arm.bodies[np.argmax(arm.robot.order), 0], 1.0))}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:

@@ -17,31 +17,38 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TransmissionLoss(Effect):
-    """A gear of efficiency eta = 1 - loss_coefficient in either direction of power flow.
+    """A gear with the same efficiency eta in both directions of power flow.
 
     With the torque ``tau_l`` that goes through the gear to the link, without the rotor's own inertia, the motor gives
-    ``tau_l / (N eta)`` where it drives (tau_l v > 0) and ``tau_l eta / N`` where it is driven: in either direction
-    the loss coefficient is the share of the torque put into the gear that does not come out of it. With
-    sigma = -ln(eta) the loss is ``(tau_l/N) (cosh(sigma) - 1) + sinh(sigma) |tau_l/N| sign(v)``, so that
-    sinh(sigma), which exceeds the loss coefficient by half its square, is what a column ``|tau_l/N| sign(v)`` finds.
-    At standstill the gear holds within the same bounds.
+    ``tau_l / (N eta)`` where it drives (tau_l v > 0) and ``tau_l eta / N`` where it is driven. Of the transmitted
+    torque the shares 1/eta - 1 and 1 - eta are lost; their mean is the loss coefficient, so that with
+    ``eta = sqrt(1 + c^2) - c``
+
+        u_l = tau_l/N sqrt(1 + c^2) + c |tau_l/N| sign(v)
+
+    exactly, and a column ``|tau_l/N| sign(v)`` finds c. At standstill the gear holds within the same bounds.
     """
 
     name: ClassVar[str] = "transmission_loss"
-    equation: ClassVar[str] = "u_l = tau_l/(N eta) if tau_l v > 0 else tau_l eta/N, eta = 1 - loss_coefficient"
+    equation: ClassVar[str] = "u_l = tau_l/N sqrt(1 + loss_coefficient^2) + loss_coefficient |tau_l/N| sign(v)"
     units: ClassVar[dict[str, str]] = {"loss_coefficient": "1"}
-    bounds: ClassVar[dict[str, tuple[float, float]]] = {"loss_coefficient": (0.0, 0.95)}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"loss_coefficient": (0.0, 5.0)}
     loss_coefficient: float = 0.15
+
+    @property
+    def efficiency(self) -> float:
+        """Share of the torque put in that comes out, in either direction."""
+        return float(np.hypot(1.0, self.loss_coefficient) - self.loss_coefficient)
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Set the efficiency."""
         j = self.place(arm)
         vacant(self, draft.arrays["efficiency"][j], 1.0)
-        draft.arrays["efficiency"][j] = 1.0 - self.loss_coefficient
+        draft.arrays["efficiency"][j] = self.efficiency
 
     def as_dict(self) -> dict[str, Any]:
-        """Add what the column |tau_l| sign(v) should find."""
-        return super().as_dict() | {"equivalent": {"column_coefficient": np.sinh(-np.log1p(-self.loss_coefficient))}}
+        """Add the efficiency."""
+        return super().as_dict() | {"efficiency": self.efficiency}
 
 
 def _needs_rotor(effect: Effect, arm: VirtualArm, draft: PlantDraft, j: int) -> None:
@@ -65,7 +72,7 @@ class JointElasticity(Effect):
     damping_ratio: float = 0.03
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """A resonance of 25 Hz between motor and link."""
+        """Give a resonance of 25 Hz between motor and link."""
         return {"stiffness": float((2 * np.pi * 25.0) ** 2 * _reduced_inertia(arm, joint))}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
@@ -100,7 +107,7 @@ class Backlash(Effect):
     contact_damping_ratio: float = 0.3
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """A contact resonance of 80 Hz."""
+        """Give a contact resonance of 80 Hz."""
         return {"contact_stiffness": float((2 * np.pi * 80.0) ** 2 * _reduced_inertia(arm, joint))}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
@@ -120,7 +127,5 @@ class Backlash(Effect):
 
 def _reduced_inertia(arm: VirtualArm, joint: int) -> float:
     """Reduced mass of rotor and link about a joint, 1/(1/Jr + 1/Jl), the link's at the neutral pose, kg m^2."""
-    from scara_ident.virtual.defaults import link_inertia
-
-    link, rotor = float(link_inertia(arm)[joint]), float(arm.armature[joint])
+    link, rotor = float(arm.link_inertia()[joint]), float(arm.armature[joint])
     return link * rotor / (link + rotor) if rotor > 0.0 else link

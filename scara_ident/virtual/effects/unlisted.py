@@ -28,7 +28,7 @@ class UnlistedSignedSine(Effect):
     amplitude: float = BY_ARM
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """A share of the usual torque."""
+        """Give a share of the usual torque."""
         return {"amplitude": float(0.06 * arm.torque_scale[joint])}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
@@ -49,7 +49,7 @@ class UnlistedSwingingViscous(Effect):
     viscous: float = BY_ARM
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """A share of the usual torque per unit of speed."""
+        """Give a share of the usual torque per unit of speed."""
         return {"viscous": float(0.06 * arm.torque_scale[joint])}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:

@@ -1,0 +1,175 @@
+"""What the rows say for and against each candidate: tests that respect correlation, gain on what was not fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.diagnosis.bank import Stack
+
+Array = NDArray[np.float64]
+
+# A candidate of which less than this share lies outside the model cannot be told from it.
+ABSORBED = 1e-6
+WEAK = 5e-4
+# A fold that excites a candidate with less than this share of the mean over folds abstains.
+ABSTAIN = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Examination:
+    """Statistics of one candidate, before any decision.
+
+    Attributes
+    ----------
+    value : ndarray, shape (k,)
+        Coefficients when it is added to the model.
+    covariance : ndarray, shape (k, k)
+        Of the coefficients, from block scores.
+    p_value : float
+        That all coefficients are zero; F test with block scores.
+    outside : float
+        Share of the candidate that the model does not span already.
+    gain : float
+        Fall of the weighted sum of squares on the rows it was fitted to, as a share.
+    held_out : float
+        The same with its coefficients fitted to the other folds; the model's own parameters are fitted to all, so
+        that a fold which they cannot be fitted without does not speak against a candidate.
+    fold_gains : tuple of float or None
+        Per fold; None where the fold abstains.
+    contribution : float
+        Weighted sum of squares of what it adds.
+    """
+
+    value: Array
+    covariance: Array
+    p_value: float
+    outside: float
+    gain: float
+    held_out: float
+    fold_gains: tuple[float | None, ...]
+    contribution: float
+
+    @property
+    def votes(self) -> tuple[int, int]:
+        """Folds in which it helps, and folds that do not abstain."""
+        voting = [gain for gain in self.fold_gains if gain is not None]
+        return sum(gain > 0.0 for gain in voting), len(voting)
+
+
+def examine(stack: Stack, model: Sequence[int], groups: Sequence[Sequence[int]]) -> list[Examination]:
+    """Examine candidates beside a model.
+
+    Parameters
+    ----------
+    stack : Stack
+    model : sequence of int
+        Columns that are in the model.
+    groups : sequence of sequence of int
+        Columns of each candidate.
+
+    Returns
+    -------
+    list of Examination
+    """
+    columns = sorted({k for group in groups for k in group})
+    place = {k: i for i, k in enumerate(columns)}
+    wanted = [*columns, stack.rows.shape[1] - 1]
+    whole = np.linalg.qr(np.vstack(stack.fold_factors), mode="r")
+    sums = _sums(whole, model, wanted)
+    residual = stack.rows[:, wanted] - stack.rows[:, model] @ sums
+    sizes = np.sum(stack.rows[:, wanted] ** 2, axis=0)
+    # What is left of a column that the model spans is rounding, and must not be scaled up.
+    residual[:, np.sum(residual**2, axis=0) < ABSORBED * sizes] = 0.0
+    folds = [factor[:, wanted] - factor[:, model] @ sums for factor in stack.fold_factors]
+    return [_examine_one(stack, residual, sizes, folds, [place[k] for k in group], len(model)) for group in groups]
+
+
+def _sums(factor: Array, model: Sequence[int], wanted: Sequence[int]) -> Array:
+    """Return the sums of the model's columns that explain each wanted column best."""
+    basis = factor[:, model]
+    size = np.linalg.norm(basis, axis=0)
+    size[size == 0.0] = 1.0
+    return np.asarray(np.linalg.lstsq(basis / size, factor[:, wanted], rcond=1e-10)[0] / size[:, None])
+
+
+def _solve(columns: Array, target: Array) -> Array:
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0.0] = 1.0
+    return np.asarray(np.linalg.lstsq(columns / size, target, rcond=1e-9)[0] / size)
+
+
+def _examine_one(
+    stack: Stack, residual: Array, sizes: Array, folds: Sequence[Array], group: list[int], used: int
+) -> Examination:
+    columns, error = residual[:, group], residual[:, -1]
+    left = np.sum(columns**2, axis=0)
+    outside = float(np.max(left / np.maximum(sizes[group], np.finfo(float).tiny)))
+    before = float(error @ error)
+    k = len(group)
+    if outside < ABSORBED or before == 0.0:
+        nothing = np.zeros(k)
+        return Examination(nothing, np.full((k, k), np.inf), 1.0, outside, 0.0, 0.0, (None,) * len(folds), 0.0)
+    value = _solve(columns, error)
+    added = columns @ value
+    after = error - added
+    p_value, covariance = _block_test(stack, columns, after, value, used)
+    products = [fold[:, group].T @ fold[:, group] for fold in folds]
+    aims = [fold[:, group].T @ fold[:, -1] for fold in folds]
+    mean = np.mean([np.trace(product) for product in products])
+    gains: list[float | None] = []
+    saved = 0.0
+    for k_fold, (fold, product) in enumerate(zip(folds, products, strict=True)):
+        base = float(fold[:, -1] @ fold[:, -1])
+        if np.trace(product) < ABSTAIN * mean or base == 0.0:
+            gains.append(None)
+            continue
+        guess = _normal(sum(products) - product, sum(aims) - aims[k_fold])
+        with_it = fold[:, -1] - fold[:, group] @ guess
+        saving = base - float(with_it @ with_it)
+        gains.append(saving / base)
+        saved += saving
+    return Examination(
+        value,
+        covariance,
+        p_value,
+        outside,
+        1.0 - float(after @ after) / before,
+        saved / before,
+        tuple(gains),
+        float(added @ added),
+    )
+
+
+def _normal(product: Array, aim: Array) -> Array:
+    """Solve normal equations of a few columns, scaled."""
+    size = np.sqrt(np.diag(product))
+    size[size == 0.0] = 1.0
+    return np.asarray(np.linalg.pinv(product / np.outer(size, size), rcond=1e-9) @ (aim / size) / size)
+
+
+def _block_test(stack: Stack, columns: Array, error: Array, value: Array, used: int) -> tuple[float, Array]:
+    """F test that coefficients are zero, and their covariance, from scores of blocks with Bartlett's weights."""
+    from scipy.special import fdtrc
+
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0.0] = 1.0
+    unit = columns / size
+    scores = np.add.reduceat(unit * error[:, None], stack.starts, axis=0)
+    meat = scores.T @ scores
+    follows = stack.recording[1:] == stack.recording[:-1]
+    cross = scores[1:][follows].T @ scores[:-1][follows]
+    meat = meat + 0.5 * (cross + cross.T)
+    blocks, k = len(stack.starts), columns.shape[1]
+    freedom = max(1.0, blocks - used / 2.0 - k)
+    meat *= blocks / freedom
+    inverse = np.linalg.pinv(unit.T @ unit, rcond=1e-9)
+    covariance = inverse @ meat @ inverse
+    scaled = value * size
+    wald = float(scaled @ np.linalg.pinv(covariance, rcond=1e-9) @ scaled)
+    # Blocks of one recording are few and alike, so the tail is F's rather than chi-squared's.
+    p_value = float(fdtrc(k, freedom, max(wald, 0.0) / k))
+    return p_value, covariance / np.outer(size, size)

@@ -1,0 +1,101 @@
+"""Physical parameters of the effects found, with standard deviations that include the nonlinear ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.covariance import block_covariance
+from scara_ident.diagnosis.bank import Candidate, Stack, stack, with_candidates
+from scara_ident.effects import Parameter, Scene
+from scara_ident.evidence import gather_all
+from scara_ident.information import Information
+from scara_ident.recording import Recording
+
+Array = NDArray[np.float64]
+
+# Step for the derivative by a nonlinear parameter, as a share of it.
+DERIVATIVE_STEP = 1e-3
+
+
+def physical_parameters(
+    scene: Scene,
+    recordings: Sequence[Recording],
+    bands: Sequence[float | None],
+    weights: Array,
+    chosen: Sequence[Candidate],
+) -> list[dict[str, Parameter]]:
+    """Return the physical parameters of each effect.
+
+    Nonlinear parameters join the fit by the derivative of the effect's columns (Gauss and Newton), so that the
+    covariance is that of all parameters together.
+    """
+    steps = [(i, k) for i, candidate in enumerate(chosen) for k in range(len(candidate.effect.knobs))]
+    variants: list[Candidate] = []
+    for i, k in steps:
+        for sign in (1.0, -1.0):
+            knobs = list(chosen[i].member.knobs)
+            knobs[k] += sign * _step(chosen[i], k)
+            variants.append(chosen[i].at(knobs))
+    extended, bank = with_candidates(scene, [*chosen, *variants])
+    rows = stack(gather_all(extended, recordings, bands), weights)
+    base = len(scene.model.columns)
+    linear = list(range(base + sum(len(candidate.term(scene).columns) for candidate in chosen)))
+    value = _solve(rows.rows[:, linear], rows.rows[:, -1])
+    derivatives = []
+    for place, (i, k) in enumerate(steps):
+        coefficients = value[_shifted(bank.places[i], base)]
+        up, down = (bank.places[len(chosen) + 2 * place + side] for side in (0, 1))
+        change = rows.rows[:, _shifted(up, base)] - rows.rows[:, _shifted(down, base)]
+        derivatives.append(change @ coefficients / (2.0 * _step(chosen[i], k)))
+    columns = np.column_stack([rows.rows[:, linear], *derivatives])
+    full = np.concatenate([value, np.zeros(len(steps))])
+    covariance = _covariance(rows, columns, full)
+    found = []
+    for i, candidate in enumerate(chosen):
+        place = _shifted(bank.places[i], base)
+        parameters = dict(
+            candidate.effect.parameters(scene, candidate.member, value[place], covariance[place, place])
+        )
+        for position, (owner, k) in enumerate(steps):
+            if owner == i:
+                knob = candidate.effect.knobs[k]
+                variance = covariance[len(linear) + position, len(linear) + position]
+                parameters[knob.name] = Parameter(
+                    candidate.member.knobs[k], float(np.sqrt(max(variance, 0.0))), knob.unit
+                )
+        found.append(parameters)
+    return found
+
+
+def _step(candidate: Candidate, k: int) -> float:
+    knob, value = candidate.effect.knobs[k], candidate.member.knobs[k]
+    return DERIVATIVE_STEP * (abs(value) if value else knob.upper - knob.lower)
+
+
+def _shifted(place: slice, by: int) -> slice:
+    return slice(place.start + by, place.stop + by)
+
+
+def _solve(columns: Array, target: Array) -> Array:
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0.0] = 1.0
+    return np.asarray(np.linalg.lstsq(columns / size, target, rcond=1e-10)[0] / size)
+
+
+def _covariance(rows: Stack, columns: Array, value: Array) -> Array:
+    """Block covariance of all parameters, columns scaled to unit size meanwhile."""
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0.0] = 1.0
+    bounds = [*rows.starts, len(columns)]
+    table = np.column_stack([columns / size, rows.rows[:, -1]])
+    sequences: dict[int, list[tuple[Information, ...]]] = {}
+    for block, recording in enumerate(rows.recording):
+        part = table[bounds[block] : bounds[block + 1]]
+        factor = np.linalg.qr(part, mode="r") if len(part) > 1 else part
+        sequences.setdefault(int(recording), []).append((Information(factor, float(len(part))),))
+    whole = Information(np.linalg.qr(table, mode="r"), float(len(table)))
+    spread = block_covariance(whole.inverse(), value * size, list(sequences.values()))
+    return np.asarray(spread.matrix / np.outer(size, size))

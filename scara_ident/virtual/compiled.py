@@ -1,0 +1,40 @@
+"""The one way in which this package compiles its loops."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import ParamSpec, TypeVar, cast
+
+from numba import njit
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+SOURCES = ("compiled.py", "spatial.py", "plant.py", "forces.py", "integrate.py", "loop.py")
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function with numba; the machine code is kept on disk, so that only the first run waits for it.
+
+    Numba keeps the code of a function as long as its own file does not change, also when a function that it calls
+    has changed in another file. So the stamp of its file is replaced by one of all the sources.
+    """
+    dispatcher = njit(cache=True)(function)
+    kept = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    if kept is not None and hasattr(kept, "_source_stamp"):
+        kept._source_stamp = _stamp()
+    else:
+        # Another numba: better compile in every run than run what was compiled from older sources.
+        dispatcher = njit(function)
+    return cast(Callable[P, R], dispatcher)
+
+
+@cache
+def _stamp() -> str:
+    digest = hashlib.sha256()
+    for name in SOURCES:
+        digest.update((Path(__file__).parent / name).read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,134 @@
+"""Arms for tests: URDFs written on the spot, those of example-robot-data, and recordings simulated with Pinocchio."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import distribution
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from scara_ident.motion import Motion
+from scara_ident.recording import Recording, split_name
+from scara_ident.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link of a test arm and the joint that moves it."""
+
+    kind: str = "revolute"
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    xyz: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mass: float = 2.0
+    com: tuple[float, float, float] = (0.1, 0.02, 0.03)
+    inertia: tuple[float, float, float] = (0.03, 0.04, 0.05)
+    parent: int = -1
+    """Number of the link it hangs on; -1 is the one before it (the base for the first), -2 is the base."""
+
+
+def write_urdf(path: Path, links: Sequence[Link], reductions: Sequence[float] = ()) -> Path:
+    """Write a URDF with joints j1, j2, ... and links l1, l2, ..."""
+    text = ['<robot name="test_arm"><link name="base"/>']
+    for i, link in enumerate(links):
+        on = i - 1 if link.parent == -1 else link.parent
+        parent = "base" if on < 0 else f"l{on + 1}"
+        ixx, iyy, izz = (repr(float(x)) for x in link.inertia)
+        text.append(
+            f'<link name="l{i + 1}"><inertial><origin xyz="{_words(link.com)}"/><mass value="{link.mass!r}"/>'
+            f'<inertia ixx="{ixx}" ixy="0" ixz="0" iyy="{iyy}" iyz="0" izz="{izz}"/></inertial></link>'
+            f'<joint name="j{i + 1}" type="{link.kind}"><parent link="{parent}"/><child link="l{i + 1}"/>'
+            f'<origin xyz="{_words(link.xyz)}" rpy="{_words(link.rpy)}"/><axis xyz="{_words(link.axis)}"/>'
+            '<limit lower="-3" upper="3" effort="50" velocity="4"/></joint>'
+        )
+    for i, value in enumerate(reductions):
+        text.append(
+            f'<transmission name="t{i}"><type>transmission_interface/SimpleTransmission</type><joint name="j{i + 1}"/>'
+            f'<actuator name="m{i}"><mechanicalReduction>{value!r}</mechanicalReduction></actuator></transmission>'
+        )
+    path.write_text("\n".join([*text, "</robot>"]), encoding="utf-8")
+    return path
+
+
+def _words(numbers: Sequence[float]) -> str:
+    return " ".join(repr(float(x)) for x in numbers)
+
+
+PLANAR_2R = (
+    Link(axis=(0.0, 1.0, 0.0), mass=3.0, com=(0.15, 0.0, 0.0), inertia=(0.01, 0.05, 0.05)),
+    Link(axis=(0.0, 1.0, 0.0), xyz=(0.4, 0.0, 0.0), mass=1.5, com=(0.12, 0.0, 0.02), inertia=(0.005, 0.03, 0.03)),
+)
+"""Two links in a vertical plane."""
+
+
+def example_urdf(name: str) -> Path:
+    """Return a URDF of example-robot-data by the end of its path, without loading any mesh."""
+    files = distribution("example-robot-data").files or []
+    found = [file for file in files if str(file).endswith(f"/{name}") and "/robots/" in str(file)]
+    assert len(found) == 1, f"{name}: {found}"
+    return Path(str(found[0].locate()))
+
+
+def sines(rng: np.random.Generator, time: Array, n: int, size: float = 0.6, lowest: float = 0.15) -> list[Array]:
+    """Return positions, velocities and accelerations of sums of three sines, each of shape (n, N)."""
+    result = [np.zeros((n, len(time))) for _ in range(3)]
+    for j in range(n):
+        for k in range(3):
+            w = 2 * np.pi * lowest * (k + 1) * rng.uniform(0.85, 1.15)
+            phase = w * time + rng.uniform(0, 2 * np.pi)
+            amplitude = size / (k + 1)
+            result[0][j] += amplitude * np.sin(phase)
+            result[1][j] += amplitude * w * np.cos(phase)
+            result[2][j] -= amplitude * w**2 * np.sin(phase)
+    return result
+
+
+def rnea(robot: Robot, q: Array, v: Array, a: Array) -> Array:
+    """Inverse dynamics by Pinocchio in the order of the robot's joints, rotors not included, shape (n, N)."""
+    data = robot.model.createData()
+    back = np.argsort(robot.order)
+    torque = np.empty_like(q)
+    for k in range(q.shape[1]):
+        angle = q[back, k]
+        full = pin.neutral(robot.model)
+        for joint in list(robot.model.joints)[1:]:
+            if joint.nq == 1:
+                full[joint.idx_q] = angle[joint.idx_v]
+            else:
+                full[joint.idx_q : joint.idx_q + 2] = np.cos(angle[joint.idx_v]), np.sin(angle[joint.idx_v])
+        torque[:, k] = pin.rnea(robot.model, data, full, v[back, k], a[back, k])[robot.order]
+    return torque
+
+
+def recorded_torque(robot: Robot, q: Array, v: Array, a: Array, friction: Sequence[Sequence[float]]) -> Array:
+    """Torque on the recorded side: bodies, rotors, friction a0..a3 at the motor's sign, and an offset per joint."""
+    torque = rnea(robot, q, v, a) + (robot.reduction**2 * robot.rotor_inertia)[:, None] * a
+    torque *= robot.row_scale[:, None]
+    for j, (a0, a1, a2, a3, offset) in enumerate(friction):
+        speed = robot.drive_sign[j] * v[j]
+        torque[j] += a0 * np.sign(speed) + a1 * speed + a2 * np.abs(speed) * speed + a3 * speed**3 + offset
+    return torque
+
+
+def recording(robot: Robot, name: str, time: Array, q: Array, torque: Array | None, **more: Array) -> Recording:
+    """Make a recording as if read from a file."""
+    trajectory, repetition = split_name(name)
+    return Recording(name, trajectory, repetition, robot.joints, time, q, torque, **more)
+
+
+def noisy(item: Recording, rng: np.random.Generator, sigma: float | Sequence[float]) -> Recording:
+    """Return the recording with white noise on its torque."""
+    assert item.effort is not None
+    scale = np.broadcast_to(np.asarray(sigma, dtype=float), item.effort.shape[:1])[:, None]
+    return replace(item, effort=item.effort + scale * rng.standard_normal(item.effort.shape))
+
+
+def motion(q: Array, v: Array, a: Array, rate: float = 1000.0, torque: Array | None = None) -> Motion:
+    """Make a motion from exact signals."""
+    return Motion("m", "m", np.arange(q.shape[1]) / rate, q, v, a, torque, rate)
