@@ -89,7 +89,8 @@ class BaseParameters:
             name, factor = self._physical(k)
             coefficient = row[k] * factor
             sign = "-" if coefficient < 0 else "+"
-            size = f"{abs(coefficient):.6g}"
+            # Twice, so that noise in the last digits does not decide how a five is rounded.
+            size = f"{float(f'{abs(coefficient):.10g}'):.6g}"
             part = name if size == "1" else f"{size} {name}"
             text = (f"-{part}" if sign == "-" else part) if not text else f"{text} {sign} {part}"
         return text
@@ -164,18 +165,17 @@ def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int 
     names += [f"Ia{i + 1}" for i in range(n)]
     units = list(BODY_UNITS) * n + [_armature_unit(robot, i) for i in range(n)]
 
-    length = _length_scale(robot)
-    scale = np.concatenate(
-        [np.tile([1.0, *(length,) * 3, *(length**2,) * 6], n), np.where(robot.prismatic, 1.0, length**2)]
-    )
+    scale = _parameter_scale(robot)
     columns = _random_columns(robot, seed, samples=max(40, 4 * p)) * scale
     size = np.linalg.norm(columns, axis=0)
     largest = size.max(initial=0.0)
     absent = [k for k in range(p) if size[k] <= RANK_TOLERANCE * largest]
     weak = [(k, float(size[k] / largest)) for k in absent if size[k] > EXACT_TOLERANCE * largest]
-    order = [10 * i + k for i in range(n) for k in BODY_PREFERENCE]
+    # From the base outwards, in whatever order the description names the joints.
+    outwards = [int(i) for i in np.argsort(robot.order)]
+    order = [10 * i + k for i in outwards for k in BODY_PREFERENCE]
     if rotor_inertia:
-        order += list(range(10 * n, p))
+        order += [10 * n + i for i in outwards]
     else:
         absent += list(range(10 * n, p))
     absent = sorted(set(absent))
@@ -236,6 +236,13 @@ def _length_scale(robot: Robot) -> float:
     return total if total > 0.0 else 1.0
 
 
+def _parameter_scale(robot: Robot) -> NDArray[np.float64]:
+    """Factors on the columns that go with one kilogram at the arm's length, shape (11 n,)."""
+    length = _length_scale(robot)
+    body = [1.0, *(length,) * 3, *(length**2,) * 6]
+    return np.concatenate([np.tile(body, robot.n), np.where(robot.prismatic, 1.0, length**2)])
+
+
 def _random_columns(robot: Robot, seed: int, samples: int) -> NDArray[np.float64]:
     """Stack the standard regressor of random states that move gravity, speed and acceleration alike."""
     rng = np.random.default_rng(seed)
@@ -294,8 +301,13 @@ def check_base_parameters(robot: Robot, base: BaseParameters, *, seed: int = 1) 
     """
     rng = np.random.default_rng(seed)
     columns = _random_columns(robot, seed + 1000, samples=max(40, 4 * base.grouping.shape[1]))
-    used = np.any(base.grouping != 0.0, axis=0)
-    size = np.where(used, np.linalg.norm(columns, axis=0), 1.0)
+    # Every column that moves the torque, not only those that the reduction knows of.
+    size = np.linalg.norm(columns, axis=0)
+    entering = size * _parameter_scale(robot)
+    used = entering > RANK_TOLERANCE * np.max(entering)
+    if not np.any(base.grouping[:, 10 * robot.n :]):
+        used[10 * robot.n :] = False
+    size = np.where(used, size, 1.0)
     singular = np.linalg.svd(columns[:, used] / size[used], compute_uv=False)
     pi = rng.standard_normal(columns.shape[1]) / size * used
     torque = columns @ pi
@@ -310,7 +322,7 @@ def check_base_parameters(robot: Robot, base: BaseParameters, *, seed: int = 1) 
         rank=int(np.count_nonzero(singular > RANK_TOLERANCE * singular[0])),
         count=base.count,
         torque_error=float(np.max(np.abs(error))) / rms,
-        null_error=float(np.max(np.abs(moved))) / reference,
+        null_error=float(np.max(np.abs(moved))) / reference if reference > 0.0 else 0.0,
     )
 
 

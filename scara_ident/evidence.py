@@ -191,6 +191,7 @@ def row_step(rate: float, band: float | None) -> int:
 
 
 def trim_of(stretch: Stretch, bands: Sequence[float | None]) -> int:
+    """Return how many samples are left out at each end of a stretch."""
     slowest = min((band for band in bands if band is not None), default=None)
     return 1 if slowest is None else max(1, int(np.ceil(END_PERIODS * stretch.rate / slowest)))
 

@@ -112,9 +112,9 @@ def identify(
         raise UsageError("no recordings to identify from")
     if method not in METHODS:
         raise UsageError(f"method {method!r}: expected one of {', '.join(METHODS)}")
-    _check_held_out(recordings, validation)
+    check_held_out(recordings, validation)
     equation = build_model(robot, model) if isinstance(model, str) else model
-    notes = _notes((*recordings, *validation))
+    notes = data_notes((*recordings, *validation))
     if bands is None:
         progress("choosing the bands")
         choice = choose_bands(equation, recordings)
@@ -134,9 +134,7 @@ def identify(
         estimate = ols(equation, training)
     unweighted = pooled_information(training, np.ones(robot.n))
     log_det, condition = paper_criteria(unweighted, training)
-    return Identification(
-        estimate, history, tuple(bands), training, held_out, noise, log_det, condition, tuple(notes)
-    )
+    return Identification(estimate, history, tuple(bands), training, held_out, noise, log_det, condition, tuple(notes))
 
 
 def _joint_noise(noise: Mapping[str, Array]) -> Array | None:
@@ -147,14 +145,20 @@ def _joint_noise(noise: Mapping[str, Array]) -> Array | None:
     return sigma if np.all(sigma > 0.0) else None
 
 
-def _check_held_out(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:
+def check_held_out(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:
+    """Refuse a recording that is both fitted and held out.
+
+    Raises
+    ------
+    UsageError
+    """
     fitted = {recording.path.resolve() for recording in recordings if recording.path is not None}
     for recording in validation:
         if recording.path is not None and recording.path.resolve() in fitted:
             raise UsageError(f"{recording.path}: given to fit and to validate; a validation recording must be held out")
 
 
-def _notes(recordings: Sequence[Recording]) -> list[str]:
+def data_notes(recordings: Sequence[Recording]) -> list[str]:
     """Return what the audits found, the same remark on many recordings in one line."""
     found: dict[str, list[str]] = {}
     for recording in recordings:

@@ -201,8 +201,14 @@ def _filtered(signal: Array, rate: float, cut: float | None, orders: Sequence[in
     # Without its chord the continued signal closes on itself; the chord is put back after.
     slope = (extended[..., -1:] - extended[..., :1]) / (length - 1)
     ramp = extended[..., :1] + slope * np.arange(length)
+    flat = extended - ramp
+    if cut is None:
+        # No filter would stop the kink where the ends meet from ringing through the derivatives.
+        fade = np.sin(0.5 * np.pi * np.arange(reach) / reach) ** 2
+        flat[..., :reach] *= fade
+        flat[..., -reach:] *= fade[::-1]
     closed = _fast_length(length)
-    spectrum = np.fft.rfft(_close(extended - ramp, closed), axis=-1)
+    spectrum = np.fft.rfft(_close(flat, closed), axis=-1)
     frequency = np.arange(closed // 2 + 1) * (rate / closed)
     gain = np.ones_like(frequency) if cut is None else 1.0 / (1.0 + (frequency / cut) ** 8)
     keep = slice(reach, reach + count)

@@ -32,7 +32,8 @@ def base(robot: RobotOption = None, output: OutputOption = None) -> None:
         )
     check = content["check"]
     console.print(
-        f"check: rank {check['rank']} of {content['count']}, torque unchanged to {check['torque_error']:.1e}", markup=False
+        f"check: rank {check['rank']} of {content['count']}, torque unchanged to {check['torque_error']:.1e}",
+        markup=False,
     )
     if output is not None:
         write_json(output / "base.json", content)

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from scara_ident.cli.console import OutputOption, RecordingArguments, RobotOption, number, output_console, progress, table
+from scara_ident.cli.console import (
+    OutputOption,
+    RecordingArguments,
+    RobotOption,
+    number,
+    output_console,
+    progress,
+    table,
+)
 
 
 def identify(
     recordings: RecordingArguments,
     robot: RobotOption = None,
-    model: Annotated[Literal["complete", "reduced", "basic"], typer.Option(help="Terms of the torque equation.")] = "complete",
+    model: Annotated[
+        Literal["complete", "reduced", "basic"], typer.Option(help="Terms of the torque equation.")
+    ] = "complete",
     method: Annotated[Literal["ols", "wls", "rls"], typer.Option(help="Estimator.")] = "ols",
     validate: Annotated[
         list[str] | None, typer.Option("--validate", metavar="RECORDING", help="Recording held out; may be repeated.")
     ] = None,
     band: Annotated[
-        float | None, typer.Option("--band", metavar="HZ", min=1e-3, help="Low-pass for all joints; default: chosen from the data.")
+        float | None,
+        typer.Option("--band", metavar="HZ", min=1e-3, help="Low-pass for all joints; default: chosen from the data."),
     ] = None,
     output: OutputOption = None,
 ) -> None:
@@ -48,11 +58,22 @@ def identify(
     console = output_console()
     for note in result.notes:
         console.print(f"note: {note}", markup=False, style="dim")
-    parameters = table(f"{arm.name}: {model} model by {method}", "name", "value", "std", "unit", "meaning", right=("value", "std"))
+    parameters = table(
+        f"{arm.name}: {model} model by {method}", "name", "value", "std", "unit", "meaning", right=("value", "std")
+    )
     for row, value, std in zip(content["parameters"], result.estimate.value, result.estimate.std, strict=True):
         parameters.add_row(row["name"], number(value, std), f"{std:.2g}", row["unit"], row["meaning"])
     console.print(parameters)
-    errors = table("rms error within the band", "recording", "joint", "rms", "of torque", "unfiltered", "", right=("rms", "of torque", "unfiltered"))
+    errors = table(
+        "rms error within the band",
+        "recording",
+        "joint",
+        "rms",
+        "of torque",
+        "unfiltered",
+        "",
+        right=("rms", "of torque", "unfiltered"),
+    )
     for kind, found in (("", result.training_errors()), ("held out", result.validation_errors())):
         for name, joints in found.items():
             for joint, error in zip(arm.joints, joints, strict=True):
@@ -62,7 +83,10 @@ def identify(
                 share = "-" if error.relative is None else f"{error.relative:.1%}"
                 errors.add_row(name, joint, f"{error.rms:.3g}", share, f"{error.rms_unfiltered:.3g}", kind)
     console.print(errors)
-    bands = ", ".join(f"{joint} {'none' if cut is None else f'{cut:.3g} Hz'}" for joint, cut in zip(arm.joints, result.bands, strict=True))
+    bands = ", ".join(
+        f"{joint} {'none' if cut is None else f'{cut:.3g} Hz'}"
+        for joint, cut in zip(arm.joints, result.bands, strict=True)
+    )
     console.print(f"band: {bands}; J_d {result.log_det:.2f}, J_k {result.condition:.3g}", markup=False)
     for sentence in sentences(result):
         console.print(sentence, markup=False)
@@ -71,4 +95,6 @@ def identify(
 
         write_whole(output / "torque.png", lambda path: torque_figure(path, result, (*training, *held_out)))
         write_json(output / "identification.json", content)
-        console.print(f"written: {output / 'identification.json'}, {output / 'torque.png'}", markup=False, soft_wrap=True)
+        console.print(
+            f"written: {output / 'identification.json'}, {output / 'torque.png'}", markup=False, soft_wrap=True
+        )

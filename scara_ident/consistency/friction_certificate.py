@@ -111,7 +111,7 @@ def _lubricated(low: Affine, high: Affine | None) -> Affine:
     # Concave: the second derivative is linear, so its ends decide; then the slope falls, so its end decides.
     c = low.matrix
     rows = [
-        low(np.zeros(c.shape[1]))[0] * 0 + c[0],
+        c[0],
         -2.0 * c[2],
         -2.0 * c[2] - 6.0 * c[3],
         c[1] + 2.0 * c[2] + 3.0 * c[3],
@@ -150,9 +150,7 @@ def _nonnegative(side: Affine, degree: int, finite: bool, place: int, sides: int
         # [d e; e f] + t k with a number k: a matrix would have to be singular.
         return Cones(_rows([c1 - e * 2.0]), _rows([c0, e, c2]), Affine.none(unknowns))
     # [d e; e h] + t [a b; b g], with e and b (here f) free.
-    return Cones(
-        Affine.none(unknowns), _rows([c0, e, c2 - f * 2.0, c1 - e * 2.0, f, c3]), Affine.none(unknowns)
-    )
+    return Cones(Affine.none(unknowns), _rows([c0, e, c2 - f * 2.0, c1 - e * 2.0, f, c3]), Affine.none(unknowns))
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,9 +61,7 @@ def decide(candidate: Candidate, examination: Examination, scene: Scene, tried: 
     return Decision(candidate, candidate.label(scene), examination, why is None, words, gain)
 
 
-def _objection(
-    candidate: Candidate, examination: Examination, scene: Scene, tried: int, gain: float
-) -> str | None:
+def _objection(candidate: Candidate, examination: Examination, scene: Scene, tried: int, gain: float) -> str | None:
     if examination.outside < ABSORBED:
         return "the model absorbs it: these recordings cannot show it"
     if examination.outside < WEAK:

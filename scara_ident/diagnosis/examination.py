@@ -173,3 +173,12 @@ def _block_test(stack: Stack, columns: Array, error: Array, value: Array, used: 
     # Blocks of one recording are few and alike, so the tail is F's rather than chi-squared's.
     p_value = float(fdtrc(k, freedom, max(wald, 0.0) / k))
     return p_value, covariance / np.outer(size, size)
+
+
+def left_over(stack: Stack, model: Sequence[int], group: Sequence[int]) -> Array:
+    """Return the squared residual of every block with a candidate in the model, shape (blocks,)."""
+    wanted = [*model, *group]
+    whole = np.linalg.qr(np.vstack(stack.fold_factors), mode="r")
+    sums = _sums(whole, wanted, [stack.rows.shape[1] - 1])[:, 0]
+    residual = stack.rows[:, -1] - stack.rows[:, wanted] @ sums
+    return np.asarray(np.add.reduceat(residual**2, stack.starts))

@@ -56,9 +56,7 @@ def physical_parameters(
     found = []
     for i, candidate in enumerate(chosen):
         place = _shifted(bank.places[i], base)
-        parameters = dict(
-            candidate.effect.parameters(scene, candidate.member, value[place], covariance[place, place])
-        )
+        parameters = dict(candidate.effect.parameters(scene, candidate.member, value[place], covariance[place, place]))
         for position, (owner, k) in enumerate(steps):
             if owner == i:
                 knob = candidate.effect.knobs[k]

@@ -178,9 +178,7 @@ def weighted_fit(model: TorqueModel, evidence: Sequence[Evidence]) -> Estimate:
     return least_squares(model, evidence, 1.0 / residual_noise(first, evidence), "wls")
 
 
-def _scene(
-    model: TorqueModel, value: Array, recordings: Sequence[Recording], bands: Sequence[float | None]
-) -> Scene:
+def _scene(model: TorqueModel, value: Array, recordings: Sequence[Recording], bands: Sequence[float | None]) -> Scene:
     robot = model.robot
     travel, speed = np.zeros(robot.n), np.zeros(robot.n)
     longest, slowest = 0.0, np.inf
@@ -230,16 +228,17 @@ def _choose(
     best: dict[str, Decision] = {}
     for decision in decisions:
         held = best.get(decision.label)
-        if held is None or (decision.accepted, decision.examination.held_out) > (held.accepted, held.examination.held_out):
+        if held is None or (decision.accepted, decision.examination.held_out) > (
+            held.accepted,
+            held.examination.held_out,
+        ):
             best[decision.label] = decision
-    accepted = sorted(
-        (item for item in best.values() if item.accepted), key=lambda item: -item.examination.held_out
-    )
+    accepted = sorted((item for item in best.values() if item.accepted), key=lambda item: -item.examination.held_out)
     if not accepted:
         return None
-    leaders = [
-        item for item in accepted if item.examination.held_out >= NEAR_BEST * accepted[0].examination.held_out
-    ][:MOST_REFINED]
+    leaders = [item for item in accepted if item.examination.held_out >= NEAR_BEST * accepted[0].examination.held_out][
+        :MOST_REFINED
+    ]
     refined = refine(scene, recordings, bands, weights, chosen, leaders, tried)
     sound = [item for item in refined if item.accepted]
     return max(sound, key=lambda item: item.examination.held_out, default=None)
@@ -257,7 +256,9 @@ def refine(
     """Refine the nonlinear parameters of several candidates on lines that narrow about the best point so far."""
     current = list(leaders)
     for round_ in range(LINE_ROUNDS):
-        variants = [(place, item) for place, held in enumerate(current) for item in _line(scene, held.candidate, round_)]
+        variants = [
+            (place, item) for place, held in enumerate(current) for item in _line(scene, held.candidate, round_)
+        ]
         if not variants:
             break
         found = _examine_all(scene, recordings, bands, weights, chosen, [item for _, item in variants], tried)

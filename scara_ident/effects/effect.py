@@ -103,9 +103,7 @@ class Effect(Protocol):
         """
         ...
 
-    def parameters(
-        self, scene: Scene, member: Member, value: Array, covariance: Array
-    ) -> Mapping[str, Parameter]:
+    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Turn coefficients (k,) and their covariance (k, k) into the effect's physical parameters.
 
         The nonlinear parameters are added by the caller, who knows how sure they are.

@@ -116,7 +116,10 @@ def pooled_information(evidence: Sequence[Evidence], weights: Array) -> Informat
 def weighted_blocks(evidence: Sequence[Evidence], weights: Array) -> list[list[tuple[Information, ...]]]:
     """Return for every recording its blocks, each joint's rows with its weight."""
     return [
-        [tuple(part.scaled(float(weight)) for part, weight in zip(block, weights, strict=True)) for block in item.blocks]
+        [
+            tuple(part.scaled(float(weight)) for part, weight in zip(block, weights, strict=True))
+            for block in item.blocks
+        ]
         for item in evidence
     ]
 

@@ -80,6 +80,4 @@ def least_squares(
     spread = block_covariance(information.inverse(), solution.value, weighted_blocks(evidence, weights))
     covariance = spread.matrix.copy()
     covariance[np.diag_indices_from(covariance)] = np.where(solution.undetermined, np.inf, np.diag(covariance))
-    return Estimate(
-        model, method, solution.value, covariance, solution.undetermined, information, weights, spread.kind
-    )
+    return Estimate(model, method, solution.value, covariance, solution.undetermined, information, weights, spread.kind)

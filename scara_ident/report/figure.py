@@ -45,7 +45,13 @@ def torque_figure(path: Path, identification: Identification, recordings: Sequen
                 measured = rows.banded[j][-1]
                 predicted = identification.estimate.value @ rows.banded[j][:-1]
                 axis = axes[j, column]
-                axis.plot(part.time, part.torque[j] if part.torque is not None else measured, color="0.8", lw=0.6, label="recorded")
+                axis.plot(
+                    part.time,
+                    part.torque[j] if part.torque is not None else measured,
+                    color="0.8",
+                    lw=0.6,
+                    label="recorded",
+                )
                 axis.plot(part.time, measured, color="#0072b2", lw=1.0, label="measured, in the band")
                 axis.plot(part.time, predicted, color="#d55e00", lw=1.0, ls="--", label="predicted")
                 axis.plot(part.time, measured - predicted, color="#009e73", lw=0.8, label="residual")

@@ -1,0 +1,58 @@
+"""``scara-ident diagnose``."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+from scara_ident.cli.console import OutputOption, RecordingArguments, RobotOption, output_console, progress, table
+
+
+def diagnose(
+    recordings: RecordingArguments,
+    robot: RobotOption = None,
+    model: Annotated[Literal["complete", "reduced", "basic"], typer.Option(help="Base model.")] = "complete",
+    validate: Annotated[
+        list[str] | None, typer.Option("--validate", metavar="RECORDING", help="Recording held out; may be repeated.")
+    ] = None,
+    output: OutputOption = None,
+) -> None:
+    """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
+    from scara_ident.diagnosis import diagnose as run
+    from scara_ident.recording import read_recordings
+    from scara_ident.report.diagnosis import diagnosis_dict, diagnosis_markdown
+    from scara_ident.report.files import write_json, write_text
+    from scara_ident.robot import load_robot
+
+    arm = load_robot(robot)
+    with progress() as step:
+        step("reading the recordings")
+        training = read_recordings(recordings, arm)
+        held_out = read_recordings(validate, arm) if validate else ()
+        result = run(arm, model, training, held_out, progress=step)
+    content = diagnosis_dict(result)
+    console = output_console()
+    for note in result.notes:
+        console.print(f"note: {note}", markup=False, style="dim")
+    console.print(f"{arm.name}: {result.verdict}", markup=False, style="bold")
+    for sentence in content["summary"]:
+        console.print(sentence, markup=False)
+    errors = table("rms error within the band", "recordings", "joint", "before", "after", right=("before", "after"))
+    for kind in ("training", "validation"):
+        for joint in arm.joints if content[kind]["before"] else ():
+            before, after = content[kind]["before"][joint], content[kind]["after"][joint]
+            errors.add_row(kind, joint, _number(before), _number(after))
+    console.print(errors)
+    rows = table("candidates", "candidate", "gain", "p", "why", right=("gain", "p"))
+    for row in content["candidates"][:8]:
+        rows.add_row(row["label"], f"{row['gain']:.1%}", f"{row['p_value']:.0e}", row["why"])
+    console.print(rows)
+    if output is not None:
+        write_text(output / "diagnosis.md", diagnosis_markdown(result))
+        write_json(output / "diagnosis.json", content)
+        console.print(f"written: {output / 'diagnosis.json'}, {output / 'diagnosis.md'}", markup=False, soft_wrap=True)
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"

@@ -1,0 +1,276 @@
+"""The semidefinite programme, canonicalised once and solved again and again.
+
+    minimise    |F theta - g|^2 + |W (x - x0)|^2     with the model's parameters  theta = T x
+    subject to  Q_i >= eps 1  for every body, rotors, friction certificates, limits
+
+F and g are a triangular factor and its right-hand side, so the size does not depend on how many samples there are.
+Numerically the least-squares part is brought to ``|w|^2`` first: with the triangular factor R of the stacked rows
+[F T; W] and the unconstrained minimiser c, ``x = c + R^-1 w``. The solver then sees the unit matrix as its quadratic
+term, however ill-conditioned the data are, and only the constraints carry parameters: R^-1 and c. That is a
+disciplined parametrised programme (Agrawal et al. 2019), so cvxpy's canonical form is a constant linear map of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dtrtri
+
+from scara_ident.consistency.bodies import PACKED_IDENTITY, unpack, unpacking
+from scara_ident.consistency.options import ConsistentOptions
+from scara_ident.consistency.unknowns import Unknowns, build_unknowns
+from scara_ident.errors import EstimationError
+from scara_ident.model import TorqueModel
+
+Array = NDArray[np.float64]
+
+# Every body keeps this share of its nominal pseudo-inertia: above what the solver leaves of its constraints, and small
+# enough that no estimate moves by more than about this share of the nominal.
+MARGIN = 1e-7
+# The solver stops when the cost, in squared standard deviations of the noise, is known to this: half of a
+# thousandth of a standard deviation in any parameter.
+GAP = 1e-7
+RELATIVE_GAP = 1e-9
+FEASIBILITY = 1e-9
+# A second run that stops short of these is still good to a hundredth of a standard deviation.
+ACCEPTED_GAP = 1e-4
+ACCEPTED_RELATIVE_GAP = 1e-6
+
+# Of the two runs the first goes without iterative refinement: its linear systems are well-scaled, and it takes
+# half the time.
+_FAST = {"iterative_refinement_enable": False}
+_CAREFUL = {"iterative_refinement_enable": True, "tol_gap_abs": 1e-8}
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A solution.
+
+    Attributes
+    ----------
+    x : ndarray, shape (size,)
+        See `Unknowns`.
+    auxiliary : ndarray
+        Auxiliary unknowns.
+    parameters : ndarray, shape (p,)
+        The model's parameters.
+    dual_bodies : ndarray, shape (n, 4, 4)
+        Multipliers of the bodies: what the cost gains per share of the nominal body by which the body may lack.
+    dual_nonnegative, dual_small, dual_ball : ndarray
+        Multipliers of the other cones, in the order of their rows.
+    cost : float
+        Value of the objective.
+    iterations : int
+    seconds : float
+        Time in the solver.
+    """
+
+    x: Array
+    auxiliary: Array
+    parameters: Array
+    dual_bodies: Array
+    dual_nonnegative: Array
+    dual_small: Array
+    dual_ball: Array
+    cost: float
+    iterations: int
+    seconds: float
+
+
+class Programme:
+    """A compiled programme for one model and set of options; not to be shared by threads.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    options : ConsistentOptions, optional
+
+    Attributes
+    ----------
+    unknowns : Unknowns
+    problem : cvxpy.Problem
+        The parametrised problem.
+    """
+
+    def __init__(self, model: TorqueModel, options: ConsistentOptions | None = None) -> None:
+        self.options = options or ConsistentOptions()
+        self.unknowns: Unknowns = build_unknowns(model, self.options)
+        self.problem, self._root, self._centre = self._build()
+        self._canonical: Any = None
+        self._solver: Any = None
+
+    def _build(self) -> tuple[Any, Any, Any]:
+        import cvxpy as cp
+
+        u = self.unknowns
+        size = u.size
+        w, auxiliary = cp.Variable(size, name="w"), cp.Variable(u.auxiliary, name="auxiliary")
+        root = cp.Parameter((size, size), sparsity=np.triu_indices(size), name="root")
+        centre = cp.Parameter(size, name="centre")
+        x = centre + root @ w
+        whole = cp.hstack([x, auxiliary]) if u.auxiliary else x
+        matrix = unpacking()
+        constraints = [
+            cp.reshape(matrix @ x[10 * i : 10 * i + 10], (4, 4), order="C") >> MARGIN * np.eye(4) for i in range(u.n)
+        ]
+        cones = u.cones
+        if len(cones.nonnegative):
+            constraints.append(_sparse(cones.nonnegative.matrix) @ whole + cones.nonnegative.offset >= MARGIN)
+        if len(cones.small):
+            d, e, f = (_sparse(cones.small.matrix[k::3]) @ whole + cones.small.offset[k::3] for k in range(3))
+            constraints.append(cp.SOC(d + f, cp.vstack([d - f, 2.0 * e]), axis=0))
+        if len(cones.ball):
+            t, *parts = (_sparse(cones.ball.matrix[k::4]) @ whole + cones.ball.offset[k::4] for k in range(4))
+            constraints.append(cp.SOC(t - MARGIN, cp.vstack(parts), axis=0))
+        if len(u.held):
+            constraints.append(_sparse(u.held) @ x == 0.0)
+        self._w, self._auxiliary = w, auxiliary
+        return cp.Problem(cp.Minimize(cp.sum_squares(w)), constraints), root, centre
+
+    def solve(self, factor: Array, target: Array, weight: Array) -> Point:
+        """Solve for one set of data.
+
+        Parameters
+        ----------
+        factor : ndarray, shape (r, p)
+            Rows of the data term, such as a triangular factor divided by the noise.
+        target : ndarray, shape (r,)
+        weight : ndarray, shape (size,)
+            Weight of each unknown's distance from its reference, above 0.
+
+        Returns
+        -------
+        Point
+
+        Raises
+        ------
+        EstimationError
+            If the solver does not succeed.
+        """
+        u = self.unknowns
+        return self.solve_rows(factor @ u.to_parameters, target, weight)
+
+    def solve_rows(self, rows: Array, target: Array, weight: Array) -> Point:
+        """Solve with rows that act on x instead of the model's parameters; see `solve`."""
+        u = self.unknowns
+        stacked = np.vstack([np.column_stack([rows, target]), np.column_stack([np.diag(weight), weight * u.reference])])
+        triangular = np.linalg.qr(stacked, mode="r")
+        root, info = dtrtri(triangular[: u.size, : u.size])
+        if info:
+            raise EstimationError("the data hold numbers that are not finite, or a weight of the prior is 0")
+        root = np.triu(root)
+        centre = root @ triangular[: u.size, u.size]
+        left_over = float(np.sum(triangular[u.size :, u.size] ** 2))
+        w, auxiliary, z, info_ = self._run(root, centre)
+        x = centre + root @ w
+        return self._point(x, auxiliary, z, left_over + float(w @ w), info_)
+
+    def _run(self, root: Array, centre: Array) -> tuple[Array, Array, Array, Any]:
+        import scipy.sparse as sp
+
+        upper = np.triu_indices(root.shape[0])
+        self._root.value_sparse = sp.coo_array((root[upper], upper), shape=root.shape)
+        self._centre.value = centre
+        if self._canonical is None:
+            import cvxpy as cp
+
+            data, _, _ = self.problem.get_problem_data(cp.CLARABEL)
+            self._canonical = (data["param_prob"], data["dims"])
+        canonical, dims = self._canonical
+        quadratic, linear, _, matrix, offset = canonical.apply_parameters(quad_obj=True)[:5]
+        # cvxpy's canonical form is A x + b in the cones, CLARABEL's is b - A x.
+        data_ = (quadratic, linear, -sp.csc_matrix(matrix), offset)
+        result = self._attempt(data_, dims, _FAST)
+        if not self._is_good(result, strict=True):
+            result = self._attempt(data_, dims, _CAREFUL)
+            if not self._is_good(result, strict=False):
+                raise EstimationError(_what_to_try(str(result.status)))
+        found, z = np.array(result.x), np.array(result.z)
+        places = canonical.var_id_to_col
+        start = places[self._w.id]
+        w = found[start : start + root.shape[0]]
+        count = self.unknowns.auxiliary
+        start = places.get(self._auxiliary.id, 0)
+        return w, found[start : start + count], z, result
+
+    def _attempt(self, data: Any, dims: Any, extra: dict[str, Any]) -> Any:
+        import clarabel
+        import scipy.sparse as sp
+        from cvxpy.reductions.solvers.conic_solvers.clarabel_conif import dims_to_solver_cones
+
+        quadratic, linear, matrix, offset = data
+        if extra is _FAST and self._solver is not None:
+            self._solver.update(A=matrix, b=offset)
+            return self._solver.solve()
+        settings = clarabel.DefaultSettings()
+        chosen = {
+            "verbose": False,
+            "max_threads": 1,
+            "presolve_enable": False,
+            "chordal_decomposition_enable": False,
+            "tol_gap_abs": GAP,
+            "tol_gap_rel": RELATIVE_GAP,
+            "tol_feas": FEASIBILITY,
+            **extra,
+        }
+        for name, value in chosen.items():
+            setattr(settings, name, value)
+        upper = sp.triu(quadratic).tocsc()
+        solver = clarabel.DefaultSolver(upper, linear, matrix, offset, dims_to_solver_cones(dims), settings)
+        if extra is _FAST:
+            self._solver = solver
+        return solver.solve()
+
+    @staticmethod
+    def _is_good(result: Any, *, strict: bool) -> bool:
+        status = str(result.status)
+        if status == "Solved":
+            return True
+        if strict or status not in ("AlmostSolved", "InsufficientProgress"):
+            return False
+        gap = abs(result.obj_val - result.obj_val_dual)
+        small = gap <= max(ACCEPTED_GAP, ACCEPTED_RELATIVE_GAP * abs(result.obj_val))
+        return bool(small and result.r_prim <= 10.0 * FEASIBILITY)
+
+    def _point(self, x: Array, auxiliary: Array, z: Array, cost: float, result: Any) -> Point:
+        u = self.unknowns
+        counts = [len(u.held), len(u.cones.nonnegative), len(u.cones.small), len(u.cones.ball), 10 * u.n]
+        _, nonnegative, small, ball, bodies = np.split(z, np.cumsum(counts)[:-1])
+        return Point(
+            x=x,
+            auxiliary=auxiliary,
+            parameters=u.parameters(x),
+            dual_bodies=unpack(bodies.reshape(u.n, 10)),
+            dual_nonnegative=nonnegative,
+            dual_small=small,
+            dual_ball=ball,
+            cost=cost,
+            iterations=int(result.iterations),
+            seconds=float(result.solve_time),
+        )
+
+
+def smallest_share(bodies: Array) -> float:
+    """Return the smallest eigenvalue of bodies relative to nominal, packed, shape (10 n,)."""
+    return float(np.min(np.linalg.eigvalsh(unpack(bodies.reshape(-1, len(PACKED_IDENTITY))))))
+
+
+def _sparse(matrix: Array) -> Any:
+    import scipy.sparse as sp
+
+    return sp.csr_array(matrix)
+
+
+def _what_to_try(status: str) -> str:
+    if "PrimalInfeasible" in status:
+        return (
+            f"the programme has no solution (CLARABEL: {status}): the given masses, centres of mass and friction "
+            "contradict each other; widen a tolerance or leave one out"
+        )
+    return (
+        f"the programme was not solved (CLARABEL: {status}); try richer motion, another model, a larger prior_weight "
+        "or fewer limits"
+    )

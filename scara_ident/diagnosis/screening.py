@@ -1,0 +1,138 @@
+"""What a remainder depends on: shrunken means over bins of signals, judged on trajectories that they were not taken from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.evidence import row_step, rows_of, standstill, trim_of
+from scara_ident.model import TorqueModel
+from scara_ident.motion import Motion, stretches
+from scara_ident.recording import Recording
+
+Array = NDArray[np.float64]
+
+# Bins of one signal, and of each signal of a pair; equal numbers of samples in each.
+SINGLE_BINS = 24
+PAIR_BINS = 10
+# A bin's mean is shrunk as if this many further samples of zero were in it.
+SHRINKAGE = 5.0
+# Folds where there is only one trajectory.
+PARTS = 4
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """How much of a joint's residual signals explain.
+
+    Attributes
+    ----------
+    joint : str
+    signals : tuple of str
+        One or two signals.
+    explained : float
+        Share of the squared residual that they explain on trajectories held out.
+    rms : float
+        The same as an rms torque, N m or N.
+    """
+
+    joint: str
+    signals: tuple[str, ...]
+    explained: float
+    rms: float
+
+
+def screen(
+    model: TorqueModel, value: Array, recordings: Sequence[Recording], bands: Sequence[float | None]
+) -> tuple[Dependence, ...]:
+    """Rank what each joint's residual depends on.
+
+    Parameters
+    ----------
+    model : TorqueModel
+        With the effects found so far.
+    value : ndarray, shape (p,)
+    recordings : sequence of Recording
+    bands : sequence of float or None, one per joint
+
+    Returns
+    -------
+    tuple of Dependence
+        All single signals and pairs of every joint, the most explaining first.
+    """
+    found: list[Dependence] = []
+    for j, joint in enumerate(model.robot.joints):
+        residual, signals, fold = _samples(model, value, recordings, bands, j)
+        if len(residual) < 10 * PAIR_BINS**2 or not np.any(residual):
+            continue
+        total = float(np.mean(residual**2))
+        singles = {name: _bins(values, SINGLE_BINS) for name, values in signals.items()}
+        coarse = {name: _bins(values, PAIR_BINS) for name, values in signals.items()}
+        sets = [((name,), bins) for name, bins in singles.items()]
+        sets += [((one, other), coarse[one] * PAIR_BINS + coarse[other]) for one, other in combinations(signals, 2)]
+        for names, bins in sets:
+            share = _held_out(residual, bins, fold)
+            found.append(Dependence(joint, names, share, float(np.sqrt(max(share, 0.0) * total))))
+    return tuple(sorted(found, key=lambda item: -item.explained))
+
+
+def _samples(
+    model: TorqueModel, value: Array, recordings: Sequence[Recording], bands: Sequence[float | None], j: int
+) -> tuple[Array, dict[str, Array], NDArray[np.intp]]:
+    """Residual of a joint within its band at independent times, the signals then, and the fold of each."""
+    trajectories = list(dict.fromkeys(recording.trajectory for recording in recordings))
+    residual, signals, fold = [], [], []
+    for recording in recordings:
+        begin = float(recording.time[0])
+        for part in stretches(recording):
+            rows = rows_of(model, part, bands)
+            rest = standstill(part, rows.motion, bands)[j]
+            trim = trim_of(part, bands)
+            places = np.arange(trim, len(part.time) - trim, row_step(part.rate, bands[j]))
+            places = places[~rest[places]]
+            residual.append((rows.banded[j][-1] - value @ rows.banded[j][:-1])[places])
+            signals.append(_signals(model, rows.motion, rows.raw[j], value, j, begin, places))
+            fold.append(np.full(len(places), trajectories.index(recording.trajectory)))
+    merged = {name: np.concatenate([part[name] for part in signals]) for name in signals[0]}
+    error = np.concatenate(residual)
+    groups = np.concatenate(fold)
+    if len(trajectories) == 1:
+        groups = np.arange(len(error)) * PARTS // max(1, len(error))
+    return error, merged, groups
+
+
+def _signals(
+    model: TorqueModel, motion: Motion, rows: Array, value: Array, j: int, begin: float, places: NDArray[np.intp]
+) -> dict[str, Array]:
+    names = model.robot.joints
+    found: dict[str, Array] = {}
+    for i, name in enumerate(names):
+        found[f"position of {name}"] = motion.q[i][places]
+        found[f"velocity of {name}"] = motion.v[i][places]
+        found[f"acceleration of {name}"] = motion.a[i][places]
+    found["predicted torque"] = (value @ rows[:-1])[places]
+    found["time"] = motion.time[places] - begin
+    if abs(model.robot.reduction[j]) != 1.0:
+        found["motor angle"] = np.mod(model.robot.reduction[j] * motion.q[j][places], 2.0 * np.pi)
+    return found
+
+
+def _bins(values: Array, count: int) -> NDArray[np.intp]:
+    edges = np.quantile(values, np.linspace(0.0, 1.0, count + 1)[1:-1])
+    return np.searchsorted(edges, values)
+
+
+def _held_out(residual: Array, bins: NDArray[np.intp], fold: NDArray[np.intp]) -> float:
+    """Share of the squared residual that the bins' means of the other folds explain."""
+    size = int(bins.max()) + 1
+    folds = int(fold.max()) + 1
+    place = fold * size + bins
+    count = np.bincount(place, minlength=folds * size).reshape(folds, size)
+    total = np.bincount(place, residual, folds * size).reshape(folds, size)
+    mean = (total.sum(axis=0) - total) / (count.sum(axis=0) - count + SHRINKAGE)
+    left = residual - mean[fold, bins]
+    return 1.0 - float(np.sum(left**2) / np.sum(residual**2))

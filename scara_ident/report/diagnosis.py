@@ -1,0 +1,270 @@
+"""What a diagnosis tells: the contract's JSON, and the story in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.diagnosis.decision import Decision
+from scara_ident.diagnosis.diagnosis import Diagnosis, joint_errors
+from scara_ident.evidence import Evidence
+
+Array = NDArray[np.float64]
+
+
+def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the content of ``diagnosis.json``."""
+    joints = diagnosis.robot.joints
+    return {
+        "robot": diagnosis.robot.name,
+        "model": diagnosis.before.model.name,
+        "verdict": diagnosis.verdict,
+        "summary": list(sentences(diagnosis)),
+        "band_hz": dict(zip(joints, diagnosis.search.bands, strict=True)),
+        "noise_floor": {fit.joint: fit.noise for fit in diagnosis.fit_after} or dict.fromkeys(joints),
+        "lack_of_fit": {
+            "before": {fit.joint: fit.missing for fit in diagnosis.fit_before},
+            "after": {fit.joint: fit.missing for fit in diagnosis.fit_after},
+            "p_value": {fit.joint: fit.p_value for fit in diagnosis.fit_after},
+        },
+        "effects": [
+            {
+                "effect": effect.effect,
+                "joint": effect.joint,
+                "description": effect.description,
+                "parameters": {
+                    name: {"value": parameter.value, "std": parameter.std, "unit": parameter.unit}
+                    for name, parameter in effect.parameters.items()
+                },
+                "confounded_with": list(dict.fromkeys(rival.effect for rival in effect.confounded_with)),
+                "rivals": [
+                    {"effect": rival.effect, "joint": rival.joint, "gain": rival.gain}
+                    for rival in effect.confounded_with
+                ],
+                "p_value": effect.p_value,
+                "gain": effect.gain,
+                "helps_in": list(effect.votes),
+                "training": {"before": dict(effect.before), "after": dict(effect.after)},
+            }
+            for effect in diagnosis.effects
+        ],
+        "training": _before_after(
+            joints,
+            diagnosis.before.value,
+            diagnosis.training_before,
+            diagnosis.after.value,
+            diagnosis.training_after,
+        ),
+        "validation": _before_after(
+            joints,
+            diagnosis.before.value,
+            diagnosis.validation_before,
+            diagnosis.after.value,
+            diagnosis.validation_after,
+        ),
+        "recordings": {
+            kind: {
+                item.recording: {
+                    "before": dict(zip(joints, _rms(diagnosis.before.value, [item]), strict=True)),
+                    "after": dict(zip(joints, _rms(diagnosis.after.value, [later]), strict=True)),
+                }
+                for item, later in zip(before, after, strict=True)
+            }
+            for kind, before, after in (
+                ("training", diagnosis.training_before, diagnosis.training_after),
+                ("validation", diagnosis.validation_before, diagnosis.validation_after),
+            )
+        },
+        "moved": moved(diagnosis),
+        "parameters": [
+            {
+                "name": column.name,
+                "joint": column.joint,
+                "value": diagnosis.after.value[k],
+                "std": diagnosis.after.std[k],
+                "unit": column.unit,
+                "meaning": column.meaning,
+            }
+            for k, column in enumerate(diagnosis.after.model.columns)
+        ],
+        "not_identifiable": [
+            {"effect": alias.effect, "absorbed_by": list(alias.absorbed_by), "opened_by": alias.opened_by}
+            for alias in diagnosis.aliases
+        ],
+        "candidates": [_candidate(decision, diagnosis) for decision in best_by_label(diagnosis.search.decisions)],
+        "tried": diagnosis.search.tried,
+        "unexplained": _unexplained(diagnosis),
+        "notes": list(diagnosis.notes),
+    }
+
+
+def best_by_label(decisions: Sequence[Decision]) -> list[Decision]:
+    """Return the best scan point of each family and joint, the most gaining first."""
+    best: dict[str, Decision] = {}
+    for decision in decisions:
+        held = best.get(decision.label)
+        if held is None or decision.gain > held.gain:
+            best[decision.label] = decision
+    return sorted(best.values(), key=lambda item: -item.gain)
+
+
+def _candidate(decision: Decision, diagnosis: Diagnosis) -> dict[str, Any]:
+    scene = diagnosis.search.scene
+    helps, voting = decision.examination.votes
+    return {
+        "effect": decision.candidate.effect.name,
+        "joint": decision.candidate.joint(scene),
+        "label": decision.label,
+        "p_value": min(1.0, decision.examination.p_value * diagnosis.search.tried),
+        "decision": "accepted" if decision.accepted else "rejected",
+        "why": decision.why,
+        "gain": decision.gain,
+        "helps_in": [helps, voting],
+        "outside_model": decision.examination.outside,
+        "knobs": {
+            knob.name: value
+            for knob, value in zip(decision.candidate.effect.knobs, decision.candidate.member.knobs, strict=True)
+        },
+    }
+
+
+def _unexplained(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    remainder = diagnosis.unexplained
+    if remainder is None:
+        return None
+    return {
+        "joint": remainder.joint,
+        "signals": list(remainder.signals),
+        "rms": remainder.rms,
+        "explained_share": remainder.explained,
+    }
+
+
+def _rms(value: Array, evidence: Sequence[Evidence]) -> list[float | None]:
+    return [error.rms if error else None for error in joint_errors(value, evidence)]
+
+
+def _before_after(
+    joints: Sequence[str], before: Array, old: Sequence[Evidence], after: Array, new: Sequence[Evidence]
+) -> dict[str, dict[str, float | None]]:
+    if not old:
+        return {"before": {}, "after": {}}
+    result: dict[str, dict[str, float | None]] = {}
+    for name, value, evidence in (("before", before, old), ("after", after, new)):
+        errors = joint_errors(value, evidence)
+        pairs = list(zip(joints, errors, strict=True))
+        result[name] = {joint: error.rms if error else None for joint, error in pairs}
+        result[f"{name}_relative"] = {joint: error.relative if error else None for joint, error in pairs}
+        result[f"{name}_unfiltered"] = {joint: error.rms_unfiltered if error else None for joint, error in pairs}
+    return result
+
+
+def moved(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return the parameters of the base model that moved by over three standard deviations."""
+    before, after = diagnosis.before, diagnosis.after
+    found = []
+    for k, column in enumerate(before.model.columns):
+        change = float(after.value[k] - before.value[k])
+        std = float(after.std[k])
+        if diagnosis.effects and std > 0.0 and abs(change) > 3.0 * std:
+            found.append(
+                {"name": column.name, "before": before.value[k], "after": after.value[k], "in_std": change / std}
+            )
+    return sorted(found, key=lambda item: -abs(item["in_std"]))
+
+
+def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Return the result in words."""
+    found = []
+    if diagnosis.verdict == "complete":
+        found.append("The model lacks nothing that these recordings can show.")
+    for effect in diagnosis.effects:
+        where = f" on {effect.joint}" if effect.joint else ""
+        values = ", ".join(
+            f"{name} {parameter.value:.3g} ± {parameter.std:.1g} {parameter.unit}".rstrip(" 1")
+            if parameter.unit == "1"
+            else f"{name} {parameter.value:.3g} ± {parameter.std:.1g} {parameter.unit}"
+            for name, parameter in effect.parameters.items()
+        )
+        found.append(f"Found {effect.effect}{where}: {effect.description}; {values}.")
+        if effect.confounded_with:
+            others = ", ".join(rival.label for rival in effect.confounded_with)
+            found.append(f"These recordings cannot tell it from: {others}.")
+    kind = "held-out" if diagnosis.validation_before else "training"
+    old = diagnosis.validation_before or diagnosis.training_before
+    new = diagnosis.validation_after or diagnosis.training_after
+    if diagnosis.effects:
+        changes = [
+            f"{joint} {a:.3g} to {b:.3g} {diagnosis.robot.torque_unit(j)}"
+            for j, (joint, a, b) in enumerate(
+                zip(
+                    diagnosis.robot.joints,
+                    _rms(diagnosis.before.value, old),
+                    _rms(diagnosis.after.value, new),
+                    strict=True,
+                )
+            )
+            if a is not None and b is not None
+        ]
+        found.append(f"Rms error on the {kind} recordings: {'; '.join(changes)}.")
+    if not diagnosis.fit_after:
+        found.append(
+            "No trajectory was repeated, so the noise floor is not known: record each trajectory twice or more."
+        )
+    remainder = diagnosis.unexplained
+    if remainder is not None:
+        unit = diagnosis.robot.torque_unit(diagnosis.robot.joints.index(remainder.joint))
+        on = f"depends on {' and '.join(remainder.signals)}" if remainder.signals else "repeats from run to run"
+        found.append(
+            f"Unexplained: on {remainder.joint} a remainder of {remainder.rms:.3g} {unit} rms {on}; "
+            "no effect of the catalogue accounts for it."
+        )
+    return tuple(found)
+
+
+def diagnosis_markdown(diagnosis: Diagnosis) -> str:
+    """Return the story as Markdown."""
+    content = diagnosis_dict(diagnosis)
+    lines = [f"# Diagnosis of {diagnosis.robot.name}: {diagnosis.verdict}", ""]
+    lines += [f"{sentence}  " for sentence in content["summary"]]
+    for kind in ("training", "validation"):
+        part = content[kind]
+        if not part["before"]:
+            continue
+        lines += [
+            "",
+            f"## Error on the {kind} recordings",
+            "",
+            "| joint | before | after | before, share | after, share |",
+        ]
+        lines += ["|---|---|---|---|---|"]
+        for joint in diagnosis.robot.joints:
+            cells = [part[key][joint] for key in ("before", "after", "before_relative", "after_relative")]
+            lines.append(f"| {joint} | " + " | ".join(_cell(x, k > 1) for k, x in enumerate(cells)) + " |")
+    if content["moved"]:
+        lines += ["", "## Parameters that moved when the effects came in", "", "| name | before | after | in std |"]
+        lines += ["|---|---|---|---|"]
+        lines += [
+            f"| {m['name']} | {m['before']:.4g} | {m['after']:.4g} | {m['in_std']:+.1f} |" for m in content["moved"]
+        ]
+    lines += ["", "## Candidates", "", "| candidate | gain held out | p | decision | why |", "|---|---|---|---|---|"]
+    for row in content["candidates"]:
+        lines.append(
+            f"| {row['label']} | {row['gain']:.2%} | {row['p_value']:.1e} | {row['decision']} | {row['why']} |"
+        )
+    if content["not_identifiable"]:
+        lines += ["", "## What no such recording can show", "", "| effect | absorbed by | opened by |", "|---|---|---|"]
+        lines += [
+            f"| {row['effect']} | {', '.join(row['absorbed_by'])} | {row['opened_by']} |"
+            for row in content["not_identifiable"]
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _cell(value: float | None, share: bool) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.1%}" if share else f"{value:.4g}"
