@@ -127,7 +127,8 @@ def _sample(recordings: Sequence[Recording]) -> list[Recording]:
         turn = seen.get(recording.trajectory, 0)
         seen[recording.trajectory] = turn + 1
         ranked.append((turn, place, recording))
-    chosen, total = [], 0
+    chosen: list[Recording] = []
+    total = 0
     for _, _, recording in sorted(ranked, key=lambda item: item[:2]):
         if chosen and total + len(recording.time) > ENOUGH_SAMPLES:
             continue
@@ -181,4 +182,4 @@ def binned_power(signals: Array, rate: float, edges: Array) -> Array:
     place = np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, len(edges) - 2)
     result = np.zeros((signals.shape[0], len(edges) - 1))
     np.add.at(result.T, place, np.asarray(power).T)
-    return result * count / (len(starts) * length)
+    return np.asarray(result * (count / (len(starts) * length)))

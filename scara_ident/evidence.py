@@ -229,7 +229,7 @@ def _velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | 
     scatter = float(np.median(np.abs(rest))) / 0.6745
     nyquist = 0.5 * stretch.rate
     removed = max(nyquist - cut, 0.1 * nyquist)
-    return scatter / np.sqrt(removed) * 2.0 * np.pi * np.sqrt(cut**3 / 3.0)
+    return float(scatter / np.sqrt(removed) * 2.0 * np.pi * np.sqrt(cut**3 / 3.0))
 
 
 def _runs_longer_than(mask: NDArray[np.bool_], length: int, widen: int) -> NDArray[np.bool_]:

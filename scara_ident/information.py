@@ -61,12 +61,12 @@ class Information:
         if np.any(~(std > 0.0)):
             raise ValueError(f"std of a prior must be positive, found {std[~(std > 0.0)][0]:g}")
         weight = np.where(np.isinf(std), 0.0, 1.0 / std)
-        return Information(_triangular(np.column_stack([np.diag(weight), weight * mean])), 0.0)
+        return Information(triangular(np.column_stack([np.diag(weight), weight * mean])), 0.0)
 
     @property
     def parameters(self) -> int:
         """Number of parameters p."""
-        return self.factor.shape[1] - 1
+        return int(self.factor.shape[1]) - 1
 
     @property
     def regressor_factor(self) -> Array:
@@ -107,8 +107,8 @@ class Information:
         # Equal panels, so that the last is not a sliver.
         panels = max(1, -(-count // PANEL_ROWS))
         bounds = np.linspace(0, count, panels + 1).astype(int)
-        factors = [_triangular(columns[:, a:b].T) for a, b in pairwise(bounds) if b > a]
-        return Information(_triangular(np.vstack([factor, *factors])), decay * self.rows + count)
+        factors = [triangular(columns[:, a:b].T) for a, b in pairwise(bounds) if b > a]
+        return Information(triangular(np.vstack([factor, *factors])), decay * self.rows + count)
 
     def scaled(self, weight: float) -> Information:
         """Return this information with every row multiplied by ``weight``."""
@@ -117,13 +117,13 @@ class Information:
     def select(self, columns: Sequence[int] | NDArray[np.intp]) -> Information:
         """Return the information of the sub-model that has these columns only."""
         kept = [*columns, self.parameters]
-        return Information(_triangular(self.factor[:, kept]), self.rows)
+        return Information(triangular(self.factor[:, kept]), self.rows)
 
     def embed(self, columns: Sequence[int] | NDArray[np.intp], parameters: int) -> Information:
         """Return the information in a larger model whose other columns are zero on these rows."""
         wide = np.zeros((self.parameters + 1, parameters + 1))
         wide[:, [*columns, parameters]] = self.factor
-        return Information(_triangular(wide), self.rows)
+        return Information(triangular(wide), self.rows)
 
     def solve(self) -> Solution:
         """Return the least-squares estimate and what it leaves undetermined."""
@@ -228,10 +228,10 @@ def merge(parts: Iterable[Information]) -> Information:
     if not items:
         raise ValueError("nothing to merge")
     stacked = np.vstack([item.factor for item in items])
-    return Information(_triangular(stacked), sum(item.rows for item in items))
+    return Information(triangular(stacked), sum(item.rows for item in items))
 
 
-def _triangular(rows: Array) -> Array:
+def triangular(rows: Array) -> Array:
     """Triangular factor of rows; rows that are fewer than the columns are kept as they are."""
     if rows.shape[0] <= rows.shape[1] and rows.shape[0] <= 1:
         return rows

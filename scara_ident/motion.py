@@ -91,7 +91,7 @@ class Stretch:
 def stretches(recording: Recording) -> tuple[Stretch, ...]:
     """Cut a recording at its gaps and put each part on a uniform time grid.
 
-    Jittered positions are interpolated by a cubic spline, torque linearly, at the median rate.
+    Jittered positions are interpolated by a cubic spline, torque linearly, at the rate of the samples, those dropped counted in.
 
     Parameters
     ----------
@@ -130,7 +130,9 @@ def _uniform(recording: Recording, start: int, stop: int, median: float) -> Stre
     if np.max(np.abs(time - ideal)) > UNIFORM_TOLERANCE * median:
         from scipy.interpolate import CubicSpline
 
-        ideal = time[0] + median * np.arange(int((time[-1] - time[0]) / median * (1 + 1e-12)) + 1)
+        # The median of jittered steps is off by up to a per cent; the number of steps is not.
+        steps = int(np.sum(np.maximum(np.rint(np.diff(time) / median), 1.0)))
+        ideal = np.linspace(time[0], time[-1], steps + 1)
         position = CubicSpline(time, position, axis=1)(ideal)
         torque = None if torque is None else np.array([np.interp(ideal, time, row) for row in torque])
     rate = (len(ideal) - 1) / (ideal[-1] - ideal[0])

@@ -271,11 +271,11 @@ def _identified_joints(
             raise RobotError(f"{source}: locked.{name}: the joint is also under joints; name it in one of them")
     if not names:
         raise RobotError(f"{source}: joints: none to identify; {description.urdf} has {_listed(movable)}")
-    kinds = {joint.get("name"): joint.get("type") for joint in tree.findall("joint")}
-    for name in kinds:
-        if kinds[name] not in (*MOVABLE, "fixed"):
+    kinds = {joint.get("name", ""): joint.get("type") for joint in tree.findall("joint")}
+    for name, kind in kinds.items():
+        if kind not in (*MOVABLE, "fixed"):
             raise RobotError(
-                f"{description.urdf}: joint {name} is of type {kinds[name]}; revolute, continuous, prismatic "
+                f"{description.urdf}: joint {name} is of type {kind}; revolute, continuous, prismatic "
                 "and fixed joints are supported"
             )
     return names

@@ -108,8 +108,10 @@ class Programme:
         u = self.unknowns
         size = u.size
         w, auxiliary = cp.Variable(size, name="w"), cp.Variable(u.auxiliary, name="auxiliary")
-        root = cp.Parameter((size, size), sparsity=np.triu_indices(size), name="root")
+        # The triangle's entries as one vector: a parameter's value then goes into the canonical form as it is.
+        entries = cp.Parameter(size * (size + 1) // 2, name="root")
         centre = cp.Parameter(size, name="centre")
+        root = cp.reshape(_triangle(size) @ entries, (size, size), order="C")
         x = centre + root @ w
         whole = cp.hstack([x, auxiliary]) if u.auxiliary else x
         matrix = unpacking()
@@ -128,7 +130,7 @@ class Programme:
         if len(u.held):
             constraints.append(_sparse(u.held) @ x == 0.0)
         self._w, self._auxiliary = w, auxiliary
-        return cp.Problem(cp.Minimize(cp.sum_squares(w)), constraints), root, centre
+        return cp.Problem(cp.Minimize(cp.sum_squares(w)), constraints), entries, centre
 
     def solve(self, factor: Array, target: Array, weight: Array) -> Point:
         """Solve for one set of data.
@@ -171,16 +173,15 @@ class Programme:
     def _run(self, root: Array, centre: Array) -> tuple[Array, Array, Array, Any]:
         import scipy.sparse as sp
 
-        upper = np.triu_indices(root.shape[0])
-        self._root.value_sparse = sp.coo_array((root[upper], upper), shape=root.shape)
-        self._centre.value = centre
+        values = {self._root.id: root[np.triu_indices(root.shape[0])], self._centre.id: centre}
         if self._canonical is None:
             import cvxpy as cp
 
+            self._root.value, self._centre.value = values[self._root.id], centre
             data, _, _ = self.problem.get_problem_data(cp.CLARABEL)
             self._canonical = (data["param_prob"], data["dims"])
         canonical, dims = self._canonical
-        quadratic, linear, _, matrix, offset = canonical.apply_parameters(quad_obj=True)[:5]
+        quadratic, linear, _, matrix, offset = canonical.apply_parameters(values, quad_obj=True)
         # cvxpy's canonical form is A x + b in the cones, CLARABEL's is b - A x.
         data_ = (quadratic, linear, -sp.csc_matrix(matrix), offset)
         result = self._attempt(data_, dims, _FAST)
@@ -256,6 +257,15 @@ class Programme:
 def smallest_share(bodies: Array) -> float:
     """Return the smallest eigenvalue of bodies relative to nominal, packed, shape (10 n,)."""
     return float(np.min(np.linalg.eigvalsh(unpack(bodies.reshape(-1, len(PACKED_IDENTITY))))))
+
+
+def _triangle(size: int) -> Any:
+    """Return the constant matrix that writes the entries of an upper triangle, row by row, into a square one."""
+    import scipy.sparse as sp
+
+    rows, columns = np.triu_indices(size)
+    count = len(rows)
+    return sp.csr_array((np.ones(count), (size * rows + columns, np.arange(count))), shape=(size**2, count))
 
 
 def _sparse(matrix: Array) -> Any:

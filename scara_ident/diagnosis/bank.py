@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
 from scara_ident.evidence import Evidence
+from scara_ident.information import triangular
 from scara_ident.model import TorqueModel
 from scara_ident.motion import Motion
 from scara_ident.terms import Column
@@ -128,9 +129,7 @@ class Stack:
     def fold_factors(self) -> tuple[Array, ...]:
         """Triangular factor of the rows of each fold."""
         fold_of_row = np.repeat(self.fold_of_block, np.diff([*self.starts, len(self.rows)]))
-        return tuple(
-            np.asarray(np.linalg.qr(self.rows[fold_of_row == fold], mode="r")) for fold in range(len(self.fold_names))
-        )
+        return tuple(triangular(self.rows[fold_of_row == fold]) for fold in range(len(self.fold_names)))
 
 
 # Folds where there is one trajectory only: consecutive parts of it.

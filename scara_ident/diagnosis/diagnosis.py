@@ -54,7 +54,7 @@ class FoundEffect:
         Share of the squared residual of its joints removed on data that it was not fitted to.
     votes : tuple of (int, int)
         Trajectories in which it helps, of those that excite it.
-    before, after : mapping of str to float
+    before, after : mapping of str to float or None
         Rms of each joint over the training recordings when it came in.
     """
 
@@ -66,8 +66,8 @@ class FoundEffect:
     p_value: float
     gain: float
     votes: tuple[int, int]
-    before: Mapping[str, float]
-    after: Mapping[str, float]
+    before: Mapping[str, float | None]
+    after: Mapping[str, float | None]
 
 
 @dataclass(frozen=True)

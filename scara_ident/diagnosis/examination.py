@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.bank import Stack
+from scara_ident.information import triangular
 
 Array = NDArray[np.float64]
 
@@ -78,7 +79,7 @@ def examine(stack: Stack, model: Sequence[int], groups: Sequence[Sequence[int]])
     columns = sorted({k for group in groups for k in group})
     place = {k: i for i, k in enumerate(columns)}
     wanted = [*columns, stack.rows.shape[1] - 1]
-    whole = np.linalg.qr(np.vstack(stack.fold_factors), mode="r")
+    whole = triangular(np.vstack(stack.fold_factors))
     sums = _sums(whole, model, wanted)
     residual = stack.rows[:, wanted] - stack.rows[:, model] @ sums
     sizes = np.sum(stack.rows[:, wanted] ** 2, axis=0)
@@ -178,7 +179,7 @@ def _block_test(stack: Stack, columns: Array, error: Array, value: Array, used: 
 def left_over(stack: Stack, model: Sequence[int], group: Sequence[int]) -> Array:
     """Return the squared residual of every block with a candidate in the model, shape (blocks,)."""
     wanted = [*model, *group]
-    whole = np.linalg.qr(np.vstack(stack.fold_factors), mode="r")
+    whole = triangular(np.vstack(stack.fold_factors))
     sums = _sums(whole, wanted, [stack.rows.shape[1] - 1])[:, 0]
     residual = stack.rows[:, -1] - stack.rows[:, wanted] @ sums
     return np.asarray(np.add.reduceat(residual**2, stack.starts))

@@ -11,7 +11,7 @@ from scara_ident.covariance import block_covariance
 from scara_ident.diagnosis.bank import Candidate, Stack, stack, with_candidates
 from scara_ident.effects import Parameter, Scene
 from scara_ident.evidence import gather_all
-from scara_ident.information import Information
+from scara_ident.information import Information, triangular
 from scara_ident.recording import Recording
 
 Array = NDArray[np.float64]
@@ -55,8 +55,8 @@ def physical_parameters(
     covariance = _covariance(rows, columns, full)
     found = []
     for i, candidate in enumerate(chosen):
-        place = _shifted(bank.places[i], base)
-        parameters = dict(candidate.effect.parameters(scene, candidate.member, value[place], covariance[place, place]))
+        own = _shifted(bank.places[i], base)
+        parameters = dict(candidate.effect.parameters(scene, candidate.member, value[own], covariance[own, own]))
         for position, (owner, k) in enumerate(steps):
             if owner == i:
                 knob = candidate.effect.knobs[k]
@@ -92,8 +92,8 @@ def _covariance(rows: Stack, columns: Array, value: Array) -> Array:
     sequences: dict[int, list[tuple[Information, ...]]] = {}
     for block, recording in enumerate(rows.recording):
         part = table[bounds[block] : bounds[block + 1]]
-        factor = np.linalg.qr(part, mode="r") if len(part) > 1 else part
+        factor = triangular(part)
         sequences.setdefault(int(recording), []).append((Information(factor, float(len(part))),))
-    whole = Information(np.linalg.qr(table, mode="r"), float(len(table)))
+    whole = Information(triangular(table), float(len(table)))
     spread = block_covariance(whole.inverse(), value * size, list(sequences.values()))
     return np.asarray(spread.matrix / np.outer(size, size))

@@ -72,7 +72,7 @@ def screen(
         total = float(np.mean(residual**2))
         singles = {name: _bins(values, SINGLE_BINS) for name, values in signals.items()}
         coarse = {name: _bins(values, PAIR_BINS) for name, values in signals.items()}
-        sets = [((name,), bins) for name, bins in singles.items()]
+        sets: list[tuple[tuple[str, ...], NDArray[np.intp]]] = [((name,), bins) for name, bins in singles.items()]
         sets += [((one, other), coarse[one] * PAIR_BINS + coarse[other]) for one, other in combinations(signals, 2)]
         for names, bins in sets:
             share = _held_out(residual, bins, fold)
@@ -123,7 +123,7 @@ def _signals(
 
 def _bins(values: Array, count: int) -> NDArray[np.intp]:
     edges = np.quantile(values, np.linspace(0.0, 1.0, count + 1)[1:-1])
-    return np.searchsorted(edges, values)
+    return np.asarray(np.searchsorted(edges, values), dtype=np.intp)
 
 
 def _held_out(residual: Array, bins: NDArray[np.intp], fold: NDArray[np.intp]) -> float:

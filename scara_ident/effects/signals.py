@@ -85,14 +85,14 @@ class Signals:
     @cached_property
     def predicted(self) -> Array:
         """Recorded torque as the base model predicts it, shape (n, N)."""
-        return np.einsum("jpn,p->jn", self.scene.model.regressor(self.motion), self.scene.value)
+        return np.asarray(np.einsum("jpn,p->jn", self.scene.model.regressor(self.motion), self.scene.value))
 
     @cached_property
     def rigid(self) -> Array:
         """Torque of links and rotors as the base model predicts it, recorded side, shape (n, N)."""
         model = self.scene.model
         term = model.rigid_body
-        return np.einsum("jpn,p->jn", term.regressor(self.motion), self.scene.value[model.place(term)])
+        return np.asarray(np.einsum("jpn,p->jn", term.regressor(self.motion), self.scene.value[model.place(term)]))
 
     def load(self, joint: int, armature: float | None = None) -> Array:
         """Torque that the gear of a joint transmits, recorded side, shape (N,): rigid torque without the own rotor's.
@@ -108,7 +108,7 @@ class Signals:
             armature = self.scene.armature(joint)
         if armature is None:
             armature = float(robot.reduction[joint] ** 2 * robot.rotor_inertia[joint])
-        return self.rigid[joint] - robot.row_scale[joint] * armature * self.motion.a[joint]
+        return np.asarray(self.rigid[joint] - robot.row_scale[joint] * armature * self.motion.a[joint])
 
     @cached_property
     def motor_turns(self) -> Array:

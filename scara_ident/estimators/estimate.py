@@ -79,7 +79,7 @@ class Estimate:
 
     def predict(self, motion: Motion) -> Array:
         """Predict the recorded torque along a motion, shape (n, N)."""
-        return np.einsum("jpn,p->jn", self.model.regressor(motion), self.value)
+        return np.asarray(np.einsum("jpn,p->jn", self.model.regressor(motion), self.value))
 
     def errors(self, evidence: Evidence) -> tuple[JointError | None, ...]:
         """Return the error on a recording, joint by joint; None where no sample of a joint was used."""
