@@ -22,8 +22,10 @@ Block = Sequence[Information]
 
 # With fewer blocks than this many per parameter the matrix of scores is too noisy to stand for itself.
 BLOCKS_PER_PARAMETER = 2.5
-# Leverage above which a block fixes a direction alone, so that its residual says nothing about it.
-FULL_LEVERAGE = 1.0 - 1e-6
+# Leverage above which a block fixes a direction all but alone, so that its residual says nothing about it.
+FULL_LEVERAGE = 0.99
+# Redundancy below which nothing is known of a joint's noise.
+NO_REDUNDANCY = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +36,9 @@ class Covariance:
     ----------
     matrix : ndarray, shape (p, p)
     kind : {"block", "pooled block"}
-        ``block``: every direction from the scatter of its own scores. ``pooled block``: few blocks, so the
-        shape of white residuals with a size from the scatter of all scores together.
+        ``block``: every direction from the scatter of its own scores. ``pooled block``: few blocks, or one that
+        fixes a direction alone, so the shape of white residuals with a size from the scatter of all scores
+        together.
     blocks : int
         Number of blocks.
     """
@@ -64,31 +67,40 @@ def block_covariance(inverse: Array, value: Array, sequences: Sequence[Sequence[
     """
     root = _square_root(inverse)
     count = sum(len(blocks) for blocks in sequences)
-    if count < BLOCKS_PER_PARAMETER * root.shape[1]:
-        meat = _pooled(root, value, sequences)
-        return Covariance(root @ meat @ root.T, "pooled block", count)
+    meat = _scattered(root, value, sequences) if count >= BLOCKS_PER_PARAMETER * root.shape[1] else None
+    if meat is None:
+        return Covariance(_pooled(root, value, sequences), "pooled block", count)
+    return Covariance(root @ meat @ root.T, "block", count)
+
+
+def _scattered(root: Array, value: Array, sequences: Sequence[Sequence[Block]]) -> Array | None:
+    """Scatter of the scores block by block; None where a block leaves no residual to judge a direction by."""
     meat = np.zeros((root.shape[1], root.shape[1]))
     for blocks in sequences:
         before = None
         for block in blocks:
             score = _reduced_score(merge(block), root, value)
+            if score is None:
+                return None
             meat += np.outer(score, score)
             if before is not None:
                 meat += 0.5 * (np.outer(score, before) + np.outer(before, score))
             before = score
-    return Covariance(root @ meat @ root.T, "block", count)
+    return meat
 
 
 def _pooled(root: Array, value: Array, sequences: Sequence[Sequence[Block]]) -> Array:
-    """Scores as white residuals of one size per joint would have them, the size from all scores together.
+    """Covariance as if residuals were white and of one size per joint, the size from all scores together.
 
     White residuals of variance s^2 leave scores of total power s^2 sum tr(H (1 - H)) with the leverages H.
     """
     joints = len(sequences[0][0])
-    meat = np.zeros((root.shape[1], root.shape[1]))
+    matrix = np.zeros((root.shape[0], root.shape[0]))
+    total = np.sum(root**2, axis=1)
+    unknown = np.zeros(root.shape[0], dtype=bool)
     for j in range(joints):
         power, expected = 0.0, 0.0
-        product = np.zeros_like(meat)
+        product = np.zeros((root.shape[1], root.shape[1]))
         for blocks in sequences:
             for block in blocks:
                 half = block[j].regressor_factor @ root
@@ -97,21 +109,25 @@ def _pooled(root: Array, value: Array, sequences: Sequence[Sequence[Block]]) -> 
                 power += float(score @ score)
                 expected += float(np.sum(leverage * np.clip(1.0 - leverage, 0.0, None)))
                 product += half.T @ half
-        if np.any(product):
+        share = root @ product @ root.T
+        if expected > NO_REDUNDANCY:
+            matrix += power / expected * share
+        else:
             # Rows that fix the parameters without any redundancy say nothing of the noise.
-            meat += (power / expected if expected > 1e-9 else np.inf) * product
-    return meat
+            unknown |= np.diag(share) > NO_REDUNDANCY * total
+    matrix[np.diag_indices_from(matrix)] = np.where(unknown, np.inf, np.diag(matrix))
+    return matrix
 
 
-def _reduced_score(block: Information, root: Array, value: Array) -> Array:
+def _reduced_score(block: Information, root: Array, value: Array) -> Array | None:
     """Score of a block in the directions of ``root``, with residuals freed of the bias of fitting."""
     residual = block.projected_torque - block.regressor_factor @ value
     half = block.regressor_factor @ root
     left, singular, right = np.linalg.svd(half, full_matrices=False)
     leverage = singular**2
-    free = leverage < FULL_LEVERAGE
-    factor = np.where(free, singular / np.sqrt(np.where(free, 1.0 - leverage, 1.0)), 0.0)
-    return np.asarray(right.T @ (factor * (left.T @ residual)))
+    if np.any(leverage > FULL_LEVERAGE):
+        return None
+    return np.asarray(right.T @ (singular / np.sqrt(1.0 - leverage) * (left.T @ residual)))
 
 
 def _square_root(matrix: Array) -> Array:

@@ -125,16 +125,21 @@ def identify(
     held_out = gather_all(equation, validation, bands)
     progress("estimating")
     noise = repeatability(recordings)
-    history = None
-    if method == "rls":
-        estimate, history = rls(equation, training)
-    elif method == "wls":
-        estimate = wls(equation, training, _joint_noise(noise))
-    else:
-        estimate = ols(equation, training)
+    estimate, history = estimate_by(method, equation, training, _joint_noise(noise))
     unweighted = pooled_information(training, np.ones(robot.n))
     log_det, condition = paper_criteria(unweighted, training)
     return Identification(estimate, history, tuple(bands), training, held_out, noise, log_det, condition, tuple(notes))
+
+
+def estimate_by(
+    method: Method, model: TorqueModel, evidence: Sequence[Evidence], noise: Array | None = None
+) -> tuple[Estimate, History | None]:
+    """Estimate by a method given by name; ``noise`` is each joint's, where repetitions tell it."""
+    if method == "rls":
+        return rls(model, evidence)
+    if method == "wls":
+        return wls(model, evidence, noise), None
+    return ols(model, evidence), None
 
 
 def _joint_noise(noise: Mapping[str, Array]) -> Array | None:

@@ -18,7 +18,6 @@ from scara_ident.base_parameters import (
     pseudo_inertia,
     standard_regressor,
 )
-from scara_ident.errors import RobotError
 from scara_ident.robot import Robot, load_robot
 from tests.arms import PLANAR_2R, Link, example_urdf, rnea, write_urdf
 
@@ -33,10 +32,25 @@ def two_fingers(folder: Path) -> Robot:
     return load_robot(path)
 
 
+_ARMS: dict[str, Robot] = {}
+_REDUCTIONS: dict[tuple[str, bool], BaseParameters] = {}
+
+
 def arm(name: str, folder: Path) -> Robot:
-    if name == "scara03":
-        return load_robot()
-    return two_fingers(folder) if name == "hand" else load_robot(example_urdf(f"{name}.urdf"))
+    if name not in _ARMS:
+        if name == "scara03":
+            _ARMS[name] = load_robot()
+        else:
+            _ARMS[name] = two_fingers(folder) if name == "hand" else load_robot(example_urdf(f"{name}.urdf"))
+    return _ARMS[name]
+
+
+def reduction(name: str, folder: Path, rotor_inertia: bool = True) -> BaseParameters:
+    """Return the reduction of an arm, made once for all tests."""
+    if (name, rotor_inertia) not in _REDUCTIONS:
+        found = find_base_parameters(arm(name, folder), rotor_inertia=rotor_inertia)
+        _REDUCTIONS[name, rotor_inertia] = found
+    return _REDUCTIONS[name, rotor_inertia]
 
 
 ARMS = ("scara03", "double_pendulum", "ur5_robot", "ur10_robot", "panda", "hand")
@@ -47,10 +61,10 @@ def svd_rank(robot: Robot, rotor_inertia: bool) -> int:
     rng = np.random.default_rng(99)
     model, data = robot.model, robot.model.createData()
     rows = []
-    for _ in range(30 * robot.n):
+    for _ in range(max(40, 20 * robot.n)):
         q = pin.randomConfiguration(model, np.full(model.nq, -2.0), np.full(model.nq, 2.0))
         v, a = 3 * rng.uniform(-1, 1, (2, model.nv))
-        columns = pin.computeJointTorqueRegressor(model, data, q, v, 5 * a)
+        columns = pin.computeJointTorqueRegressor(model, data, q, v, 5 * a).reshape(robot.n, -1)
         rows.append(np.hstack([columns, np.diag(5 * a)]) if rotor_inertia else columns.copy())
     stacked = np.vstack(rows)
     size = np.linalg.norm(stacked, axis=0)
@@ -66,17 +80,15 @@ def svd_rank(robot: Robot, rotor_inertia: bool) -> int:
 @pytest.mark.parametrize("rotor_inertia", [True, False])
 @pytest.mark.parametrize("name", ARMS)
 def test_the_count_is_the_rank_of_pinocchios_regressor(tmp_path: Path, name: str, rotor_inertia: bool):
-    robot = arm(name, tmp_path)
-    base = find_base_parameters(robot, rotor_inertia=rotor_inertia)
+    robot, base = arm(name, tmp_path), reduction(name, tmp_path, rotor_inertia)
     assert base.count == svd_rank(robot, rotor_inertia)
     assert base.approximate == ()
 
 
 @pytest.mark.parametrize(("name", "rigid", "with_rotors"), [("scara03", 4, 5), ("double_pendulum", 6, 7), ("ur5_robot", 36, 40), ("ur10_robot", 36, 40)])
 def test_the_count_is_the_known_one(tmp_path: Path, name: str, rigid: int, with_rotors: int):
-    robot = arm(name, tmp_path)
-    assert find_base_parameters(robot, rotor_inertia=False).count == rigid
-    assert find_base_parameters(robot).count == with_rotors
+    assert reduction(name, tmp_path, rotor_inertia=False).count == rigid
+    assert reduction(name, tmp_path).count == with_rotors
 
 
 def test_the_panda_arm_without_its_fingers_has_the_published_43(tmp_path: Path):
@@ -88,8 +100,7 @@ def test_the_panda_arm_without_its_fingers_has_the_published_43(tmp_path: Path):
 
 @pytest.mark.parametrize("name", ARMS)
 def test_the_check_passes(tmp_path: Path, name: str):
-    robot = arm(name, tmp_path)
-    check = check_base_parameters(robot, find_base_parameters(robot))
+    check = check_base_parameters(arm(name, tmp_path), reduction(name, tmp_path))
     assert check.passed
     assert check.rank == check.count
 
@@ -107,8 +118,8 @@ def test_the_check_does_not_pass_a_wrong_reduction():
 @pytest.mark.parametrize("name", ["scara03", "double_pendulum", "ur5_robot", "hand"])
 def test_the_set_does_not_depend_on_the_seed(tmp_path: Path, name: str):
     robot = arm(name, tmp_path)
-    first = find_base_parameters(robot)
-    for seed in range(1, 21 if robot.n < 4 else 6):
+    first = reduction(name, tmp_path)
+    for seed in range(1, 21 if robot.n < 4 else 4):
         other = find_base_parameters(robot, seed=seed)
         assert_same_set(first, other)
 
@@ -116,8 +127,8 @@ def test_the_set_does_not_depend_on_the_seed(tmp_path: Path, name: str):
 @pytest.mark.parametrize("name", ["ur10_robot", "panda"])
 def test_the_set_of_larger_arms_does_not_depend_on_the_seed(tmp_path: Path, name: str):
     robot = arm(name, tmp_path)
-    for seed in (7, 20):
-        assert_same_set(find_base_parameters(robot), find_base_parameters(robot, seed=seed))
+    for seed in (20,):
+        assert_same_set(reduction(name, tmp_path), find_base_parameters(robot, seed=seed))
 
 
 def assert_same_set(one: BaseParameters, other: BaseParameters) -> None:
@@ -130,8 +141,7 @@ def assert_same_set(one: BaseParameters, other: BaseParameters) -> None:
 @pytest.mark.parametrize("name", ARMS)
 def test_torque_of_base_parameters_is_pinocchios(tmp_path: Path, name: str):
     """The whole way: URDF inertias and armatures, grouped, times the kept columns, is inverse dynamics."""
-    robot = arm(name, tmp_path)
-    base = find_base_parameters(robot)
+    robot, base = arm(name, tmp_path), reduction(name, tmp_path)
     rng = np.random.default_rng(3)
     q, v, a = (rng.uniform(-1.5, 1.5, (robot.n, 6)) for _ in range(3))
     regressor = standard_regressor(robot, q, v, a)[:, base.kept]
@@ -164,7 +174,7 @@ def test_a_coefficient_of_minus_one_is_written_as_a_sign():
 
 
 def test_every_standard_parameter_is_accounted_for(tmp_path: Path):
-    base = find_base_parameters(arm("ur5_robot", tmp_path))
+    base = reduction("ur5_robot", tmp_path)
     entering = set(np.flatnonzero(np.any(base.grouping != 0.0, axis=0)))
     assert entering | set(base.absent) == set(range(66))
     assert not entering & set(base.absent)
@@ -225,17 +235,13 @@ def test_an_angle_with_few_digits_is_said_and_gains_no_parameters(tmp_path: Path
     assert all(0 < share < 2e-5 for _, share in approximate[1])
 
 
-def test_an_arm_that_torque_tells_nothing_of_is_refused(tmp_path: Path):
-    path = write_urdf(tmp_path / "arm.urdf", (Link(),))
-    robot = load_robot(path)
-    assert find_base_parameters(robot, rotor_inertia=False).names == ("I1zz",)
-    # A slide without mass in the direction of nothing: only mass enters, and a rotor beside it.
-    slide = load_robot(write_urdf(path, (Link(kind="prismatic"),)))
-    assert find_base_parameters(slide, rotor_inertia=False).names == ("m1",)
-    with pytest.raises(RobotError, match="no inertial parameter enters"):
-        find_base_parameters(replace(robot, model=pin.Model(), joints=(), order=np.array([], dtype=np.intp),
-                                     prismatic=np.array([], dtype=bool), reduction=np.array([]),
-                                     lower=np.array([]), upper=np.array([])))
+def test_single_joints_have_what_moves_them(tmp_path: Path):
+    for link, lead in ((Link(), "I1zz"), (Link(kind="prismatic"), "m1")):
+        robot = load_robot(write_urdf(tmp_path / "arm.urdf", (link,)))
+        base = find_base_parameters(robot, rotor_inertia=False)
+        # A vertical slide feels its weight, a vertical axis no gravity.
+        assert base.names == (lead,)
+        assert check_base_parameters(robot, base).passed
 
 
 DIRECTIONS = st.sampled_from([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.0, -1.0, 0.0)])

@@ -10,10 +10,12 @@ from typing import Annotated, Any
 import typer
 
 from scara_ident.cli.base import base
+from scara_ident.cli.compare import compare
 from scara_ident.cli.console import errors_console
 from scara_ident.cli.diagnose import diagnose
 from scara_ident.cli.identify import identify
 from scara_ident.cli.paper import paper
+from scara_ident.cli.simulate import simulate
 from scara_ident.errors import ScaraIdentError
 
 app = typer.Typer(
@@ -43,7 +45,7 @@ def program(
     """Identify the dynamic model of a robot arm from measured motion, and find what the model lacks."""
 
 
-_COMMANDS: tuple[Callable[..., Any], ...] = (identify, diagnose, base, paper)
+_COMMANDS: tuple[Callable[..., Any], ...] = (identify, diagnose, compare, simulate, base, paper)
 for _command in _COMMANDS:
     app.command()(_command)
 

@@ -39,6 +39,16 @@ FEASIBILITY = 1e-9
 ACCEPTED_GAP = 1e-4
 ACCEPTED_RELATIVE_GAP = 1e-6
 
+_SETTINGS = {
+    "verbose": False,
+    "max_threads": 1,
+    # Presolve and decomposition would change the shape of the problem with its numbers.
+    "presolve_enable": False,
+    "chordal_decomposition_enable": False,
+    "tol_gap_abs": GAP,
+    "tol_gap_rel": RELATIVE_GAP,
+    "tol_feas": FEASIBILITY,
+}
 # Of the two runs the first goes without iterative refinement: its linear systems are well-scaled, and it takes
 # half the time.
 _FAST = {"iterative_refinement_enable": False}
@@ -99,7 +109,6 @@ class Programme:
         self.options = options or ConsistentOptions()
         self.unknowns: Unknowns = build_unknowns(model, self.options)
         self.problem, self._root, self._centre = self._build()
-        self._canonical: Any = None
         self._solver: Any = None
 
     def _build(self) -> tuple[Any, Any, Any]:
@@ -166,61 +175,41 @@ class Programme:
         root = np.triu(root)
         centre = root @ triangular[: u.size, u.size]
         left_over = float(np.sum(triangular[u.size :, u.size] ** 2))
-        w, auxiliary, z, info_ = self._run(root, centre)
-        x = centre + root @ w
-        return self._point(x, auxiliary, z, left_over + float(w @ w), info_)
+        w, auxiliary, z, result = self._run(root, centre)
+        return self._point(centre + root @ w, auxiliary, z, left_over + float(w @ w), result)
 
     def _run(self, root: Array, centre: Array) -> tuple[Array, Array, Array, Any]:
-        import scipy.sparse as sp
+        import cvxpy as cp
 
-        values = {self._root.id: root[np.triu_indices(root.shape[0])], self._centre.id: centre}
-        if self._canonical is None:
-            import cvxpy as cp
-
-            self._root.value, self._centre.value = values[self._root.id], centre
-            data, _, _ = self.problem.get_problem_data(cp.CLARABEL)
-            self._canonical = (data["param_prob"], data["dims"])
-        canonical, dims = self._canonical
-        quadratic, linear, _, matrix, offset = canonical.apply_parameters(values, quad_obj=True)
-        # cvxpy's canonical form is A x + b in the cones, CLARABEL's is b - A x.
-        data_ = (quadratic, linear, -sp.csc_matrix(matrix), offset)
-        result = self._attempt(data_, dims, _FAST)
+        self._root.value = root[np.triu_indices(root.shape[0])]
+        self._centre.value = centre
+        data = self.problem.get_problem_data(cp.CLARABEL)[0]
+        result = self._attempt(data, _FAST)
         if not self._is_good(result, strict=True):
-            result = self._attempt(data_, dims, _CAREFUL)
+            result = self._attempt(data, _CAREFUL)
             if not self._is_good(result, strict=False):
                 raise EstimationError(_what_to_try(str(result.status)))
-        found, z = np.array(result.x), np.array(result.z)
-        places = canonical.var_id_to_col
+        found = np.array(result.x)
+        places = data["param_prob"].var_id_to_col
         start = places[self._w.id]
         w = found[start : start + root.shape[0]]
-        count = self.unknowns.auxiliary
         start = places.get(self._auxiliary.id, 0)
-        return w, found[start : start + count], z, result
+        return w, found[start : start + self.unknowns.auxiliary], np.array(result.z), result
 
-    def _attempt(self, data: Any, dims: Any, extra: dict[str, Any]) -> Any:
+    def _attempt(self, data: Any, extra: dict[str, Any]) -> Any:
         import clarabel
         import scipy.sparse as sp
         from cvxpy.reductions.solvers.conic_solvers.clarabel_conif import dims_to_solver_cones
 
-        quadratic, linear, matrix, offset = data
         if extra is _FAST and self._solver is not None:
-            self._solver.update(A=matrix, b=offset)
+            # Only the constraints' numbers change; the factorisation's plan is kept.
+            self._solver.update(A=data["A"], b=data["b"])
             return self._solver.solve()
         settings = clarabel.DefaultSettings()
-        chosen = {
-            "verbose": False,
-            "max_threads": 1,
-            "presolve_enable": False,
-            "chordal_decomposition_enable": False,
-            "tol_gap_abs": GAP,
-            "tol_gap_rel": RELATIVE_GAP,
-            "tol_feas": FEASIBILITY,
-            **extra,
-        }
-        for name, value in chosen.items():
+        for name, value in {**_SETTINGS, **extra}.items():
             setattr(settings, name, value)
-        upper = sp.triu(quadratic).tocsc()
-        solver = clarabel.DefaultSolver(upper, linear, matrix, offset, dims_to_solver_cones(dims), settings)
+        cones = dims_to_solver_cones(data["dims"])
+        solver = clarabel.DefaultSolver(sp.triu(data["P"]).tocsc(), data["c"], data["A"], data["b"], cones, settings)
         if extra is _FAST:
             self._solver = solver
         return solver.solve()

@@ -106,7 +106,7 @@ def joint_side(robot: Robot, friction: JointFriction | None) -> JointSideFrictio
             raise ValueError(f"{word} friction has shape {given.shape}; expected ({robot.n},)")
         for name, value in zip(robot.joints, given, strict=True):
             if np.isnan(value):
-                notes.append(f"{name}: {word} friction is not known and was left as it is")
+                notes.append(f"{name}: {word} friction is not known and was not written")
             elif value < 0.0:
                 notes.append(
                     f"{name}: {word} friction is {value:.6g}; below zero it would drive the joint, so 0 was written"

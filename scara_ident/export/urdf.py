@@ -126,7 +126,7 @@ def _inertials(robot: Robot, bodies: Array, links: dict[str, Element], content: 
             carrying = ", ".join(f"{name} at {value:g}" for name, value in robot.locked)
             yield f"{note} (with {carrying})" if carrying else note
         for member, part in zip(members, parts, strict=True):
-            if member is members[0] or part is not member.parameters:
+            if not np.array_equal(part, member.parameters):
                 yield from _set_inertial(content, links[member.link], part)
 
 
@@ -157,7 +157,8 @@ def _set_inertial(content: bytes, link: Element, parameters: Array) -> Iterator[
 
 
 def _element(tag: str, values: dict[str, list[float]]) -> str:
-    return f"<{tag} {' '.join(f'{key}="{format_numbers(numbers)}"' for key, numbers in values.items())}/>"
+    attributes = [f'{key}="{format_numbers(numbers)}"' for key, numbers in values.items()]
+    return f"<{tag} {' '.join(attributes)}/>"
 
 
 def _dynamics(robot: Robot, friction: JointFriction | None, root: Element, content: bytes) -> Iterator[Edit | str]:

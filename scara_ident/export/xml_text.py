@@ -7,7 +7,7 @@ tells where elements stand, and the edits are made in the text.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
@@ -128,7 +128,7 @@ def parse(content: bytes, path: Path) -> Element:
     return next(child for child in top.children if child.tag != COMMENT)
 
 
-def set_numbers(content: bytes, element: Element, values: dict[str, Sequence[float]]) -> list[Edit]:
+def set_numbers(content: bytes, element: Element, values: Mapping[str, Sequence[float]]) -> list[Edit]:
     """Set attributes to numbers; one that has the number already keeps its spelling, a missing one is appended."""
     edits: list[Edit] = []
     spans = {match.group(1).decode(): match.span(2) for match in _attributes(content, element)}

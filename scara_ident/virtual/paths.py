@@ -27,6 +27,8 @@ NEWTON_STEPS = 60
 # A Newton step turns no joint farther than this, rad or m.
 LONGEST_STEP = 0.3
 STARTS = 30
+# A path that is singular and this share of the way on out of reach is said to leave the reach.
+AHEAD = 0.03
 
 
 class PathError(ScaraIdentError):
@@ -231,9 +233,9 @@ def follow(
     for k, share in enumerate(shares):
         point = curve(share)
         q, distance, quality = _solve(tool, point, orientation, q)
-        if quality < SINGULAR:
+        if quality < SINGULAR and not _leads_out(tool, curve(min(share + AHEAD, 1.0)), orientation, q):
             raise PathError(f"{name}: singular at {_where(share, point)}; choose a path away from it", share, point)
-        if distance > CLOSE * tool.reach:
+        if quality < SINGULAR or distance > CLOSE * tool.reach:
             raise PathError(f"{name}: {_where(share, point)} is outside the reach; move the path closer", share, point)
         _check_range(robot, q, share, point, name)
         poses[k] = q
@@ -294,6 +296,11 @@ def _solve(tool: Tool, point: Array, orientation: Array | None, q: Array) -> tup
         step = vt[: tool.rank].T @ ((u[:, : tool.rank].T @ error) * used / (used**2 + damping))
         q += step * min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
     return q, distance, quality
+
+
+def _leads_out(tool: Tool, point: Array, orientation: Array | None, q: Array) -> bool:
+    """Whether a point ahead of a singular pose is out of reach: the pose is then on the border of the reach."""
+    return _solve(tool, point, orientation, q)[1] > 1e-4 * tool.reach
 
 
 def _inside(robot: Robot, q: Array) -> bool:

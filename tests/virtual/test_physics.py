@@ -114,7 +114,7 @@ def test_an_elastic_arm_without_damping_conserves_energy() -> None:
 @pytest.mark.parametrize("side", ["motor", "joint"])
 def test_least_squares_on_exact_signals_give_the_arm_its_own_parameters(side: str) -> None:
     arm = on_side(replace(scara(), torque_offset=np.array([0.03, -0.02])), side)
-    arm = replace(arm, friction=arm.friction + [[0, 0, 0, 0.01], [0, 0, 0, -0.002]])
+    arm = replace(arm, friction=arm.friction + np.array([[0, 0, 0, 0.01], [0, 0, 0, -0.002]]))
     assert_own_parameters(arm, duration=12.0)
 
 
@@ -219,9 +219,7 @@ def test_elastic_joint_rings_at_its_resonance() -> None:
     arm = replace(arm, friction=np.array([[0, 0, 0, 0], [50.0, 0, 0, 0]]))
     effect = JointElasticity(joint="joint1", stiffness=stiffness, damping_ratio=0.0)
     rate = 4000.0
-    time, true = free_motion(
-        arm, [0.0, 0.0], [0.0, 0.0], 2.0, torque=np.array([0.1, 0.0]), effects=[effect], rate=rate
-    )
+    time, true = free_motion(arm, [0.0, 0.0], [0.0, 0.0], 2.0, torque=np.array([0.1, 0.0]), effects=[effect], rate=rate)
     link, rotor = arm.link_inertia()[0], arm.armature[0]
     expected = np.sqrt(stiffness * (1.0 / link + 1.0 / rotor)) / (2 * np.pi)
     wind_up = (true.position - true.link_position)[0]

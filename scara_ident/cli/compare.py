@@ -1,0 +1,61 @@
+"""``scara-ident compare``."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+from scara_ident.cli.console import OutputOption, RecordingArguments, RobotOption, output_console, progress, table
+
+
+def compare(
+    recordings: RecordingArguments,
+    robot: RobotOption = None,
+    model: Annotated[
+        Literal["complete", "reduced", "basic"], typer.Option(help="Terms of the torque equation.")
+    ] = "complete",
+    method: Annotated[Literal["ols", "wls", "rls"], typer.Option(help="Estimator.")] = "ols",
+    output: OutputOption = None,
+) -> None:
+    """Set every trajectory's parameters against every trajectory."""
+    from scara_ident.comparison import compare as run
+    from scara_ident.recording import read_recordings
+    from scara_ident.report.comparison import comparison_dict
+    from scara_ident.report.files import write_json
+    from scara_ident.robot import load_robot
+
+    arm = load_robot(robot)
+    with progress() as step:
+        step("reading the recordings")
+        result = run(arm, read_recordings(recordings, arm), model=model, method=method, progress=step)
+    content = comparison_dict(result)
+    console = output_console()
+    for note in result.notes:
+        console.print(f"note: {note}", markup=False, style="dim")
+    names = content["trajectories"]
+    what = table("trajectories", "trajectory", "J_d", "J_k", "runs", right=("J_d", "J_k", "runs"))
+    for name in names:
+        row = content["characteristics"][name]
+        what.add_row(name, f"{row['log_det']:.2f}", f"{row['condition']:.3g}", str(len(row["recordings"])))
+    console.print(what)
+    for joint in arm.joints:
+        rows = table(
+            f"{joint}: rms error (what noise explains), parameters from", "predicted", "torque", *names, "average",
+            right=("torque", *names, "average"),
+        )  # fmt: skip
+        for name in names:
+            cells = [
+                f"{content['errors'][name][other][joint]:.3g} ({content['predicted_by_covariance'][name][other][joint]:.2g})"
+                for other in names
+            ]
+            average = content["average_of_predicted"][name][joint]
+            rows.add_row(name, f"{content['torque_rms'][name][joint]:.3g}", *cells, f"{average:.3g}")
+        averages = [f"{content['average_of_estimated'][other][joint]:.3g}" for other in names]
+        rows.add_row("average", "", *averages, "")
+        console.print(rows)
+    for sentence in content["summary"]:
+        console.print(sentence, markup=False)
+    if output is not None:
+        write_json(output / "comparison.json", content)
+        console.print(f"written: {output / 'comparison.json'}", markup=False, soft_wrap=True)

@@ -1,0 +1,43 @@
+"""``scara-ident simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scara_ident.cli.console import RobotOption, output_console, progress
+
+
+def simulate(
+    trajectory: Annotated[
+        list[str],
+        typer.Argument(metavar="TRAJECTORY...", help="trajectory.csv, or OJK, OJD, CI, L1, L2 on the SCARA03."),
+    ],
+    robot: RobotOption = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option("--effect", metavar="NAME[:JOINT][:KEY=VALUE,..]", help="Effect to switch on; may be repeated."),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of noise and encoder zero.")] = 0,
+    repetitions: Annotated[int, typer.Option(min=1, help="Recordings of each trajectory.")] = 1,
+    output: Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the recordings.")] = Path("."),
+) -> None:
+    """Record the virtual arm in closed loop, with what it really was in a JSON beside."""
+    from scara_ident.robot import load_robot
+    from scara_ident.virtual import parse_effect, virtual_arm, write_simulation
+    from scara_ident.virtual import simulate as run
+    from scara_ident.virtual.named import named_motion
+
+    arm = virtual_arm(load_robot(robot))
+    effects = [parse_effect(text) for text in effect or ()]
+    motions = [named_motion(word, arm.robot) for word in trajectory]
+    console = output_console()
+    with progress() as step:
+        for motion in motions:
+            for repetition in range(1, repetitions + 1):
+                step(f"simulating {motion.name}, run {repetition}")
+                result = run(arm, motion, effects=effects, seed=seed, repetition=repetition)
+                path = write_simulation(result, output)
+                console.print(f"written: {path}", markup=False, soft_wrap=True)

@@ -1,0 +1,160 @@
+"""The bodies nearest to the nominal ones among all that give the same base parameters.
+
+Near is meant in the entropic divergence of pseudo-inertias (Lee, Wensing, Park 2020, "Geometric robot dynamic
+identification: a convex programming approach")
+
+    D(P | P0) = tr(P0^-1 P) - log det(P0^-1 P) - 4,
+
+which knows neither frame nor unit. It is infinite at the edge of what a body can be, so the result is inside. Each
+rotor enters with the same divergence of numbers, a/a0 - log(a/a0) - 1. The minimum under linear equations is found by
+Newton's method, which for such a function is safe and quick (Nesterov, Nemirovskii 1994).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.consistency.bodies import PACKED_IDENTITY, unpack
+from scara_ident.consistency.cones import Cones
+from scara_ident.errors import EstimationError
+
+Array = NDArray[np.float64]
+
+# Newton's decrement at which the divergence is known to twelve digits.
+DECREMENT = 1e-6
+MOST_STEPS = 200
+# Weights of the barrier of limits, the last so small that it moves nothing.
+BARRIER = (1.0, 1e-2, 1e-4, 1e-6, 1e-8)
+# Singular values below this share of the largest are equations that say nothing new.
+DEPENDENT = 1e-9
+
+
+def divergence(x: Array) -> float:
+    """Return the divergence of bodies and rotors relative to nominal, shape (11 n,), from the nominal arm."""
+    n = len(x) // 11
+    matrices = unpack(x[: 10 * n].reshape(n, 10))
+    sign, log = np.linalg.slogdet(matrices)
+    if np.any(sign <= 0.0) or np.any(x[10 * n :] <= 0.0):
+        return np.inf
+    bodies = float(np.sum(np.trace(matrices, axis1=1, axis2=2) - log - 4.0))
+    return bodies + float(np.sum(x[10 * n :] - np.log(x[10 * n :]) - 1.0))
+
+
+def null_space(rows: Array) -> Array:
+    """Return an orthonormal basis of the directions that rows do not see, shape (k, free)."""
+    if rows.shape[0] == 0:
+        return np.eye(rows.shape[1])
+    _, singular, right = np.linalg.svd(rows)
+    rank = int(np.count_nonzero(singular > DEPENDENT * singular[0])) if singular[0] > 0.0 else 0
+    return np.asarray(right[rank:].T)
+
+
+def nearest_to_nominal(start: Array, free: Array, limits: Cones) -> Array:
+    """Find the bodies nearest to nominal along free directions.
+
+    Parameters
+    ----------
+    start : ndarray, shape (11 n,)
+        Bodies and rotors relative to nominal (see `Unknowns`), strictly possible and strictly within the limits.
+    free : ndarray, shape (11 n, k)
+        Directions along which nothing that torque tells changes.
+    limits : Cones
+        On the 11 n unknowns.
+
+    Returns
+    -------
+    ndarray, shape (11 n,)
+
+    Raises
+    ------
+    EstimationError
+        If Newton's method does not converge.
+    """
+    if free.shape[1] == 0:
+        return start
+    bounded = bool(len(limits.nonnegative) or len(limits.ball))
+    x = start
+    for weight in BARRIER if bounded else (0.0,):
+        x = _newton(x, free, limits, weight)
+    return x
+
+
+def _newton(start: Array, free: Array, limits: Cones, weight: float) -> Array:
+    n = len(start) // 11
+    directions = unpack(np.moveaxis(free[: 10 * n].reshape(n, 10, -1), 2, 1))
+    moved = np.zeros(free.shape[1])
+    x, value = start, _value(start, limits, weight)
+    for _ in range(MOST_STEPS):
+        gradient, root = _slopes(x, n, directions, free, limits, weight)
+        triangular = np.linalg.qr(root, mode="r")
+        half = np.linalg.solve(triangular.T, gradient)
+        step = -np.linalg.solve(triangular, half)
+        decrement = float(np.linalg.norm(half))
+        if decrement < DECREMENT:
+            return x
+        length = 1.0
+        while True:
+            trial = start + free @ (moved + length * step)
+            new = _value(trial, limits, weight)
+            if new <= value - 0.25 * length * decrement**2:
+                break
+            if decrement < 1e-3 and abs(new - value) <= 1e-12 * max(1.0, abs(value)):
+                # What is left to gain is below rounding.
+                return x
+            length *= 0.5
+            if length < 1e-12:
+                raise EstimationError(
+                    "the bodies nearest to the nominal ones were not found: the URDF's inertias and the data are too "
+                    "far apart; correct the URDF or give link_mass"
+                )
+        moved, x, value = moved + length * step, trial, new
+    raise EstimationError(
+        f"the bodies nearest to the nominal ones were not found in {MOST_STEPS} steps; correct the URDF's inertias"
+    )
+
+
+def _value(x: Array, limits: Cones, weight: float) -> float:
+    value = divergence(x)
+    if weight == 0.0 or not np.isfinite(value):
+        return value
+    slack = limits.nonnegative(x)
+    cones = limits.ball(x).reshape(-1, 4)
+    room = cones[:, 0] ** 2 - np.sum(cones[:, 1:] ** 2, axis=1)
+    if np.any(slack <= 0.0) or np.any(room <= 0.0) or np.any(cones[:, 0] <= 0.0):
+        return np.inf
+    return value - weight * float(np.sum(np.log(slack)) + np.sum(np.log(room)))
+
+
+def _slopes(
+    x: Array, n: int, directions: Array, free: Array, limits: Cones, weight: float
+) -> tuple[Array, Array]:
+    """Gradient along the free directions, and a square root of the Hessian, as rows."""
+    inverse_root = np.linalg.inv(np.linalg.cholesky(unpack(x[: 10 * n].reshape(n, 10))))
+    # In the metric of the point itself, each direction is a symmetric matrix per body.
+    local = inverse_root[:, None] @ directions @ np.swapaxes(inverse_root, 1, 2)[:, None]
+    rotors = free[10 * n :]
+    own = rotors / x[10 * n :, None]
+    trace = np.trace(local, axis1=2, axis2=3)
+    gradient = np.tile(PACKED_IDENTITY, n) @ free[: 10 * n] - trace.sum(axis=0) + rotors.sum(axis=0) - own.sum(axis=0)
+    count = free.shape[1]
+    rows = [np.moveaxis(local, 1, 3).reshape(16 * n, count), own]
+    if weight > 0.0:
+        slack = limits.nonnegative(x)
+        linear = limits.nonnegative.matrix @ free / slack[:, None]
+        gradient = gradient - weight * linear.sum(axis=0)
+        rows.append(np.sqrt(weight) * linear)
+        for first in range(0, len(limits.ball), 4):
+            slope, root = _ball(limits.ball.matrix[first : first + 4] @ free, limits.ball(x)[first : first + 4])
+            gradient = gradient + weight * slope
+            rows.append(np.sqrt(weight) * root)
+    return gradient, np.vstack(rows)
+
+
+def _ball(rows: Array, value: Array) -> tuple[Array, Array]:
+    """Gradient and a root of the Hessian of -log(t^2 - |u|^2) along rows of (t, u)."""
+    flip = np.array([1.0, -1.0, -1.0, -1.0])
+    room = float(flip @ value**2)
+    slope = -2.0 / room * (flip * value)
+    hessian = np.outer(slope, slope) - 2.0 / room * np.diag(flip)
+    return slope @ rows, np.linalg.cholesky(hessian).T @ rows

@@ -1,0 +1,116 @@
+"""What a comparison tells: the JSON and the sentences."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from scara_ident.comparison import Comparison
+
+
+def comparison_dict(comparison: Comparison) -> dict[str, Any]:
+    """Return the content of ``comparison.json``."""
+    joints = comparison.model.robot.joints
+    names = [summary.name for summary in comparison.trajectories]
+    own = np.array([comparison.errors[i, i] for i in range(len(names))])
+    return {
+        "robot": comparison.model.robot.name,
+        "model": comparison.model.name,
+        "method": comparison.method,
+        "trajectories": names,
+        "joints": list(joints),
+        "band_hz": dict(zip(joints, comparison.bands, strict=True)),
+        "characteristics": {
+            summary.name: {
+                "recordings": list(summary.recordings),
+                "log_det": summary.log_det,
+                "condition": summary.condition,
+                "sigma": None if summary.sigma is None else dict(zip(joints, summary.sigma, strict=True)),
+                "peak_velocity": dict(zip(joints, summary.peak_velocity, strict=True)),
+                "peak_acceleration": dict(zip(joints, summary.peak_acceleration, strict=True)),
+            }
+            for summary in comparison.trajectories
+        },
+        "torque_rms": {
+            summary.name: dict(zip(joints, summary.torque_rms, strict=True)) for summary in comparison.trajectories
+        },
+        "errors": _cells(comparison, comparison.errors),
+        "predicted_by_covariance": _cells(comparison, comparison.expected),
+        "normalised": _cells(comparison, comparison.errors / own[:, None]),
+        "average_of_predicted": {
+            name: dict(zip(joints, comparison.errors[i].mean(axis=0), strict=True)) for i, name in enumerate(names)
+        },
+        "average_of_estimated": {
+            name: dict(zip(joints, comparison.errors[:, k].mean(axis=0), strict=True)) for k, name in enumerate(names)
+        },
+        "parameters": {
+            summary.name: {
+                column.name: {
+                    "value": summary.estimate.value[k],
+                    "std": summary.estimate.std[k],
+                    "unit": column.unit,
+                }
+                for k, column in enumerate(comparison.model.columns)
+            }
+            for summary in comparison.trajectories
+        },
+        "friction": _friction(comparison),
+        "summary": list(comparison_sentences(comparison)),
+        "notes": list(comparison.notes),
+    }
+
+
+def _cells(comparison: Comparison, values: Any) -> dict[str, dict[str, dict[str, float]]]:
+    names = [summary.name for summary in comparison.trajectories]
+    joints = comparison.model.robot.joints
+    return {
+        predicted: {estimated: dict(zip(joints, values[i, k], strict=True)) for k, estimated in enumerate(names)}
+        for i, predicted in enumerate(names)
+    }
+
+
+def _friction(comparison: Comparison) -> dict[str, Any]:
+    """Friction curves of every joint from every trajectory, to the fastest speed of all (Fig. 4 of the paper)."""
+    robot = comparison.model.robot
+    found: dict[str, Any] = {}
+    names = comparison.model.names
+    for j, joint in enumerate(robot.joints):
+        fastest = max(summary.peak_velocity[j] for summary in comparison.trajectories)
+        speed = np.linspace(0.0, fastest, 60)
+        curves = {}
+        for summary in comparison.trajectories:
+            curve = np.zeros_like(speed)
+            for power in range(4):
+                if f"a{power}{j + 1}" in names:
+                    curve += summary.estimate.value[names.index(f"a{power}{j + 1}")] * speed**power
+            curves[summary.name] = curve
+        found[joint] = {
+            "speed": speed,
+            "torque": curves,
+            "fastest": {summary.name: summary.peak_velocity[j] for summary in comparison.trajectories},
+        }
+    return found
+
+
+def comparison_sentences(comparison: Comparison) -> tuple[str, ...]:
+    """Return the result in words: which trajectory's parameters serve best, and where bias is at work."""
+    names = [summary.name for summary in comparison.trajectories]
+    own = np.array([comparison.errors[i, i] for i in range(len(names))])
+    # Ratios to each trajectory's own error, so that joints of different torque count the same.
+    ratio = np.nanmean(comparison.errors / own[:, None], axis=(0, 2))
+    best, worst = int(np.argmin(ratio)), int(np.argmax(ratio))
+    found = [
+        f"Parameters from {names[best]} predict all trajectories best ({ratio[best]:.2f} times each one's own error), "
+        f"those from {names[worst]} worst ({ratio[worst]:.3g} times)."
+    ]
+    beyond = comparison.errors / comparison.expected
+    i, k, j = np.unravel_index(int(np.nanargmax(np.where(np.isfinite(beyond), beyond, -1.0))), beyond.shape)
+    if beyond[i, k, j] > 2.0:
+        found.append(
+            f"Bias, not noise, is at work where {names[k]} predicts {names[i]} on {comparison.model.robot.joints[j]}: "
+            f"the error is {beyond[i, k, j]:.3g} times what the parameters' covariance promises."
+        )
+    else:
+        found.append("No error exceeds twice what noise in the parameters explains.")
+    return tuple(found)
