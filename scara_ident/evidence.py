@@ -28,8 +28,12 @@ Array = NDArray[np.float64]
 POSITION_BAND = 3.0
 # Rows per period of the band that are kept: the filter lets little through above 1.25 of its cut-off.
 ROWS_PER_PERIOD = 2.5
-# Periods of the band left out at both ends of a stretch, where the filter's continuation is a guess.
+# Periods of the band left out at both ends of a stretch, where the filter's continuation is a guess, and the least
+# number of samples, where an unfiltered derivative rings.
 END_PERIODS = 1.0
+END_SAMPLES = 20
+# A rate is known to rounding only; what is a whole number but for that is one.
+ROUNDING = 1e-9
 # A joint stands still where its speed stays below this share of its peak, or below this many standard deviations of its
 # velocity's noise, for longer than this many periods of the band: friction is then anything up to Coulomb's.
 REST_SHARE = 3e-3
@@ -187,18 +191,18 @@ def position_cuts(rate: float, bands: Sequence[float | None]) -> list[float | No
 
 def row_step(rate: float, band: float | None) -> int:
     """Return how many samples one row stands for in a band."""
-    return 1 if band is None else max(1, int(rate / (ROWS_PER_PERIOD * band)))
+    return 1 if band is None else max(1, int(rate / (ROWS_PER_PERIOD * band) * (1.0 + ROUNDING)))
 
 
 def trim_of(stretch: Stretch, bands: Sequence[float | None]) -> int:
     """Return how many samples are left out at each end of a stretch."""
-    slowest = min((band for band in bands if band is not None), default=None)
-    return 1 if slowest is None else max(1, int(np.ceil(END_PERIODS * stretch.rate / slowest)))
+    slowest = min((band for band in bands if band is not None), default=np.inf)
+    return max(END_SAMPLES, int(np.ceil(END_PERIODS * stretch.rate / slowest * (1.0 - ROUNDING))))
 
 
 def _block_length(rate: float, bands: Sequence[float | None]) -> int:
     slowest = min((band for band in bands if band is not None), default=np.inf)
-    return max(1, int(rate * max(BLOCK_SECONDS, BLOCK_PERIODS / slowest)))
+    return max(1, int(rate * max(BLOCK_SECONDS, BLOCK_PERIODS / slowest) * (1.0 + ROUNDING)))
 
 
 def standstill(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) -> NDArray[np.bool_]:

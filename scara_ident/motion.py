@@ -14,13 +14,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.audit.samples import GAP_STEPS
 from scara_ident.errors import RecordingError
 from scara_ident.recording import Recording
 
 Array = NDArray[np.float64]
 
-# Time steps longer than this many medians are gaps; nothing is interpolated across them.
-GAP_STEPS = 5.0
+# Longer parts are cut, so that memory does not grow with the length of a recording.
+MOST_SAMPLES = 60_000
 # A time step that differs by less than this share from the median is not jitter.
 UNIFORM_TOLERANCE = 1e-3
 # The filter's memory in periods of its cut-off: 4 of them leave under 1e-4 of a step.
@@ -109,8 +110,9 @@ def stretches(recording: Recording) -> tuple[Stretch, ...]:
     """
     step = np.diff(recording.time)
     median = float(np.median(step))
+    # Nothing is interpolated across a gap.
     cuts = np.flatnonzero(step > GAP_STEPS * median) + 1
-    bounds = [0, *cuts.tolist(), len(recording.time)]
+    bounds = _cut_long([0, *cuts.tolist(), len(recording.time)])
     found = []
     for start, stop in pairwise(bounds):
         if stop - start < 4:
@@ -119,6 +121,15 @@ def stretches(recording: Recording) -> tuple[Stretch, ...]:
     if not found:
         raise RecordingError(f"{recording.path or recording.name}: no four samples in a row without a gap in time")
     return tuple(found)
+
+
+def _cut_long(bounds: Sequence[int]) -> list[int]:
+    """Divide parts that are too long into equal ones."""
+    found = [bounds[0]]
+    for start, stop in pairwise(bounds):
+        pieces = -(-(stop - start) // MOST_SAMPLES)
+        found += [start + (stop - start) * k // pieces for k in range(1, pieces + 1)]
+    return found
 
 
 def _uniform(recording: Recording, start: int, stop: int, median: float) -> Stretch:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.motion import stretches
+from scara_ident.motion import stretches, torque_of
 from scara_ident.recording import Recording
 
 Array = NDArray[np.float64]
@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 LARGEST_SHIFT = 1.0
 # Aligned positions that differ by more than this share of their range are not the same motion.
 SAME_MOTION = 0.01
+# Sample rates that differ by more than this share are not compared sample by sample.
+SAME_RATE = 1e-3
 
 
 def repeatability(recordings: Sequence[Recording]) -> dict[str, Array]:
@@ -46,22 +48,23 @@ def repeatability(recordings: Sequence[Recording]) -> dict[str, Array]:
 
 
 def _scatter(group: Sequence[Recording]) -> Array | None:
-    first = max(stretches(group[0]), key=lambda part: len(part.time))
-    aligned = [first.torque]
-    for recording in group[1:]:
-        other = max(stretches(recording), key=lambda part: len(part.time))
-        if abs(other.rate / first.rate - 1.0) > 1e-3:
-            continue
-        shift = alignment(first.position, other.position, round(LARGEST_SHIFT * first.rate))
-        if shift is None or other.torque is None:
-            continue
-        aligned.append(np.roll(other.torque, shift, axis=1)[:, : first.position.shape[1]])
-    if len(aligned) < 2:
-        return None
-    margin = round(LARGEST_SHIFT * first.rate) if len(first.time) > 4 * LARGEST_SHIFT * first.rate else 0
-    length = min(part.shape[1] for part in aligned if part is not None)
-    stack = np.array([part[:, margin : length - margin] for part in aligned if part is not None])
-    return np.asarray(np.sqrt(np.mean(np.var(stack, axis=0, ddof=1), axis=1)))
+    """Scatter about the mean of the repetitions of the first motion that has any."""
+    longest = [max(stretches(recording), key=lambda part: len(part.time)) for recording in group]
+    for place, first in enumerate(longest[:-1]):
+        aligned = [(torque_of(first), 0)]
+        for other in longest[place + 1 :]:
+            if abs(other.rate / first.rate - 1.0) > SAME_RATE:
+                continue
+            shift = alignment(first.position, other.position, round(LARGEST_SHIFT * first.rate))
+            if shift is not None:
+                aligned.append((torque_of(other), shift))
+        # The samples that all of them have.
+        start = max(shift for _, shift in aligned)
+        stop = min(torque.shape[1] + shift for torque, shift in aligned)
+        if len(aligned) > 1 and start < stop:
+            stack = np.array([torque[:, start - shift : stop - shift] for torque, shift in aligned])
+            return np.asarray(np.sqrt(np.mean(np.var(stack, axis=0, ddof=1), axis=1)))
+    return None
 
 
 def alignment(reference: Array, other: Array, largest: int) -> int | None:

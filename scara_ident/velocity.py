@@ -39,6 +39,8 @@ class VelocityAudit:
 
     def verdict(self, rate: float) -> str | None:
         """Return what a person should know, None when the velocity is what it says."""
+        if self.gain == 0.0:
+            return "it is 0 while the position moves"
         if self.unrelated > UNRELATED:
             return f"{self.unrelated:.0%} of it is not the derivative of the position"
         if abs(self.gain - 1.0) > GAIN_ERROR:
@@ -76,7 +78,10 @@ def audit_velocity(recording: Recording, part: Stretch) -> tuple[VelocityAudit, 
         _, v, a = differentiate(part.position[j], part.rate, cut)
         smooth = differentiate(recorded, part.rate, cut)[0]
         scale = float(np.sqrt(np.mean(smooth**2)))
-        if scale == 0.0 or float(np.max(np.abs(v))) < 1e-4 * max(1.0, float(np.max(np.abs(recorded)))):
+        if float(np.max(np.abs(v))) < 1e-4 * max(1.0, float(np.max(np.abs(recorded)))):
+            continue
+        if scale == 0.0:
+            found.append(VelocityAudit(joint, 0.0, 0.0, 0.0))
             continue
         columns = np.column_stack([v, a])
         (gain, change), *_ = np.linalg.lstsq(columns, smooth, rcond=None)

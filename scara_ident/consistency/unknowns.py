@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,8 +40,10 @@ class Unknowns:
         Where the prior pulls: the nominal arm, and zero for everything else.
     cones : Cones
         On [x; aux].
+    labels : tuple of tuple of str
+        What each function of ``cones.nonnegative``, each 2x2 matrix of ``cones.small`` and each ball is about.
     limits : Cones
-        The part of them that bounds masses and centres of mass, on the first 11 n of x.
+        The part of the cones that bounds masses and centres of mass, on the first 11 n of x.
     polynomials : tuple of (BrakingPolynomial)
         Friction of the joints, with columns counted in the model.
     nonnegative : ndarray of int
@@ -55,6 +57,7 @@ class Unknowns:
     held: Array
     reference: Array
     cones: Cones
+    labels: tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
     limits: Cones
     polynomials: tuple[BrakingPolynomial, ...]
     nonnegative: NDArray[np.intp]
@@ -148,12 +151,15 @@ def build_unknowns(model: TorqueModel, options: ConsistentOptions) -> Unknowns:
 
     total = size + auxiliary
     cones, start = [_rotors(robot.n, total), _columns(positive, where, total)], size
+    labels = [[f"rotor inertia of {joint}" for joint in robot.joints], [model.names[c] for c in positive]]
     for polynomial, piece in pieces:
         places = [where[c] for c in polynomial.columns] + list(range(start, start + piece.auxiliary))
         cones.append(piece.cones.at(places, total))
+        labels.append([f"friction of {polynomial.joint}"])
         start += piece.auxiliary
     limits = _through(body_limits(robot, options), arm.to_standard)
     cones.append(limits.at(np.arange(rigid), total))
+    labels.append(["given mass or centre of mass"])
     return Unknowns(
         model=model,
         nominal=arm,
@@ -161,11 +167,24 @@ def build_unknowns(model: TorqueModel, options: ConsistentOptions) -> Unknowns:
         held=held,
         reference=np.concatenate([arm.relative, np.zeros(len(others))]),
         cones=Cones.stacked(cones, total),
+        labels=(
+            _labels(cones, labels, lambda c: len(c.nonnegative)),
+            _labels(cones, labels, lambda c: len(c.small) // 3),
+            _labels(cones, labels, lambda c: len(c.ball) // 4),
+        ),
         limits=limits,
         polynomials=tuple(polynomials),
         nonnegative=np.array(positive, dtype=np.intp),
         auxiliary=auxiliary,
     )
+
+
+def _labels(cones: list[Cones], labels: list[list[str]], count: Callable[[Cones], int]) -> tuple[str, ...]:
+    """Name every row: a part has a name for each of its rows, or one for all."""
+    named: list[str] = []
+    for part, names in zip(cones, labels, strict=True):
+        named += names if len(names) == count(part) else names * count(part)
+    return tuple(named)
 
 
 def _declared(model: TorqueModel) -> Iterator[tuple[int, object]]:

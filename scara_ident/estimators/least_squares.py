@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.covariance import block_covariance
+from scara_ident.errors import EstimationError
 from scara_ident.estimators.estimate import Estimate, pooled_information, weighted_blocks
 from scara_ident.evidence import Evidence
 from scara_ident.information import Information, merge
@@ -51,9 +52,17 @@ def wls(model: TorqueModel, evidence: Sequence[Evidence], noise: Array | None = 
     Returns
     -------
     Estimate
+
+    Raises
+    ------
+    EstimationError
+        If there is no evidence, or a joint's noise is not a positive number.
     """
     if noise is None:
         noise = residual_noise(ols(model, evidence), evidence)
+    for joint, sigma in zip(model.robot.joints, noise, strict=True):
+        if not 0.0 < sigma < np.inf:
+            raise EstimationError(f"noise of joint {joint} is {sigma:g}; expected a positive number to weigh by")
     return least_squares(model, evidence, 1.0 / noise, "wls")
 
 
@@ -77,7 +86,12 @@ def least_squares(
     if prior is not None:
         information = merge([information, prior])
     solution = information.solve()
-    spread = block_covariance(information.inverse(), solution.value, weighted_blocks(evidence, weights))
+    inverse = information.inverse()
+    spread = block_covariance(inverse, solution.value, weighted_blocks(evidence, weights))
     covariance = spread.matrix.copy()
+    if prior is not None:
+        # The prior's own error, which no residual shows.
+        precision = prior.regressor_factor.T @ prior.regressor_factor
+        covariance += inverse @ precision @ inverse
     covariance[np.diag_indices_from(covariance)] = np.where(solution.undetermined, np.inf, np.diag(covariance))
     return Estimate(model, method, solution.value, covariance, solution.undetermined, information, weights, spread.kind)

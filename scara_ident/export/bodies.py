@@ -56,8 +56,8 @@ def body_parameters(body: Body) -> Array:
     return np.asarray(pin.Inertia(body.mass, body.com, body.inertia).toDynamicParameters())
 
 
-def check_standard(robot: Robot, standard: Array) -> Array:
-    """Check that standard parameters are those of an arm that can exist.
+def check_standard(robot: Robot, standard: Array) -> tuple[Array, Array]:
+    """Split standard parameters into bodies and armatures, if they are those of an arm that can exist.
 
     Parameters
     ----------
@@ -67,8 +67,10 @@ def check_standard(robot: Robot, standard: Array) -> Array:
 
     Returns
     -------
-    ndarray, shape (n, 10)
+    bodies : ndarray, shape (n, 10)
         The bodies' parameters in the order of ``robot.joints``.
+    armature : ndarray, shape (n,)
+        Never negative; what a solver leaves below zero is cut off.
 
     Raises
     ------
@@ -100,10 +102,12 @@ def check_standard(robot: Robot, standard: Array) -> Array:
                 f"{link}: its pseudo-inertia has the eigenvalue {smallest:.6g}, of a trace of "
                 f"{np.trace(pseudo):.6g}; {advice}"
             )
-    for joint, armature in zip(robot.joints, standard[10 * robot.n :], strict=True):
-        if not armature >= 0.0:
-            raise ScaraIdentError(f"{joint}: its armature is {armature:.6g}; {advice.replace('link', 'rotor')}")
-    return bodies
+    armature = standard[10 * robot.n :]
+    for joint, value in zip(robot.joints, armature, strict=True):
+        # Not the other way round: NaN has to end here too.
+        if not value >= -CONSISTENCY_TOLERANCE * float(np.max(np.abs(armature))):
+            raise ScaraIdentError(f"{joint}: its armature is {value:.6g}; {advice.replace('link', 'rotor')}")
+    return bodies, np.maximum(armature, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,8 +51,7 @@ def mjcf_text(robot: Robot, standard: Array, friction: JointFriction | None = No
     ScaraIdentError
         If a link cannot exist, or has no mass, which MuJoCo does not take.
     """
-    parameters = check_standard(robot, standard)
-    armature = np.asarray(standard, dtype=float)[10 * robot.n :]
+    parameters, armature = check_standard(robot, standard)
     known = joint_side(robot, friction)
     notes = [*known.notes]
     bodies: list[Body] = []

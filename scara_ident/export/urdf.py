@@ -67,7 +67,7 @@ def urdf_text(robot: Robot, standard: Array, friction: JointFriction | None = No
     ScaraIdentError
         If a link cannot exist, or the robot's file cannot be read.
     """
-    bodies = check_standard(robot, standard)
+    bodies, armature = check_standard(robot, standard)
     content, converted = read_xml(robot.urdf)
     root = parse(content, robot.urdf)
     notes = [f"{robot.urdf.name} was in another encoding; this is UTF-8"] if converted else []
@@ -78,7 +78,7 @@ def urdf_text(robot: Robot, standard: Array, friction: JointFriction | None = No
     for part in (
         _inertials(robot, bodies, links, content),
         _dynamics(robot, friction, root, content),
-        _rotors(robot, np.asarray(standard, dtype=float)[10 * robot.n :], root, content),
+        _rotors(robot, armature, root, content),
     ):
         for item in part:
             if isinstance(item, Edit):

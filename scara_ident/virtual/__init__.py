@@ -11,6 +11,9 @@ from __future__ import annotations
 from scara_ident.virtual.arm import Controller, VirtualArm, ideal, on_side
 from scara_ident.virtual.defaults import virtual_arm
 from scara_ident.virtual.effects import CATALOGUE, EFFECTS, Effect, parse_effect
+from scara_ident.virtual.laws import MotionLaw
+from scara_ident.virtual.paths import PathError, circle, line
+from scara_ident.virtual.reconstructions import RECONSTRUCTIONS, reconstruction, reconstruction_match
 from scara_ident.virtual.reference import ReferenceMotion, read_trajectory, sampled
 from scara_ident.virtual.simulate import SimulationResult, TrueMotion, free_motion, simulate
 from scara_ident.virtual.truth import truth, write_simulation
@@ -20,15 +23,22 @@ __all__ = [
     "Controller",
     "EFFECTS",
     "Effect",
+    "MotionLaw",
+    "PathError",
+    "RECONSTRUCTIONS",
     "ReferenceMotion",
     "SimulationResult",
     "TrueMotion",
     "VirtualArm",
+    "circle",
     "free_motion",
     "ideal",
+    "line",
     "on_side",
     "parse_effect",
     "read_trajectory",
+    "reconstruction",
+    "reconstruction_match",
     "sampled",
     "simulate",
     "truth",

@@ -123,6 +123,37 @@ def _first_to_stop(plant: Plant, x: State, s: Stages) -> int:
 
 
 @compiled
+def _instant_of_stop(
+    plant: Plant, room: Room, x: State, s: Stages, t: float, left: float, drive: Array, stopping: int
+) -> tuple[int, float]:
+    """Return the first joint to stop and the length of the step that takes it there; ``s.new_*`` is then its end."""
+    taken = left
+    low, low_value = 0.0, x.omega[stopping]
+    high, high_value = left, s.new_omega[stopping]
+    for _ in range(20):
+        taken = low - low_value * (high - low) / (high_value - low_value)
+        _runge_kutta(plant, room, x, s, t, taken, drive)
+        other = _first_to_stop(plant, x, s)
+        if other >= 0 and other != stopping and x.omega[other] != 0.0:
+            # Another joint has stopped even before.
+            stopping = other
+            low, low_value = 0.0, x.omega[stopping]
+            high, high_value = taken, s.new_omega[stopping]
+            continue
+        value = s.new_omega[stopping]
+        if abs(value) <= 1e-13 + 1e-12 * abs(x.omega[stopping]):
+            break
+        # False position, with the end that stays halved so that it too moves (the Illinois rule).
+        if value * low_value > 0.0:
+            low, low_value = taken, value
+            high_value *= 0.5
+        else:
+            high, high_value = taken, value
+            low_value *= 0.5
+    return stopping, taken
+
+
+@compiled
 def step(plant: Plant, room: Room, x: State, s: Stages, t: float, h: float, drive: Array) -> int:
     """Advance the state by ``h``; stage 0 must be there. Returns the number of events.
 
@@ -136,54 +167,30 @@ def step(plant: Plant, room: Room, x: State, s: Stages, t: float, h: float, driv
         _runge_kutta(plant, room, x, s, t, left, drive)
         stopping = _first_to_stop(plant, x, s)
         taken = left
-        if stopping >= 0:
+        last = stopping < 0 or events >= EVENTS_PER_JOINT * n
+        if not last:
             events += 1
-            if x.omega[stopping] == 0.0 or events > EVENTS_PER_JOINT * n:
+            if x.omega[stopping] == 0.0:
                 # Let go and turned back within one step: it is held for the rest of it.
                 x.mode[stopping] = 0.0
                 accelerate(
                     plant, room, t, x.q, x.v, x.theta, x.omega, x.mode, x.dahl, x.theta, drive, s.a[0], s.alpha[0]
                 )  # fmt: skip
-                x.omega[stopping] = 0.0
-                s.omega[0, stopping] = 0.0
-                if not plant.elastic[stopping]:
-                    x.v[stopping] = 0.0
-                    s.v[0, stopping] = 0.0
-                if events <= EVENTS_PER_JOINT * n + n:
-                    continue
-            low, low_value = 0.0, x.omega[stopping]
-            high, high_value = left, s.new_omega[stopping]
-            for _ in range(12):
-                if low_value == high_value:
-                    break
-                taken = low - low_value * (high - low) / (high_value - low_value)
-                _runge_kutta(plant, room, x, s, t, taken, drive)
-                other = _first_to_stop(plant, x, s)
-                if other >= 0 and other != stopping and s.new_omega[other] * x.mode[other] < 0.0:
-                    stopping = other
-                    low, low_value = 0.0, x.omega[stopping]
-                    high, high_value = taken, s.new_omega[stopping]
-                    continue
-                value = s.new_omega[stopping]
-                if abs(value) <= 1e-13 + 1e-12 * abs(x.omega[stopping]):
-                    break
-                if value * low_value > 0.0:
-                    low, low_value = taken, value
-                    high_value *= 0.5
-                else:
-                    high, high_value = taken, value
-                    low_value *= 0.5
+                continue
+            stopping, taken = _instant_of_stop(plant, room, x, s, t, left, drive, stopping)
         for j in range(n):
             if plant.presliding[j] > 0.0:
                 way = s.new_theta[j] - x.theta[j]
                 end = 1.0 if way > 0.0 else -1.0
                 x.dahl[j] = end - (end - x.dahl[j]) * np.exp(-abs(way) / plant.presliding[j])
+            turned = plant.direction_matters[j] and s.new_omega[j] * x.mode[j] < 0.0
             x.q[j], x.v[j], x.theta[j], x.omega[j] = s.new_q[j], s.new_v[j], s.new_theta[j], s.new_omega[j]
-        if stopping < 0:
+            if j == stopping or turned:
+                x.omega[j] = 0.0
+                if not plant.elastic[j]:
+                    x.v[j] = 0.0
+        if last:
             return events
-        x.omega[stopping] = 0.0
-        if not plant.elastic[stopping]:
-            x.v[stopping] = 0.0
         t += taken
         left -= taken
         if left <= 1e-9 * h:

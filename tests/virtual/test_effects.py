@@ -368,3 +368,23 @@ def test_an_elastic_joint_needs_a_rotor(tmp_path: Path) -> None:
     arm = replace(scara(), rotor_inertia=np.array([0.0, 4e-4]))
     with pytest.raises(UsageError, match="joint1 has no rotor inertia"):
         run(fx.JointElasticity("joint1", 1000.0), arm, 0.1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_any_mix_of_effects_leaves_the_arm_on_its_way(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    arm = virtual_arm()
+    for _ in range(4):
+        kinds = random.permutation(list(EFFECTS.values()))[:5]
+        chosen = [
+            kind(
+                joint=None
+                if kind.whole_arm != "never" or kind is fx.TorqueGainMismatch
+                else random.choice(["joint1", "joint2"])
+            )
+            for kind in kinds
+        ]
+        motion = swing(arm.robot, 1.0, amplitude=float(random.choice([0.002, 0.3])))
+        result = simulate(arm, motion, effects=chosen)
+        assert np.abs(result.true.position - motion.position).max() < 0.05
+        assert result.stops < 200

@@ -53,8 +53,8 @@ def test_a_line_of_the_scara_is_straight_and_keeps_its_elbow() -> None:
 
 
 def test_a_circle_of_the_scara_has_its_radius() -> None:
-    motion = circle(load_robot(), [0.35, 0.25], 0.12, 3.0, near=[-0.3, 1.2], turns=-2.0, start_angle=0.4)
-    arms = planar(motion.position) - np.array([[0.35], [0.25]])
+    motion = circle(load_robot(), [0.2, 0.4], 0.12, 3.0, near=[0.4, 1.3], turns=-2.0, start_angle=0.4)
+    arms = planar(motion.position) - np.array([[0.2], [0.4]])
     np.testing.assert_allclose(np.hypot(*arms), 0.12, atol=1e-8)
     angle = np.unwrap(np.arctan2(arms[1], arms[0]))
     assert angle[0] == pytest.approx(0.4)

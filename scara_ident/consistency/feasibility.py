@@ -1,0 +1,190 @@
+"""Whether an arm with the estimated parameters could exist, and if not, what contradicts it, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.consistency.friction_certificate import FrictionFault, friction_faults
+from scara_ident.consistency.matching import match, sizes
+from scara_ident.consistency.options import ConsistentOptions
+from scara_ident.consistency.programme import Programme
+from scara_ident.errors import UsageError
+from scara_ident.information import Information
+from scara_ident.model import TorqueModel
+from scara_ident.terms.constraints import BrakingPolynomial
+from scara_ident.terms.term import Column
+
+Array = NDArray[np.float64]
+
+# So many contradictions are told; more would not help anyone.
+MOST_REASONS = 5
+# A base parameter whose multiplier contributes less than this share takes no part in a contradiction.
+NO_PART = 1e-4
+
+
+@dataclass(frozen=True)
+class Possibility:
+    """Whether an arm with given parameters can exist.
+
+    Attributes
+    ----------
+    possible : bool
+    reasons : tuple of str
+        What contradicts it; empty for a possible arm.
+    distance : float
+        How far the base parameters are from those of the nearest possible arm: the largest difference relative to
+        the base parameter's size (its value, or what its bodies make of it in the nominal arm).
+    distance_std : float or None
+        The same distance, friction included, in standard deviations of the estimate; None where no information
+        was given.
+    """
+
+    possible: bool
+    reasons: tuple[str, ...]
+    distance: float
+    distance_std: float | None
+
+
+def check_possible(
+    model: TorqueModel,
+    value: Array,
+    *,
+    information: Information | None = None,
+    programme: Programme | None = None,
+) -> Possibility:
+    """Check whether a physically consistent arm has these parameters.
+
+    Bodies are possible when their pseudo-inertias can be positive semidefinite and the rotors' inertias
+    nonnegative with these base parameters, to rounding. Friction is possible when it takes energy out and the motor
+    can overcome it at every speed up to the velocity limit. What the data leave open counts as the estimate has it.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    value : ndarray, shape (p,)
+        Parameters, estimated by whatever method.
+    information : Information, optional
+        The rows that they came from, to tell the distance in standard deviations.
+    programme : Programme, optional
+        A compiled programme of the same model, to spare compiling it again.
+
+    Returns
+    -------
+    Possibility
+
+    Raises
+    ------
+    UsageError
+        If the number of parameters is not the model's, or one is not finite.
+    EstimationError
+        If the solver fails.
+    """
+    value = np.asarray(value, dtype=float)
+    if value.shape != (len(model.columns),) or not np.all(np.isfinite(value)):
+        raise UsageError(
+            f"expected {len(model.columns)} finite parameters of the model {model.name}, found shape {value.shape}"
+        )
+    if programme is None:
+        programme = Programme(model, ConsistentOptions(friction="free"))
+    u = programme.unknowns
+    size = sizes(u, value)
+    place = model.place(model.rigid_body)
+    bodies = np.arange(place.start, place.stop)
+    found = match(programme, value, _rows(bodies, size))
+    reasons: list[str] = []
+    if not found.possible:
+        reasons += _contradictions(programme, value, size, bodies)
+    reasons += [_column_reason(model.columns[k], value[k]) for k in u.nonnegative if value[k] < 0.0]
+    for polynomial in u.polynomials:
+        faults = friction_faults(polynomial, value[list(polynomial.columns)])
+        reasons += [friction_reason(fault, polynomial, _speed_unit(model, polynomial)) for fault in faults]
+    distance_std = None
+    if information is not None:
+        distance_std = 0.0 if not reasons else _distance_std(model, value, information)
+    return Possibility(not reasons, tuple(reasons), found.distance, distance_std)
+
+
+def _rows(columns: Sequence[int] | NDArray[np.intp], size: Array) -> Array:
+    rows = np.zeros((len(columns), len(size)))
+    rows[np.arange(len(columns)), columns] = 1.0 / size[columns]
+    return rows
+
+
+def _distance_std(model: TorqueModel, value: Array, information: Information) -> float:
+    # The nearest arm in the data's own metric, friction and signs included.
+    programme = Programme(model)
+    noise = information.rms() or 1.0
+    factor = information.regressor_factor / noise
+    point = programme.solve(factor, factor @ value, np.full(programme.unknowns.size, 1e-2))
+    return float(np.linalg.norm(factor @ (point.parameters - value)))
+
+
+def _contradictions(programme: Programme, value: Array, size: Array, bodies: NDArray[np.intp]) -> list[str]:
+    """Find sets of base parameters that no arm has together, each as small as possible."""
+    columns = programme.unknowns.model.columns
+    negative = [int(k) for k in bodies if columns[k].nonnegative and value[k] < 0.0]
+    reasons = [_column_reason(columns[k], value[k]) for k in negative]
+    left = [int(k) for k in bodies if k not in negative]
+    while len(reasons) < MOST_REASONS and left:
+        found = match(programme, value, _rows(left, size))
+        if found.possible:
+            return reasons
+        together = _irreducible(programme, value, size, left, found.gap)
+        reasons.append(_together_reason([columns[k] for k in together], value[together]))
+        left = [k for k in left if k not in together]
+    return reasons
+
+
+def _irreducible(programme: Programme, value: Array, size: Array, columns: list[int], gap: Array) -> list[int]:
+    """Leave out every base parameter without which the others still contradict each other.
+
+    At the nearest possible arm what is left of each base parameter is, up to a factor, its multiplier in the proof
+    that there is none with distance 0; those without a part in the proof are left out at once.
+    """
+    part = np.abs(gap)
+    order = np.argsort(part)
+    members = [columns[k] for k in order if part[k] > NO_PART * part.max()]
+    if match(programme, value, _rows(members, size)).possible:
+        members = [columns[k] for k in order]
+    for k in list(members):
+        rest = [m for m in members if m != k]
+        if rest and not match(programme, value, _rows(rest, size)).possible:
+            members = rest
+    return sorted(members)
+
+
+def _column_reason(column: Column, value: float) -> str:
+    meaning = "" if column.meaning == column.name else f" = {column.meaning}"
+    return f"{column.name}{meaning} = {value:.3g} {column.unit} cannot be negative"
+
+
+def _together_reason(columns: Sequence[Column], values: Array) -> str:
+    listed = ", ".join(f"{c.name} = {v:.3g} {c.unit}" for c, v in zip(columns, values, strict=True))
+    if len(columns) == 1:
+        return f"{listed} belongs to no bodies with mass"
+    return f"{listed} cannot all be true: no bodies with mass have them together"
+
+
+def friction_reason(fault: FrictionFault, polynomial: BrakingPolynomial, unit: str) -> str:
+    """Write a friction fault in words."""
+    until = "above" if not np.isfinite(fault.stop) or fault.stop >= polynomial.speed * (1.0 - 1e-9) else "between"
+    where = (
+        f"above {fault.start:.3g} {unit}"
+        if until == "above"
+        else f"between {fault.start:.3g} and {fault.stop:.3g} {unit}"
+    )
+    if fault.start == 0.0 and until == "above":
+        where = "at every speed"
+    if fault.kind == "pushes":
+        return f"friction of {fault.joint} pushes {where}"
+    torque = "N" if "m/s" in unit and polynomial.limit else "N m"
+    return f"friction of {fault.joint} exceeds the motor's limit of {polynomial.limit:.3g} {torque} {where}"
+
+
+def _speed_unit(model: TorqueModel, polynomial: BrakingPolynomial) -> str:
+    joint = model.robot.joints.index(polynomial.joint)
+    return "m/s" if model.robot.prismatic[joint] else "rad/s"

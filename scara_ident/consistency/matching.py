@@ -1,0 +1,222 @@
+"""Arms that have given parameters exactly: how far inside what is possible the best of them is.
+
+All bodies with the same base parameters differ by a few directions that torque does not see. Along these the
+smallest eigenvalue of all bodies (relative to nominal) is made as large as it can be: a small semidefinite programme.
+A positive result is an arm; a negative one proves that there is none, and its multipliers say which base parameters
+contradict each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.consistency.bodies import PACKED_IDENTITY
+from scara_ident.consistency.cones import Affine
+from scara_ident.consistency.friction_certificate import friction_faults, shape_faults
+from scara_ident.consistency.options import FrictionShape
+from scara_ident.consistency.prior import null_space
+from scara_ident.consistency.unknowns import Unknowns
+from scara_ident.errors import EstimationError
+
+Array = NDArray[np.float64]
+
+# A body that lacks less than this share of the nominal one lacks nothing but the solver's digits.
+ROUNDING = 1e-7
+# Bodies further inside than this need no further search.
+ENOUGH = 0.5
+# The solver's slack, well below ROUNDING.
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """The arm with given parameters that is furthest inside what is possible.
+
+    Attributes
+    ----------
+    x : ndarray, shape (size,)
+        See `Unknowns`; it gives the parameters to rounding.
+    margin : float
+        Smallest eigenvalue of bodies, rotors and limits relative to nominal; at most a half.
+    multipliers : ndarray, shape (k,)
+        Of the matched combinations: where the margin is negative, no possible arm has a negative sum of
+        multiplier times combination, and this one has.
+    """
+
+    x: Array
+    margin: float
+    multipliers: Array
+
+    @property
+    def possible(self) -> bool:
+        """Whether such an arm exists, to rounding."""
+        return self.margin >= -ROUNDING
+
+    @property
+    def inside(self) -> bool:
+        """Whether x itself is possible without any tolerance."""
+        return self.margin > 0.0
+
+
+def sizes(unknowns: Unknowns, value: Array) -> Array:
+    """Return the size of each parameter, shape (p,): what a change of the nominal arm by itself does, or the value."""
+    return np.maximum(np.linalg.norm(unknowns.to_parameters, axis=1), np.abs(value))
+
+
+@dataclass(frozen=True, eq=False)
+class Fixed:
+    """What is matched, and what it leaves free.
+
+    Attributes
+    ----------
+    combinations : ndarray, shape (k, p)
+        Rows on the model's parameters, each scaled to its size.
+    rows : ndarray, shape (k + h, size)
+        The same on x, and below them the rows that the model holds at zero.
+    inverse : ndarray, shape (size, k + h)
+        Their pseudo-inverse.
+    free : ndarray, shape (size, f)
+        Orthonormal directions of x that they do not see.
+    """
+
+    combinations: Array
+    rows: Array
+    inverse: Array
+    free: Array
+
+
+def fixed(unknowns: Unknowns, combinations: Array) -> Fixed:
+    """Prepare matching these combinations of parameters."""
+    rows = np.vstack([combinations @ unknowns.to_parameters, unknowns.held])
+    return Fixed(combinations, rows, np.linalg.pinv(rows, rcond=1e-12), null_space(rows))
+
+
+def match(unknowns: Unknowns, value: Array, what: Fixed) -> Match:
+    """Find the arm that has given parameters and is furthest inside what is possible.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    value : ndarray, shape (p,)
+        The model's parameters.
+    what : Fixed
+        What is to be matched. What it leaves free among friction and other columns keeps its own constraints; what
+        it fixes there is not judged.
+
+    Returns
+    -------
+    Match
+
+    Raises
+    ------
+    EstimationError
+        If the solver fails.
+    """
+    wanted = np.concatenate([what.combinations @ value, np.zeros(len(unknowns.held))])
+    # Without its part in the free directions the shortest solution is as good as any other.
+    start = what.inverse @ wanted
+    start += what.inverse @ (wanted - what.rows @ start)
+    x, margin, forces = _furthest_inside(unknowns, start, what.free)
+    # At the best point the multipliers' force on x is a combination of the matched rows.
+    return Match(x, margin, (what.inverse.T @ forces)[: len(what.combinations)])
+
+
+def _furthest_inside(u: Unknowns, start: Array, free: Array) -> tuple[Array, float, Array]:
+    n, count = u.n, free.shape[1]
+    others = bool(np.any(np.abs(free[11 * n :]) > 1e-12))
+    linear = u.limits.nonnegative.at(np.arange(11 * n), u.size)
+    linear = Affine.stacked([Affine(np.eye(u.size)[10 * n : 11 * n], np.zeros(n)), linear], u.size)
+    ball = u.limits.ball.at(np.arange(11 * n), u.size)
+    bodies = Affine(np.eye(u.size)[: 10 * n], np.zeros(10 * n))
+
+    # Unknowns of the solver: the move along free directions, auxiliary ones where friction takes part, the margin.
+    extra = u.auxiliary if others else 0
+    whole = np.concatenate([start, np.zeros(extra)])
+    along = np.zeros((u.size + extra, count + extra))
+    along[: u.size, :count], along[u.size :, count:] = free, np.eye(extra)
+    blocks: list[tuple[Affine, Array, str]] = [
+        (linear.widened(len(whole)), np.ones(len(linear)), "nonnegative"),
+        (Affine(np.zeros((1, len(whole))), np.array([ENOUGH])), np.ones(1), "nonnegative"),
+    ]
+    if others:
+        friction = u.cones.nonnegative
+        mine = np.any(friction.matrix[:, 11 * n :] != 0.0, axis=1)
+        blocks.append((Affine(friction.matrix[mine], friction.offset[mine]), np.zeros(int(mine.sum())), "nonnegative"))
+        blocks += [(_as_ball(u.cones.small, k), np.zeros(3), "ball") for k in range(len(u.cones.small) // 3)]
+    for k in range(len(ball) // 4):
+        four = Affine(ball.matrix[4 * k : 4 * k + 4], ball.offset[4 * k : 4 * k + 4])
+        blocks.append((four.widened(len(whole)), np.array([1.0, 0.0, 0.0, 0.0]), "ball"))
+    for i in range(n):
+        ten = Affine(bodies.matrix[10 * i : 10 * i + 10], bodies.offset[10 * i : 10 * i + 10])
+        blocks.append((ten.widened(len(whole)), PACKED_IDENTITY, "body"))
+    found, duals = _solve(blocks, whole, along)
+    # Force of the multipliers on x: rotors and limits, then bodies.
+    forces = np.zeros(u.size)
+    for (block, _, _), dual in zip(blocks, duals, strict=True):
+        forces += dual @ block.matrix[:, : u.size]
+    x = start + free @ found[:count]
+    return x, min(_margin(u, x, linear, ball), ENOUGH), forces
+
+
+def _as_ball(small: Affine, k: int) -> Affine:
+    d, e, f = range(3 * k, 3 * k + 3)
+    mix = np.zeros((3, len(small)))
+    mix[0, [d, f]], mix[1, d], mix[1, f], mix[2, e] = 1.0, 1.0, -1.0, 2.0
+    return Affine(mix @ small.matrix, mix @ small.offset)
+
+
+def _margin(u: Unknowns, x: Array, linear: Affine, ball: Affine) -> float:
+    from scara_ident.consistency.programme import smallest_share
+
+    cones = ball(x).reshape(-1, 4)
+    room = cones[:, 0] - np.linalg.norm(cones[:, 1:], axis=1)
+    return float(min(smallest_share(x[: 10 * u.n]), np.min(linear(x)), np.min(room, initial=np.inf)))
+
+
+def _solve(blocks: list[tuple[Affine, Array, str]], whole: Array, along: Array) -> tuple[Array, list[Array]]:
+    """Maximise t so that every block's functions less t times its direction lie in the block's cone."""
+    import clarabel
+    import scipy.sparse as sp
+
+    kinds: dict[str, Any] = {
+        "nonnegative": clarabel.NonnegativeConeT,
+        "ball": clarabel.SecondOrderConeT,
+        "body": lambda _: clarabel.PSDTriangleConeT(4),
+    }
+    matrix = np.vstack([np.column_stack([-block.matrix @ along, down]) for block, down, _ in blocks])
+    # The row that caps the margin is a function without unknowns: 1/2 - t.
+    offset = np.concatenate([block(whole) for block, _, _ in blocks])
+    size = along.shape[1] + 1
+    goal = np.zeros(size)
+    goal[-1] = -1.0
+    settings = clarabel.DefaultSettings()
+    settings.verbose, settings.max_threads = False, 1
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
+    cones = [kinds[kind](len(block)) for block, _, kind in blocks]
+    solver = clarabel.DefaultSolver(sp.csc_matrix((size, size)), goal, sp.csc_matrix(matrix), offset, cones, settings)
+    result = solver.solve()
+    if str(result.status) not in ("Solved", "AlmostSolved", "InsufficientProgress") or not np.all(
+        np.isfinite(result.x)
+    ):
+        raise EstimationError(
+            f"whether an arm with these parameters exists was not decided (CLARABEL: {result.status}); "
+            "check the inertias in the URDF"
+        )
+    duals = np.split(np.array(result.z), np.cumsum([len(block) for block, _, _ in blocks])[:-1])
+    return np.array(result.x), duals
+
+
+def is_allowed(unknowns: Unknowns, value: Array, friction: FrictionShape) -> bool:
+    """Whether friction and the signs of parameters are possible; says nothing of bodies."""
+    if np.any(value[unknowns.nonnegative] < 0.0):
+        return False
+    if friction == "free":
+        return True
+    parts = [(p, value[list(p.columns)]) for p in unknowns.polynomials]
+    if any(friction_faults(p, part) for p, part in parts):
+        return False
+    return friction != "lubricated" or not any(shape_faults(p, part) for p, part in parts)

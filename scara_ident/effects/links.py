@@ -1,0 +1,182 @@
+"""What the rigid bodies of an arm do when gravity, a payload or a joint's position is not what the model takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from functools import lru_cache
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.effects.signals import Scene, Signals
+from scara_ident.motion import Motion
+from scara_ident.regressor import RegressorKernel, build_kernel
+from scara_ident.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Where a robot's gravity is zero this is how large it is once the base tilts.
+STANDARD_GRAVITY = 9.81
+# Shifts of a joint by which its torque is differentiated: rad or m, and share of the largest speed.
+SHIFT = 1e-5
+SPEED_SHIFT = 1e-4
+
+_SHARED: WeakKeyDictionary[Signals, dict[Hashable, Array]] = WeakKeyDictionary()
+
+
+def shared(signals: Signals, key: Hashable, make: Callable[[], Array]) -> Array:
+    """Return what several members of a family need of one stretch of motion, made once."""
+    held = _SHARED.setdefault(signals, {})
+    if key not in held:
+        held[key] = make()
+    return held[key]
+
+
+def gravity_size(robot: Robot) -> float:
+    """Return the size of gravity, m/s^2."""
+    return float(np.linalg.norm(robot.model.gravity.linear)) or STANDARD_GRAVITY
+
+
+def pinocchio_columns(robot: Robot, standard: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return Pinocchio's places of the bodies' standard parameters, which stand in the robot's order of joints."""
+    return np.asarray(10 * robot.order[standard // 10] + standard % 10, dtype=np.intp)
+
+
+def first_moments(robot: Robot) -> NDArray[np.intp]:
+    """Return the standard parameters that gravity acts on, shape (4 n,): mass and first moments of every body."""
+    return np.asarray((10 * np.arange(robot.n)[:, None] + np.arange(4)).ravel(), dtype=np.intp)
+
+
+@lru_cache(maxsize=8)
+def gravity_kernels(robot: Robot) -> tuple[RegressorKernel, RegressorKernel]:
+    """Return the kernels of the torque that gravity along minus the base's x, and y, gives the `first_moments`."""
+    columns = pinocchio_columns(robot, first_moments(robot))
+    kernels = []
+    for axis in range(2):
+        model = robot.model.copy()
+        direction = np.zeros(3)
+        direction[axis] = -gravity_size(robot)
+        model.gravity.linear = direction
+        kernels.append(build_kernel(model, columns))
+    return kernels[0], kernels[1]
+
+
+def gravity_columns(robot: Robot, axis: int, q: Array) -> Array:
+    """Return the torque per mass and first moment under gravity along minus the base's x (0) or y (1).
+
+    Parameters
+    ----------
+    robot : Robot
+    axis : {0, 1}
+    q : ndarray, shape (n, N)
+
+    Returns
+    -------
+    ndarray, shape (n, 4 n, N)
+        Recorded side; parameters as `first_moments`.
+    """
+    rest = np.zeros_like(q)
+    columns = gravity_kernels(robot)[axis](q[np.argsort(robot.order)], rest, rest)[robot.order]
+    return np.asarray(columns * robot.row_scale[:, None, None])
+
+
+@dataclass(frozen=True, eq=False)
+class Tool:
+    """Where a payload sits.
+
+    Attributes
+    ----------
+    joint : int
+        Place in the robot's joints of the last one, which carries it.
+    point : ndarray, shape (3,)
+        In the frame of that joint, m.
+    kernel : RegressorKernel
+        Torque per standard parameter of what that joint carries.
+    """
+
+    joint: int
+    point: Array
+    kernel: RegressorKernel
+
+    def columns(self, robot: Robot, motion: Motion) -> Array:
+        """Return the torque per standard parameter of a body fixed to the last link, shape (n, 10, N)."""
+        back = np.argsort(robot.order)
+        columns = self.kernel(motion.q[back], motion.v[back], motion.a[back])[robot.order]
+        return np.asarray(columns * robot.row_scale[:, None, None])
+
+
+@lru_cache(maxsize=8)
+def tool_of(robot: Robot) -> Tool:
+    """Return the tool of a robot: of the frames that its last joint carries, the one farthest from that joint."""
+    last = robot.model.njoints - 1
+    points = [np.array(frame.placement.translation) for frame in robot.model.frames if frame.parentJoint == last]
+    point = max(points, key=lambda place: float(np.linalg.norm(place)), default=np.zeros(3))
+    velocity = robot.model.joints[last].idx_v
+    joint = int(np.flatnonzero(robot.order == velocity)[0])
+    return Tool(joint, point, build_kernel(robot.model, range(10 * (last - 1), 10 * last)))
+
+
+def point_mass(point: Array) -> Array:
+    """Return the standard parameters of 1 kg at a point, Pinocchio's order, the inertia about the frame's origin."""
+    x, y, z = point
+    return np.array([1.0, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y])
+
+
+def armature_of(scene: Scene, joint: int) -> float:
+    """Return the armature of a joint: what the data tell of it, else its nominal value."""
+    told = scene.armature(joint)
+    return float(scene.robot.reduction[joint] ** 2 * scene.robot.rotor_inertia[joint]) if told is None else told
+
+
+def rigid_torque(scene: Scene, motion: Motion, q: Array, v: Array, a: Array) -> Array:
+    """Return what `Signals.rigid` gives, at other positions, velocities and accelerations, shape (n, N)."""
+    term = scene.model.rigid_body
+    moved = Motion(motion.name, motion.trajectory, motion.time, q, v, a, None, motion.rate)
+    return np.asarray(np.einsum("jpn,p->jn", term.regressor(moved), scene.value[scene.model.place(term)]))
+
+
+def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Array:
+    """Change of all torques when the link of one joint lags its motor, to first order in the lag.
+
+    The motor, whose rotor is not part of what lags, moves as recorded.
+
+    Parameters
+    ----------
+    signals : Signals
+    joint : int
+    lag : tuple of ndarray (N,)
+        Motor's position less the link's, at the joint, with its first two derivatives.
+
+    Returns
+    -------
+    ndarray, shape (n, N)
+        Recorded side.
+    """
+    scene, motion = signals.scene, signals.motion
+    sizes = [float(np.max(np.abs(part))) for part in lag[:2]]
+    steps = [SHIFT / sizes[0] if sizes[0] else np.inf]
+    steps.append(SPEED_SHIFT * float(np.max(np.abs(motion.v[joint]))) / sizes[1] if sizes[1] else np.inf)
+    step = min(steps)
+    if not 0.0 < step < np.inf:
+        return np.zeros_like(motion.q)
+    moved = [part.copy() for part in (motion.q, motion.v, motion.a)]
+    for part, change in zip(moved, lag, strict=True):
+        part[joint] -= step * change
+    result = (rigid_torque(scene, motion, *moved) - signals.rigid) / step
+    result[joint] += scene.robot.row_scale[joint] * armature_of(scene, joint) * lag[2]
+    return np.asarray(result)
+
+
+def link_inertia(signals: Signals, joint: int) -> Array:
+    """Return the inertia that a joint moves without its rotor, the other joints held, at the joint, shape (N,)."""
+
+    def make() -> Array:
+        scene, motion = signals.scene, signals.motion
+        pushed = motion.a.copy()
+        pushed[joint] += 1.0
+        change = rigid_torque(scene, motion, motion.q, motion.v, pushed)[joint] - signals.rigid[joint]
+        return np.asarray(change / scene.robot.row_scale[joint] - armature_of(scene, joint))
+
+    return shared(signals, ("link inertia", joint), make)

@@ -1,0 +1,299 @@
+"""A base that is not level: gravity where the model has none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.links import first_moments, gravity_columns, shared
+from scara_ident.effects.signals import Scene, Signals
+from scara_ident.robot import Robot
+from scara_ident.terms import Column, RigidBody
+
+Array = NDArray[np.float64]
+
+# A base that leans further, rad, is seen by eye.
+LARGEST_TILT = 0.1
+# Nominal first moments of links that the base model says nothing of are believed within this factor.
+MOMENT_FACTOR = 2.0
+# Torques below this share of the largest are rounding of angles in the URDF.
+NOTHING = 1e-4
+# Known and newly entering parameters agree on the direction of gravity within this many standard deviations.
+AGREEMENT = 3.0
+AXES = ("x", "y")
+
+
+@dataclass(frozen=True, eq=False)
+class _Gravity:
+    """How gravity along minus the base's x and y enters the torque, per robot.
+
+    Attributes
+    ----------
+    known : ndarray, shape (4 n, b)
+        First moments per base parameter.
+    known_axes : tuple of int
+        Directions of gravity that the base parameters tell.
+    entering : ndarray, shape (4 n, r)
+        First moments, one combination per column, that the base parameters leave out and this gravity brings in.
+    entering_axes : tuple of int
+        Direction of gravity of each column of ``entering``.
+    nominal : ndarray, shape (4 n,)
+        The nominal ones of them.
+    blend : ndarray, shape (r, 2)
+        Coefficients of the columns of ``entering`` per tilt, with the nominal parameters.
+    """
+
+    known: Array
+    known_axes: tuple[int, ...]
+    entering: Array
+    entering_axes: tuple[int, ...]
+    nominal: Array
+    blend: Array
+
+
+@lru_cache(maxsize=16)
+def _gravity(term: RigidBody) -> _Gravity:
+    from scipy.linalg import qr
+
+    robot, base = term.robot, term.base
+    kept, moments = first_moments(robot), base.kept
+    count = base.grouping.shape[1]
+    leads = np.zeros((count, base.count))
+    leads[moments, np.arange(base.count)] = 1.0
+    rest = (np.eye(count) - leads @ base.grouping)[kept]
+    nominal = rest @ robot.standard_parameters()
+    known = leads[np.ix_(kept, term.kept)]
+
+    rng = np.random.default_rng(0)
+    reach = np.where(robot.prismatic, 1.0, np.pi)[:, None]
+    q = reach * rng.uniform(-1.0, 1.0, (robot.n, max(30, 10 * robot.n)))
+    columns = [gravity_columns(robot, axis, q).transpose(0, 2, 1).reshape(-1, len(kept)) for axis in range(2)]
+    largest = max(float(np.max(np.linalg.norm(part, axis=0))) for part in columns) or 1.0
+    axes = tuple(axis for axis in range(2) if np.linalg.norm(columns[axis] @ known) > NOTHING * largest)
+    new = np.hstack([part @ rest for part in columns])
+    pivots: list[int] = []
+    if np.max(np.abs(new), initial=0.0) > 0.0:
+        _, factor, order = qr(new, mode="economic", pivoting=True)
+        size = np.abs(np.diag(factor))
+        pivots = sorted(int(k) for k in order[: np.count_nonzero(size > NOTHING * largest)])
+    chosen = np.array(pivots, dtype=np.intp)
+    blend: Array = np.zeros((len(pivots), 2), dtype=np.float64)
+    if pivots:
+        wanted = np.column_stack([part @ nominal for part in columns])
+        blend = np.asarray(np.linalg.lstsq(new[:, chosen], wanted, rcond=None)[0], dtype=np.float64)
+        blend[np.abs(blend) < 1e-9 * np.max(np.abs(blend), initial=1e-300)] = 0.0
+    return _Gravity(
+        known=known,
+        known_axes=axes,
+        entering=rest[:, chosen % count],
+        entering_axes=tuple(int(k) // count for k in chosen),
+        nominal=nominal,
+        blend=blend,
+    )
+
+
+def _parts(signals: Signals) -> Array:
+    """Torques under gravity along -x and -y of what the estimate knows and of the nominal rest, then of what enters.
+
+    Shape (n, 4 + r, N): known x, known y, nominal x, nominal y, entering.
+    """
+
+    def make() -> Array:
+        scene, motion = signals.scene, signals.motion
+        term = scene.model.rigid_body
+        gravity = _gravity(term)
+        known = gravity.known @ scene.value[scene.model.place(term)]
+        result = np.zeros((scene.robot.n, 4 + len(gravity.entering_axes), motion.samples))
+        for axis in range(2):
+            columns = gravity_columns(scene.robot, axis, motion.q)
+            result[:, axis] = np.einsum("jkn,k->jn", columns, known)
+            result[:, 2 + axis] = np.einsum("jkn,k->jn", columns, gravity.nominal)
+            for place, of in enumerate(gravity.entering_axes):
+                if of == axis:
+                    result[:, 4 + place] = np.einsum("jkn,k->jn", columns, gravity.entering[:, place])
+        return result
+
+    return shared(signals, "tilt", make)
+
+
+@dataclass(frozen=True)
+class BaseTilt:
+    """Gravity's components -g tilt_x and -g tilt_y along the base's x and y axes.
+
+    What they do to parameters that the model estimates anyway tells the tilt. On an arm with vertical axes they also
+    bring in first moments that no motion told before (of the first link, and of all that it carries); these have
+    columns of their own, whose coefficients are tilt times first moment. If they point where the URDF's first moments
+    say, they take part in the estimate of the tilt; a position torque of one joint, such as a spring, gives a tilt of
+    zero beside such coefficients.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name in the table of effects."""
+        return "base_tilt"
+
+    @property
+    def knobs(self) -> tuple[Knob, ...]:
+        """It has no nonlinear parameter."""
+        return ()
+
+    def members(self, scene: Scene) -> tuple[Member, ...]:
+        """One, where the model's parameters feel gravity from the side."""
+        return (Member(None),) if _gravity(scene.model.rigid_body).known_axes else ()
+
+    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
+        """Tilt about each axis that can be told, then what enters newly."""
+        gravity = _gravity(scene.model.rigid_body)
+        tilts = (_tilt_column(axis) for axis in gravity.known_axes)
+        units = (_moment_unit(scene.robot, gravity.entering[:, k]) for k in range(len(gravity.entering_axes)))
+        entering = (
+            Column(f"tilt_moment{k + 1}", None, unit, "tilt times a first moment that a level base does not show")
+            for k, unit in enumerate(units)
+        )
+        return (*tilts, *entering)
+
+    def regressor(self, signals: Signals, member: Member) -> Array:
+        """Return the torques of known parameters under sideways gravity and those of new ones, shape (n, k, N)."""
+        axes = _gravity(signals.scene.model.rigid_body).known_axes
+        parts = _parts(signals)
+        return np.concatenate([parts[:, list(axes)], parts[:, 4:]], axis=1)
+
+    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
+        """The base is nearly level, and parameters that are known show what new ones show."""
+        gravity = _gravity(scene.model.rigid_body)
+        count = len(gravity.known_axes)
+        steep = _too_steep(value[:count], std[:count])
+        if steep is not None or not gravity.entering_axes:
+            return steep
+        if np.all(np.abs(value[:count]) < 2.0 * std[:count]):
+            return "only one joint shows it, as a spring would; what else gravity must do is missing"
+        return None
+
+    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
+        """Return the tilt, from all columns where they agree, else from those of known parameters."""
+        gravity = _gravity(scene.model.rigid_body)
+        count = len(gravity.known_axes)
+        tilt, spread = value[:count], covariance[:count, :count]
+        if count == 2 and np.any(gravity.blend):
+            tilt, spread = _combined(value, covariance, gravity.blend)
+        return {
+            f"tilt_{AXES[axis]}": Parameter(float(tilt[k]), float(np.sqrt(spread[k, k])), "rad")
+            for k, axis in enumerate(gravity.known_axes)
+        }
+
+    def description(self, scene: Scene, member: Member) -> str:
+        """Say what it is."""
+        return "a base that is not level"
+
+
+@dataclass(frozen=True)
+class NominalBaseTilt:
+    """The same with the URDF's first moments, but for one factor, for those that a level base does not show.
+
+    Two columns say what `BaseTilt` says with more, so that a smaller tilt is found, and found on all joints at once;
+    a spring on one joint has no such company. It offers nothing where no new parameter enters.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name in the table of effects."""
+        return "base_tilt"
+
+    @property
+    def knobs(self) -> tuple[Knob, ...]:
+        """The factor on the nominal first moments."""
+        return (Knob("moment_factor", "1", 1.0 / MOMENT_FACTOR, MOMENT_FACTOR),)
+
+    def members(self, scene: Scene) -> tuple[Member, ...]:
+        """Return five factors; one where nothing else is known of gravity and factor and tilt are one."""
+        gravity = _gravity(scene.model.rigid_body)
+        if not np.any(gravity.blend):
+            return ()
+        if not gravity.known_axes:
+            return (Member(None, (1.0,)),)
+        return tuple(Member(None, (float(x),)) for x in np.geomspace(1.0 / MOMENT_FACTOR, MOMENT_FACTOR, 5))
+
+    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
+        """Tilt about each axis."""
+        return tuple(_tilt_column(axis) for axis in self._axes(scene))
+
+    def regressor(self, signals: Signals, member: Member) -> Array:
+        """Return the torque under sideways gravity, shape (n, k, N)."""
+        gravity = _gravity(signals.scene.model.rigid_body)
+        factor = member.knobs[0] if gravity.known_axes else 1.0
+        parts = _parts(signals)
+        axes = np.array(self._axes(signals.scene))
+        return np.asarray(parts[:, axes] + factor * parts[:, 2 + axes])
+
+    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
+        """The base is nearly level."""
+        return _too_steep(value, std)
+
+    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
+        """Return the tilt."""
+        return {
+            f"tilt_{AXES[axis]}": Parameter(float(value[k]), float(np.sqrt(covariance[k, k])), "rad")
+            for k, axis in enumerate(self._axes(scene))
+        }
+
+    def description(self, scene: Scene, member: Member) -> str:
+        """Say what it is."""
+        return "a base that is not level"
+
+    def _axes(self, scene: Scene) -> list[int]:
+        gravity = _gravity(scene.model.rigid_body)
+        return [axis for axis in range(2) if axis in gravity.known_axes or np.any(gravity.blend[:, axis])]
+
+
+def _tilt_column(axis: int) -> Column:
+    name = AXES[axis]
+    return Column(f"tilt_{name}", None, "rad", f"gravity along the base's {name} is -g times this")
+
+
+def _moment_unit(robot: Robot, moments: Array) -> str:
+    # A mass enters beside first moments only where a prismatic joint slides along the base's x or y.
+    return (
+        "kg"
+        if np.any(robot.prismatic) and np.any(moments[::4]) and not np.any(moments.reshape(-1, 4)[:, 1:])
+        else "kg m"
+    )
+
+
+def _too_steep(tilt: Array, std: Array) -> str | None:
+    if np.any(np.abs(tilt) > LARGEST_TILT + 2.0 * std):
+        return f"a base that leans by {float(np.max(np.abs(tilt))):.2g} rad would be seen by eye"
+    return None
+
+
+def _combined(value: Array, covariance: Array, blend: Array) -> tuple[Array, Array]:
+    """Fit tilt and one factor on the nominal first moments to all coefficients, by Gauss and Newton."""
+    from scipy.stats import chi2
+
+    size = np.sqrt(np.clip(np.diag(covariance), np.finfo(float).tiny, None))
+    weight = np.linalg.pinv(covariance / np.outer(size, size), rcond=1e-9, hermitian=True) / np.outer(size, size)
+    tilt = value[:2].copy()
+    ideal = blend @ tilt
+    factor = float(ideal @ value[2:] / max(float(ideal @ ideal), np.finfo(float).tiny))
+    factor = float(np.clip(factor, 1.0 / MOMENT_FACTOR, MOMENT_FACTOR))
+    for _ in range(20):
+        error = value - np.concatenate([tilt, factor * blend @ tilt])
+        slope = np.column_stack(
+            [np.vstack([np.eye(2), factor * blend]), np.concatenate([np.zeros(2), blend @ tilt])]
+        )  # fmt: skip
+        normal = slope.T @ weight @ slope
+        step = np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ slope.T @ weight @ error
+        tilt, factor = tilt + step[:2], factor + float(step[2])
+    error = value - np.concatenate([tilt, factor * blend @ tilt])
+    disagreement = float(error @ weight @ error)
+    free = len(value) - 3
+    accepted = chi2.ppf(chi2.cdf(AGREEMENT**2, 1), free) if free > 0 else np.inf
+    believed = 1.0 / MOMENT_FACTOR <= factor <= MOMENT_FACTOR
+    if not np.isfinite(disagreement) or disagreement > accepted or not believed:
+        return value[:2], covariance[:2, :2]
+    spread = np.linalg.pinv(slope.T @ weight @ slope, rcond=1e-12, hermitian=True)
+    return tilt, spread[:2, :2]
