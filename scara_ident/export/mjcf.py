@@ -147,7 +147,9 @@ def _axis(robot: Robot, j: int) -> Array:
     """Axis of a joint in its own frame: its column of the joint's Jacobian there."""
     model = robot.model
     joint_id = int(robot.order[j]) + 1
-    column = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), joint_id)[:, robot.order[j]]
+    jacobian = np.asarray(pin.computeJointJacobian(model, model.createData(), pin.neutral(model), joint_id))
+    # Pinocchio gives the matrix of a single joint as a vector.
+    column = jacobian.reshape(6, model.nv)[:, robot.order[j]]
     return np.asarray(column[:3] if robot.prismatic[j] else column[3:])
 
 

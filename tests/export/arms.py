@@ -32,7 +32,7 @@ BRANCHED = """<?xml version='1.0'?>
 \t<link name="arm"><inertial><origin xyz="0.1 0.02 0" rpy="0.3 0.1 -0.2"/><mass value="2"/>
 \t\t<inertia ixx="0.02" ixy="0.001" ixz="0" iyy="0.03" iyz="0" izz="0.025"/></inertial></link>
 \t<link name="slide"/>
-\t<link name="wrist">
+\t<link name="hand">
 \t\t<inertial>
 \t\t\t<!-- from the data sheet -->
 \t\t\t<mass value='0.8'/>
@@ -54,11 +54,11 @@ BRANCHED = """<?xml version='1.0'?>
 \t\t<limit lower="-0.2" upper="0.3" effort="50" velocity="1"/> <!-- a screw -->
 \t</joint>
 \t<joint name="wrist" type="revolute">
-\t\t<parent link="arm"/><child link="wrist"/><origin xyz="0.3 0 0" rpy="1.57 0 0"/><axis xyz="0 -1 0"/>
+\t\t<parent link="arm"/><child link="hand"/><origin xyz="0.3 0 0" rpy="1.57 0 0"/><axis xyz="0 -1 0"/>
 \t\t<limit lower="-2" upper="2" effort="20" velocity="3"/>
 \t</joint>
 \t<joint name="flange" type="fixed">
-\t\t<parent link="wrist"/><child link="tool"/><origin xyz="0 0.05 0" rpy="0 0 0.5"/>
+\t\t<parent link="hand"/><child link="tool"/><origin xyz="0 0.05 0" rpy="0 0 0.5"/>
 \t</joint>
 \t<joint name="grip" type="prismatic">
 \t\t<parent link="tool"/><child link="finger"/><origin xyz="0 0 0.1"/><axis xyz="0 1 0"/>
