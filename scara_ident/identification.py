@@ -104,7 +104,8 @@ def identify(
     Raises
     ------
     UsageError
-        If there are no recordings, the method is unknown, or a recording is both fitted and held out.
+        If there are no recordings, the method is unknown, a recording is both fitted and held out, or a band is no
+        frequency.
     RecordingError
         If a recording cannot be used.
     """
@@ -120,6 +121,8 @@ def identify(
         choice = choose_bands(equation, recordings)
         bands = choice.bands
         notes += choice.notes
+    else:
+        _check_bands(robot, bands)
     progress("absorbing the recordings")
     training = gather_all(equation, recordings, bands)
     held_out = gather_all(equation, validation, bands)
@@ -129,6 +132,14 @@ def identify(
     unweighted = pooled_information(training, np.ones(robot.n))
     log_det, condition = paper_criteria(unweighted, training)
     return Identification(estimate, history, tuple(bands), training, held_out, noise, log_det, condition, tuple(notes))
+
+
+def _check_bands(robot: Robot, bands: Sequence[float | None]) -> None:
+    if len(bands) != robot.n:
+        raise UsageError(f"bands: {len(bands)} given; expected one for each of {', '.join(robot.joints)}")
+    for joint, band in zip(robot.joints, bands, strict=True):
+        if band is not None and not 0.0 < band < np.inf:
+            raise UsageError(f"band of {joint} is {band:g} Hz; expected a frequency above 0, or none")
 
 
 def estimate_by(
@@ -159,8 +170,11 @@ def check_held_out(recordings: Sequence[Recording], validation: Sequence[Recordi
     """
     fitted = {recording.path.resolve() for recording in recordings if recording.path is not None}
     for recording in validation:
-        if recording.path is not None and recording.path.resolve() in fitted:
-            raise UsageError(f"{recording.path}: given to fit and to validate; a validation recording must be held out")
+        known = recording.path is not None and recording.path.resolve() in fitted
+        if known or any(recording is other for other in recordings):
+            raise UsageError(
+                f"{recording.path or recording.name}: given to fit and to validate; a validation recording must be held out"
+            )
 
 
 def data_notes(recordings: Sequence[Recording]) -> list[str]:

@@ -313,7 +313,14 @@ def _lock(
             reference[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
         locked.append((name, value))
         ids.append(joint_id)
-    reduced = pin.buildReducedModel(model, ids, reference) if ids else model
+    try:
+        reduced = pin.buildReducedModel(model, ids, reference) if ids else model
+    except (ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        raise RobotError(
+            f"{description.urdf}: cannot lock {', '.join(name for name, _ in locked)}: {reason}; "
+            "a joint and a link may have the same name"
+        ) from None
     for joint_id in range(1, reduced.njoints):
         if reduced.joints[joint_id].nv != 1:
             raise RobotError(f"{source}: joints.{reduced.names[joint_id]}: has more than one degree of freedom")

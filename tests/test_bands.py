@@ -102,7 +102,10 @@ def test_a_joint_that_stands_still_gets_a_band_and_leaves_the_other_alone(model:
     # Held by its friction: what the torque does there is no function of motion.
     torque = recorded_torque(
         model.robot,
-        *(np.array([row, np.full_like(row, still)]) for row, still in zip(derivatives(clean), (0.4, 0.0, 0.0), strict=True)),
+        *(
+            np.array([row, np.full_like(row, still)])
+            for row, still in zip(derivatives(clean), (0.4, 0.0, 0.0), strict=True)
+        ),
         FRICTION,
     )
     torque[1] += 0.05 * rng.standard_normal(torque.shape[1])
@@ -133,8 +136,14 @@ def test_the_order_of_recordings_does_not_matter(model: TorqueModel, clean: Reco
     assert clean.effort is not None
     whole = replace(clean, position=clean.position + noise)
     halves = [
-        replace(whole, name=f"h{k}_1", trajectory=f"h{k}", time=whole.time[part], position=whole.position[:, part],
-                effort=whole.effort[:, part])
+        replace(
+            whole,
+            name=f"h{k}_1",
+            trajectory=f"h{k}",
+            time=whole.time[part],
+            position=whole.position[:, part],
+            effort=whole.effort[:, part],
+        )
         for k, part in enumerate((slice(0, 5000), slice(5000, 10000)))
     ]
     forth, back = choose_bands(model, halves), choose_bands(model, halves[::-1])

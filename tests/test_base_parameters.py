@@ -85,7 +85,10 @@ def test_the_count_is_the_rank_of_pinocchios_regressor(tmp_path: Path, name: str
     assert base.approximate == ()
 
 
-@pytest.mark.parametrize(("name", "rigid", "with_rotors"), [("scara03", 4, 5), ("double_pendulum", 6, 7), ("ur5_robot", 36, 40), ("ur10_robot", 36, 40)])
+@pytest.mark.parametrize(
+    ("name", "rigid", "with_rotors"),
+    [("scara03", 4, 5), ("double_pendulum", 6, 7), ("ur5_robot", 36, 40), ("ur10_robot", 36, 40)],
+)
 def test_the_count_is_the_known_one(tmp_path: Path, name: str, rigid: int, with_rotors: int):
     assert reduction(name, tmp_path, rotor_inertia=False).count == rigid
     assert reduction(name, tmp_path).count == with_rotors
@@ -210,8 +213,11 @@ def test_the_unit_of_length_does_not_change_the_set(tmp_path: Path, factor: floa
         for link in links
     )
     one, other = (load_robot(write_urdf(tmp_path / f"{k}.urdf", made)) for k, made in enumerate((links, scaled)))
-    stretched = replace(other, lower=np.where(other.prismatic, factor, 1.0) * other.lower,
-                        upper=np.where(other.prismatic, factor, 1.0) * other.upper)
+    stretched = replace(
+        other,
+        lower=np.where(other.prismatic, factor, 1.0) * other.lower,
+        upper=np.where(other.prismatic, factor, 1.0) * other.upper,
+    )
     base, changed = find_base_parameters(one), find_base_parameters(stretched)
     np.testing.assert_array_equal(base.kept, changed.kept)
     assert base.absent == changed.absent

@@ -28,7 +28,8 @@ def smooth_columns(rng: np.random.Generator, count: int, p: int) -> np.ndarray:
     """Columns as motion makes them: slow sines, so that correlated noise matters."""
     time = np.arange(count)
     return np.column_stack(
-        [np.sin(2 * np.pi * time * rng.uniform(0.002, 0.008) + rng.uniform(0, 6)) for _ in range(p - 1)] + [np.ones(count)]
+        [np.sin(2 * np.pi * time * rng.uniform(0.002, 0.008) + rng.uniform(0, 6)) for _ in range(p - 1)]
+        + [np.ones(count)]
     )
 
 

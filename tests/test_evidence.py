@@ -119,7 +119,9 @@ def test_splitting_a_recording_costs_its_new_ends_only(model: TorqueModel, truth
     whole = swing(model, seconds=20.0)
     assert whole.effort is not None
     halves = [
-        replace(whole, name=f"half_{k}", time=whole.time[a:b], position=whole.position[:, a:b], effort=whole.effort[:, a:b])
+        replace(
+            whole, name=f"half_{k}", time=whole.time[a:b], position=whole.position[:, a:b], effort=whole.effort[:, a:b]
+        )
         for k, (a, b) in enumerate(((0, 5000), (5000, 10000)))
     ]
     one, two = gather(model, whole, bands), gather_all(model, halves, bands)

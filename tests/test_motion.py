@@ -160,7 +160,11 @@ def test_a_recording_is_cut_at_its_gaps_and_nothing_bridges_them():
     time = np.arange(4000) / RATE
     keep = ((time < 1.0) | (time >= 1.5)) & ((time < 3.0) | (time >= 3.006))
     parts = stretches(recorded(time[keep], sine(1.0, time[keep])[0][None]))
-    assert [(round(part.time[0], 3), round(part.time[-1], 3)) for part in parts] == [(0.0, 0.999), (1.5, 2.999), (3.006, 3.999)]
+    assert [(round(part.time[0], 3), round(part.time[-1], 3)) for part in parts] == [
+        (0.0, 0.999),
+        (1.5, 2.999),
+        (3.006, 3.999),
+    ]
     assert sum(len(part.time) for part in parts) == np.count_nonzero(keep)
 
 

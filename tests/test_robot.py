@@ -82,7 +82,9 @@ def test_limits_come_from_the_urdf_and_a_continuous_joint_has_none(tmp_path: Pat
     np.testing.assert_array_equal(robot.effort_limit, [50, 50, 50, 50])
 
 
-@pytest.mark.parametrize("urdf", ["ur5_robot.urdf", "panda.urdf", "allegro_right_hand.urdf", "double_pendulum_continuous.urdf"])
+@pytest.mark.parametrize(
+    "urdf", ["ur5_robot.urdf", "panda.urdf", "allegro_right_hand.urdf", "double_pendulum_continuous.urdf"]
+)
 def test_arms_of_example_robot_data_load(urdf: str):
     robot = load_robot(example_urdf(urdf))
     full = pin.buildModelFromUrdf(str(example_urdf(urdf)))
@@ -240,9 +242,7 @@ def test_a_fixed_joint_cannot_be_identified(tmp_path: Path):
         ),
     ],
 )
-def test_what_is_no_urdf_is_refused(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], content: bytes, said: str
-):
+def test_what_is_no_urdf_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str], content: bytes, said: str):
     path = tmp_path / "robot.yaml"
     path.write_text("urdf: arm.urdf\n", encoding="utf-8")
     (tmp_path / "arm.urdf").write_bytes(content)
@@ -262,7 +262,9 @@ def test_a_missing_urdf_is_refused(tmp_path: Path):
     assert str(tmp_path / "lost.urdf") in refusal(tmp_path / "lost.urdf")
 
 
-@pytest.mark.parametrize(("value", "said"), [("0", "is 0"), ("fast", "expected a number"), ("nan", "expected"), ("inf", "expected")])
+@pytest.mark.parametrize(
+    ("value", "said"), [("0", "is 0"), ("fast", "expected a number"), ("nan", "expected"), ("inf", "expected")]
+)
 def test_a_transmission_that_makes_no_sense_is_refused(tmp_path: Path, value: str, said: str):
     path = described(tmp_path, "effort_side: motor\n", reductions=(100.0,))
     urdf = tmp_path / "arm.urdf"

@@ -71,7 +71,9 @@ def test_a_lead_is_called_a_lead(truthful: Recording):
 
 def test_degrees_are_recognised(truthful: Recording):
     assert truthful.velocity is not None
-    assert all("degrees" in str(verdict) for verdict in verdicts(replace(truthful, velocity=np.degrees(truthful.velocity))))
+    assert all(
+        "degrees" in str(verdict) for verdict in verdicts(replace(truthful, velocity=np.degrees(truthful.velocity)))
+    )
 
 
 @pytest.mark.parametrize("gain", [-1.0, 0.5, 100.0])

@@ -22,15 +22,26 @@ OutputOption = Annotated[
 ]
 
 
+class PlainConsole(Console):
+    """A console that prints names as they are, brackets included, and stops quietly when nobody reads any more."""
+
+    def __init__(self, *, stderr: bool = False, width: int | None = None) -> None:
+        super().__init__(stderr=stderr, width=width, highlight=False, markup=False)
+
+    def on_broken_pipe(self) -> None:
+        """Leave it to the program what a reader that has gone means; rich would exit with status 1."""
+        raise BrokenPipeError
+
+
 def output_console() -> Console:
-    """Return a console on stdout; 80 columns where it is not a terminal."""
-    console = Console(highlight=False)
-    return console if console.is_terminal else Console(highlight=False, width=100)
+    """Return a console on stdout; 100 columns where it is not a terminal."""
+    console = PlainConsole()
+    return console if console.is_terminal else PlainConsole(width=100)
 
 
 def errors_console() -> Console:
     """Return a console on stderr."""
-    return Console(stderr=True, highlight=False)
+    return PlainConsole(stderr=True)
 
 
 @contextmanager

@@ -36,7 +36,7 @@ def active(unknowns: Unknowns, point: Point) -> tuple[Array, tuple[str, ...]]:
     rows: list[Array] = []
     labels: list[str] = []
     slack = cones.nonnegative(whole) - MARGIN
-    for k in np.flatnonzero(point.dual_nonnegative > slack):
+    for k in np.flatnonzero(point.dual_nonnegative > slack).tolist():
         rows.append(cones.nonnegative.matrix[k])
         labels.append(unknowns.labels[0][k])
     values, duals = cones.small(whole).reshape(-1, 3), point.dual_small.reshape(-1, 3)

@@ -93,6 +93,11 @@ def link_inertia(name: str, parameters: Array) -> LinkInertia:
     )
 
 
+def smallest_share(bodies: Array) -> float:
+    """Return the smallest eigenvalue of bodies relative to nominal, packed one after another, shape (10 n,)."""
+    return float(np.min(np.linalg.eigvalsh(unpack(bodies.reshape(-1, 10)))))
+
+
 def smallest_eigenvalue_share(parameters: Array) -> float:
     """Return the smallest eigenvalue of a body's pseudo-inertia as a share of its trace; below 0 it cannot exist."""
     matrix = pseudo_inertia(parameters)

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.consistency.friction_certificate import FrictionFault, friction_faults
-from scara_ident.consistency.matching import match, sizes
+from scara_ident.consistency.matching import Match, fixed, match, sizes
 from scara_ident.consistency.options import ConsistentOptions
 from scara_ident.consistency.programme import Programme
+from scara_ident.consistency.unknowns import Unknowns, build_unknowns
 from scara_ident.errors import UsageError
 from scara_ident.information import Information
 from scara_ident.model import TorqueModel
@@ -22,8 +23,8 @@ Array = NDArray[np.float64]
 
 # So many contradictions are told; more would not help anyone.
 MOST_REASONS = 5
-# A base parameter whose multiplier contributes less than this share takes no part in a contradiction.
-NO_PART = 1e-4
+# A base parameter whose multiplier contributes less than this to the margin takes no part in a contradiction.
+NO_PART = 1e-6
 
 
 @dataclass(frozen=True)
@@ -35,17 +36,17 @@ class Possibility:
     possible : bool
     reasons : tuple of str
         What contradicts it; empty for a possible arm.
-    distance : float
-        How far the base parameters are from those of the nearest possible arm: the largest difference relative to
-        the base parameter's size (its value, or what its bodies make of it in the nominal arm).
+    margin : float
+        How far inside what is possible the best arm with these base parameters is: the smallest eigenvalue of its
+        bodies relative to the nominal ones, at most a half; negative for the share that they lack.
     distance_std : float or None
-        The same distance, friction included, in standard deviations of the estimate; None where no information
-        was given.
+        Distance of the nearest possible arm, friction included, in standard deviations of the estimate; None where
+        no information was given.
     """
 
     possible: bool
     reasons: tuple[str, ...]
-    distance: float
+    margin: float
     distance_std: float | None
 
 
@@ -54,7 +55,7 @@ def check_possible(
     value: Array,
     *,
     information: Information | None = None,
-    programme: Programme | None = None,
+    unknowns: Unknowns | None = None,
 ) -> Possibility:
     """Check whether a physically consistent arm has these parameters.
 
@@ -69,8 +70,8 @@ def check_possible(
         Parameters, estimated by whatever method.
     information : Information, optional
         The rows that they came from, to tell the distance in standard deviations.
-    programme : Programme, optional
-        A compiled programme of the same model, to spare compiling it again.
+    unknowns : Unknowns, optional
+        Of the same model, to spare building them again; limits on masses and centres of mass in them count too.
 
     Returns
     -------
@@ -88,16 +89,14 @@ def check_possible(
         raise UsageError(
             f"expected {len(model.columns)} finite parameters of the model {model.name}, found shape {value.shape}"
         )
-    if programme is None:
-        programme = Programme(model, ConsistentOptions(friction="free"))
-    u = programme.unknowns
+    u = unknowns or build_unknowns(model, ConsistentOptions(friction="free"))
     size = sizes(u, value)
     place = model.place(model.rigid_body)
     bodies = np.arange(place.start, place.stop)
-    found = match(programme, value, _rows(bodies, size))
+    found = _matched(u, value, size, bodies)
     reasons: list[str] = []
     if not found.possible:
-        reasons += _contradictions(programme, value, size, bodies)
+        reasons += _contradictions(u, value, size, bodies)
     reasons += [_column_reason(model.columns[k], value[k]) for k in u.nonnegative if value[k] < 0.0]
     for polynomial in u.polynomials:
         faults = friction_faults(polynomial, value[list(polynomial.columns)])
@@ -105,13 +104,13 @@ def check_possible(
     distance_std = None
     if information is not None:
         distance_std = 0.0 if not reasons else _distance_std(model, value, information)
-    return Possibility(not reasons, tuple(reasons), found.distance, distance_std)
+    return Possibility(not reasons, tuple(reasons), found.margin, distance_std)
 
 
-def _rows(columns: Sequence[int] | NDArray[np.intp], size: Array) -> Array:
+def _matched(u: Unknowns, value: Array, size: Array, columns: Sequence[int] | NDArray[np.intp]) -> Match:
     rows = np.zeros((len(columns), len(size)))
     rows[np.arange(len(columns)), columns] = 1.0 / size[columns]
-    return rows
+    return match(u, value, fixed(u, rows))
 
 
 def _distance_std(model: TorqueModel, value: Array, information: Information) -> float:
@@ -119,40 +118,39 @@ def _distance_std(model: TorqueModel, value: Array, information: Information) ->
     programme = Programme(model)
     noise = information.rms() or 1.0
     factor = information.regressor_factor / noise
-    point = programme.solve(factor, factor @ value, np.full(programme.unknowns.size, 1e-2))
+    point = programme.solve(factor, factor @ value, 1e-2 * np.eye(programme.unknowns.size))
     return float(np.linalg.norm(factor @ (point.parameters - value)))
 
 
-def _contradictions(programme: Programme, value: Array, size: Array, bodies: NDArray[np.intp]) -> list[str]:
+def _contradictions(u: Unknowns, value: Array, size: Array, bodies: NDArray[np.intp]) -> list[str]:
     """Find sets of base parameters that no arm has together, each as small as possible."""
-    columns = programme.unknowns.model.columns
+    columns = u.model.columns
     negative = [int(k) for k in bodies if columns[k].nonnegative and value[k] < 0.0]
     reasons = [_column_reason(columns[k], value[k]) for k in negative]
     left = [int(k) for k in bodies if k not in negative]
     while len(reasons) < MOST_REASONS and left:
-        found = match(programme, value, _rows(left, size))
+        found = _matched(u, value, size, left)
         if found.possible:
-            return reasons
-        together = _irreducible(programme, value, size, left, found.gap)
+            break
+        part = np.abs(found.multipliers * value[left] / size[left])
+        together = _irreducible(u, value, size, [left[k] for k in np.argsort(part)], int(np.sum(part > NO_PART)))
         reasons.append(_together_reason([columns[k] for k in together], value[together]))
         left = [k for k in left if k not in together]
     return reasons
 
 
-def _irreducible(programme: Programme, value: Array, size: Array, columns: list[int], gap: Array) -> list[int]:
+def _irreducible(u: Unknowns, value: Array, size: Array, columns: list[int], taking_part: int) -> list[int]:
     """Leave out every base parameter without which the others still contradict each other.
 
-    At the nearest possible arm what is left of each base parameter is, up to a factor, its multiplier in the proof
-    that there is none with distance 0; those without a part in the proof are left out at once.
+    ``columns`` come in the order of their part in the proof that there is no such arm; those with hardly a part are
+    left out at once.
     """
-    part = np.abs(gap)
-    order = np.argsort(part)
-    members = [columns[k] for k in order if part[k] > NO_PART * part.max()]
-    if match(programme, value, _rows(members, size)).possible:
-        members = [columns[k] for k in order]
+    members = columns[-taking_part:] if taking_part else columns
+    if _matched(u, value, size, members).possible:
+        members = columns
     for k in list(members):
         rest = [m for m in members if m != k]
-        if rest and not match(programme, value, _rows(rest, size)).possible:
+        if rest and not _matched(u, value, size, rest).possible:
             members = rest
     return sorted(members)
 

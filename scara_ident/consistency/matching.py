@@ -8,13 +8,14 @@ contradict each other.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.consistency.bodies import PACKED_IDENTITY
+from scara_ident.consistency.bodies import PACKED_IDENTITY, smallest_share
 from scara_ident.consistency.cones import Affine
 from scara_ident.consistency.friction_certificate import friction_faults, shape_faults
 from scara_ident.consistency.options import FrictionShape
@@ -28,6 +29,9 @@ Array = NDArray[np.float64]
 ROUNDING = 1e-7
 # Bodies further inside than this need no further search.
 ENOUGH = 0.5
+# So many proofs are kept, and one counts where it is this clear.
+PROOFS = 32
+PROVEN = 1e-5
 # The solver's slack, well below ROUNDING.
 TOLERANCE = 1e-9
 
@@ -125,6 +129,65 @@ def match(unknowns: Unknowns, value: Array, what: Fixed) -> Match:
     return Match(x, margin, (what.inverse.T @ forces)[: len(what.combinations)])
 
 
+class Matcher:
+    """Finds arms with given base parameters; remembers proofs that there are none.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+
+    Attributes
+    ----------
+    unknowns : Unknowns
+    """
+
+    def __init__(self, unknowns: Unknowns) -> None:
+        self.unknowns = unknowns
+        place = unknowns.model.place(unknowns.model.rigid_body)
+        rows = np.eye(unknowns.to_parameters.shape[0])[place]
+        self._size = np.linalg.norm(unknowns.to_parameters[place], axis=1)
+        self._place = place
+        self._all = fixed(unknowns, rows / self._size[:, None])
+        self._proofs: deque[Array] = deque(maxlen=PROOFS)
+
+    def find(self, value: Array) -> Match | None:
+        """Find an arm with these parameters, None if there is none.
+
+        Parameters
+        ----------
+        value : ndarray, shape (p,)
+            The model's parameters; those of bodies and rotors are matched, the others are taken as they are.
+        """
+        u = self.unknowns
+        scaled = value[self._place] / self._size
+        for proof in self._proofs:
+            if proof @ scaled < -PROVEN * float(np.abs(proof) @ np.abs(scaled)):
+                return None
+        # The arm nearest to the nominal one may do already.
+        x = u.reference.copy()
+        x[11 * u.n :] = 0.0
+        wanted = np.concatenate([scaled, np.zeros(len(u.held))])
+        for _ in range(2):
+            x += self._all.inverse @ (wanted - self._all.rows @ x)
+        margin = min(margin_of(u, x), ENOUGH)
+        if margin > ROUNDING:
+            return Match(self._completed(x, value), margin, np.zeros(len(scaled)))
+        found = match(u, value, self._all)
+        if not found.possible:
+            self._proofs.appendleft(found.multipliers)
+            return None
+        return Match(self._completed(found.x, value), found.margin, found.multipliers)
+
+    def _completed(self, x: Array, value: Array) -> Array:
+        """Put the parameters of the other columns into x."""
+        u = self.unknowns
+        result = x.copy()
+        part = u.to_parameters[:, 11 * u.n :]
+        column = np.argmax(part != 0.0, axis=0)
+        result[11 * u.n :] = value[column] / part[column, np.arange(part.shape[1])]
+        return result
+
+
 def _furthest_inside(u: Unknowns, start: Array, free: Array) -> tuple[Array, float, Array]:
     n, count = u.n, free.shape[1]
     others = bool(np.any(np.abs(free[11 * n :]) > 1e-12))
@@ -153,13 +216,17 @@ def _furthest_inside(u: Unknowns, start: Array, free: Array) -> tuple[Array, flo
     for i in range(n):
         ten = Affine(bodies.matrix[10 * i : 10 * i + 10], bodies.offset[10 * i : 10 * i + 10])
         blocks.append((ten.widened(len(whole)), PACKED_IDENTITY, "body"))
-    found, duals = _solve(blocks, whole, along)
+    solved = _solve(blocks, whole, along)
+    if solved is None:
+        # Bodies could lack as much as it takes; friction and the like cannot.
+        return start, -np.inf, np.zeros(u.size)
+    found, duals = solved
     # Force of the multipliers on x: rotors and limits, then bodies.
     forces = np.zeros(u.size)
     for (block, _, _), dual in zip(blocks, duals, strict=True):
         forces += dual @ block.matrix[:, : u.size]
     x = start + free @ found[:count]
-    return x, min(_margin(u, x, linear, ball), ENOUGH), forces
+    return x, min(margin_of(u, x), ENOUGH), forces
 
 
 def _as_ball(small: Affine, k: int) -> Affine:
@@ -169,16 +236,17 @@ def _as_ball(small: Affine, k: int) -> Affine:
     return Affine(mix @ small.matrix, mix @ small.offset)
 
 
-def _margin(u: Unknowns, x: Array, linear: Affine, ball: Affine) -> float:
-    from scara_ident.consistency.programme import smallest_share
-
-    cones = ball(x).reshape(-1, 4)
+def margin_of(u: Unknowns, x: Array) -> float:
+    """Return the smallest eigenvalue of bodies and the smallest of rotors and limits at x."""
+    arm = x[u.rigid]
+    cones = u.limits.ball(arm).reshape(-1, 4)
     room = cones[:, 0] - np.linalg.norm(cones[:, 1:], axis=1)
-    return float(min(smallest_share(x[: 10 * u.n]), np.min(linear(x)), np.min(room, initial=np.inf)))
+    slack = np.concatenate([arm[10 * u.n :], u.limits.nonnegative(arm), room])
+    return float(min(smallest_share(arm[: 10 * u.n]), np.min(slack)))
 
 
-def _solve(blocks: list[tuple[Affine, Array, str]], whole: Array, along: Array) -> tuple[Array, list[Array]]:
-    """Maximise t so that every block's functions less t times its direction lie in the block's cone."""
+def _solve(blocks: list[tuple[Affine, Array, str]], whole: Array, along: Array) -> tuple[Array, list[Array]] | None:
+    """Maximise t so that every block's functions less t times its direction lie in the block's cone, if any t does."""
     import clarabel
     import scipy.sparse as sp
 
@@ -195,10 +263,13 @@ def _solve(blocks: list[tuple[Affine, Array, str]], whole: Array, along: Array) 
     goal[-1] = -1.0
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.max_threads = False, 1
+    settings.iterative_refinement_enable = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
     cones = [kinds[kind](len(block)) for block, _, kind in blocks]
     solver = clarabel.DefaultSolver(sp.csc_matrix((size, size)), goal, sp.csc_matrix(matrix), offset, cones, settings)
     result = solver.solve()
+    if "PrimalInfeasible" in str(result.status):
+        return None
     if str(result.status) not in ("Solved", "AlmostSolved", "InsufficientProgress") or not np.all(
         np.isfinite(result.x)
     ):

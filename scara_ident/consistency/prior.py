@@ -33,11 +33,10 @@ DEPENDENT = 1e-9
 def divergence(x: Array) -> float:
     """Return the divergence of bodies and rotors relative to nominal, shape (11 n,), from the nominal arm."""
     n = len(x) // 11
-    matrices = unpack(x[: 10 * n].reshape(n, 10))
-    sign, log = np.linalg.slogdet(matrices)
-    if np.any(sign <= 0.0) or np.any(x[10 * n :] <= 0.0):
+    values = np.linalg.eigvalsh(unpack(x[: 10 * n].reshape(n, 10)))
+    if np.any(values <= 0.0) or np.any(x[10 * n :] <= 0.0):
         return np.inf
-    bodies = float(np.sum(np.trace(matrices, axis1=1, axis2=2) - log - 4.0))
+    bodies = float(np.sum(values - np.log(values) - 1.0))
     return bodies + float(np.sum(x[10 * n :] - np.log(x[10 * n :]) - 1.0))
 
 
@@ -126,9 +125,7 @@ def _value(x: Array, limits: Cones, weight: float) -> float:
     return value - weight * float(np.sum(np.log(slack)) + np.sum(np.log(room)))
 
 
-def _slopes(
-    x: Array, n: int, directions: Array, free: Array, limits: Cones, weight: float
-) -> tuple[Array, Array]:
+def _slopes(x: Array, n: int, directions: Array, free: Array, limits: Cones, weight: float) -> tuple[Array, Array]:
     """Gradient along the free directions, and a square root of the Hessian, as rows."""
     inverse_root = np.linalg.inv(np.linalg.cholesky(unpack(x[: 10 * n].reshape(n, 10))))
     # In the metric of the point itself, each direction is a symmetric matrix per body.

@@ -1,6 +1,6 @@
 """The semidefinite programme, canonicalised once and solved again and again.
 
-    minimise    |F theta - g|^2 + |W (x - x0)|^2     with the model's parameters  theta = T x
+    minimise    |F theta - g|^2 + |W (x - x0)|^2    with the model's parameters  theta = T x
     subject to  Q_i >= eps 1  for every body, rotors, friction certificates, limits
 
 F and g are a triangular factor and its right-hand side, so the size does not depend on how many samples there are.
@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dtrtri
 
-from scara_ident.consistency.bodies import PACKED_IDENTITY, unpack, unpacking
+from scara_ident.consistency.bodies import unpack, unpacking
+from scara_ident.consistency.matching import Matcher
 from scara_ident.consistency.options import ConsistentOptions
 from scara_ident.consistency.unknowns import Unknowns, build_unknowns
 from scara_ident.errors import EstimationError
@@ -101,6 +102,7 @@ class Programme:
     Attributes
     ----------
     unknowns : Unknowns
+    matcher : Matcher
     problem : cvxpy.Problem
         The parametrised problem.
     """
@@ -108,6 +110,7 @@ class Programme:
     def __init__(self, model: TorqueModel, options: ConsistentOptions | None = None) -> None:
         self.options = options or ConsistentOptions()
         self.unknowns: Unknowns = build_unknowns(model, self.options)
+        self.matcher = Matcher(self.unknowns)
         self.problem, self._root, self._centre = self._build()
         self._solver: Any = None
 
@@ -116,12 +119,13 @@ class Programme:
 
         u = self.unknowns
         size = u.size
+        whole: Any
         w, auxiliary = cp.Variable(size, name="w"), cp.Variable(u.auxiliary, name="auxiliary")
         # The triangle's entries as one vector: a parameter's value then goes into the canonical form as it is.
         entries = cp.Parameter(size * (size + 1) // 2, name="root")
         centre = cp.Parameter(size, name="centre")
         root = cp.reshape(_triangle(size) @ entries, (size, size), order="C")
-        x = centre + root @ w
+        x: Any = centre + root @ w
         whole = cp.hstack([x, auxiliary]) if u.auxiliary else x
         matrix = unpacking()
         constraints = [
@@ -141,7 +145,7 @@ class Programme:
         self._w, self._auxiliary = w, auxiliary
         return cp.Problem(cp.Minimize(cp.sum_squares(w)), constraints), entries, centre
 
-    def solve(self, factor: Array, target: Array, weight: Array) -> Point:
+    def solve(self, factor: Array, target: Array, prior: Array) -> Point:
         """Solve for one set of data.
 
         Parameters
@@ -149,8 +153,8 @@ class Programme:
         factor : ndarray, shape (r, p)
             Rows of the data term, such as a triangular factor divided by the noise.
         target : ndarray, shape (r,)
-        weight : ndarray, shape (size,)
-            Weight of each unknown's distance from its reference, above 0.
+        prior : ndarray, shape (size, size)
+            Rows W on the unknowns' distance from their reference; of full rank, so that there is one solution.
 
         Returns
         -------
@@ -162,12 +166,12 @@ class Programme:
             If the solver does not succeed.
         """
         u = self.unknowns
-        return self.solve_rows(factor @ u.to_parameters, target, weight)
+        return self.solve_rows(factor @ u.to_parameters, target, prior)
 
-    def solve_rows(self, rows: Array, target: Array, weight: Array) -> Point:
+    def solve_rows(self, rows: Array, target: Array, prior: Array) -> Point:
         """Solve with rows that act on x instead of the model's parameters; see `solve`."""
         u = self.unknowns
-        stacked = np.vstack([np.column_stack([rows, target]), np.column_stack([np.diag(weight), weight * u.reference])])
+        stacked = np.vstack([np.column_stack([rows, target]), np.column_stack([prior, prior @ u.reference])])
         triangular = np.linalg.qr(stacked, mode="r")
         root, info = dtrtri(triangular[: u.size, : u.size])
         if info:
@@ -241,11 +245,6 @@ class Programme:
             iterations=int(result.iterations),
             seconds=float(result.solve_time),
         )
-
-
-def smallest_share(bodies: Array) -> float:
-    """Return the smallest eigenvalue of bodies relative to nominal, packed, shape (10 n,)."""
-    return float(np.min(np.linalg.eigvalsh(unpack(bodies.reshape(-1, len(PACKED_IDENTITY))))))
 
 
 def _triangle(size: int) -> Any:

@@ -5,11 +5,19 @@ from __future__ import annotations
 from scara_ident.effects.effect import Effect
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import TimeDelay, TorqueGainMismatch, TorqueSensorNonlinearity
+from scara_ident.effects.payload import FreePayloadChange, GravityCounterbalance, PayloadChange, PayloadOfRecordings
 from scara_ident.effects.position import Spring
+from scara_ident.effects.tilt import BaseTilt, NominalBaseTilt
 
 CATALOGUE: tuple[Effect, ...] = (
     TransmissionLoss(),
     Spring(),
+    BaseTilt(),
+    NominalBaseTilt(),
+    PayloadChange(),
+    FreePayloadChange(),
+    PayloadOfRecordings(),
+    GravityCounterbalance(),
     TorqueSensorNonlinearity(),
     TorqueGainMismatch(),
     TimeDelay(),

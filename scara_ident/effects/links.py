@@ -180,3 +180,15 @@ def link_inertia(signals: Signals, joint: int) -> Array:
         return np.asarray(change / scene.robot.row_scale[joint] - armature_of(scene, joint))
 
     return shared(signals, ("link inertia", joint), make)
+
+
+def usual_link_inertia(scene: Scene, joint: int) -> float:
+    """Return the mean of `link_inertia` over poses within a turn or a metre, at the joint; negative where misjudged."""
+    robot = scene.robot
+    reach = np.where(robot.prismatic, 1.0, np.pi)[:, None]
+    q = reach * np.random.default_rng(0).uniform(-1.0, 1.0, (robot.n, 40))
+    rest, pushed = np.zeros_like(q), np.zeros_like(q)
+    pushed[joint] = 1.0
+    motion = Motion("poses", "poses", np.arange(40.0), q, rest, rest, None, 1.0)
+    change = rigid_torque(scene, motion, q, rest, pushed) - rigid_torque(scene, motion, q, rest, rest)
+    return float(np.mean(change[joint]) / robot.row_scale[joint] - armature_of(scene, joint))

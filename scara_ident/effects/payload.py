@@ -145,7 +145,8 @@ class PayloadOfRecordings:
     """A mass at the tool point in some recordings and not in others.
 
     Groups tried: recordings whose names share a word, each recording alone, and all from some recording on in the
-    order of time. Where all have the same payload, nothing but a known mass can tell it.
+    order of time; the mass counts from the first recording, whose payload is part of the last link. Where all have
+    the same payload, nothing but a known mass can tell it.
     """
 
     @property
@@ -177,7 +178,7 @@ class PayloadOfRecordings:
         return _too_heavy(scene, float(value[0]), float(std[0]))
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
-        """Return the mass, of the group more than of the others."""
+        """Return the mass, by which the group has more than the others."""
         return {"mass": Parameter(float(value[0]), float(np.sqrt(covariance[0, 0])), "kg")}
 
     def description(self, scene: Scene, member: Member) -> str:
@@ -319,7 +320,7 @@ def _loaded_by_gravity(robot: Robot) -> tuple[bool, ...]:
 
 @lru_cache(maxsize=32)
 def _groups_of(names: tuple[str, ...]) -> tuple[frozenset[str], ...]:
-    """Return groups of recordings, given in the order of time; a group and its complement count as one."""
+    """Return groups of recordings, given in the order of time, that leave out the first."""
     everything = frozenset(names)
     words: dict[str, set[str]] = {}
     for name in names:
@@ -329,8 +330,6 @@ def _groups_of(names: tuple[str, ...]) -> tuple[frozenset[str], ...]:
     proposals = [frozenset(group) for group in words.values()]
     proposals += [frozenset(names[k:]) for k in range(1, len(names))]
     proposals += [frozenset([name]) for name in names]
-    found: list[frozenset[str]] = []
-    for group in proposals:
-        if 0 < len(group) < len(everything) and group not in found and everything - group not in found:
-            found.append(group)
-    return tuple(found[:MOST_GROUPS])
+    # A group and its complement say the same; the one without the first recording counts what was added since.
+    proposals = [everything - group if names[0] in group else group for group in proposals]
+    return tuple(dict.fromkeys(group for group in proposals if group))[:MOST_GROUPS]

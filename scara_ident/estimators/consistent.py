@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from scara_ident.consistency.activity import active, tangent
 from scara_ident.consistency.bodies import LinkInertia, link_inertia
 from scara_ident.consistency.feasibility import Possibility, check_possible
-from scara_ident.consistency.matching import is_allowed, match, sizes
+from scara_ident.consistency.matching import Match, fixed, is_allowed, margin_of, match, sizes
 from scara_ident.consistency.options import ConsistentOptions
+from scara_ident.consistency.pull import prior_rows
 from scara_ident.consistency.prior import nearest_to_nominal, null_space
 from scara_ident.consistency.programme import MARGIN, Programme
 from scara_ident.consistency.unknowns import Unknowns
@@ -199,7 +200,8 @@ def solve_consistent(
         known = extra[:, u.rigid]
     else:
         known = np.zeros((0, 11 * u.n))
-    point = programme.solve_rows(rows, target, _prior_weights(u, information, programme.options))
+    prior = prior_rows(u, rows, target, programme.options.prior_weight)
+    point = programme.solve_rows(rows, target, prior)
     held, labels = active(u, point)
     x = _filled(u, point.x, information, solution, known)
     return ConsistentSolution(x, u.parameters(x), u.standard(x), tangent(u, held), labels, False, point.iterations)
@@ -275,29 +277,30 @@ def _priors(u: Unknowns, options: ConsistentOptions) -> tuple[Information | None
 def _if_possible(programme: Programme, solution: Solution) -> Array | None:
     """Return an arm that has the least-squares parameters, None where there is none."""
     u, value = programme.unknowns, solution.value
-    determined = solution.null.shape[1] == 0
     place = u.model.place(u.model.rigid_body)
     signs = [k for k in range(place.start, place.stop) if u.model.columns[k].nonnegative]
-    if determined and (np.any(value[signs] < 0.0) or not is_allowed(programme, value)):
-        return None
+    if solution.null.shape[1] == 0:
+        if np.any(value[signs] < 0.0) or not is_allowed(u, value, programme.options.friction):
+            return None
+        found = programme.matcher.find(value)
+        return None if found is None else _inside(u, found)
+    # What the data leave open may take any value that makes the rest possible.
     size = sizes(u, value)
     combinations = null_space((solution.null / size[:, None]).T).T / size
-    found = match(programme, value, combinations)
-    return found.x if found.possible else None
+    found = match(u, value, fixed(u, combinations))
+    if not found.possible or not is_allowed(u, u.parameters(found.x), programme.options.friction):
+        return None
+    return _inside(u, found)
 
 
-def _prior_weights(u: Unknowns, information: Information, options: ConsistentOptions) -> Array:
-    """Weight of each unknown's distance from nominal: bodies by their own size, other columns by the torque's."""
-    root = float(np.sqrt(options.prior_weight))
-    weight = np.full(u.size, root)
-    column_size = np.linalg.norm(information.regressor_factor, axis=0)
-    torque = float(np.linalg.norm(information.factor[:, -1]))
-    for column in np.setdiff1d(np.flatnonzero(np.any(u.to_parameters[:, 11 * u.n :] != 0.0, axis=1)), u.bounded):
-        place = 11 * u.n + int(np.flatnonzero(u.to_parameters[column, 11 * u.n :])[0])
-        if column_size[column] > 0.0 and torque > 0.0:
-            # The unknown at which this column alone makes the whole torque.
-            weight[place] = root * column_size[column] * u.to_parameters[column, place] / torque
-    return weight
+def _inside(u: Unknowns, found: Match) -> Array | None:
+    """Move an arm at the very edge inside by the margin that all estimates keep."""
+    if found.margin >= MARGIN:
+        return found.x
+    share = 2.0 * MARGIN - found.margin
+    x = found.x.copy()
+    x[u.rigid] += share * (u.nominal.relative - x[u.rigid])
+    return x if margin_of(u, x) > 0.0 else None
 
 
 def _filled(u: Unknowns, x: Array, information: Information, solution: Solution, known: Array) -> Array:

@@ -47,7 +47,8 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
             for trajectory, sigma in identification.noise.items()
         },
         "left_out": {
-            item.recording: _left_out(robot, item) for item in (*identification.training, *identification.validation)
+            kind: {item.recording: _left_out(robot, item) for item in items}
+            for kind, items in (("training", identification.training), ("validation", identification.validation))
         },
         "summary": list(sentences(identification)),
         "notes": list(identification.notes),

@@ -150,4 +150,4 @@ def random_motion(robot: Robot, seed: int, samples: int = 8) -> tuple[Array, Arr
 
 def joint_torque(robot: Robot, standard: Array, q: Array, v: Array, a: Array) -> Array:
     """Torque at the joints, by the regressor that identification uses."""
-    return np.einsum("jpn,p->jn", standard_regressor(robot, q, v, a), standard)
+    return np.asarray(np.einsum("jpn,p->jn", standard_regressor(robot, q, v, a), standard))

@@ -73,6 +73,11 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Cell | str]], numeric: Se
     return Text(f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>')
 
 
+def superscripts(unit: str) -> str:
+    """Return a unit or formula with its exponents raised."""
+    return unit.replace("^2", "²").replace("^3", "³")
+
+
 def tag(text: str, kind: str = "plain") -> str:
     """Return a small label as HTML; ``kind`` is ``good``, ``bad`` or ``plain``."""
     return f'<span class="tag {kind}">{escape(text)}</span>'
@@ -247,9 +252,10 @@ def _figure(figure: Figure) -> str:
     matrix = all(isinstance(drawing, Matrix) for drawing in figure.variants.values())
     tools = "" if matrix else f'<span class="tools">{_TOOLS}</span>'
     words = f"<p>{escape(figure.words)}</p>" if figure.words else ""
+    kind = "matrix" if matrix else ("quiet" if figure.quiet else "")
     focus = "" if matrix else ' tabindex="0"'
     return (
-        f'<figure{_class("matrix" if matrix else "")} data-figure="{escape(figure.name)}"><figcaption><b>{escape(figure.title)}</b>{tools}{words}</figcaption>'
+        f'<figure{_class(kind)} data-figure="{escape(figure.name)}"><figcaption><b>{escape(figure.title)}</b>{tools}{words}</figcaption>'
         f'<div class="legend"></div><div class="plot"{focus}></div></figure>'
     )
 

@@ -291,6 +291,8 @@ class Figure:
         By the choices of the selectors in ``by``; a variant that is absent hides the figure.
     by : tuple of int
         Selectors that it depends on.
+    quiet : bool
+        Without a legend, where the words around it say what its colours are.
     """
 
     name: str
@@ -298,6 +300,7 @@ class Figure:
     words: str
     variants: Mapping[tuple[int, ...], Drawing] = field(default_factory=dict)
     by: tuple[int, ...] = ()
+    quiet: bool = False
 
     def spec(self) -> dict[str, Any]:
         """Return what the page draws."""
@@ -307,6 +310,6 @@ class Figure:
         return {"by": list(self.by), "variants": variants}
 
 
-def single(name: str, title: str, words: str, drawing: Drawing) -> Figure:
+def single(name: str, title: str, words: str, drawing: Drawing, *, quiet: bool = False) -> Figure:
     """Return a figure without variants."""
-    return Figure(name, title, words, {(): drawing})
+    return Figure(name, title, words, {(): drawing}, quiet=quiet)

@@ -40,6 +40,8 @@ class Trace:
         Samples that the estimate uses: without ends and standstill.
     step : tuple of int
         Per joint, samples that the band makes dependent on each other.
+    trim : int
+        Samples at either end where the filter's continuation is a guess.
     """
 
     recording: str
@@ -52,6 +54,17 @@ class Trace:
     friction: Array
     used: NDArray[np.bool_]
     step: tuple[int, ...]
+    trim: int
+
+    @property
+    def time(self) -> Array:
+        """Seconds since the recording began, shape (N,)."""
+        return self.motion.time - self.start
+
+    @property
+    def core(self) -> slice:
+        """Samples without the ends; empty where there are too few."""
+        return slice(self.trim, max(self.trim, self.motion.samples - self.trim))
 
     @property
     def residual(self) -> Array:
@@ -108,4 +121,4 @@ def _trace(model: TorqueModel, value: Array, part: Stretch, bands: Sequence[floa
     trim = trim_of(part, bands)
     used[:, :trim] = used[:, -trim:] = False
     steps = tuple(row_step(part.rate, band) for band in bands)
-    return Trace(part.name, start, motion, measured, predicted, total, load, friction, used, steps)
+    return Trace(part.name, start, motion, measured, predicted, total, load, friction, used, steps, trim)

@@ -30,7 +30,7 @@ const Plot = (() => {
   function number(value, digits = 4) {
     if (!Number.isFinite(value)) return "–";
     const size = Math.abs(value);
-    const text = size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(digits - 1).replace(/\.?0+e/, "e")
+    const text = size !== 0 && (size < 1e-3 || size >= 1e6) ? value.toExponential(digits - 1).replace(/\.?0+e/, "e")
       : String(+value.toPrecision(digits));
     return text.replace("e+", "e").replace(/-/g, "−");
   }
@@ -42,6 +42,13 @@ const Plot = (() => {
     for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) ticks.push([k * step, true]);
     return ticks;
   }
+
+  // Digits that tell neighbouring ticks apart.
+  const tickDigits = (ticks) => {
+    if (ticks.length < 2) return 4;
+    const most = Math.max(Math.abs(ticks[0][0]), Math.abs(ticks[ticks.length - 1][0]));
+    return Math.max(3, Math.min(12, Math.ceil(Math.log10(most / (ticks[1][0] - ticks[0][0]))) + 1));
+  };
 
   function logTicks(low, high, most) {
     const first = Math.floor(low), last = Math.ceil(high), every = Math.max(1, Math.ceil((last - first) / most));
@@ -186,7 +193,7 @@ const Plot = (() => {
   function draw(host, spec, state) {
     const width = Math.max(240, Math.round(host.clientWidth || 640));
     if (spec.kind === "matrix") return drawMatrix(host, spec, width);
-    const small = Boolean(spec.small), left = small ? 54 : LEFT, bottom = small ? 34 : BOTTOM;
+    const small = Boolean(spec.small), left = small ? 60 : LEFT, bottom = small ? 34 : BOTTOM;
     const inner = width - left - RIGHT;
     const logX = Boolean(spec.x.log);
     if (!spec.prepared) {
@@ -223,17 +230,18 @@ const Plot = (() => {
       const sy = (v) => top + height - ((v - y0) / (y1 - y0)) * height;
       const clip = `clip${++clips}`;
       const ticks = panel.log ? logTicks(y0, y1, height / 34) : linearTicks(y0, y1, height / 34);
+      const digits = panel.log ? 3 : tickDigits(ticks);
       for (const [v, label] of ticks) {
         const py = sy(v).toFixed(1);
         body += `<line class="grid" x1="${left}" x2="${left + inner}" y1="${py}" y2="${py}"/>`;
-        if (label) body += `<text class="tick" x="${left - 6}" y="${py}" dy=".32em" text-anchor="end">${number(panel.log ? 10 ** v : v)}</text>`;
+        if (label) body += `<text class="tick" x="${left - 6}" y="${py}" dy=".32em" text-anchor="end">${number(panel.log ? 10 ** v : v, digits)}</text>`;
       }
       const xTicks = (logX ? logTicks : linearTicks)(x0, x1, inner / (small ? 62 : 80)).filter(([v]) => v >= x0 && v <= x1);
       const lowest = panel === spec.panels[spec.panels.length - 1];
       for (const [v, label] of xTicks) {
         const px = sx(v).toFixed(1);
         body += `<line class="grid" x1="${px}" x2="${px}" y1="${top}" y2="${top + height}"/>`;
-        if (lowest && label) body += `<text class="tick" x="${px}" y="${top + height + 15}" text-anchor="middle">${number(logX ? 10 ** v : v)}</text>`;
+        if (lowest && label) body += `<text class="tick" x="${px}" y="${top + height + 15}" text-anchor="middle">${number(logX ? 10 ** v : v, logX ? 3 : tickDigits(xTicks))}</text>`;
       }
       if (y0 < 0 && y1 > 0 && !panel.log) body += `<line class="zero" x1="${left}" x2="${left + inner}" y1="${sy(0).toFixed(1)}" y2="${sy(0).toFixed(1)}"/>`;
       body += `<clipPath id="${clip}"><rect x="${left}" y="${top}" width="${inner}" height="${height}"/></clipPath><g clip-path="url(#${clip})">`;

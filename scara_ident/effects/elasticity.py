@@ -1,0 +1,273 @@
+"""Links that do not follow their motors: elastic gears and clearance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.links import lagging, link_inertia, shared, usual_link_inertia
+from scara_ident.effects.signals import Scene, Signals
+from scara_ident.motion import differentiate
+from scara_ident.terms import Column
+
+Array = NDArray[np.float64]
+
+# The torque that winds up a gear keeps this many times the band, so that the band itself is left alone.
+LOAD_BAND = 3.0
+# The link's lag in a clearance keeps this many times the band: beyond it its second derivative is noise.
+LAG_BAND = 1.5
+# Frequencies of the link against its held motor that are tried, in bands, and where arms have them, Hz.
+FREQUENCIES = (0.7, 1.2, 2.0, 4.0)
+LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 2.0, 200.0
+# Damping ratio of that swinging: strain-wave gears have 0.03 to 0.1.
+DAMPING = 0.05
+# Clearances tried, rad or m at the joint.
+WIDTHS = (3e-4, 1e-3, 3e-3)
+LARGEST_WIDTH = 0.05
+
+
+@dataclass(frozen=True)
+class JointElasticity:
+    """An elastic gear with the encoder on the motor: the link lags by x.
+
+    The link swings in the gear, ``M_jj x'' + d x' + k x = tau_j`` with the torque tau_j that a rigid gear would pass
+    on, and its lag changes the torques of all joints, ``-M x''`` first (Spong 1987). Well below the frequency of that
+    swinging, x is ``tau_j / k``. The frequency is the nonlinear parameter, which matters where it is not far above the
+    band; the coefficient is ``1/stiffness`` whatever it is. A base that yields about the first joint's axis does the
+    same to the torques.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name in the table of effects."""
+        return "joint_elasticity"
+
+    @property
+    def knobs(self) -> tuple[Knob, ...]:
+        """The frequency at which the link swings while its motor is held."""
+        return (Knob("frequency", "Hz", LOWEST_FREQUENCY, HIGHEST_FREQUENCY),)
+
+    def members(self, scene: Scene) -> tuple[Member, ...]:
+        """Frequencies from below the band to far above it, per joint."""
+        frequencies = dict.fromkeys(
+            float(np.clip(share * scene.band, LOWEST_FREQUENCY, HIGHEST_FREQUENCY)) for share in FREQUENCIES
+        )
+        return tuple(Member(j, (f,)) for j in range(scene.robot.n) for f in frequencies)
+
+    def rows(self, member: Member) -> slice:
+        """Return that all joints feel it."""
+        return slice(None)
+
+    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
+        """One column: the compliance."""
+        j = member.joint or 0
+        joint, unit = scene.robot.joints[j], "m/N" if scene.robot.prismatic[j] else "rad/(N m)"
+        return (Column("compliance", joint, unit, f"compliance of the gear of {joint}"),)
+
+    def regressor(self, signals: Signals, member: Member) -> Array:
+        """Return the change of torque per compliance, shape (n, 1, N)."""
+        j = member.joint or 0
+        usual = usual_link_inertia(signals.scene, j)
+        if not usual > 0.0:
+            return np.zeros((signals.scene.robot.n, 1, signals.motion.samples))
+        load = _differentiated(signals, _load(signals, j), LOAD_BAND)[0]
+        inertia = np.maximum(link_inertia(signals, j), 0.1 * usual)
+        stiffness = (2.0 * np.pi * member.knobs[0]) ** 2 * usual
+        lag = swing(load, inertia, stiffness, 2.0 * DAMPING * np.sqrt(stiffness * usual), 1.0 / signals.motion.rate)
+        return stiffness * lagging(signals, j, lag)[:, None]
+
+    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
+        """A spring pulls back, and swings at the frequency that its stiffness gives."""
+        if value[0] < -2.0 * std[0]:
+            return "its stiffness would be negative"
+        return None
+
+    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
+        """Return the stiffness, 1 over the coefficient."""
+        compliance = float(value[0])
+        unit = "N/m" if scene.robot.prismatic[member.joint or 0] else "N m/rad"
+        if compliance == 0.0:
+            return {"stiffness": Parameter(np.inf, np.inf, unit)}
+        return {"stiffness": Parameter(1.0 / compliance, float(np.sqrt(covariance[0, 0])) / compliance**2, unit)}
+
+    def description(self, scene: Scene, member: Member) -> str:
+        """Say what it is."""
+        if member.joint == 0:
+            return "an elastic gear, or a base that yields about the same axis"
+        return "an elastic gear"
+
+
+def swing(torque: Array, inertia: Array, stiffness: float, damping: float, step: float) -> tuple[Array, Array, Array]:
+    """Solve ``inertia x'' + damping x' + stiffness x = torque`` from the static x at the start.
+
+    Parameters
+    ----------
+    torque, inertia : ndarray, shape (N,)
+        N at least 3.
+    stiffness, damping : float
+    step : float
+        s per sample.
+
+    Returns
+    -------
+    tuple of ndarray, each of shape (N,)
+        x, its derivative and its second derivative.
+
+    Notes
+    -----
+    Newmark's constant-average scheme (stable at any step), written as one banded triangular system.
+    """
+    from scipy.linalg import solve_banded
+
+    count = len(torque)
+    mean = 0.25 * (torque[2:] + 2.0 * torque[1:-1] + torque[:-2])
+    heavy = inertia[1:-1] / step**2
+    bands = np.ones((3, count))
+    bands[0, 2:] = heavy + damping / (2.0 * step) + 0.25 * stiffness
+    bands[1, 1:-1] = -2.0 * heavy + 0.5 * stiffness
+    bands[1, 0] = 0.0
+    bands[2, :-2] = heavy - damping / (2.0 * step) + 0.25 * stiffness
+    start = torque[:2] / stiffness
+    x = np.asarray(solve_banded((2, 0), bands, np.concatenate([start, mean])))
+    first = np.gradient(x, step)
+    return x, first, (torque - damping * first - stiffness * x) / inertia
+
+
+@dataclass(frozen=True)
+class Backlash:
+    """Clearance between motor and link: ``q_link = q - width s(t)``, where s is one half on either flank.
+
+    When the torque through the gear changes its sign the link loses contact and flies freely, motor and link drifting
+    apart with the acceleration that the torque would have given, until it lands on the other flank without bouncing.
+    How long that takes depends on the width, weakly; the width taken for this is the nonlinear parameter, the
+    coefficient is the width itself. It lives where the torque reverses, not where the speed does.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name in the table of effects."""
+        return "backlash"
+
+    @property
+    def knobs(self) -> tuple[Knob, ...]:
+        """The width that times the crossing."""
+        return (Knob("crossing_width", "rad", 1e-5, LARGEST_WIDTH),)
+
+    def members(self, scene: Scene) -> tuple[Member, ...]:
+        """Three widths per joint."""
+        return tuple(Member(j, (width,)) for j in range(scene.robot.n) for width in WIDTHS)
+
+    def rows(self, member: Member) -> slice:
+        """Return that all joints feel it."""
+        return slice(None)
+
+    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
+        """One column: the width."""
+        j = member.joint or 0
+        joint = scene.robot.joints[j]
+        return (Column("width", joint, _length(scene, member), f"clearance in the gear of {joint}", True),)
+
+    def regressor(self, signals: Signals, member: Member) -> Array:
+        """Return the change of torque per width, shape (n, 1, N)."""
+        j = member.joint or 0
+        load, inertia = _load(signals, j), link_inertia(signals, j)
+        usual = usual_link_inertia(signals.scene, j)
+        if not usual > 0.0:
+            return np.zeros((signals.scene.robot.n, 1, signals.motion.samples))
+        drift = load / np.maximum(inertia, 0.1 * usual)
+        place = flank(drift, member.knobs[0], 1.0 / signals.motion.rate)
+        return lagging(signals, j, _differentiated(signals, place, LAG_BAND))[:, None]
+
+    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
+        """A clearance is open, and small."""
+        if value[0] < -2.0 * std[0]:
+            return "the clearance would be negative"
+        if value[0] > LARGEST_WIDTH + 2.0 * std[0]:
+            return f"a clearance of {value[0]:.2g} {_length(scene, member)} would rattle by hand"
+        return None
+
+    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
+        """Return the width."""
+        return {"width": Parameter(float(value[0]), float(np.sqrt(covariance[0, 0])), _length(scene, member))}
+
+    def description(self, scene: Scene, member: Member) -> str:
+        """Say what it is."""
+        return "clearance in the gear"
+
+
+def _length(scene: Scene, member: Member) -> str:
+    return "m" if scene.robot.prismatic[member.joint or 0] else "rad"
+
+
+def _load(signals: Signals, joint: int) -> Array:
+    """Return the torque that a rigid gear passes on, at the joint, shape (N,)."""
+    scale = signals.scene.robot.row_scale[joint]
+    return shared(signals, ("load", joint), lambda: signals.load(joint) / scale)
+
+
+def _differentiated(signals: Signals, signal: Array, bands: float) -> tuple[Array, Array, Array]:
+    rate, cut = signals.motion.rate, bands * signals.scene.band
+    return differentiate(signal, rate, cut if cut < 0.45 * rate else None)
+
+
+def flank(drift: Array, width: float, step: float) -> Array:
+    """Return where in its clearance a link is.
+
+    Parameters
+    ----------
+    drift : ndarray, shape (N,)
+        Acceleration of the motor relative to the free link: the torque through a gear without clearance over the
+        link's inertia.
+    width : float
+        rad or m.
+    step : float
+        s per sample.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        Motor less link as a share of the width: 0.5 while the torque is positive, -0.5 while it is negative, and the
+        free flight between them.
+    """
+    count = len(drift)
+    result = np.empty(count)
+    side = 1.0 if drift[0] >= 0.0 else -1.0
+    # Where the sign changes to positive, and to negative.
+    changes = {
+        1.0: np.flatnonzero((drift[1:] > 0.0) & (drift[:-1] <= 0.0)) + 1,
+        -1.0: np.flatnonzero((drift[1:] < 0.0) & (drift[:-1] >= 0.0)) + 1,
+    }
+    now = 0
+    while now < count:
+        following = changes[-side]
+        place = int(np.searchsorted(following, now))
+        leaves = int(following[place]) if place < len(following) else count
+        result[now:leaves] = 0.5 * side
+        if leaves == count:
+            break
+        now, side = _fly(drift, leaves, side, width, step, result)
+    return result
+
+
+def _fly(drift: Array, start: int, side: float, width: float, step: float, result: Array) -> tuple[int, float]:
+    """Fill the flight that begins at a sample, and return where and on which flank it ends."""
+    reach = 64
+    while True:
+        stop = min(start + reach, len(drift))
+        speed = np.cumsum(drift[start:stop]) * step
+        way = 0.5 * side + np.cumsum(speed) * step / width
+        landed = np.flatnonzero(np.abs(way) >= 0.5 + 1e-12)
+        # The first step off the flank is inside; touching either flank ends the flight.
+        landed = landed[landed > 0] if len(landed) and landed[0] == 0 and len(way) > 1 else landed
+        if len(landed) or stop == len(drift):
+            break
+        reach *= 4
+    end = int(landed[0]) if len(landed) else len(way)
+    result[start : start + end] = np.clip(way[:end], -0.5, 0.5)
+    if end == len(way):
+        return len(drift), side
+    return start + end, float(np.sign(way[end]))

@@ -1,0 +1,271 @@
+"""What a motion must stay within, and a posture at rest that does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.errors import RobotError, ScaraIdentError, UsageError
+from scara_ident.excitation.tool import Tool, tool_motion, tool_of
+from scara_ident.model import TorqueModel
+from scara_ident.motion import Motion
+from scara_ident.robot import Robot
+
+Array = NDArray[np.float64]
+Value = TypeVar("Value")
+
+# Indri et al. 2002, section 2.1, horizontal acceleration of the gripper, m/s^2.
+SCARA03_TOOL_ACCELERATION = 9.0
+# Postures that are tried when the middle of the ranges is not within all limits.
+POSTURES = 4000
+# A posture at rest must leave this share of every limit to move in.
+ROOM = 0.02
+
+
+class InfeasibleLimits(ScaraIdentError):
+    """Limits that no motion, or no posture at rest, can keep."""
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Limits of a motion.
+
+    Attributes
+    ----------
+    lower, upper : ndarray, shape (n,)
+        Range of each joint, rad or m.
+    velocity : ndarray, shape (n,)
+        rad/s or m/s.
+    torque : ndarray, shape (n,)
+        On the side where effort is recorded, N m or N; infinite where there is none.
+    tool_acceleration, tool_speed : float
+        m/s^2 (gravity not counted) and m/s; infinite where there is none.
+    floor : float
+        Height in the base frame that the tool stays above, m; -inf where there is none.
+    tool : Tool or None
+        The point that the last three are about.
+    """
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    torque: Array
+    tool_acceleration: float = np.inf
+    tool_speed: float = np.inf
+    floor: float = -np.inf
+    tool: Tool | None = field(default=None, repr=False)
+
+    @property
+    def centre(self) -> Array:
+        """Middle of each joint's range, shape (n,)."""
+        return 0.5 * (self.lower + self.upper)
+
+    @property
+    def watches_tool(self) -> bool:
+        """Whether any limit is about the tool."""
+        return bool(np.isfinite([self.tool_acceleration, self.tool_speed, self.floor]).any())
+
+
+def limits_of(
+    robot: Robot,
+    *,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    velocities: Mapping[str, float] | None = None,
+    torques: Mapping[str, float] | None = None,
+    tool_acceleration: float | None = None,
+    tool_speed: float = np.inf,
+    floor: float = -np.inf,
+    tool: str | None = None,
+    share: float = 1.0,
+) -> Limits:
+    """Gather the limits of a robot.
+
+    Parameters
+    ----------
+    robot : Robot
+        Its URDF gives ranges, velocities and efforts.
+    ranges, velocities, torques : mapping from joint to limit, optional
+        Instead of the URDF's: (lower, upper) in rad or m, rad/s or m/s, and N m or N on the recorded side.
+    tool_acceleration : float, optional
+        m/s^2; without it 9 for the SCARA03 and none for any other robot. Infinity lifts it.
+    tool_speed, floor : float, optional
+        m/s, and a height in the base frame in m.
+    tool : str, optional
+        Link whose origin is the tool; see `tool_of`.
+    share : float, optional
+        Share of the ranges (about their middle), velocities and torques to be used, in (0, 1].
+
+    Raises
+    ------
+    UsageError
+        If a limit is given for a joint that the robot lacks, or makes no sense.
+    RobotError
+        If a joint has no range or no velocity limit.
+    """
+    if not 0.0 < share <= 1.0:
+        raise UsageError(f"share of the limits {share:g}: expected more than 0 and at most 1")
+    lower, upper = robot.lower.copy(), robot.upper.copy()
+    velocity, torque = robot.velocity_limit.copy(), robot.torque_limit.copy()
+    for joint, (low, high) in _of_joints(robot, ranges, "range"):
+        if not (np.isfinite(low) and np.isfinite(high) and low < high):
+            raise UsageError(f"range of {robot.joints[joint]}: {low:g}..{high:g} is empty; give lower < upper")
+        lower[joint], upper[joint] = low, high
+    for given, wanted, kind in ((velocities, velocity, "velocity"), (torques, torque, "torque")):
+        for joint, limit in _of_joints(robot, given, kind):
+            if not limit > 0.0:
+                raise UsageError(f"{kind} limit of {robot.joints[joint]}: {limit:g} allows no motion; give more than 0")
+            wanted[joint] = limit
+    for joint, name in enumerate(robot.joints):
+        unit = "m" if robot.prismatic[joint] else "rad"
+        if not (np.isfinite(lower[joint]) and np.isfinite(upper[joint])):
+            raise RobotError(
+                f"{robot.urdf}: joint {name!r} has no position limits; give <limit lower= upper=> in the URDF, or a "
+                f"range for {name} in {unit}"
+            )
+        if not lower[joint] < upper[joint]:
+            raise RobotError(
+                f"{robot.urdf}: joint {name!r} cannot move: its range is {lower[joint]:g}..{upper[joint]:g} {unit}; "
+                "correct the URDF, give a range, or lock the joint"
+            )
+        if not np.isfinite(velocity[joint]):
+            raise RobotError(
+                f"{robot.urdf}: joint {name!r} has no velocity limit; give <limit velocity=> in the URDF, or a "
+                f"velocity for {name} in {unit}/s"
+            )
+    if tool_acceleration is None:
+        tool_acceleration = SCARA03_TOOL_ACCELERATION if robot.name == "scara03" else np.inf
+    for value, kind in ((tool_acceleration, "tool acceleration"), (tool_speed, "tool speed")):
+        if not value > 0.0:
+            raise UsageError(f"{kind} {value:g}: allows no motion; give more than 0")
+    middle, half = 0.5 * (lower + upper), 0.5 * share * (upper - lower)
+    limits = Limits(
+        middle - half, middle + half, share * velocity, share * torque, tool_acceleration, tool_speed, floor
+    )
+    if limits.watches_tool or tool is not None:
+        return replace(limits, tool=tool_of(robot, tool))
+    return limits
+
+
+def _of_joints(robot: Robot, given: Mapping[str, Value] | None, kind: str) -> list[tuple[int, Value]]:
+    for name in given or {}:
+        if name not in robot.joints:
+            raise UsageError(f"{kind} for {name!r}: the robot has no such joint; its joints: {', '.join(robot.joints)}")
+    return [(robot.joints.index(name), value) for name, value in (given or {}).items()]
+
+
+def nominal_parameters(model: TorqueModel, known: Mapping[str, float] | None = None) -> Array:
+    """Return parameters with which the torque of a motion is foreseen.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    known : mapping from parameter to value, optional
+        What is known better than the URDF says: an earlier identification, or friction alone.
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        The URDF's bodies and rotors as base parameters, and zero for what it does not say (friction, offset).
+
+    Raises
+    ------
+    UsageError
+        If a parameter is given that the model lacks.
+    """
+    value = np.zeros(len(model.names))
+    body = model.rigid_body
+    value[model.place(body)] = (body.base.grouping @ model.robot.standard_parameters())[body.kept]
+    for name, given in (known or {}).items():
+        if name not in model.names:
+            raise UsageError(f"parameter {name!r}: the model {model.name} has none of that name: {model.names}")
+        value[model.names.index(name)] = given
+    return value
+
+
+def resting_posture(
+    model: TorqueModel, limits: Limits, nominal: Array, *, start: Array | None = None, seed: int = 0
+) -> Array:
+    """Find a posture in which the arm can rest with room to move.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    limits : Limits
+    nominal : ndarray, shape (p,)
+        Parameters of which the torque of holding is foreseen.
+    start : ndarray, shape (n,), optional
+        A posture that must be the one, rad or m.
+    seed : int, optional
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        ``start``; else the middle of the ranges if it will do, else the roomiest of random postures.
+
+    Raises
+    ------
+    InfeasibleLimits
+        In one line: which limit is broken, where, by how much, and what to do.
+    """
+    robot = model.robot
+    if start is not None:
+        start = np.asarray(start, dtype=float)
+        if start.shape != (robot.n,):
+            raise UsageError(f"start: expected {robot.n} positions ({', '.join(robot.joints)}), given {start.size}")
+        for joint, name in enumerate(robot.joints):
+            if not limits.lower[joint] <= start[joint] <= limits.upper[joint]:
+                raise InfeasibleLimits(
+                    f"start: {name} = {start[joint]:g} lies outside its range "
+                    f"{limits.lower[joint]:g}..{limits.upper[joint]:g}; start within it, or widen the range"
+                )
+        tried = start[:, None]
+    else:
+        random = np.random.default_rng(seed)
+        drawn = random.uniform(limits.lower[:, None], limits.upper[:, None], (robot.n, POSTURES))
+        tried = np.concatenate([limits.centre[:, None], drawn], axis=1)
+    excess, broken = _at_rest(model, limits, nominal, tried)
+    if excess[0] <= -ROOM:
+        return np.asarray(tried[:, 0])
+    best = int(np.argmin(excess))
+    if excess[best] > -ROOM:
+        where = "at the start" if start is not None else "in every posture tried"
+        raise InfeasibleLimits(f"limits cannot be kept {where}, even at rest: {broken(best)}")
+    return np.asarray(tried[:, best])
+
+
+def _at_rest(model: TorqueModel, limits: Limits, nominal: Array, q: Array) -> tuple[Array, Callable[[int], str]]:
+    """Return how far postures are beyond the limits, as shares, and a function that says which."""
+    robot, samples = model.robot, q.shape[1]
+    still = np.zeros_like(q)
+    motion = Motion("rest", "rest", np.arange(samples, dtype=float), q, still, still, None, 1.0)
+    torque = np.einsum("jpN,p->jN", model.regressor(motion), nominal)
+    shares = list(np.abs(torque) / limits.torque[:, None] - 1.0)
+    half = 0.5 * (limits.upper - limits.lower)
+    shares += list(np.abs(q - limits.centre[:, None]) / half[:, None] - 1.0)
+    height: Array = np.full(samples, np.inf)
+    if limits.tool is not None and np.isfinite(limits.floor):
+        height = tool_motion(limits.tool, q, still, still).position[2]
+        shares.append(limits.floor - height)
+    stacked = np.array(shares)
+
+    def broken(index: int) -> str:
+        row = int(np.argmax(stacked[:, index]))
+        if row < robot.n:
+            unit, name = robot.torque_unit(row), robot.joints[row]
+            return (
+                f"{name} needs {abs(torque[row, index]):.4g} of {limits.torque[row]:.4g} {unit} to hold the arm; "
+                f"allow {name} more torque, or correct masses and gravity in the URDF"
+            )
+        if row < 2 * robot.n:
+            name = robot.joints[row - robot.n]
+            return f"{name} stands at the end of its range; start away from it"
+        return (
+            f"the tool's height is {height[index]:.4g} m where the floor is at {limits.floor:.4g} m; "
+            "lower the floor, or start higher"
+        )
+
+    return stacked.max(axis=0), broken

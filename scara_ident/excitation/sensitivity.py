@@ -1,0 +1,135 @@
+"""How the regressor of a motion changes with the motion.
+
+What an optimiser needs is linear in the regressor: the derivative of ``sum_ij G_ij W_ij`` by positions, velocities
+and accelerations, for weights G of every sample, and that of the torques of given parameters. Every term is
+evaluated beside the motion and the differences are taken of these sums.
+
+For rigid bodies the differences are exact. Kinetic energy is a trigonometric polynomial of degree 2 in the angle of
+a revolute joint, and a polynomial of degree 2 in the position of a prismatic one, and so is the regressor; it is
+quadratic in velocities and linear in accelerations. The derivative of a trigonometric polynomial of degree 2 is a sum
+of its values at four points (M. Riesz's interpolation formula), that of a parabola a central difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.model import TorqueModel
+from scara_ident.motion import Motion
+from scara_ident.terms import Friction, Offset, RigidBody, Term
+
+Array = NDArray[np.float64]
+Stencil = tuple[tuple[float, float], ...]
+
+# f'(x) = sum_k weight_k f(x + shift_k), exact for trigonometric polynomials of degree 2.
+RIESZ: Stencil = tuple(
+    ((2 * k - 1) * np.pi / 4, (-1) ** (k + 1) / (8.0 * np.sin((2 * k - 1) * np.pi / 8) ** 2)) for k in range(1, 5)
+)
+# Exact for parabolas, whatever the step.
+CENTRAL: Stencil = ((1.0, 0.5), (-1.0, -0.5))
+# For any smooth function; the step balances its error h^4 with rounding 1e-16 / h.
+SMOOTH_STEP = 1e-3
+SMOOTH: Stencil = tuple(
+    (k * SMOOTH_STEP, weight / (12.0 * SMOOTH_STEP)) for k, weight in ((1, 8.0), (-1, -8.0), (2, -1.0), (-2, 1.0))
+)
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothModel:
+    """A torque model whose Coulomb friction turns within a width of speed, so that it can be differentiated.
+
+    Attributes
+    ----------
+    model : TorqueModel
+    width : ndarray, shape (n,)
+        Speed over which ``tanh(v / width)`` stands for sign(v).
+    """
+
+    model: TorqueModel
+    width: Array
+
+    def regressor(self, motion: Motion) -> Array:
+        """Return the regressor with sign(v) smoothed, shape (n, p, N)."""
+        return np.concatenate([self._columns(term, motion) for term in self.model.terms], axis=1)
+
+    def _columns(self, term: Term, motion: Motion) -> Array:
+        if isinstance(term, Friction):
+            return _friction(term, motion, self.width)[0]
+        return term.regressor(motion)
+
+    def derivatives(self, motion: Motion, weights: Array, parameters: Array | None = None) -> tuple[Array, Array]:
+        """Differentiate a weighted sum of the regressor, and torques, by the motion.
+
+        Parameters
+        ----------
+        motion : Motion
+            N samples.
+        weights : ndarray, shape (n, p, N)
+            G: what each entry of the regressor counts.
+        parameters : ndarray, shape (p,), optional
+            Parameters of the torques.
+
+        Returns
+        -------
+        gradient : ndarray, shape (3, n, N)
+            Derivative of ``sum_ij G_ij W_ij`` of each sample by position, velocity and acceleration of each joint.
+        torque : ndarray, shape (n, 3, n, N)
+            Derivative of every joint's torque by the same; zeros without parameters.
+        """
+        n = self.model.robot.n
+        gradient = np.zeros((3, n, motion.samples))
+        torque = np.zeros((n, 3, n, motion.samples))
+        for term in self.model.terms:
+            place = self.model.place(term)
+            part = np.ascontiguousarray(weights[:, place])
+            value = None if parameters is None or not np.any(parameters[place]) else parameters[place]
+            if isinstance(term, Offset):
+                continue
+            if isinstance(term, Friction):
+                slope = _friction(term, motion, self.width)[1]
+                gradient[1] += np.einsum("ipN,ipN->iN", part, slope)
+                if value is not None:
+                    torque[np.arange(n), 1, np.arange(n)] += np.einsum("ipN,p->iN", slope, value)
+                continue
+            for kind, joint, weight, columns in _beside(term, motion):
+                gradient[kind, joint] += weight * np.einsum("ipN,ipN->N", part, columns)
+                if value is not None:
+                    torque[:, kind, joint] += weight * np.einsum("ipN,p->iN", columns, value)
+        return gradient, torque
+
+
+def _friction(term: Friction, motion: Motion, width: Array) -> tuple[Array, Array]:
+    """Return friction columns with sign(v) smoothed, and their derivative by the joint's speed."""
+    n, k = term.robot.n, len(term.powers)
+    columns, slopes = np.zeros((2, n, n * k, motion.samples))
+    for i in range(n):
+        v = motion.v[i]
+        turn = np.tanh(v / width[i])
+        turning = (1.0 - turn**2) / width[i]
+        for place, power in enumerate(term.powers):
+            j = i * k + place
+            if power % 2:
+                columns[i, j], slopes[i, j] = v**power, power * v ** (power - 1)
+            else:
+                columns[i, j] = turn * v**power
+                slopes[i, j] = turning * v**power + (power * turn * v ** (power - 1) if power else 0.0)
+        columns[i] *= term.robot.drive_sign[i]
+        slopes[i] *= term.robot.drive_sign[i]
+    return columns, slopes
+
+
+def _beside(term: Term, motion: Motion) -> Iterator[tuple[int, int, float, Array]]:
+    """Give (kind, joint, weight, columns) whose weighted sums are derivatives; kind is 0, 1, 2 for q, v, a."""
+    exact = isinstance(term, RigidBody)
+    prismatic = term.robot.prismatic if isinstance(term, RigidBody) else np.zeros(len(motion.q), dtype=bool)
+    for joint in range(len(motion.q)):
+        for kind, signal in enumerate("qva"):
+            stencil = (SMOOTH if not exact else CENTRAL) if kind or prismatic[joint] or not exact else RIESZ
+            for shift, weight in stencil:
+                moved = getattr(motion, signal).copy()
+                moved[joint] += shift
+                yield kind, joint, weight, term.regressor(replace(motion, **{signal: moved}))

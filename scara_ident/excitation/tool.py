@@ -1,0 +1,160 @@
+"""A point that the last joint carries: its position, velocity and acceleration, and how they follow the joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from scara_ident.errors import RobotError
+from scara_ident.recursion import JointGeometry, joint_geometry
+from scara_ident.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Tool:
+    """A point of the arm with the joints that move it.
+
+    Attributes
+    ----------
+    name : str
+        Frame of the URDF.
+    chain : tuple of (int, JointGeometry)
+        From the base outwards: place of the joint in ``robot.joints``, and the joint.
+    point : ndarray, shape (3,)
+        In the frame of the last of these joints, m.
+    joints : int
+        Number n of joints of the robot.
+    """
+
+    name: str
+    chain: tuple[tuple[int, JointGeometry], ...]
+    point: Array
+    joints: int
+
+
+@dataclass(frozen=True, eq=False)
+class ToolMotion:
+    """Motion of the tool over N samples, in the base frame.
+
+    Attributes
+    ----------
+    position, velocity, acceleration : ndarray, shape (3, N)
+        m, m/s, m/s^2; acceleration without gravity.
+    jacobian, jacobian_rate, jacobian_acceleration : ndarray, shape (n, 3, N)
+        What a unit rate of each joint gives to the point, and its first two derivatives in time. For a point that
+        depends on q(t) alone, the derivative of its acceleration by q_j is the second derivative in time of its
+        derivative by q_j, and that by q_j' is twice the first.
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    jacobian: Array
+    jacobian_rate: Array
+    jacobian_acceleration: Array
+
+
+def tool_of(robot: Robot, frame: str | None = None) -> Tool:
+    """Find a point to watch.
+
+    Parameters
+    ----------
+    robot : Robot
+    frame : str, optional
+        A frame (link) of the URDF; without it the one that is farthest out on the last joint: 0.33 m along the
+        second link of the SCARA03.
+
+    Raises
+    ------
+    RobotError
+        If the URDF has no such frame, or no joint moves it.
+    """
+    model = robot.model
+    if frame is None:
+        last = model.njoints - 1
+        candidates = [f for f in model.frames if f.parentJoint == last and f.type == pin.FrameType.BODY]
+        found = max(candidates, key=lambda f: float(np.linalg.norm(f.placement.translation)))
+    else:
+        names = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
+        if frame not in names:
+            raise RobotError(f"{robot.urdf}: no link {frame!r} for the tool; it has {', '.join(names)}")
+        found = model.frames[model.getFrameId(frame, pin.FrameType.BODY)]
+        if found.parentJoint == 0:
+            raise RobotError(f"{robot.urdf}: no identified joint moves {frame!r}; name a link that moves")
+    geometry = joint_geometry(model)
+    place = {int(velocity): joint for joint, velocity in enumerate(robot.order)}
+    chain = []
+    index = int(found.parentJoint)
+    while index > 0:
+        joint = geometry[index - 1]
+        chain.append((place[joint.velocity_index], joint))
+        index = joint.parent
+    return Tool(found.name, tuple(reversed(chain)), np.array(found.placement.translation), robot.n)
+
+
+def tool_motion(tool: Tool, q: Array, v: Array, a: Array) -> ToolMotion:
+    """Return the motion of a tool.
+
+    Parameters
+    ----------
+    tool : Tool
+    q, v, a : ndarray, shape (n, N)
+        In the order of ``robot.joints``.
+    """
+    samples = q.shape[1]
+    turn = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, samples))
+    origin, speed, push, spin, twist = (np.zeros((3, samples)) for _ in range(5))
+    # Per joint: its axis with two derivatives, and the point it turns about with two derivatives.
+    axes, centres = [], []
+    for place, joint in tool.chain:
+        arm = np.einsum("abN,b->aN", turn, joint.offset)
+        swing = _cross(spin, arm)
+        origin = origin + arm
+        push = push + _cross(twist, arm) + _cross(spin, swing)
+        speed = speed + swing
+        turn = np.einsum("abN,bc->acN", turn, joint.rotation)
+        axis = np.einsum("abN,b->aN", turn, joint.axis)
+        rate = _cross(spin, axis)
+        change = _cross(twist, axis) + _cross(spin, rate)
+        axes.append((axis, rate, change))
+        x, dx, ddx = q[place], v[place], a[place]
+        if joint.prismatic:
+            origin = origin + axis * x
+            push = push + axis * ddx + 2.0 * rate * dx + change * x
+            speed = speed + axis * dx + rate * x
+        else:
+            twist = twist + axis * ddx + rate * dx
+            spin = spin + axis * dx
+            turn = np.einsum("abN,bcN->acN", turn, _rotation(joint.axis, x))
+        centres.append((origin, speed, push))
+    arm = np.einsum("abN,b->aN", turn, tool.point)
+    swing = _cross(spin, arm)
+    position, velocity = origin + arm, speed + swing
+    acceleration = push + _cross(twist, arm) + _cross(spin, swing)
+    jacobians = np.zeros((3, tool.joints, 3, samples))
+    for (place, joint), (axis, rate, change), (centre, moved, pushed) in zip(tool.chain, axes, centres, strict=True):
+        if joint.prismatic:
+            jacobians[:, place] = axis, rate, change
+            continue
+        r, dr, ddr = position - centre, velocity - moved, acceleration - pushed
+        jacobians[0, place] = _cross(axis, r)
+        jacobians[1, place] = _cross(rate, r) + _cross(axis, dr)
+        jacobians[2, place] = _cross(change, r) + 2.0 * _cross(rate, dr) + _cross(axis, ddr)
+    return ToolMotion(position, velocity, acceleration, *jacobians)
+
+
+def _cross(x: Array, y: Array) -> Array:
+    return np.stack([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]])
+
+
+def _rotation(axis: Array, angle: Array) -> Array:
+    """Rotations about an axis, shape (3, 3, N), by Rodrigues' formula."""
+    x, y, z = axis
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    first, second = skew[:, :, None], (skew @ skew)[:, :, None]
+    return np.asarray(np.eye(3)[:, :, None] + np.sin(angle) * first + (1.0 - np.cos(angle)) * second)

@@ -1,0 +1,123 @@
+"""Parameters with intervals and meaning, their correlation, and how the estimate settled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.estimators import Estimate, History, rls
+from scara_ident.evidence import Evidence
+from scara_ident.information import merge
+from scara_ident.report.html.page import Cell, Group, Text, bar, escape, superscripts, table, tag
+from scara_ident.report.html.plot import Band, Layer, Level, Line, Mark, Matrix, Panel, Plot, single
+from scara_ident.threads import one_blas_thread
+
+Array = NDArray[np.float64]
+
+# Steps of a recursion that is made for the picture only.
+MOST_STEPS = 48
+# Recordings whose limits are marked in the pictures of the recursion.
+MOST_MARKS = 12
+
+
+def parameter_table(estimate: Estimate) -> Text:
+    """Return the parameters with 95 % intervals, relative standard deviations and meanings."""
+    rows: list[list[Cell | str]] = []
+    for k, column in enumerate(estimate.model.columns):
+        value, std = float(estimate.value[k]), float(estimate.std[k])
+        if estimate.undetermined[k]:
+            interval, share = Cell(tag("undetermined", "bad")), Cell("")
+        else:
+            relative = std / abs(value) if value else np.inf
+            weak = relative > 0.5
+            interval = Cell(f"{_digits(value - 1.96 * std, std)} … {_digits(value + 1.96 * std, std)}", "num")
+            words = f"{100.0 * relative:.2g} %" if relative < 10.0 else "over 1000 %"
+            share = Cell(f"{bar(relative, weak=weak)} {escape(words)}{' ' + tag('not told from 0', 'bad') if weak else ''}")
+        rows.append(
+            [Cell(escape(column.name), "name"), Cell(_digits(value, std), "num"), interval, Cell(escape(superscripts(column.unit)), "unit"), share, Cell(escape(superscripts(column.meaning)), "words")]
+        )
+    return table(("name", "value", "95 % interval", "unit", "std / value", "meaning"), rows, numeric=(1, 2))
+
+
+def _digits(value: float, std: float) -> str:
+    """Return a value to the second digit of its standard deviation."""
+    if not np.isfinite(std) or std <= 0.0:
+        return f"{value:.4g}"
+    places = max(0, int(np.ceil(1.0 - np.log10(std))))
+    return f"{value:.{places}f}" if places <= 7 else f"{value:.4g}"
+
+
+def correlation_group(estimate: Estimate) -> Group:
+    """Return the correlation of the parameters as a heat map."""
+    covariance = estimate.covariance
+    std = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    known = np.isfinite(std) & (std > 0.0) & ~estimate.undetermined
+    values = np.full_like(covariance, np.nan)
+    both = np.ix_(known, known)
+    values[both] = covariance[both] / np.outer(std[known], std[known])
+    names = estimate.model.names
+    figure = single(
+        "correlation",
+        "Correlation of the parameters",
+        "Blue: they rise together; vermillion: one rises as the other falls. Strong pairs are told apart only in their sum or difference.",
+        Matrix(names, names, values),
+    )
+    return Group("correlation-group", (figure,))
+
+
+def strongest_pairs(estimate: Estimate, most: int = 4, least: float = 0.9) -> list[str]:
+    """Return in words the pairs of parameters with the strongest correlation."""
+    std = estimate.std
+    known = np.isfinite(std) & (std > 0.0) & ~estimate.undetermined
+    size = np.where(known, std, np.inf)
+    with np.errstate(invalid="ignore"):
+        correlation = np.triu(np.nan_to_num(estimate.covariance / np.outer(size, size), posinf=0.0, neginf=0.0), 1)
+    order = np.argsort(-np.abs(correlation), axis=None)[:most]
+    names = estimate.model.names
+    pairs = [np.unravel_index(place, correlation.shape) for place in order]
+    return [f"{names[i]} and {names[k]} ({correlation[i, k]:+.3f})" for i, k in pairs if abs(correlation[i, k]) >= least]
+
+
+def cheap_history(estimate: Estimate, evidence: Sequence[Evidence]) -> History:
+    """Return the course of a recursive estimate in few steps."""
+    total = sum(len(item.blocks) for item in evidence)
+    size = max(1, -(-total // MOST_STEPS))
+    coarse = []
+    for item in evidence:
+        blocks = [item.blocks[k : k + size] for k in range(0, len(item.blocks), size)]
+        joints = range(len(item.unfiltered))
+        merged = tuple(tuple(merge(block[j] for block in group) for j in joints) for group in blocks)
+        coarse.append(replace(item, blocks=merged))
+    with one_blas_thread():
+        return rls(estimate.model, coarse)[1]
+
+
+def convergence_group(estimate: Estimate, history: History, evidence: Sequence[Evidence]) -> Group:
+    """Return for every parameter how the recursive estimate settled."""
+    ends = np.cumsum([sum(merge(block).rows for block in item.blocks) for item in evidence]) / estimate.model.robot.n
+    marks: list[Layer] = [Mark(float(end), "grey") for end in ends[:-1]] if len(ends) <= MOST_MARKS else []
+    figures = []
+    for k, column in enumerate(estimate.model.columns):
+        value, std = history.value[:, k], history.std[:, k]
+        final = float(estimate.value[k])
+        known = np.isfinite(value) & np.isfinite(std)
+        if np.count_nonzero(known) < 2:
+            continue
+        # The first guesses may be wild; the picture is of how it settles.
+        late = known & (np.arange(len(value)) >= len(value) // 5)
+        late = late if np.any(late) else known
+        low = min(final, float(np.min((value - 2.0 * std)[late])))
+        high = max(final, float(np.max((value + 2.0 * std)[late])))
+        pad = 0.05 * (high - low) or 1.0
+        layers = (
+            *marks,
+            Band(history.samples, value - 2.0 * std, value + 2.0 * std, "blue", "± 2 std"),
+            Line(history.samples, value, "blue", "estimate", 1.6),
+            Level(final, "vermillion", "final"),
+        )
+        panel = Panel(superscripts(column.unit), layers, 120, (low - pad, high + pad))
+        figures.append(single(f"converge-{k}", column.name, "", Plot("samples", (panel,), small=True), quiet=True))
+    return Group("convergence-group", figures, (), "three")

@@ -1,0 +1,177 @@
+"""What is left: the residual against each signal, its spectra and its memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.report.html.bins import binned_means, density, middle_range
+from scara_ident.report.html.page import Block, Group, Selector, heading, paragraph
+from scara_ident.report.html.plot import Band, Density, Drawing, Figure, Layer, Level, Line, Mark, Panel, Plot
+from scara_ident.report.html.spectra import autocorrelation, orders, spectrum
+from scara_ident.report.html.traces import Trace
+from scara_ident.robot import Robot
+
+Array = NDArray[np.float64]
+Sets = Mapping[str, Sequence[Trace]]
+Variants = dict[tuple[int, ...], Drawing]
+
+
+def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None], prefix: str = "") -> list[Block]:
+    """Return the figures of the residual.
+
+    Parameters
+    ----------
+    robot : Robot
+    sets : mapping of str to sequence of Trace
+        Such as the fitted and the held-out recordings; empty ones are left out.
+    bands : sequence of float or None, one per joint
+        Hz.
+    prefix : str, optional
+        Keeps the names of figures apart where there are several on a page.
+    """
+    sets = {name: traces for name, traces in sets.items() if traces}
+    return [
+        heading("Against signals"),
+        paragraph("Blue: how many samples lie where. Vermillion: their mean over the signal, with two standard errors."),
+        _signals_group(robot, sets, prefix),
+        heading("By frequency, motor angle and lag"),
+        _spectra_group(robot, sets, bands, prefix),
+    ]
+
+
+def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None], prefix: str) -> Group:
+    by_time: Variants = {}
+    by_order: Variants = {}
+    by_lag: Variants = {}
+    for s, traces in enumerate(sets.values()):
+        for j in range(robot.n):
+            unit = robot.torque_unit(j)
+            for found, plot in (
+                (by_time, _frequency_plot(traces, j, bands[j], unit)),
+                (by_order, _order_plot(robot, traces, j, unit)),
+                (by_lag, _lag_plot(traces, j)),
+            ):
+                if plot is not None:
+                    found[j, s] = plot
+    figures = [
+        Figure(
+            f"{prefix}frequency",
+            "Spectrum over frequency",
+            "Amplitude density of recorded torque and of what is left of it, nothing filtered; the area reaches to the highest line of each bin. Beyond the band the prediction carries the noise of the position.",
+            by_time,
+            (0, 1),
+        ),
+        Figure(
+            f"{prefix}order",
+            "Spectrum over the motor's angle",
+            "What repeats with the motor's turn; noise alone crosses the dashed bound anywhere in 1 of 100 cases.",
+            by_order,
+            (0, 1),
+        ),
+        Figure(
+            f"{prefix}lag",
+            "Autocorrelation",
+            "Within the band; white residuals stay between the dashed bounds at 95 % of the lags.",
+            by_lag,
+            (0, 1),
+        ),
+    ]
+    kept = [figure for figure in figures if figure.variants]
+    return Group(f"{prefix}spectra-group", kept, _selectors(robot, sets), "two")
+
+
+def _selectors(robot: Robot, sets: Sets) -> tuple[Selector, Selector]:
+    return Selector("residual of", robot.joints), Selector("recordings", tuple(sets))
+
+
+def _frequency_plot(traces: Sequence[Trace], j: int, band: float | None, unit: str) -> Plot | None:
+    recorded = spectrum([(trace.recorded[j, trace.core], trace.motion.rate) for trace in traces])
+    left = spectrum([(trace.raw_residual[j, trace.core], trace.motion.rate) for trace in traces])
+    if recorded is None or left is None:
+        return None
+    layers: list[Layer] = [
+        Line(recorded.frequency, recorded.mean, "grey", "recorded torque"),
+        Band(left.frequency, left.mean, left.highest, "green"),
+        Line(left.frequency, left.mean, "green", "residual"),
+    ]
+    if band is not None:
+        layers.append(Mark(band, "black", f"band {band:.3g} Hz"))
+    return Plot("frequency [Hz]", (Panel(f"density [{unit}/√Hz]", layers, 220, log=True),), log=True)
+
+
+def _order_plot(robot: Robot, traces: Sequence[Trace], j: int, unit: str) -> Plot | None:
+    found = orders(robot, traces, j, [trace.raw_residual[j] for trace in traces])
+    if found is None:
+        return None
+    layers = (
+        Line(found.order, found.bound, "black", "bound of noise", 1.0, "4 3"),
+        Line(found.order, found.amplitude, "green", "residual"),
+    )
+    return Plot("order [1 / motor turn]", (Panel(f"amplitude [{unit}]", layers, 220),))
+
+
+def _lag_plot(traces: Sequence[Trace], j: int) -> Plot | None:
+    found = autocorrelation(traces, j)
+    if found is None:
+        return None
+    layers: list[Layer] = [
+        Line(found.lag, found.value, "green", "autocorrelation", 1.6),
+        Level(found.bound, "black", "bounds of white noise"),
+        Level(-found.bound, "black", "bounds of white noise"),
+    ]
+    return Plot("lag [s]", (Panel("correlation", layers, 220),))
+
+
+def _signals_group(robot: Robot, sets: Sets, prefix: str) -> Group:
+    signals: tuple[tuple[str, str, Callable[[Trace, int], Array], Callable[[int], str]], ...] = (
+        ("position", "Position", lambda trace, i: trace.motion.q[i], lambda i: f"position [{_length(robot, i)}]"),
+        ("velocity", "Velocity", lambda trace, i: trace.motion.v[i], lambda i: f"velocity [{_length(robot, i)}/s]"),
+        ("acceleration", "Acceleration", lambda trace, i: trace.motion.a[i], lambda i: f"acceleration [{_length(robot, i)}/s²]"),
+        ("load", "Load", lambda trace, i: trace.load[i], lambda i: f"links and rotors [{robot.torque_unit(i)}]"),
+        ("time", "Time", lambda trace, i: trace.time, lambda i: "time since the start [s]"),
+        ("motor", "Motor angle", lambda trace, i: np.mod(robot.reduction[i] * trace.motion.q[i], 2.0 * np.pi), lambda i: "within a motor turn [rad]"),
+    )  # fmt: skip
+    figures = []
+    for name, title, signal, label in signals:
+        variants: Variants = {}
+        for s, traces in enumerate(sets.values()):
+            for j in range(robot.n):
+                y = _kept(traces, j, lambda trace, j=j: trace.residual[j])
+                if not len(y):
+                    continue
+                # Time is the same for all joints.
+                for i in range(1 if name == "time" else robot.n):
+                    x = _kept(traces, j, lambda trace, i=i, signal=signal: signal(trace, i))
+                    variants[(j, s) if name == "time" else (j, s, i)] = _scatter(x, y, label(i), robot.torque_unit(j))
+        by = (0, 1) if name == "time" else (0, 1, 2)
+        figures.append(Figure(f"{prefix}against-{name}", title, "", variants, by, quiet=True))
+    selectors = (*_selectors(robot, sets), Selector("signals of", robot.joints))
+    return Group(f"{prefix}signals-group", figures, selectors, "three")
+
+
+def _kept(traces: Sequence[Trace], j: int, signal: Callable[[Trace], Array]) -> Array:
+    """Gather a signal over the samples of a joint that the estimate uses, as many as the band leaves independent."""
+    parts = []
+    for trace in traces:
+        used = trace.used[j, :: trace.step[j]]
+        parts.append(signal(trace)[:: trace.step[j]][used])
+    return np.concatenate(parts)
+
+
+def _scatter(x: Array, y: Array, label: str, unit: str) -> Plot:
+    limits = middle_range(x)
+    reach = 1.25 * float(np.quantile(np.abs(y), 0.995)) or 1.0
+    means = binned_means(x, y, limits)
+    layers = (
+        Density(density(x, y, limits, (-reach, reach)), limits, (-reach, reach), "blue", "samples"),
+        Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, "vermillion"),
+        Line(means.x, means.y, "vermillion", "mean ± 2 s.e.", 1.8),
+    )
+    return Plot(label, (Panel(f"residual [{unit}]", layers, 170, (-reach, reach)),), limits, small=True)
+
+
+def _length(robot: Robot, joint: int) -> str:
+    return "m" if robot.prismatic[joint] else "rad"

@@ -1,0 +1,32 @@
+"""base.json: what each base parameter is made of, what is not identifiable and why."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from scara_ident.report.base import base_dict
+from scara_ident.report.files import plain
+from scara_ident.robot import load_robot
+from tests.arms import example_urdf
+
+
+def test_the_scara03_is_told():
+    content = json.loads(json.dumps(plain(base_dict(load_robot())), allow_nan=False))
+    assert (content["robot"], content["count"]) == ("scara03", 5)
+    assert [row["name"] for row in content["base_parameters"]] == ["P_d1", "P_d2", "P_d3", "P_d4", "P_d5"]
+    first = content["base_parameters"][0]
+    assert first["expression"] == "I1zz + 0.1089 m2 + 10000 Jm1"
+    np.testing.assert_allclose([first["made_of"][name] for name in ("I1zz", "m2", "Ia1")], [1.0, 0.1089, 1.0])
+    assert [body["link"] for body in content["bodies"]] == ["link1", "link2"]
+    assert content["check"]["passed"] is True
+    assert content["check"]["rank"] == 5
+
+
+def test_every_standard_parameter_is_alone_in_sums_or_never_there():
+    content = base_dict(load_robot(example_urdf("double_pendulum.urdf")))
+    alone = {next(iter(row["made_of"])) for row in content["base_parameters"] if len(row["made_of"]) == 1}
+    groups = [alone, set(content["only_in_sums"]), set(content["never_enter"])]
+    assert sum(len(group) for group in groups) == 22
+    assert len(set.union(*groups)) == 22

@@ -1,0 +1,77 @@
+"""Result files are written whole or not at all, and JSON is JSON."""
+
+from __future__ import annotations
+
+import json
+import stat
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scara_ident.errors import ScaraIdentError
+from scara_ident.report.files import plain, write_json, write_text, write_whole
+
+
+def refuse(constant: str) -> None:
+    raise AssertionError(f"{constant} is not JSON")
+
+
+def test_json_has_no_nan_and_no_infinity(tmp_path: Path):
+    path = tmp_path / "deep" / "er" / "a.json"
+    write_json(path, {"a": np.nan, "b": [np.inf, -np.inf, np.float64(1.5)], "c": {"d": (np.float32("nan"), 2)}})
+    found = json.loads(path.read_text(), parse_constant=refuse)
+    assert found == {"a": None, "b": [None, None, 1.5], "c": {"d": [None, 2]}}
+
+
+def test_numbers_of_numpy_become_numbers():
+    made = plain({"i": np.int64(3), "t": np.bool_(True), "a": np.array([[1.0, np.nan]]), 1: "x", "n": None})
+    assert made == {"i": 3, "t": True, "a": [[1.0, None]], "1": "x", "n": None}
+    assert [type(made[key]) for key in ("i", "t")] == [int, bool]
+
+
+def test_numbers_keep_all_their_digits(tmp_path: Path):
+    value = 0.1 + 0.2
+    write_json(tmp_path / "a.json", {"x": value})
+    assert json.loads((tmp_path / "a.json").read_text())["x"] == value
+
+
+def test_an_existing_file_stays_until_the_new_one_is_complete(tmp_path: Path):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+
+    def fails(temporary: Path) -> None:
+        temporary.write_text("half of the ne")
+        raise KeyError("in the middle")
+
+    with pytest.raises(KeyError):
+        write_whole(path, fails)
+    assert path.read_text() == "old"
+    assert [file.name for file in tmp_path.iterdir()] == ["a.txt"]
+    write_text(path, "new")
+    assert path.read_text() == "new"
+    assert [file.name for file in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_others_may_read_what_was_written(tmp_path: Path):
+    write_text(tmp_path / "a.txt", "x")
+    assert stat.S_IMODE((tmp_path / "a.txt").stat().st_mode) == 0o644
+
+
+def test_the_temporary_file_has_the_suffix_and_stands_beside(tmp_path: Path):
+    seen: list[Path] = []
+    write_whole(tmp_path / "a.png", lambda path: seen.append(path))
+    assert seen[0].suffix == ".png"
+    assert seen[0].parent == tmp_path
+
+
+def test_a_file_where_a_folder_is_expected_is_one_line(tmp_path: Path):
+    (tmp_path / "out").write_text("a file")
+    with pytest.raises(ScaraIdentError, match="cannot be written") as caught:
+        write_json(tmp_path / "out" / "a.json", {})
+    assert str(tmp_path / "out") in str(caught.value)
+    assert "\n" not in str(caught.value)
+    (tmp_path / "b.json").mkdir()
+    with pytest.raises(ScaraIdentError, match=r"b\.json: cannot be written"):
+        write_json(tmp_path / "b.json", {})
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["b.json", "out"]

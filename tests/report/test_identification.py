@@ -1,0 +1,115 @@
+"""identification.json as the contract has it, and the sentences beside it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.report.files import plain
+from scara_ident.report.identification import identification_dict, sentences
+from tests.report.simulated import made, run
+
+
+@pytest.fixture(scope="module")
+def result():
+    return made([run("OJD_1", 1), run("OJD_2", 2)], [run("CI_1", 3, start=4.0)], method="wls")
+
+
+@pytest.fixture(scope="module")
+def content(result):
+    return json.loads(json.dumps(plain(identification_dict(result)), allow_nan=False))
+
+
+def test_it_has_the_keys_of_the_contract(content):
+    assert (content["robot"], content["model"], content["method"], content["samples"]) == (
+        "scara03",
+        "complete",
+        "wls",
+        6000,
+    )
+    assert {"name", "joint", "value", "std", "unit", "meaning"} <= set(content["parameters"][0])
+    assert {"log_det", "condition", "errors"} <= set(content)
+    assert set(content["errors"]) == {"training", "validation"}
+    assert set(content["errors"]["training"]) == {"OJD_1", "OJD_2"}
+    assert set(content["errors"]["validation"]) == {"CI_1"}
+    joints = content["errors"]["training"]["OJD_1"]
+    assert set(joints) == {"joint1", "joint2"}
+    assert {"rms", "relative", "rms_unfiltered"} <= set(joints["joint1"])
+    assert content["band_hz"] == {"joint1": 15.0, "joint2": None}
+
+
+def test_parameters_carry_the_papers_names(content):
+    names = [row["name"] for row in content["parameters"]]
+    assert names == [*(f"P_d{k}" for k in range(1, 6)), *(f"a{p}{j}" for j in (1, 2) for p in range(4)), "p_o1", "p_o2"]
+    first = content["parameters"][0]
+    assert (first["joint"], first["unit"], first["meaning"]) == ("joint1", "kg m^2", "I1z + m2 l1^2 + Jm1/tau1^2")
+
+
+def test_numbers_are_those_of_the_estimate(result, content):
+    np.testing.assert_array_equal([row["value"] for row in content["parameters"]], result.estimate.value)
+    np.testing.assert_array_equal([row["std"] for row in content["parameters"]], result.estimate.std)
+    (error,) = [result.validation_errors()["CI_1"][1]]
+    assert content["errors"]["validation"]["CI_1"]["joint2"]["relative"] == error.relative
+    assert (content["log_det"], content["condition"]) == (result.log_det, result.condition)
+
+
+def test_the_noise_floor_stands_beside_the_errors(content):
+    assert content["repeatability"]["OJD"]["joint1"] == pytest.approx(0.02, rel=0.05)
+    assert content["errors"]["training"]["OJD_1"]["joint1"]["rms_unfiltered"] == pytest.approx(0.02, rel=0.1)
+
+
+def test_what_was_left_out_is_said(content):
+    left_out = content["left_out"]
+    assert left_out["training"]["OJD_1"]["ends_s"] > 0.0
+    assert set(left_out["training"]["OJD_1"]["at_rest_share"]) == {"joint1", "joint2"}
+    assert set(left_out["validation"]) == {"CI_1"}
+
+
+def test_a_fitted_and_a_held_out_run_of_one_name_do_not_hide_each_other():
+    """Two folders may both hold an OJD_1."""
+    one = identification_dict(made([run("OJD_1", 1)], [run("OJD_1", 3, seconds=8.0, start=4.0)]))
+    assert one["errors"]["training"]["OJD_1"] != one["errors"]["validation"]["OJD_1"]
+    assert set(one["left_out"]["training"]) == set(one["left_out"]["validation"]) == {"OJD_1"}
+
+
+def test_the_worst_held_out_run_is_named_in_words(result):
+    worst = max(
+        (error.relative, joint)
+        for joint, error in zip(("joint1", "joint2"), result.validation_errors()["CI_1"], strict=True)
+    )
+    first = sentences(result)[0]
+    assert first.startswith(f"It generalises worst to CI_1, {worst[1]}: ")
+    assert f"{worst[0]:.1%} of the torque" in first
+
+
+def test_without_held_out_runs_that_is_said_instead():
+    text = sentences(made([run("OJD_1", 1)]))
+    assert text[0].startswith("Nothing was held out")
+    assert text[1] == "Every parameter is determined."
+
+
+def test_what_is_undetermined_is_named_and_null():
+    result = made([run("OJD_1", 1, still=True)])
+    content = plain(identification_dict(result))
+    open_ = [row["name"] for row in content["parameters"] if row["undetermined"]]
+    assert {"P_d5", "a02", "a12", "a22", "a32", "p_o2"} <= set(open_)
+    assert all((row["std"] is None) == row["undetermined"] for row in content["parameters"])
+    (said,) = [text for text in sentences(result) if "undetermined" in text]
+    assert all(name in said for name in open_)
+    assert content["errors"]["training"]["OJD_1"]["joint2"]["rms"] is None
+    assert (content["log_det"], content["condition"]) == (None, None)
+    json.dumps(content, allow_nan=False)
+
+
+def test_what_is_not_told_from_zero_is_named(result):
+    small = [text for text in sentences(result) if text.startswith("Within two standard deviations of zero")]
+    assert len(small) == 1
+    assert "P_d3" in small[0] or "a31" in small[0] or "p_o1" in small[0]
+    assert "P_d1" not in small[0]
+
+
+def test_notes_are_handed_on(result):
+    assert identification_dict(replace(result, notes=("seen",)))["notes"] == ["seen"]
