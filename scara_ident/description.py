@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    ValidationError,
+    model_validator,
+)
 
 from scara_ident.errors import RobotError
 
@@ -22,8 +33,56 @@ def _no_truth_value(value: Any) -> Any:
     return value
 
 
+def _number(value: Any) -> float:
+    try:
+        number = float(_no_truth_value(value))
+    except (TypeError, ValueError):
+        raise ValueError("expected a number") from None
+    if not math.isfinite(number):
+        raise ValueError("expected a finite number")
+    return number
+
+
+def _scale(value: Any) -> float:
+    return _not_zero(_number(value))
+
+
+def _counts(value: Any) -> float:
+    number = _number(value)
+    if number <= 0.0:
+        raise ValueError("expected a number above 0")
+    return number
+
+
+def _word(value: Any) -> str:
+    if not isinstance(value, str) or not value.strip():
+        raise ValueError("expected a name; put it in quotes if YAML takes it for something else")
+    return value.strip()
+
+
+def _once_or_per_joint(check: Callable[[Any], Any]) -> PlainValidator:
+    """Check one value for all joints, or a mapping from joints to values."""
+
+    def checked(value: Any) -> Any:
+        if not isinstance(value, dict):
+            return check(value)
+        for joint, item in value.items():
+            try:
+                check(item)
+            except ValueError as error:
+                raise ValueError(f"{joint}: {error}") from None
+        return {str(joint): check(item) for joint, item in value.items()}
+
+    return PlainValidator(checked)
+
+
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=False), BeforeValidator(_no_truth_value)]
 NonZero = Annotated[Finite, AfterValidator(_not_zero)]
+Word = Annotated[str, BeforeValidator(_word)]
+UnitName = Annotated[str | dict[str, str], _once_or_per_joint(_word)]
+Scale = Annotated[float | dict[str, float], _once_or_per_joint(_scale)]
+Shift = Annotated[float | dict[str, float], _once_or_per_joint(_number)]
+Counts = Annotated[float | dict[str, float], _once_or_per_joint(_counts)]
 
 
 class JointDescription(BaseModel):
@@ -36,6 +95,54 @@ class JointDescription(BaseModel):
     rotor_inertia: Annotated[Finite, Field(ge=0.0)] | None = None
 
 
+class TimeDescription(BaseModel):
+    """Where the time of a recording stands, and in which unit."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    column: Word = "time"
+    unit: Word = "s"
+
+
+class SignalDescription(BaseModel):
+    """Where a signal of every joint stands, and what its numbers mean: scale x number + offset, in ``unit``."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    column: Word | None = None
+    columns: dict[str, Word] | None = None
+    unit: UnitName | None = None
+    scale: Scale = 1.0
+    offset: Shift = 0.0
+
+    @model_validator(mode="after")
+    def _one_place(self) -> SignalDescription:
+        if self.column is not None and self.columns is not None:
+            raise ValueError("expected column (a pattern with {joint}) or columns (one for each joint), not both")
+        return self
+
+
+class MotionDescription(SignalDescription):
+    """A signal of the motion, which an encoder may measure on either side of the gear."""
+
+    side: Literal["motor", "joint"] = "joint"
+    counts_per_turn: Counts | None = None
+
+
+class RecordingDescription(BaseModel):
+    """How the channels of the recordings are named and in which units they are."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    topic: Word | None = None
+    time: TimeDescription | None = None
+    position: MotionDescription | None = None
+    velocity: MotionDescription | None = None
+    acceleration: MotionDescription | None = None
+    effort: SignalDescription | None = None
+    temperature: SignalDescription | None = None
+
+
 class RobotDescription(BaseModel):
     """The contents of ``robot.yaml``."""
 
@@ -46,6 +153,7 @@ class RobotDescription(BaseModel):
     joints: dict[str, JointDescription | None] | None = None
     locked: dict[str, Finite] = Field(default_factory=dict)
     gravity: tuple[Finite, Finite, Finite] | None = None
+    recording: RecordingDescription | None = None
 
 
 def read_description(path: Path) -> RobotDescription:
@@ -92,9 +200,22 @@ def _first_problem(error: ValidationError) -> str:
     key = ".".join(str(part) for part in problem["loc"] if part not in ("[key]",))
     kind = problem["type"]
     if kind == "extra_forbidden":
-        owner = JointDescription if key.startswith("joints.") else RobotDescription
+        owner = _owner(problem["loc"])
         return f"{key}: unknown key; expected one of {', '.join(owner.model_fields)}"
     if kind == "missing":
         return f"{key}: missing"
     message = problem["msg"].removeprefix("Value error, ")
     return f"{key}: {message[0].lower()}{message[1:]}; found {problem['input']!r}"
+
+
+def _owner(location: tuple[int | str, ...]) -> type[BaseModel]:
+    """Return the model in which the last key of a location was sought."""
+    first, *rest = location
+    if first == "joints":
+        return JointDescription
+    if first != "recording" or not rest:
+        return RobotDescription
+    if len(rest) == 1:
+        return RecordingDescription
+    plain = {"time": TimeDescription, "effort": SignalDescription, "temperature": SignalDescription}
+    return plain.get(str(rest[0]), MotionDescription)

@@ -174,3 +174,17 @@ def test_what_is_undetermined_does_not_disturb_the_others():
         rows = merge(block[0] for block in blocks)
         found.append(block_covariance(rows.inverse(), rows.solve().value, [blocks]).matrix)
     np.testing.assert_allclose(found[1][np.ix_([0, 2, 3], [0, 2, 3])], found[0], rtol=1e-9)
+
+
+def test_a_dozen_blocks_are_unbiased():
+    """What the correction for leverage is for: without it the std of four parameters would be a tenth too small."""
+    spread, reported, kind = spread_and_reported(white, count=1800, length=150, draws=500)
+    assert kind == "block"
+    np.testing.assert_allclose(np.mean(reported / spread), 1.0, atol=0.05)
+
+
+def test_noise_that_reaches_into_the_next_block_is_counted():
+    """Blocks only three memories long: each by itself would promise a sixth too little."""
+    spread, reported, kind = spread_and_reported(coloured, count=1800, length=30, draws=200)
+    assert kind == "block"
+    np.testing.assert_allclose(np.mean(reported / spread), 1.0, atol=0.09)

@@ -91,8 +91,7 @@ def check_possible(
         )
     u = unknowns or build_unknowns(model, ConsistentOptions(friction="free"))
     size = sizes(u, value)
-    place = model.place(model.rigid_body)
-    bodies = np.arange(place.start, place.stop)
+    bodies = np.arange(u.place.start, u.place.stop)
     found = _matched(u, value, size, bodies)
     reasons: list[str] = []
     if not found.possible:

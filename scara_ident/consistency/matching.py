@@ -143,7 +143,7 @@ class Matcher:
 
     def __init__(self, unknowns: Unknowns) -> None:
         self.unknowns = unknowns
-        place = unknowns.model.place(unknowns.model.rigid_body)
+        place = unknowns.place
         rows = np.eye(unknowns.to_parameters.shape[0])[place]
         self._size = np.linalg.norm(unknowns.to_parameters[place], axis=1)
         self._place = place

@@ -21,9 +21,10 @@ from scara_ident.errors import EstimationError
 
 Array = NDArray[np.float64]
 
-# Newton's decrement at which the divergence is known to twelve digits.
-DECREMENT = 1e-6
-MOST_STEPS = 200
+# Newton's method stops when the divergence is known to this, relative to itself where it is large.
+PRECISION = 1e-10
+MOST_STEPS = 100
+LINE_STEPS = 12
 # Weights of the barrier of limits, the last so small that it moves nothing.
 BARRIER = (1.0, 1e-2, 1e-4, 1e-6, 1e-8)
 # Singular values below this share of the largest are equations that say nothing new.
@@ -82,35 +83,56 @@ def nearest_to_nominal(start: Array, free: Array, limits: Cones) -> Array:
 def _newton(start: Array, free: Array, limits: Cones, weight: float) -> Array:
     n = len(start) // 11
     directions = unpack(np.moveaxis(free[: 10 * n].reshape(n, 10, -1), 2, 1))
-    moved = np.zeros(free.shape[1])
     x, value = start, _value(start, limits, weight)
     for _ in range(MOST_STEPS):
-        gradient, root = _slopes(x, n, directions, free, limits, weight)
+        gradient, root, local = _slopes(x, n, directions, free, limits, weight)
         triangular = np.linalg.qr(root, mode="r")
         half = np.linalg.solve(triangular.T, gradient)
         step = -np.linalg.solve(triangular, half)
-        decrement = float(np.linalg.norm(half))
-        if decrement < DECREMENT:
+        decrement = float(half @ half)
+        if decrement < PRECISION * max(1.0, abs(value)):
             return x
-        length = 1.0
+        change = free @ step
+        length = _length(np.tensordot(local, step, axes=(1, 0)), change, x, n)
         while True:
-            trial = start + free @ (moved + length * step)
+            trial = x + length * change
             new = _value(trial, limits, weight)
-            if new <= value - 0.25 * length * decrement**2:
+            if new < value:
                 break
-            if decrement < 1e-3 and abs(new - value) <= 1e-12 * max(1.0, abs(value)):
-                # What is left to gain is below rounding.
-                return x
             length *= 0.5
             if length < 1e-12:
                 raise EstimationError(
                     "the bodies nearest to the nominal ones were not found: the URDF's inertias and the data are too "
                     "far apart; correct the URDF or give link_mass"
                 )
-        moved, x, value = moved + length * step, trial, new
+        x, value = trial, new
     raise EstimationError(
         f"the bodies nearest to the nominal ones were not found in {MOST_STEPS} steps; correct the URDF's inertias"
     )
+
+
+def _length(local: Array, change: Array, x: Array, n: int) -> float:
+    """Length of the step that makes the divergence smallest along it.
+
+    Near the edge Newton's own length only doubles the distance from it; along a line the divergence is a sum of
+    logarithms, and its best length is the root of a falling function.
+    """
+    rates = np.concatenate([np.linalg.eigvalsh(local).ravel(), change[10 * n :] / x[10 * n :]])
+    linear = float(np.tile(PACKED_IDENTITY, n) @ change[: 10 * n] + change[10 * n :].sum())
+    fastest = float(np.min(rates))
+    low, high = 0.0, (1.0 / -fastest if fastest < 0.0 else 1e12)
+    length = min(1.0, 0.5 * high)
+    for _ in range(LINE_STEPS):
+        share = rates / (1.0 + length * rates)
+        slope = linear - float(share.sum())
+        if slope > 0.0:
+            high = length
+        else:
+            low = length
+        trial = length - slope / max(float(share @ share), np.finfo(float).tiny)
+        # Newton along the line where it stays between the bounds, their middle in ratio where not.
+        length = trial if low < trial < high else (np.sqrt(low * high) if low > 0.0 else 0.1 * high)
+    return float(length)
 
 
 def _value(x: Array, limits: Cones, weight: float) -> float:
@@ -125,8 +147,10 @@ def _value(x: Array, limits: Cones, weight: float) -> float:
     return value - weight * float(np.sum(np.log(slack)) + np.sum(np.log(room)))
 
 
-def _slopes(x: Array, n: int, directions: Array, free: Array, limits: Cones, weight: float) -> tuple[Array, Array]:
-    """Gradient along the free directions, and a square root of the Hessian, as rows."""
+def _slopes(
+    x: Array, n: int, directions: Array, free: Array, limits: Cones, weight: float
+) -> tuple[Array, Array, Array]:
+    """Gradient along the free directions, a square root of the Hessian as rows, and the directions seen from x."""
     inverse_root = np.linalg.inv(np.linalg.cholesky(unpack(x[: 10 * n].reshape(n, 10))))
     # In the metric of the point itself, each direction is a symmetric matrix per body.
     local = inverse_root[:, None] @ directions @ np.swapaxes(inverse_root, 1, 2)[:, None]
@@ -145,7 +169,7 @@ def _slopes(x: Array, n: int, directions: Array, free: Array, limits: Cones, wei
             slope, root = _ball(limits.ball.matrix[first : first + 4] @ free, limits.ball(x)[first : first + 4])
             gradient = gradient + weight * slope
             rows.append(np.sqrt(weight) * root)
-    return gradient, np.vstack(rows)
+    return gradient, np.vstack(rows), local
 
 
 def _ball(rows: Array, value: Array) -> tuple[Array, Array]:

@@ -13,6 +13,7 @@ from scara_ident.consistency.friction_certificate import certificate
 from scara_ident.consistency.limits import body_limits
 from scara_ident.consistency.nominal import Nominal, nominal
 from scara_ident.consistency.options import ConsistentOptions
+from scara_ident.consistency.prior import null_space
 from scara_ident.errors import UsageError
 from scara_ident.model import TorqueModel
 from scara_ident.terms.constraints import BrakingPolynomial, Nonnegative, constraints_of
@@ -49,6 +50,12 @@ class Unknowns:
     nonnegative : ndarray of int
         Columns of the model that other terms declare nonnegative.
     auxiliary : int
+    place : slice
+        Where the columns of bodies and rotors stand in the model.
+    sums : ndarray of int
+        Those among them that are sums of what cannot be negative.
+    unseen : ndarray, shape (11 n, k)
+        Directions of bodies and rotors that change none of their columns.
     """
 
     model: TorqueModel
@@ -62,6 +69,9 @@ class Unknowns:
     polynomials: tuple[BrakingPolynomial, ...]
     nonnegative: NDArray[np.intp]
     auxiliary: int
+    place: slice
+    sums: NDArray[np.intp]
+    unseen: Array
 
     @property
     def n(self) -> int:
@@ -71,7 +81,7 @@ class Unknowns:
     @property
     def size(self) -> int:
         """Length of x."""
-        return self.to_parameters.shape[1]
+        return len(self.reference)
 
     @property
     def rigid(self) -> slice:
@@ -176,6 +186,9 @@ def build_unknowns(model: TorqueModel, options: ConsistentOptions) -> Unknowns:
         polynomials=tuple(polynomials),
         nonnegative=np.array(positive, dtype=np.intp),
         auxiliary=auxiliary,
+        place=place,
+        sums=np.array([k for k in range(place.start, place.stop) if model.columns[k].nonnegative], dtype=np.intp),
+        unseen=null_space(_unit_rows(grouping)),
     )
 
 
@@ -191,6 +204,10 @@ def _declared(model: TorqueModel) -> Iterator[tuple[int, object]]:
     for term in model.terms:
         for constraint in constraints_of(term):
             yield model.place(term).start, constraint
+
+
+def _unit_rows(rows: Array) -> Array:
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
 
 
 def _speed(polynomial: BrakingPolynomial, options: ConsistentOptions, joints: tuple[str, ...]) -> float:

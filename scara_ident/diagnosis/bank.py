@@ -39,8 +39,12 @@ class Candidate:
     def label(self, scene: Scene) -> str:
         """Name of effect and joints, the same for all members that differ in nonlinear parameters only."""
         joint = self.joint(scene)
+        if joint is None:
+            # Members without a joint are told apart by what they are.
+            several = self.member.partner is not None
+            return f"{self.effect.name} ({self.effect.description(scene, self.member)})" if several else self.effect.name
         partner = "" if self.member.partner is None else f" by {scene.robot.joints[self.member.partner]}"
-        return self.effect.name if joint is None else f"{self.effect.name} of {joint}{partner}"
+        return f"{self.effect.name} of {joint}{partner}"
 
     def at(self, knobs: Sequence[float]) -> Candidate:
         """Return the member with other nonlinear parameters."""

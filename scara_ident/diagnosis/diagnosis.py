@@ -14,7 +14,7 @@ from scara_ident.diagnosis.confounding import Rival, rivals
 from scara_ident.diagnosis.finish import physical_parameters
 from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
 from scara_ident.diagnosis.screening import Dependence, screen
-from scara_ident.diagnosis.search import DELAY, Search, model_with, search, weighted_fit
+from scara_ident.diagnosis.search import Search, is_delay, model_with, search, weighted_fit
 from scara_ident.effects import CATALOGUE, Effect, Parameter
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.measurement import shifted
@@ -195,6 +195,11 @@ def diagnose(
     dependences = screen(final, after.value, found.recordings, bands)
     unexplained = _unexplained(fit_after, dependences)
     effects = _effects(found, after)
+    if found.delay is not None and not _is_effect(found):
+        notes.append(
+            f"effort and position are {found.delay[0] * 1e3:+.2g} ms apart, less than one sample, as when a sample is "
+            "held to the next; corrected in the data, not counted as an effect"
+        )
     verdict: Verdict = "unexplained" if unexplained else ("explained" if effects else "complete")
     return Diagnosis(
         verdict,
@@ -242,7 +247,10 @@ def _effects(found: Search, after: Estimate) -> list[FoundEffect]:
         decision = step.decision
         candidate = decision.candidate
         now = joint_rms(step.estimate.value, step.evidence)
-        if candidate.effect.name == DELAY and found.delay is not None and candidate.member.joint is None:
+        if is_delay(candidate) and found.delay is not None:
+            if not _is_effect(found):
+                before = now
+                continue
             values: Mapping[str, Parameter] = {"delay": Parameter(found.delay[0], found.delay[1], "s")}
             confounded: tuple[Rival, ...] = ()
         else:
@@ -264,6 +272,11 @@ def _effects(found: Search, after: Estimate) -> list[FoundEffect]:
         )
         before = now
     return results
+
+
+def _is_effect(found: Search) -> bool:
+    """Whether a delay is more than the place of a sample within its period."""
+    return found.delay is not None and abs(found.delay[0]) * found.scene.rate > 1.0
 
 
 def joint_rms(value: Array, evidence: Sequence[Evidence]) -> list[float | None]:

@@ -150,7 +150,7 @@ def search(
         winner = _choose(scene, data, bands, weights, chosen, decisions, tried)
         if winner is None:
             break
-        if winner.candidate.effect.name == DELAY and winner.candidate.member.joint is None:
+        if is_delay(winner.candidate):
             data, delay = _correct_delay(data, winner, delay)
         else:
             chosen.append(winner.candidate)
@@ -165,11 +165,16 @@ def search(
         if repeated and delay is not None and abs(winner.examination.value[0]) < DELAY_STEP:
             candidates = [item for item in candidates if item.label(scene) != winner.label]
     kept = _backward(scene, data, bands, weights, chosen, tried)
-    steps = [step for step in steps if step.decision.candidate in kept or step.decision.candidate.effect.name == DELAY]
+    steps = [step for step in steps if step.decision.candidate in kept or is_delay(step.decision.candidate)]
     return Search(
         model, scene, tuple(bands), start, start_evidence, tuple(steps), tuple(kept), delay,
         tuple(decisions), tried, data,
     )  # fmt: skip
+
+
+def is_delay(candidate: Candidate) -> bool:
+    """Whether a candidate is the delay of all joints, which is corrected in the data."""
+    return candidate.effect.name == DELAY and candidate.member.joint is None
 
 
 def weighted_fit(model: TorqueModel, evidence: Sequence[Evidence]) -> Estimate:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from scara_ident.effects.coupling import DriveCoupling, InertiaCoupling
 from scara_ident.effects.effect import Effect
+from scara_ident.effects.elasticity import Backlash, JointElasticity
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import TimeDelay, TorqueGainMismatch, TorqueSensorNonlinearity
 from scara_ident.effects.payload import FreePayloadChange, GravityCounterbalance, PayloadChange, PayloadOfRecordings
@@ -21,4 +23,8 @@ CATALOGUE: tuple[Effect, ...] = (
     TorqueSensorNonlinearity(),
     TorqueGainMismatch(),
     TimeDelay(),
+    JointElasticity(),
+    Backlash(),
+    InertiaCoupling(),
+    DriveCoupling(),
 )

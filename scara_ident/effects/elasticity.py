@@ -23,8 +23,9 @@ LAG_BAND = 1.5
 # Frequencies of the link against its held motor that are tried, in bands, and where arms have them, Hz.
 FREQUENCIES = (0.7, 1.2, 2.0, 4.0)
 LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 2.0, 200.0
-# Damping ratio of that swinging: strain-wave gears have 0.03 to 0.1.
-DAMPING = 0.05
+# Damping ratio of that swinging. Gears have 0.03 to 0.1, but then the phase after a few swings depends on inertia and
+# stiffness to the percent; with more, what the link does follows from the torque of the last swing.
+DAMPING = 0.3
 # Clearances tried, rad or m at the joint.
 WIDTHS = (3e-4, 1e-3, 3e-3)
 LARGEST_WIDTH = 0.05
@@ -84,6 +85,12 @@ class JointElasticity:
         """A spring pulls back, and swings at the frequency that its stiffness gives."""
         if value[0] < -2.0 * std[0]:
             return "its stiffness would be negative"
+        usual = usual_link_inertia(scene, member.joint or 0)
+        least = value[0] - 2.0 * std[0]
+        if usual > 0.0 and least > 0.0:
+            frequency = float(1.0 / np.sqrt(least * usual) / (2.0 * np.pi))
+            if 2.0 * frequency < min(member.knobs[0], scene.band):
+                return f"so soft a gear would let the link swing at {frequency:.2g} Hz, which is not seen"
         return None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:

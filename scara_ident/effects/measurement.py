@@ -9,9 +9,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.audit.samples import GAP_STEPS
 from scara_ident.effects.effect import Knob, Member, Parameter
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion import GAP_STEPS, UNIFORM_TOLERANCE, differentiate
+from scara_ident.motion import UNIFORM_TOLERANCE, differentiate
 from scara_ident.recording import Recording
 from scara_ident.terms import Column
 

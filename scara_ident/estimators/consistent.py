@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from scara_ident.consistency.activity import active, tangent
 from scara_ident.consistency.bodies import LinkInertia, link_inertia
 from scara_ident.consistency.feasibility import Possibility, check_possible
-from scara_ident.consistency.matching import Match, fixed, is_allowed, margin_of, match, sizes
+from scara_ident.consistency.matching import fixed, is_allowed, margin_of, match, sizes
 from scara_ident.consistency.options import ConsistentOptions
-from scara_ident.consistency.pull import prior_rows
 from scara_ident.consistency.prior import nearest_to_nominal, null_space
 from scara_ident.consistency.programme import MARGIN, Programme
+from scara_ident.consistency.pull import prior_rows
 from scara_ident.consistency.unknowns import Unknowns
 from scara_ident.covariance import block_covariance
-from scara_ident.errors import UsageError
+from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimators.estimate import Estimate, pooled_information, weighted_blocks
 from scara_ident.estimators.least_squares import ols, residual_noise
 from scara_ident.evidence import Evidence
@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 
 # Data without noise are not weighted beyond this share of the torque.
 LEAST_NOISE = 1e-6
+# The solver keeps its constraints to so many digits, relative to the nominal bodies.
+DIGITS = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +71,8 @@ class ConsistentSolution:
         See `Unknowns`.
     value : ndarray, shape (p,)
     standard : ndarray, shape (11 n,)
-    free : ndarray, shape (p, k)
-        Directions in which the parameters can move.
+    held : ndarray, shape (k, size + auxiliary)
+        Directions of the programme's unknowns that active constraints forbid.
     active : tuple of str
     was_possible : bool
     iterations : int
@@ -80,7 +82,7 @@ class ConsistentSolution:
     x: Array
     value: Array
     standard: Array
-    free: Array
+    held: Array
     active: tuple[str, ...]
     was_possible: bool
     iterations: int
@@ -126,14 +128,14 @@ def consistent(
     options = programme.options
     weights = _weights(model, evidence, options)
     information = pooled_information(evidence, weights)
-    noise = noise_of(information)
+    noise = noise_of(information, information.solve())
     parameter_prior, standard_prior = _priors(programme.unknowns, options)
     if parameter_prior is not None:
         information = merge([information, parameter_prior.scaled(noise)])
     found = solve_consistent(programme, information, noise, standard_prior)
     solution = information.solve()
     spread = block_covariance(
-        _inverse_along(information, found.free, sizes(programme.unknowns, found.value)),
+        _inverse_along(information, tangent(programme.unknowns, found.held), sizes(programme.unknowns, found.value)),
         found.value,
         weighted_blocks(evidence, weights),
     )
@@ -183,14 +185,14 @@ def solve_consistent(
         If the programme cannot be solved.
     """
     u = programme.unknowns
-    noise = noise_of(information) if noise is None else noise
     solution = information.solve()
+    noise = noise_of(information, solution) if noise is None else noise
     if standard_prior is None:
         matched = _if_possible(programme, solution)
         if matched is not None:
             x = _filled(u, matched, information, solution, np.zeros((0, 11 * u.n)))
-            everything = np.eye(len(solution.value))
-            return ConsistentSolution(x, u.parameters(x), u.standard(x), everything, (), True, 0)
+            nothing = np.zeros((0, u.size + u.auxiliary))
+            return ConsistentSolution(x, u.parameters(x), u.standard(x), nothing, (), True, 0)
     rows = information.regressor_factor @ u.to_parameters / noise
     target = information.projected_torque / noise
     if standard_prior is not None:
@@ -203,8 +205,15 @@ def solve_consistent(
     prior = prior_rows(u, rows, target, programme.options.prior_weight)
     point = programme.solve_rows(rows, target, prior)
     held, labels = active(u, point)
-    x = _filled(u, point.x, information, solution, known)
-    return ConsistentSolution(x, u.parameters(x), u.standard(x), tangent(u, held), labels, False, point.iterations)
+    margin = margin_of(u, point.x)
+    inside = _inside(u, point.x, margin) if margin > -DIGITS else None
+    if inside is None:
+        raise EstimationError(
+            f"the programme's solution misses its constraints by {-margin:.1g}; try richer motion, a larger "
+            "prior_weight or wider limits"
+        )
+    x = _filled(u, inside, information, solution, known)
+    return ConsistentSolution(x, u.parameters(x), u.standard(x), held, labels, False, point.iterations)
 
 
 def links(estimate: ConsistentEstimate) -> tuple[LinkInertia, ...]:
@@ -238,9 +247,9 @@ def possibility(estimate: Estimate) -> Possibility:
     return check_possible(estimate.model, estimate.value, information=estimate.information)
 
 
-def noise_of(information: Information) -> float:
+def noise_of(information: Information, solution: Solution) -> float:
     """Return the residual of the rows, but no less than a millionth of the torque."""
-    return max(information.rms(), LEAST_NOISE * information.torque_rms) or 1.0
+    return max(information.rms(solution.value), LEAST_NOISE * information.torque_rms) or 1.0
 
 
 def _weights(model: TorqueModel, evidence: Sequence[Evidence], options: ConsistentOptions) -> Array:
@@ -277,45 +286,45 @@ def _priors(u: Unknowns, options: ConsistentOptions) -> tuple[Information | None
 def _if_possible(programme: Programme, solution: Solution) -> Array | None:
     """Return an arm that has the least-squares parameters, None where there is none."""
     u, value = programme.unknowns, solution.value
-    place = u.model.place(u.model.rigid_body)
-    signs = [k for k in range(place.start, place.stop) if u.model.columns[k].nonnegative]
     if solution.null.shape[1] == 0:
-        if np.any(value[signs] < 0.0) or not is_allowed(u, value, programme.options.friction):
+        if np.any(value[u.sums] < 0.0) or not is_allowed(u, value, programme.options.friction):
             return None
         found = programme.matcher.find(value)
-        return None if found is None else _inside(u, found)
+        return None if found is None else _inside(u, found.x, found.margin)
     # What the data leave open may take any value that makes the rest possible.
     size = sizes(u, value)
     combinations = null_space((solution.null / size[:, None]).T).T / size
     found = match(u, value, fixed(u, combinations))
     if not found.possible or not is_allowed(u, u.parameters(found.x), programme.options.friction):
         return None
-    return _inside(u, found)
+    return _inside(u, found.x, found.margin)
 
 
-def _inside(u: Unknowns, found: Match) -> Array | None:
-    """Move an arm at the very edge inside by the margin that all estimates keep."""
-    if found.margin >= MARGIN:
-        return found.x
-    share = 2.0 * MARGIN - found.margin
-    x = found.x.copy()
-    x[u.rigid] += share * (u.nominal.relative - x[u.rigid])
-    return x if margin_of(u, x) > 0.0 else None
+def _inside(u: Unknowns, x: Array, margin: float) -> Array | None:
+    """Move an arm at the very edge, or out by the solver's last digits, inside by the margin that all estimates keep.
+
+    It goes towards the nominal arm by a share of the distance that is no more than that margin and those digits.
+    """
+    if margin >= 0.5 * MARGIN:
+        return x
+    moved = x.copy()
+    moved[u.rigid] += (2.0 * MARGIN - margin) * (u.nominal.relative - x[u.rigid])
+    return moved if margin_of(u, moved) > 0.0 else None
 
 
 def _filled(u: Unknowns, x: Array, information: Information, solution: Solution, known: Array) -> Array:
     """Fill what torque cannot tell of the bodies from the nominal ones; all else stays."""
-    place = u.model.place(u.model.rigid_body)
-    rows = u.to_parameters[place, u.rigid]
-    if solution.null.shape[1]:
-        factor = information.regressor_factor[:, place]
+    result = x.copy()
+    if solution.null.shape[1] == 0 and len(known) == 0:
+        free = u.unseen
+    else:
+        factor = information.regressor_factor[:, u.place]
         size = np.linalg.norm(factor, axis=0)
         size[size == 0.0] = 1.0
         _, singular, right = np.linalg.svd(factor / size)
-        rows = right[singular > UNDETERMINED * singular[0]] * size @ rows
-    rows = np.vstack([rows, u.held[:, u.rigid], known])
-    result = x.copy()
-    result[u.rigid] = nearest_to_nominal(x[u.rigid], null_space(_unit_rows(rows)), u.limits)
+        rows = right[singular > UNDETERMINED * singular[0]] * size @ u.to_parameters[u.place, u.rigid]
+        free = null_space(_unit_rows(np.vstack([rows, u.held[:, u.rigid], known])))
+    result[u.rigid] = nearest_to_nominal(x[u.rigid], free, u.limits)
     return result
 
 

@@ -1,0 +1,164 @@
+"""Dry friction that builds up over a distance after every reversal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.friction import deviation, friction_of, moving
+from scara_ident.effects.signals import Scene, Signals
+from scara_ident.terms import Column
+
+Array = NDArray[np.float64]
+
+# Distances tried, rad; on a joint that translates times a tenth of a metre.
+DISTANCES = (0.0004, 0.0012, 0.004, 0.012, 0.036)
+METRES_PER_RADIAN = 0.1
+# A distance above this share of the travel is a spring rather than friction.
+LONGEST_SHARE = 0.15
+# Friction in the state cannot be more than this many times what slides.
+MOST_OF_COULOMB = 1.5
+# Reversals shorter than this share of the distance change the state by less, and are noise of the position.
+LEAST_REVERSAL = 0.02
+
+
+@dataclass(frozen=True)
+class Presliding:
+    """Coulomb friction that follows a state z instead of sign(v) (Dahl 1968).
+
+    ``dz/dq = (1 - z sign(v))/presliding_distance``. The base model keeps ``a0 sign(v)``; the column is ``z - sign(v)``
+    and its coefficient comes out near a0. The state begins at zero: what came before is not known, and it is
+    forgotten over a few distances.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name in the table of effects."""
+        return "presliding"
+
+    @property
+    def knobs(self) -> tuple[Knob, ...]:
+        """The distance over which friction builds up."""
+        return (Knob("presliding_distance", "rad", 1e-5, 0.3),)
+
+    def members(self, scene: Scene) -> tuple[Member, ...]:
+        """Every joint, at distances that its travel holds many times."""
+        return tuple(
+            Member(j, (distance,))
+            for j in moving(scene)
+            for distance in (scale * x for x in DISTANCES for scale in [_scale(scene, j)])
+            if distance <= LONGEST_SHARE * scene.travel[j]
+        )
+
+    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
+        """One column: the dry friction that follows the state."""
+        j = member.joint or 0
+        joint = scene.robot.joints[j]
+        meaning = f"Coulomb friction of {joint} that builds up over a distance"
+        return (Column("presliding", joint, scene.robot.torque_unit(j), meaning, True),)
+
+    def regressor(self, signals: Signals, member: Member) -> Array:
+        """Return ``z - sign(v)`` in the drive's direction, shape (n, 1, N)."""
+        j = member.joint or 0
+        z = dahl_state(signals.motion.q[j], member.knobs[0])
+        return signals.row(j, [signals.scene.robot.drive_sign[j] * z - signals.sign[j]])
+
+    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
+        """What builds up is what then slides."""
+        j = member.joint or 0
+        if value[0] < -2.0 * std[0]:
+            return "friction would be largest just after a reversal"
+        if member.knobs[0] > LONGEST_SHARE * scene.travel[j]:
+            return "over so long a way it is a spring, not friction"
+        coulomb = friction_of(scene, j).get(0)
+        if coulomb is not None and value[0] - 2.0 * std[0] > MOST_OF_COULOMB * max(coulomb, 0.0):
+            return f"it would be more than {MOST_OF_COULOMB:g} times the Coulomb friction"
+        return None
+
+    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
+        """Return the friction that follows the state; the distance is a nonlinear parameter."""
+        unit = scene.robot.torque_unit(member.joint or 0)
+        return {"amplitude": Parameter(float(value[0]), deviation(covariance), unit)}
+
+    def description(self, scene: Scene, member: Member) -> str:
+        """Say what it is."""
+        return "Coulomb friction that builds up over a distance after a reversal (presliding)"
+
+
+def dahl_state(q: Array, distance: float, start: float = 0.0) -> Array:
+    """Return the state of ``dz/dq = (1 - z sign(dq))/distance``, exact between turning points.
+
+    Parameters
+    ----------
+    q : ndarray, shape (N,)
+        Positions.
+    distance : float
+    start : float
+        State at the first sample.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+    """
+    places = turning_points(q, LEAST_REVERSAL * distance)
+    q_turn = q[places]
+    way = np.diff(q_turn)
+    end = np.sign(way)
+    left = np.exp(-np.abs(way) / distance)
+    state = np.empty(len(places))
+    state[0] = start
+    for k in range(len(way)):
+        state[k + 1] = end[k] - (end[k] - state[k]) * left[k]
+    piece = np.repeat(np.arange(len(way)), np.diff(places))
+    if not len(piece):
+        return np.full_like(q, start)
+    # Noise may lead a little behind a turning point.
+    gone = np.maximum((q[:-1] - q_turn[piece]) * end[piece], 0.0)
+    z = np.empty_like(q)
+    z[:-1] = end[piece] - (end[piece] - state[piece]) * np.exp(-gone / distance)
+    z[-1] = state[-1]
+    return z
+
+
+def turning_points(q: Array, least: float) -> NDArray[np.intp]:
+    """Return first and last sample and the turning points between them that are at least ``least`` apart in q.
+
+    Parameters
+    ----------
+    q : ndarray, shape (N,)
+    least : float
+
+    Returns
+    -------
+    ndarray of int
+        Increasing.
+    """
+    step = np.sign(np.diff(q))
+    going = np.flatnonzero(step)
+    turns = going[1:][step[going[1:]] != step[going[:-1]]]
+    # The last extreme is held until the position has come back from it by enough.
+    kept = [0]
+    extreme, direction = 0, 0.0
+    for place in (*turns.tolist(), len(q) - 1):
+        change = q[place] - q[extreme]
+        if direction == 0.0:
+            if abs(change) >= least:
+                extreme, direction = place, float(np.sign(change))
+        elif change * direction >= 0.0:
+            extreme = place
+        elif abs(change) >= least:
+            kept.append(extreme)
+            extreme, direction = place, -direction
+    if direction and extreme not in (0, len(q) - 1):
+        kept.append(extreme)
+    if kept[-1] != len(q) - 1:
+        kept.append(len(q) - 1)
+    return np.array(kept, dtype=np.intp)
+
+
+def _scale(scene: Scene, joint: int) -> float:
+    return METRES_PER_RADIAN if scene.robot.prismatic[joint] else 1.0

@@ -1,0 +1,202 @@
+"""An interior-point method for a smooth cost under limits at many times.
+
+The limits at the times of a grid are many, and at an optimum about as many are met exactly as there are coefficients,
+so their barrier carries nearly all the curvature of the problem. The Newton matrix is therefore made of the barrier
+alone, in its primal-dual form (Nocedal and Wright 2006, chapter 19), with a damping that grows where a step fails.
+Every iterate is within all limits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from scara_ident.excitation.problem import Problem, Slopes
+
+Array = NDArray[np.float64]
+
+# Share of the way to the nearest limit that a step may go.
+NEARLY = 0.95
+# Least share of the foreseen decrease that a step must give (Armijo).
+SUFFICIENT = 1e-4
+HALVINGS = 8
+LEAST_DAMPING, MOST_DAMPING = 1e-6, 1e12
+# How far multipliers may be from what the barrier alone says.
+MULTIPLIER_RANGE = 1e3
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How closely the limits are approached.
+
+    Attributes
+    ----------
+    first, last : float
+        What the barrier costs at the start and at the end, in units of the cost.
+    factor : float
+        By which it shrinks from one stage to the next.
+    tolerance : float
+        Foreseen decrease below which a stage is done.
+    steps : int
+        Most Newton steps.
+    """
+
+    first: float = 6.0
+    last: float = 6e-3
+    factor: float = 0.4
+    tolerance: float = 0.02
+    steps: int = 300
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """Where a search ended.
+
+    Attributes
+    ----------
+    x : ndarray, shape (k, n, m)
+    cost : float
+        Of the sharpest criterion.
+    steps : int
+    """
+
+    x: Array
+    cost: float
+    steps: int
+
+
+def shrunk_inside(problem: Problem, x: Array, room: float = 0.03, factor: float = 0.95) -> Array | None:
+    """Shrink a motion towards its posture at rest until it is inside all limits; None where it never is.
+
+    Parameters
+    ----------
+    problem : Problem
+    x : ndarray, shape (k, n, m)
+    room : float
+        Least distance from each limit, as a share of it.
+    factor : float
+        Of each try.
+    """
+    for _ in range(400):
+        cost, values = problem.values(x)
+        if np.isfinite(cost) and np.min(_slack(problem, values)) > room:
+            return x
+        x = factor * x
+    return None
+
+
+def minimise(problem: Problem, x: Array, schedule: Schedule | None = None) -> Minimum:
+    """Lower the cost within the limits.
+
+    Parameters
+    ----------
+    problem : Problem
+    x : ndarray, shape (k, n, m)
+        Strictly inside the limits.
+    schedule : Schedule, optional
+    """
+    plan = Schedule() if schedule is None else schedule
+    span = np.log(plan.first / plan.last)
+    damping = 1e-3
+    gap, steps = plan.first, 0
+    multipliers: Array | None = None
+    while True:
+        share = float(np.clip(np.log(plan.first / gap) / span, 0.0, 1.0)) if span > 0.0 else 1.0
+        stage = problem.sharpened(share)
+        cost, values = stage.values(x)
+        slack = _slack(stage, values)
+        mu = gap / slack.size
+        if multipliers is None:
+            multipliers = mu / slack
+        stage_steps = 0
+        while steps < plan.steps:
+            slopes = stage.slopes(x)
+            direction = _Direction(stage, slopes, slack, multipliers, mu)
+            found = direction.search(x, cost, damping)
+            steps, stage_steps = steps + 1, stage_steps + 1
+            if found is None:
+                break
+            x, cost, slack, multipliers, damping = found.x, found.cost, found.slack, found.multipliers, found.damping
+            if found.decrease < plan.tolerance:
+                break
+        if gap <= plan.last or steps >= plan.steps:
+            return Minimum(x, problem.sharpened(1.0).values(x)[0], steps)
+        gap = max(plan.last, plan.factor * gap)
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    x: Array
+    cost: float
+    slack: Array
+    multipliers: Array
+    damping: float
+    decrease: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Direction:
+    problem: Problem
+    slopes: Slopes
+    slack: Array
+    multipliers: Array
+    mu: float
+
+    def search(self, x: Array, cost: float, damping: float) -> _Step | None:
+        """Take a Newton step that lowers the barrier function; None where none does."""
+        slack, mu = self.slack, self.mu
+        two = self.problem.two_sided
+        stiffness = self.multipliers / slack
+        force = -(self.slopes.gradient + self.slopes.pull(_fold(mu / slack, two, -1.0)))
+        matrix = self.slopes.curvature(_fold(stiffness, two, 1.0))
+        merit = cost - mu * np.sum(np.log(slack))
+        diagonal = np.arange(matrix.shape[1])
+        scale = np.mean(matrix[:, diagonal, diagonal])
+        while damping <= MOST_DAMPING:
+            damped = matrix.copy()
+            damped[:, diagonal, diagonal] += damping
+            try:
+                dx = np.array([cho_solve(cho_factor(a), b) for a, b in zip(damped, force, strict=True)])
+            except LinAlgError:
+                damping = max(10.0 * damping, 1e-12 * scale)
+                continue
+            closing = _unfold(self.slopes.push(dx), two)
+            near = closing > 0.0
+            length = min(1.0, NEARLY * float(np.min(slack[near] / closing[near]))) if near.any() else 1.0
+            slope = float(np.sum(force * dx))
+            for halving in range(HALVINGS):
+                moved = x + length * dx.reshape(x.shape)
+                there, values = self.problem.values(moved)
+                room = _slack(self.problem, values) if np.isfinite(there) else np.zeros(1)
+                if np.min(room) > 0.0 and there - mu * np.sum(np.log(room)) <= merit - SUFFICIENT * length * slope:
+                    wanted = self.multipliers + length * (mu / slack - self.multipliers + stiffness * closing)
+                    usual = mu / room
+                    wanted = np.where(wanted > 0.0, wanted, usual)
+                    held = np.clip(wanted, usual / MULTIPLIER_RANGE, usual * MULTIPLIER_RANGE)
+                    eased = damping * (0.3 if halving == 0 else 2.0)
+                    return _Step(moved, there, room, held, max(eased, LEAST_DAMPING), slope)
+                length *= 0.5
+            damping *= 10.0
+        return None
+
+
+def _slack(problem: Problem, values: Array) -> Array:
+    """Distance of rows (R, N) from their bounds: from the upper ones, then from the lower ones that exist."""
+    bounds = problem.bounds[: len(values), None]
+    two = problem.two_sided[: len(values)]
+    return np.concatenate([bounds - values, (bounds + values)[two]])
+
+
+def _fold(u: Array, two: NDArray[np.bool_], sign: float) -> Array:
+    """Bring what belongs to upper and lower bounds back to rows; the upper ones push down."""
+    count = len(two)
+    rows = u[:count].copy()
+    rows[two] += sign * u[count:]
+    return rows
+
+
+def _unfold(rows: Array, two: NDArray[np.bool_]) -> Array:
+    return np.concatenate([rows, -rows[two]])

@@ -1,0 +1,293 @@
+"""The report of a diagnosis: from the residual to the effect to the gain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from scara_ident.diagnosis.diagnosis import Diagnosis, FoundEffect
+from scara_ident.diagnosis.search import DELAY, Step
+from scara_ident.effects import EffectTerm
+from scara_ident.effects.measurement import shifted
+from scara_ident.estimators import Estimate
+from scara_ident.recording import Recording
+from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.html.experiments import next_experiments
+from scara_ident.report.html.page import (
+    Block,
+    Cell,
+    Page,
+    Section,
+    bar,
+    escape,
+    folded,
+    heading,
+    listing,
+    paragraph,
+    superscripts,
+    table,
+    tag,
+)
+from scara_ident.report.html.residual import residual_blocks
+from scara_ident.report.html.story import Chapter, chapter_group, moment_group
+from scara_ident.report.html.torque import torque_group
+from scara_ident.report.html.traces import Trace, traces
+from scara_ident.threads import one_blas_thread
+
+
+def diagnosis_report(
+    path: Path, diagnosis: Diagnosis, recordings: Sequence[Recording], validation: Sequence[Recording] = ()
+) -> None:
+    """Write the report of a diagnosis as one HTML file.
+
+    Parameters
+    ----------
+    path : Path
+    diagnosis : Diagnosis
+    recordings, validation : sequence of Recording
+        Those that every choice was made on, and those that were held out; as they were given.
+
+    Raises
+    ------
+    ScaraIdentError
+        If the file cannot be written.
+    """
+    diagnosis_page(diagnosis, recordings, validation).write(path)
+
+
+def diagnosis_page(diagnosis: Diagnosis, recordings: Sequence[Recording], validation: Sequence[Recording] = ()) -> Page:
+    """Assemble the report of a diagnosis."""
+    content = diagnosis_dict(diagnosis)
+    robot, bands = diagnosis.robot, diagnosis.search.bands
+    delay = diagnosis.search.delay[0] if diagnosis.search.delay else 0.0
+    held_out = tuple(shifted(recording, delay) for recording in validation) if delay else tuple(validation)
+    with one_blas_thread():
+        story = _story_blocks(diagnosis, content, recordings)
+        parts = {
+            recording.name: traces(diagnosis.after.model, diagnosis.after.value, recording, bands)
+            for recording in (*held_out, *diagnosis.search.recordings)
+        }
+    fitted = [part for recording in recordings for part in parts[recording.name]]
+    kept = [part for recording in validation for part in parts[recording.name]]
+    names = {recording.name for recording in validation}
+    experiments = next_experiments(diagnosis)
+    sections = [
+        Section("gain", "Before and after", _gain_blocks(diagnosis, content)),
+        Section("story", "The story", story),
+        Section(
+            "next",
+            "What to do next",
+            (listing(experiments) if experiments else paragraph("Nothing in these recordings asks for another experiment."),),
+        ),
+        Section("left", "What is left", (*_left_blocks(diagnosis), *residual_blocks(robot, {"training": fitted, "held out": kept}, bands))),
+        Section("torque-section", "Torque", (paragraph("Predicted by the model with the effects found."), torque_group(robot, parts, bands, names))),
+        Section("candidates", "Candidates", _candidate_blocks(content)),
+        Section("limits", "What cannot be known", _limit_blocks(diagnosis, content)),
+    ]
+    if diagnosis.notes:
+        sections.append(Section("notes", "Notes on the data", (listing(diagnosis.notes),)))
+    subtitle = (
+        f"{diagnosis.before.model.name} model; {len(recordings)} recordings, {len(validation)} held out; "
+        f"{diagnosis.search.tried} candidates and scan points tried; verdict: {diagnosis.verdict}"
+    )
+    return Page(f"Diagnosis of {robot.name}", subtitle, content["summary"], sections, diagnosis.verdict == "unexplained")
+
+
+def _gain_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
+    robot = diagnosis.robot
+    rows: list[list[Cell | str]] = []
+    for kind, words in (("validation", "held out"), ("training", "training")):
+        part = content[kind]
+        for j, joint in enumerate(robot.joints if part["before"] else ()):
+            before, after = part["before"][joint], part["after"][joint]
+            floor = content["noise_floor"][joint] if joint in content["noise_floor"] else None
+            rows.append(
+                [
+                    words,
+                    Cell(escape(joint), "name"),
+                    _number(before),
+                    _number(after),
+                    _change(before, after),
+                    _share(part["before_relative"][joint]),
+                    _share(part["after_relative"][joint]),
+                    _number(floor),
+                    robot.torque_unit(j),
+                ]
+            )
+    head = ("recordings", "joint", "before", "after", "", "before, of torque", "after, of torque", "noise floor", "unit")
+    blocks: list[Block] = [
+        paragraph("Rms residual within the band. Held-out recordings took no part in any choice; the noise floor is what does not repeat."),
+        table(head, rows, numeric=(2, 3, 5, 6, 7)),
+    ]
+    detail = [
+        [Cell(escape(name), "name"), kind, *(x for joint in robot.joints for x in (_number(row["before"][joint]), _number(row["after"][joint])))]
+        for kind in ("validation", "training")
+        for name, row in content["recordings"][kind].items()
+    ]
+    columns = ["recording", "", *(f"{joint} {when}" for joint in robot.joints for when in ("before", "after"))]
+    return [*blocks, folded("every recording", table(columns, detail, numeric=range(2, len(columns))))]
+
+
+def _change(before: float | None, after: float | None) -> Cell:
+    if not before or after is None:
+        return Cell("")
+    return Cell(f"{bar(after / before)} {100.0 * (after / before - 1.0):+.0f} %")
+
+
+def _story_blocks(diagnosis: Diagnosis, content: dict[str, Any], recordings: Sequence[Recording]) -> list[Block]:
+    if not diagnosis.effects:
+        return [paragraph(f"{diagnosis.search.tried} candidates were tried and none was let in; their reasons stand under Candidates.")]
+    search = diagnosis.search
+    bands = search.bands
+    blocks: list[Block] = []
+    corrected: Sequence[Recording] = recordings
+    estimate: Estimate = search.start
+    before = _all_traces(estimate, corrected, bands)
+    for number, (step, effect) in enumerate(zip(search.steps, diagnosis.effects, strict=True), start=1):
+        if effect.effect == DELAY and effect.joint is None:
+            corrected = search.recordings
+        estimate = step.estimate
+        after = _all_traces(estimate, corrected, bands)
+        chapter = Chapter(number, effect.effect, _shown_joint(effect, diagnosis), before, after, _term(step), estimate, bands)
+        blocks += [heading(f"{number}. {_title(effect)}"), *_effect_words(effect)]
+        blocks += [chapter_group(diagnosis.robot, chapter), moment_group(diagnosis.robot, chapter)]
+        before = after
+    if content["moved"]:
+        rows = [[Cell(escape(m["name"]), "name"), f"{m['before']:.4g}", f"{m['after']:.4g}", f"{m['in_std']:+.1f}"] for m in content["moved"]]
+        blocks += [
+            heading("Parameters that the missing effects had bent"),
+            table(("name", "before", "after", "change / std"), rows, numeric=(1, 2, 3)),
+        ]
+    return blocks
+
+
+def _all_traces(estimate: Estimate, recordings: Sequence[Recording], bands: Sequence[float | None]) -> list[Trace]:
+    return [part for recording in recordings for part in traces(estimate.model, estimate.value, recording, bands)]
+
+
+def _term(step: Step) -> EffectTerm | None:
+    candidate = step.decision.candidate
+    for term in step.estimate.model.terms:
+        if isinstance(term, EffectTerm) and term.effect is candidate.effect and term.member == candidate.member:
+            return term
+    return None
+
+
+def _shown_joint(effect: FoundEffect, diagnosis: Diagnosis) -> int:
+    """Return the effect's joint, or the one where it removes the largest share."""
+    joints = diagnosis.robot.joints
+    if effect.joint is not None:
+        return joints.index(effect.joint)
+    ratios = [(effect.after[joint] or 0.0) / (effect.before[joint] or 1.0) for joint in joints]
+    return ratios.index(min(ratios))
+
+
+def _title(effect: FoundEffect) -> str:
+    return effect.effect if effect.joint is None else f"{effect.effect} on {effect.joint}"
+
+
+def _effect_words(effect: FoundEffect) -> list[Block]:
+    helps, voting = effect.votes
+    gains = ", ".join(f"{joint} {_number(effect.before[joint])} to {_number(effect.after[joint])}" for joint in effect.before)
+    words = (
+        f"{effect.description[:1].upper()}{effect.description[1:]}. It removes {effect.gain:.0%} of the squared residual on data that it was not "
+        f"fitted to, helps in {helps} of {voting} trajectories that excite it, and would come about by chance with p = {effect.p_value:.1e}. "
+        f"Rms on the training recordings: {gains}."
+    )
+    rows = [
+        [Cell(escape(name), "name"), f"{parameter.value:.4g}", f"{parameter.std:.2g}", superscripts(parameter.unit)]
+        for name, parameter in effect.parameters.items()
+    ]
+    blocks: list[Block] = [paragraph(words), table(("parameter", "value", "std", "unit"), rows, numeric=(1, 2))]
+    if effect.confounded_with:
+        others = ", ".join(f"{rival.label} (would remove {rival.gain:.0%} in its place)" for rival in effect.confounded_with)
+        blocks.append(paragraph(f"These recordings cannot tell it from: {others}."))
+    return blocks
+
+
+def _left_blocks(diagnosis: Diagnosis) -> list[Block]:
+    blocks: list[Block] = []
+    if diagnosis.fit_after:
+        earlier = {fit.joint: fit for fit in diagnosis.fit_before}
+        rows = []
+        for fit in diagnosis.fit_after:
+            before = earlier.get(fit.joint)
+            rows.append(
+                [
+                    Cell(escape(fit.joint), "name"),
+                    _number(before.missing if before else None),
+                    _number(fit.missing),
+                    _number(fit.noise),
+                    f"{fit.p_value:.1e}",
+                    Cell(tag("nothing repeats", "good") if fit.p_value > 0.01 else tag("something repeats", "bad")),
+                ]
+            )
+        head = ("joint", "repeats, before", "repeats, after", "does not repeat", "p", "")
+        blocks += [
+            paragraph("From repetitions: what of the residual repeats from run to run, which a model could explain, against what does not (rms)."),
+            table(head, rows, numeric=(1, 2, 3, 4)),
+        ]
+    if diagnosis.dependences:
+        rows = [
+            [Cell(escape(item.joint), "name"), " and ".join(item.signals), Cell(f"{item.explained:.1%}", "num", max(0.0, min(1.0, item.explained))), f"{item.rms:.3g}"]
+            for item in diagnosis.dependences[:6]
+        ]
+        blocks += [
+            paragraph("What the remainder depends on: share of its square that means over signals explain on trajectories that they were not taken from."),
+            table(("joint", "signals", "explained", "rms"), rows, numeric=(2, 3)),
+        ]
+    return blocks
+
+
+def _candidate_blocks(content: dict[str, Any]) -> list[Block]:
+    rows: list[list[Cell | str]] = []
+    most = max((abs(row["gain"]) for row in content["candidates"]), default=0.0) or 1.0
+    for row in content["candidates"]:
+        good = row["decision"] == "accepted"
+        helps, voting = row["helps_in"]
+        rows.append(
+            [
+                Cell(escape(row["label"]), "name"),
+                Cell(f"{bar(row['gain'] / most)} {row['gain']:.2%}"),
+                f"{row['p_value']:.1e}",
+                f"{helps} of {voting}",
+                Cell(tag(row["decision"], "good" if good else "plain")),
+                Cell(escape(row["why"]), "words"),
+            ]
+        )
+    return [
+        paragraph("What else was tried beside the effects found, best member of every family: share of the squared residual removed on data not fitted to, p corrected for all that was tried."),
+        table(("candidate", "gain", "p", "helps in", "decision", "why"), rows, numeric=(2,)),
+    ]
+
+
+def _limit_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
+    blocks: list[Block] = [heading("Groups that these recordings cannot tell apart")]
+    groups = [effect for effect in diagnosis.effects if effect.confounded_with]
+    if groups:
+        blocks.append(listing(f"{_title(effect)} | {' | '.join(dict.fromkeys(rival.label for rival in effect.confounded_with))}" for effect in groups))
+    else:
+        blocks.append(paragraph("None among the effects found." if diagnosis.effects else "No effect was found."))
+    if content["not_identifiable"]:
+        rows = [
+            [Cell(escape(row["effect"]), "name"), Cell(escape(", ".join(row["absorbed_by"]) or "no torque at all"), "words"), Cell(escape(row["opened_by"]), "words")]
+            for row in content["not_identifiable"]
+        ]
+        blocks += [
+            heading("Effects that the model absorbs on any data"),
+            paragraph("Neither found nor excluded: whatever the arm does, these parameters take them up."),
+            table(("effect", "absorbed by", "what would show it"), rows),
+        ]
+    return blocks
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3g}"
+
+
+def _share(value: float | None) -> str:
+    return "–" if value is None else f"{value:.1%}"
+
+
+__all__ = ["diagnosis_page", "diagnosis_report"]

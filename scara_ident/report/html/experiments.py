@@ -1,0 +1,81 @@
+"""What experiment to do next: what would tell effects apart, or show one that the recordings cannot."""
+
+from __future__ import annotations
+
+from scara_ident.diagnosis.decision import FAMILY_ERROR
+from scara_ident.diagnosis.diagnosis import Diagnosis
+from scara_ident.diagnosis.examination import WEAK
+from scara_ident.report.diagnosis import best_by_label
+
+# What brings each effect out against the others.
+EXPERIMENTS = {
+    "transmission_loss": "accelerate hard at low speed, then the same path with a known payload: a gear's loss grows with the load, friction does not",
+    "stribeck": "run at eight or more constant speeds, spaced by a constant factor down to creeping",
+    "asymmetric_friction": "run the same path in both directions at several constant speeds",
+    "presliding": "reverse often with small amplitude at two speeds: its memory is in angle, a delay's is in time",
+    "warm_up": "run the same trajectory cold and again after half an hour of motion, with the time of day recorded",
+    "torque_ripple": "move slowly at constant speed over several motor turns and record at a high rate",
+    "position_dependent_friction": "run over the whole stroke at constant speed in both directions: half the difference is friction",
+    "spring": "hold still, or creep, at positions over the whole range: a spring grows with the angle, a tilt follows its sine",
+    "base_tilt": "hold still, or creep, at positions over more than half a turn: a tilt follows the angle's sine, a spring the angle",
+    "payload_change": "repeat the run with the payload fastened, and once without it",
+    "time_delay": "run the same path at two speeds: a delay's error grows with the third power of speed",
+    "torque_sensor_nonlinearity": "hold a known load at several torques, or repeat with a payload at the same speed",
+    "torque_gain_mismatch": "repeat with a known payload: it gives both joints the same scale",
+    "joint_elasticity": "excite above 5 Hz with short steps, and look for a resonance that stays at its frequency",
+    "backlash": "reverse under little load, and look for the angle within which no torque is needed",
+    "encoder_eccentricity": "run at two constant speeds: an error of the encoder grows with the square of speed, ripple does not",
+    "friction_coupling": "move the other joint alone while this one holds still",
+    "offset_drift": "hold still for the length of a run, at its beginning and at its end",
+    "vibration": "record at rest with the drives on: what is periodic then does not come from the motion",
+}  # fmt: skip
+# Candidates of which more could be said with other recordings, at the most.
+MOST = 4
+
+
+def next_experiments(diagnosis: Diagnosis) -> list[str]:
+    """Return in words what to record next, the most useful first."""
+    found = []
+    if diagnosis.unexplained is not None:
+        remainder = diagnosis.unexplained
+        if remainder.signals:
+            signals = " and ".join(remainder.signals)
+            found.append(
+                f"To learn what is left on {remainder.joint}: move slowly over the whole range of {signals}, all else as constant "
+                "as can be, in both directions and at two speeds; then with a payload."
+            )
+        else:
+            found.append(f"To learn what is left on {remainder.joint}: repeat one trajectory at half the speed; how the remainder scales tells friction from inertia and from delays.")  # fmt: skip
+    for effect in diagnosis.effects:
+        if effect.confounded_with:
+            others = ", ".join(dict.fromkeys(rival.label for rival in effect.confounded_with))
+            found.append(f"To tell {_label(effect.effect, effect.joint)} from {others}: {_experiment(effect.effect)}.")
+    if not diagnosis.fit_after:
+        found.append("To know the noise floor: record every trajectory at least twice.")
+    if not diagnosis.validation_before:
+        found.append("To trust the result: record a trajectory that takes no part in the diagnosis and give it with --validate.")
+    hidden, faint = [], []
+    for decision in best_by_label(diagnosis.search.decisions):
+        if decision.accepted:
+            continue
+        if decision.examination.outside < WEAK:
+            hidden.append(decision)
+        elif decision.examination.p_value * diagnosis.search.tried < FAMILY_ERROR and decision.gain > 0.0:
+            faint.append(decision)
+    found += [
+        f"To judge {decision.label}, significant but not accepted ({decision.why}): {_experiment(decision.candidate.effect.name)}."
+        for decision in faint[:MOST]
+    ]
+    found += [
+        f"To see {decision.label} at all, which these recordings cannot show: {_experiment(decision.candidate.effect.name)}."
+        for decision in hidden[:MOST]
+    ]
+    return found
+
+
+def _label(effect: str, joint: str | None) -> str:
+    return effect if joint is None else f"{effect} of {joint}"
+
+
+def _experiment(effect: str) -> str:
+    return EXPERIMENTS.get(effect, "record the same path at two speeds, in both directions, with and without a payload")
