@@ -194,15 +194,20 @@ def _csv_header(path: Path) -> list[str]:
     with path.open(encoding="utf-8-sig", newline="") as file:
         for line in file:
             if line.strip():
-                separator = max(SEPARATORS, key=line.count)
-                return next(csv.reader([line], delimiter=separator))
+                return next(csv.reader([line.strip()], delimiter=_sign_between(line)))
     return []
 
 
 def _separator(path: Path) -> str:
     with path.open(encoding="utf-8-sig", newline="") as file:
         header = next((line for line in file if line.strip()), "")
-    return max(SEPARATORS, key=header.count)
+    return _sign_between(header)
+
+
+def _sign_between(header: str) -> str:
+    """Return what separates the names of a header; blanks only where nothing else does."""
+    sign = max(SEPARATORS, key=header.count)
+    return " " if sign not in header and " " in header.strip() else sign
 
 
 def _has_decimal_comma(path: Path) -> bool:

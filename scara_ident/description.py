@@ -217,5 +217,6 @@ def _owner(location: tuple[int | str, ...]) -> type[BaseModel]:
         return RobotDescription
     if len(rest) == 1:
         return RecordingDescription
-    plain = {"time": TimeDescription, "effort": SignalDescription, "temperature": SignalDescription}
-    return plain.get(str(rest[0]), MotionDescription)
+    if rest[0] == "time":
+        return TimeDescription
+    return SignalDescription if rest[0] in ("effort", "temperature") else MotionDescription

@@ -42,7 +42,7 @@ class Information:
     @staticmethod
     def empty(parameters: int) -> Information:
         """Return the information of no rows: nothing is known of any parameter."""
-        return Information(np.zeros((parameters + 1, parameters + 1)), 0.0)
+        return Information(np.zeros((0, parameters + 1)), 0.0)
 
     @staticmethod
     def prior(mean: Array, std: Array) -> Information:
@@ -191,7 +191,7 @@ class Information:
 
     def _full_rank(self, size: Array) -> bool:
         # As in `solve`: rounding leaves a zero singular value at 1e-16 of the largest, not at 0.
-        if size.size == 0 or np.any(size == 0.0):
+        if size.size == 0 or np.any(size == 0.0) or len(self.regressor_factor) < len(size):
             return False
         singular = np.linalg.svd(self.regressor_factor / size, compute_uv=False)
         return bool(singular[-1] > UNDETERMINED * singular[0])
@@ -233,6 +233,6 @@ def merge(parts: Iterable[Information]) -> Information:
 
 def triangular(rows: Array) -> Array:
     """Triangular factor of rows; rows that are fewer than the columns are kept as they are."""
-    if rows.shape[0] <= rows.shape[1] and rows.shape[0] <= 1:
+    if rows.shape[0] <= 1:
         return rows
     return np.asarray(np.linalg.qr(rows, mode="r"))

@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.audit import Finding, Samples, audit
-from scara_ident.columns import SUFFIXES, column_names, read_columns, write_columns
+from scara_ident.channels import Channel, Channels, contract_channels
+from scara_ident.columns import write_columns
 from scara_ident.errors import RecordingError, UsageError
+from scara_ident.importers import READERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
 
 if TYPE_CHECKING:
     from scara_ident.robot import Robot
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 OPTIONAL = ("velocity", "acceleration", "temperature")
+_OTHERS = ", ".join([*list(READERS)[2:], "rosbag2 folder"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,15 +107,21 @@ def split_name(stem: str) -> tuple[str, int]:
     return (match[1], int(match[2])) if match else (stem, 1)
 
 
+def recording_name(path: Path) -> str:
+    """Return the name of a recording: the stem of its file, or the name of its folder."""
+    return path.resolve().name if path.is_dir() else path.stem
+
+
 def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) -> Recording:
     """Read a recording and audit it.
 
     Parameters
     ----------
     path : path
-        A Parquet or CSV file, by its suffix.
+        A file of a kind that `scara_ident.importers` knows by its suffix, or the folder of a rosbag2 recording.
     robot : Robot
-        Says which joints are wanted, in which order, and what a recorded effort is worth.
+        Says which joints are wanted, in which order, in which columns and units they stand, and what a recorded
+        effort is worth.
     need_effort : bool
         Whether a file without efforts is refused. Where they are not needed, efforts are read if they are complete.
 
@@ -126,42 +135,44 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
         In one line: the file, the column and row, and what to do.
     """
     path = Path(path)
-    names = column_names(path)
-    position = [f"{joint}.position" for joint in robot.joints]
-    effort = [f"{joint}.effort" for joint in robot.joints]
+    channels = robot.channels or contract_channels(robot.joints)
+    names = column_names(path, channels.topic)
+    needed = [channels.time, *channels.position, *(channels.effort if need_effort else ())]
+    _refuse_missing(path, names, [channel.column for channel in needed], channels)
+    optional, findings = _optional_channels(path, channels, names, () if need_effort else ("effort",))
+    wanted = [channel.column for channel in (*needed, *chain.from_iterable(optional.values()))]
+    columns = read_columns(path, wanted, channels.topic)
 
-    needed = ["time", *position, *(effort if need_effort else ())]
-    _refuse_missing(path, names, needed)
-    optional, findings = _optional_columns(robot, names, () if need_effort else ("effort",))
-    columns = read_columns(path, [*needed, *chain.from_iterable(optional.values())])
+    def rows(wanted: Sequence[Channel]) -> Array:
+        return np.array([channel.si(columns.pop(channel.column)) for channel in wanted])
 
-    def rows(wanted: Sequence[str]) -> Array:
-        return np.array([columns.pop(name) for name in wanted])
-
-    time = np.array(columns.pop("time"))
+    time = channels.time.si(np.array(columns.pop(channels.time.column)))
     samples = Samples(
         source=str(path),
         robot=robot,
         time=time,
-        position=rows(position),
-        effort=rows(effort) if need_effort else None,
+        position=rows(channels.position),
+        effort=rows(channels.effort) if need_effort else None,
         row=np.arange(1, len(time) + 1),
     )
+    if shares_clock(path, channels.time.column):
+        samples = samples.kept(_of_this_arm(samples))
     samples, audited = audit(samples)
     findings += audited
     signals = {"effort": samples.effort}
-    for signal, wanted in optional.items():
-        values = rows(wanted)[:, samples.row - 1] if samples.count < len(time) else rows(wanted)
+    for signal, places in optional.items():
+        values = rows(places)[:, samples.row - 1] if samples.count < len(time) else rows(places)
         if np.isfinite(values).all():
             signals[signal] = values
         else:
-            findings.append(_lacking(samples, signal, wanted, values))
+            findings.append(_lacking(samples, signal, [channel.column for channel in places], values))
     if signals["effort"] is not None:
         signals["effort"] = signals["effort"] * robot.effort_gain[:, None]
 
-    trajectory, repetition = split_name(path.stem)
+    name = recording_name(path)
+    trajectory, repetition = split_name(name)
     return Recording(
-        name=path.stem,
+        name=name,
         trajectory=trajectory,
         repetition=repetition,
         joints=robot.joints,
@@ -179,7 +190,8 @@ def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: b
     Parameters
     ----------
     words : sequence of path or str
-        Each a file, a folder (its Parquet and CSV files in natural order, not those of its folders) or a glob.
+        Each a file, a folder (its recordings in natural order, not those of its folders; the folder of a rosbag2
+        recording is one recording) or a glob.
     robot : Robot
         See `read_recording`.
     need_effort : bool
@@ -209,12 +221,12 @@ def recording_paths(words: Sequence[Path | str]) -> tuple[Path, ...]:
             real = path.resolve()
             if real in found:
                 continue
-            if path.stem in stems:
+            name = recording_name(path)
+            if name in stems:
                 raise RecordingError(
-                    f"{stems[path.stem]} and {path}: two recordings named {path.stem!r}; rename one, "
-                    "results are listed by name"
+                    f"{stems[name]} and {path}: two recordings named {name!r}; rename one, results are listed by name"
                 )
-            found[real] = stems[path.stem] = path
+            found[real] = stems[name] = path
     return tuple(found.values())
 
 
@@ -245,7 +257,13 @@ def write_recording(recording: Recording, path: Path | str, *, effort_gain: Arra
     write_columns(Path(path), columns)
 
 
-def _refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str]) -> None:
+def _of_this_arm(samples: Samples) -> NDArray[np.bool_]:
+    """Tell which rows hold any number of the arm, shape (N,); the others are other signals' samples."""
+    channels = samples.position if samples.effort is None else np.vstack((samples.position, samples.effort))
+    return np.asarray(np.isfinite(channels).any(axis=0))
+
+
+def _refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str], channels: Channels) -> None:
     missing = [name for name in wanted if name not in names]
     if not missing:
         return
@@ -256,32 +274,46 @@ def _refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str]) -> 
     name = missing[0]
     more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
     ending = name.rpartition(".")[2]
-    have = [other for other in names if other.endswith(f".{ending}")] if "." in name else list(names)
+    mapped = _declaring(channels, name)
+    have = [other for other in names if other.endswith(f".{ending}")] if "." in name and not mapped else list(names)
     lower = {other.lower(): other for other in names}
     near = get_close_matches(name.lower(), lower, n=1, cutoff=0.75)
     guess = f"is it {lower[near[0]]!r}? " if near else ""
-    kind = f"{ending} columns" if "." in name else "columns"
+    kind = f"{ending} columns" if "." in name and not mapped else "columns"
     shown = ", ".join(have[:8]) + (", ..." if len(have) > 8 else "") if have else "none"
-    raise RecordingError(
-        f"{path}: no column {name!r}{more}; {guess}its {kind}: {shown}; "
-        "rename the column, or correct the joints in the robot description"
-    )
+    remedy = "rename the column, or correct the joints in the robot description"
+    if mapped:
+        remedy = f"correct recording: {mapped} in the robot description"
+    elif len(missing) == len(wanted):
+        remedy = f"map its columns in the robot description; a first one writes: scara-ident inspect {path.name}"
+    raise RecordingError(f"{path}: no column {name!r}{more}; {guess}its {kind}: {shown}; {remedy}")
 
 
-def _optional_columns(
-    robot: Robot, names: Sequence[str], more: Sequence[str]
-) -> tuple[dict[str, list[str]], list[Finding]]:
-    columns: dict[str, list[str]] = {}
+def _declaring(channels: Channels, column: str) -> str:
+    """Return the signal for which the robot description names a column, or nothing."""
+    for signal in channels.declared:
+        places = (channels.time,) if signal == "time" else channels.of(signal)
+        if any(channel.column == column for channel in places):
+            return signal
+    return ""
+
+
+def _optional_channels(
+    path: Path, channels: Channels, names: Sequence[str], more: Sequence[str]
+) -> tuple[dict[str, tuple[Channel, ...]], list[Finding]]:
+    found: dict[str, tuple[Channel, ...]] = {}
     findings = []
     for signal in (*more, *OPTIONAL):
-        wanted = [f"{joint}.{signal}" for joint in robot.joints]
-        absent = [name for name in wanted if name not in names]
+        wanted = channels.of(signal)
+        absent = [channel.column for channel in wanted if channel.column not in names]
         if not absent:
-            columns[signal] = wanted
+            found[signal] = wanted
+        elif signal in channels.declared:
+            _refuse_missing(path, names, absent, channels)
         elif len(absent) < len(wanted):
             said = f"no {', '.join(absent)} beside the other joints' {signal}: the {signal} columns are not used"
             findings.append(Finding("missing_column", said, len(absent)))
-    return columns, findings
+    return found, findings
 
 
 def _lacking(samples: Samples, signal: str, names: Sequence[str], values: Array) -> Finding:
@@ -296,10 +328,13 @@ def _lacking(samples: Samples, signal: str, names: Sequence[str], values: Array)
 
 def _paths(word: str) -> list[Path]:
     path = Path(word)
-    if path.is_dir():
+    if path.is_dir() and not is_bag_folder(path):
         found = _in_folder(path)
         if not found:
-            raise RecordingError(f"{path}: no .parquet or .csv file in this folder; name one that holds recordings")
+            raise RecordingError(
+                f"{path}: no .parquet or .csv file in this folder, nor another recording ({_OTHERS}); "
+                "name one that holds recordings"
+            )
         return found
     if path.exists():
         return [path]
@@ -310,14 +345,14 @@ def _paths(word: str) -> list[Path]:
         raise UsageError(f"{word}: no file matches")
     found = []
     for match in matches:
-        found += _in_folder(match) if match.is_dir() else [match] if match.suffix.lower() in SUFFIXES else []
+        found += [match] if is_recording(match) else _in_folder(match) if match.is_dir() else []
     if not found:
-        raise RecordingError(f"{word}: matches {len(matches)} files but no .parquet or .csv file")
+        raise RecordingError(f"{word}: matches {len(matches)} files but no .parquet or .csv file ({_OTHERS})")
     return found
 
 
 def _in_folder(folder: Path) -> list[Path]:
-    files = [f for f in folder.iterdir() if f.suffix.lower() in SUFFIXES and f.is_file() and f.name[0] != "."]
+    files = [f for f in folder.iterdir() if is_recording(f) and f.name[0] != "."]
     return sorted(files, key=lambda file: _natural(file.name))
 
 

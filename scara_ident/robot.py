@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from scara_ident.channels import Channels, build_channels
 from scara_ident.description import JointDescription, RobotDescription, read_description
 from scara_ident.errors import RobotError
 
@@ -59,6 +60,8 @@ class Robot:
         Limits on the joint side, rad/s or m/s and N m or N; infinite where the URDF gives none.
     locked : tuple of (str, float)
         Locked joints and their positions.
+    channels : Channels or None
+        Columns and units of the recordings; None for the contract's.
     """
 
     name: str
@@ -77,6 +80,7 @@ class Robot:
     velocity_limit: NDArray[np.float64]
     effort_limit: NDArray[np.float64]
     locked: tuple[tuple[str, float], ...]
+    channels: Channels | None = None
 
     @property
     def n(self) -> int:
@@ -162,6 +166,7 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
     position = np.array([model.joints[i].idx_q for i in ids], dtype=np.intp)
     unbounded = np.array([model.joints[i].nq != 1 for i in ids])
     reduction = _reductions(names, joints, urdf, tree)
+    prismatic = ["P" in model.joints[i].shortname().removeprefix("JointModel") for i in ids]
     side = description.effort_side
     if side is None:
         if np.any(reduction != 1.0):
@@ -177,7 +182,7 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
         joints=tuple(names),
         links=tuple(_moved_link(model, i) for i in ids),
         order=order,
-        prismatic=np.array(["P" in model.joints[i].shortname().removeprefix("JointModel") for i in ids]),
+        prismatic=np.array(prismatic),
         reduction=reduction,
         rotor_inertia=_rotor_inertias(names, joints, urdf, tree),
         effort_side=side,
@@ -187,6 +192,16 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
         velocity_limit=_positive_or_inf(_upper_velocity(model)[order]),
         effort_limit=_positive_or_inf(_upper_effort(model)[order]),
         locked=locked,
+        channels=None
+        if description.recording is None
+        else build_channels(
+            description.recording,
+            source,
+            names,
+            prismatic=prismatic,
+            reduction=[float(value) for value in reduction],
+            has_gain=["effort_gain" in joint.model_fields_set for joint in joints],
+        ),
     )
 
 

@@ -187,4 +187,4 @@ def test_noise_that_reaches_into_the_next_block_is_counted():
     """Blocks only three memories long: each by itself would promise a sixth too little."""
     spread, reported, kind = spread_and_reported(coloured, count=1800, length=30, draws=200)
     assert kind == "block"
-    np.testing.assert_allclose(np.mean(reported / spread), 1.0, atol=0.09)
+    np.testing.assert_allclose(np.mean(reported / spread), 1.0, atol=0.08)

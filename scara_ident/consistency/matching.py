@@ -68,7 +68,7 @@ class Match:
 
 def sizes(unknowns: Unknowns, value: Array) -> Array:
     """Return the size of each parameter, shape (p,): what a change of the nominal arm by itself does, or the value."""
-    return np.maximum(np.linalg.norm(unknowns.to_parameters, axis=1), np.abs(value))
+    return np.asarray(np.maximum(np.linalg.norm(unknowns.to_parameters, axis=1), np.abs(value)))
 
 
 @dataclass(frozen=True, eq=False)

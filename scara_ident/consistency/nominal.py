@@ -134,7 +134,7 @@ def _moved(robot: Robot, matrices: Array) -> Array:
         parameters = to_parameters @ _packed(matrices[place])
         model.inertias[int(k) + 1] = pin.Inertia.FromDynamicParameters(parameters)
     mass_matrix = pin.crba(model, model.createData(), pin.neutral(model))
-    return np.diag(mass_matrix)[robot.order].copy()
+    return np.array(np.diag(mass_matrix)[robot.order], dtype=float)
 
 
 def _packed(matrix: Array) -> Array:

@@ -86,7 +86,7 @@ def _newton(start: Array, free: Array, limits: Cones, weight: float) -> Array:
     x, value = start, _value(start, limits, weight)
     for _ in range(MOST_STEPS):
         gradient, root, local = _slopes(x, n, directions, free, limits, weight)
-        triangular = np.linalg.qr(root, mode="r")
+        triangular = np.asarray(np.linalg.qr(root, mode="r"))
         half = np.linalg.solve(triangular.T, gradient)
         step = -np.linalg.solve(triangular, half)
         decrement = float(half @ half)

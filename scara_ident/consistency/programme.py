@@ -172,7 +172,7 @@ class Programme:
         """Solve with rows that act on x instead of the model's parameters; see `solve`."""
         u = self.unknowns
         stacked = np.vstack([np.column_stack([rows, target]), np.column_stack([prior, prior @ u.reference])])
-        triangular = np.linalg.qr(stacked, mode="r")
+        triangular: Array = np.asarray(np.linalg.qr(stacked, mode="r"))
         root, info = dtrtri(triangular[: u.size, : u.size])
         if info:
             raise EstimationError("the data hold numbers that are not finite, or a weight of the prior is 0")

@@ -207,7 +207,7 @@ def _declared(model: TorqueModel) -> Iterator[tuple[int, object]]:
 
 
 def _unit_rows(rows: Array) -> Array:
-    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
 
 
 def _speed(polynomial: BrakingPolynomial, options: ConsistentOptions, joints: tuple[str, ...]) -> float:

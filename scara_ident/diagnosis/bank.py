@@ -148,6 +148,8 @@ def stack(evidence: Sequence[Evidence], weights: Array) -> Stack:
     total = 0
     for place, item in enumerate(evidence):
         for block in item.blocks:
+            if not any(part.rows for part in block):
+                continue
             starts.append(total)
             recording.append(place)
             for part, weight in zip(block, weights, strict=True):

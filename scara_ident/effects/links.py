@@ -155,12 +155,10 @@ def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Ar
         Recorded side.
     """
     scene, motion = signals.scene, signals.motion
-    sizes = [float(np.max(np.abs(part))) for part in lag[:2]]
-    steps = [SHIFT / sizes[0] if sizes[0] else np.inf]
-    steps.append(SPEED_SHIFT * float(np.max(np.abs(motion.v[joint]))) / sizes[1] if sizes[1] else np.inf)
-    step = min(steps)
-    if not 0.0 < step < np.inf:
-        return np.zeros_like(motion.q)
+    way, speed = (float(np.max(np.abs(part))) for part in lag[:2])
+    usual = float(np.max(np.abs(motion.v)))
+    # Torque is linear in acceleration, so that only position and speed bound the step.
+    step = min(SHIFT / way if way else 1.0, SPEED_SHIFT * usual / speed if speed and usual else np.inf)
     moved = [part.copy() for part in (motion.q, motion.v, motion.a)]
     for part, change in zip(moved, lag, strict=True):
         part[joint] -= step * change

@@ -25,6 +25,8 @@ LONGEST_DELAY = 0.05
 LONGEST_DELAY_SAMPLES = 5.0
 # Torque constants of one arm that differ by more than this are a wrong unit, not a mismatch.
 LARGEST_MISMATCH = 0.5
+# Torque that is held from one sample to the next, or averaged over one, is up to this many samples off its time stamp.
+SAMPLING = 1.0
 
 
 @dataclass(frozen=True)
@@ -174,6 +176,19 @@ class TimeDelay:
     def description(self, scene: Scene, member: Member) -> str:
         """Say what it is."""
         return "effort that is recorded later than position"
+
+
+def within_sampling(delay: float, rate: float) -> bool:
+    """Return whether a delay is no longer than a sample: a matter of how samples are taken, to correct but not to name.
+
+    Parameters
+    ----------
+    delay : float
+        s.
+    rate : float
+        Samples per second.
+    """
+    return abs(delay) * rate <= SAMPLING
 
 
 def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = None) -> Recording:

@@ -175,10 +175,12 @@ class Problem:
         if np.any(np.abs(cheap) >= self.bounds[: len(cheap), None]):
             return np.inf, cheap
         regressor = self.task.smooth.regressor(motion)
-        rows = [cheap, self._torques(regressor)]
-        tool = self._tool(motion)
-        rows += [row[None] for row, _ in self._tool_rows(tool, False)]
-        return self._cost(regressor)[0], np.concatenate(rows)
+        return self._cost(regressor)[0], self._limited(motion, regressor)
+
+    def limited(self, x: Array) -> Array:
+        """Return all rows of limits (R, k M), broken or not."""
+        motion = self.motion(x)
+        return self._limited(motion, self.task.smooth.regressor(motion))
 
     def slopes(self, x: Array) -> Slopes:
         """Return cost and limits with their derivatives."""
@@ -226,6 +228,10 @@ class Problem:
         return np.concatenate(
             [(motion.q - limits.centre[:, None]) / half[:, None], motion.v / limits.velocity[:, None]]
         )
+
+    def _limited(self, motion: Motion, regressor: Array) -> Array:
+        rows = [row[None] for row, _ in self._tool_rows(self._tool(motion), False)]
+        return np.concatenate([self._own(motion), self._torques(regressor), *rows])
 
     def _torques(self, regressor: Array) -> Array:
         limit = self.task.limits.torque

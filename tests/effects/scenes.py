@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
-from scara_ident.estimators.least_squares import least_squares
+from scara_ident.estimators.least_squares import wls
 from scara_ident.evidence import gather_all
 from scara_ident.model import TorqueModel, build_model
 from scara_ident.motion import Motion
@@ -69,13 +69,13 @@ def fit(
 ) -> tuple[Scene, Array, Array]:  # fmt: skip
     """Fit an effect beside the base model; scene, its coefficients and their covariance."""
     bands = (band,) * model.robot.n
-    base = least_squares(model, gather_all(model, recordings, bands), np.ones(model.robot.n), "ols")
+    base = wls(model, gather_all(model, recordings, bands))
     start = {item.name: float(item.time[0]) for item in recordings}
     scene = scene_of(model.robot, base.value, name=model.name, start=start, rate=recordings[0].rate, band=band)
     p = len(model.columns)
     for _ in range(rounds):
         wide = TorqueModel(model.name, model.robot, (*model.terms, EffectTerm(effect, member, scene)))
-        found = least_squares(wide, gather_all(wide, recordings, bands), np.ones(model.robot.n), "ols")
+        found = wls(wide, gather_all(wide, recordings, bands))
         scene = replace(scene, value=found.value[:p])
     return scene, found.value[p:], np.asarray(found.covariance)[p:, p:]
 

@@ -1,5 +1,8 @@
 """Reports as single HTML files that need no network."""
 
+from scara_ident.report.html.comparison import comparison_report
+from scara_ident.report.html.diagnosis import diagnosis_report
+from scara_ident.report.html.excitation import excitation_report
 from scara_ident.report.html.identification import identification_report
 
-__all__ = ["identification_report"]
+__all__ = ["comparison_report", "diagnosis_report", "excitation_report", "identification_report"]

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from scara_ident.diagnosis.diagnosis import Diagnosis, FoundEffect
-from scara_ident.diagnosis.search import DELAY, Step
-from scara_ident.effects import EffectTerm
+from scara_ident.diagnosis.lack_of_fit import LackOfFit
+from scara_ident.diagnosis.search import DELAY
 from scara_ident.effects.measurement import shifted
 from scara_ident.estimators import Estimate
 from scara_ident.recording import Recording
@@ -34,6 +34,10 @@ from scara_ident.report.html.story import Chapter, chapter_group, moment_group
 from scara_ident.report.html.torque import torque_group
 from scara_ident.report.html.traces import Trace, traces
 from scara_ident.threads import one_blas_thread
+
+
+# Candidates shown at once, the best first; the others unfold.
+SHOWN_CANDIDATES = 10
 
 
 def diagnosis_report(
@@ -132,7 +136,7 @@ def _gain_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
 def _change(before: float | None, after: float | None) -> Cell:
     if not before or after is None:
         return Cell("")
-    return Cell(f"{bar(after / before)} {100.0 * (after / before - 1.0):+.0f} %")
+    return Cell(f"{bar(after / before)} {round(100.0 * (after / before - 1.0)):+d} %")
 
 
 def _story_blocks(diagnosis: Diagnosis, content: dict[str, Any], recordings: Sequence[Recording]) -> list[Block]:
@@ -144,12 +148,22 @@ def _story_blocks(diagnosis: Diagnosis, content: dict[str, Any], recordings: Seq
     corrected: Sequence[Recording] = recordings
     estimate: Estimate = search.start
     before = _all_traces(estimate, corrected, bands)
-    for number, (step, effect) in enumerate(zip(search.steps, diagnosis.effects, strict=True), start=1):
-        if effect.effect == DELAY and effect.joint is None:
+    told = 0
+    for step in search.steps:
+        candidate = step.decision.candidate
+        name, joint = candidate.effect.name, candidate.joint(search.scene)
+        if name == DELAY and joint is None:
             corrected = search.recordings
         estimate = step.estimate
         after = _all_traces(estimate, corrected, bands)
-        chapter = Chapter(number, effect.effect, _shown_joint(effect, diagnosis), before, after, _term(step), estimate, bands)
+        effect = diagnosis.effects[told] if told < len(diagnosis.effects) else None
+        if effect is None or (effect.effect, effect.joint) != (name, joint):
+            # A correction too small to be called an effect.
+            before = after
+            continue
+        told += 1
+        number = told
+        chapter = Chapter(number, effect.effect, _shown_joint(effect, diagnosis), before, after, bands)
         blocks += [heading(f"{number}. {_title(effect)}"), *_effect_words(effect)]
         blocks += [chapter_group(diagnosis.robot, chapter), moment_group(diagnosis.robot, chapter)]
         before = after
@@ -164,14 +178,6 @@ def _story_blocks(diagnosis: Diagnosis, content: dict[str, Any], recordings: Seq
 
 def _all_traces(estimate: Estimate, recordings: Sequence[Recording], bands: Sequence[float | None]) -> list[Trace]:
     return [part for recording in recordings for part in traces(estimate.model, estimate.value, recording, bands)]
-
-
-def _term(step: Step) -> EffectTerm | None:
-    candidate = step.decision.candidate
-    for term in step.estimate.model.terms:
-        if isinstance(term, EffectTerm) and term.effect is candidate.effect and term.member == candidate.member:
-            return term
-    return None
 
 
 def _shown_joint(effect: FoundEffect, diagnosis: Diagnosis) -> int:
@@ -220,7 +226,7 @@ def _left_blocks(diagnosis: Diagnosis) -> list[Block]:
                     _number(fit.missing),
                     _number(fit.noise),
                     f"{fit.p_value:.1e}",
-                    Cell(tag("nothing repeats", "good") if fit.p_value > 0.01 else tag("something repeats", "bad")),
+                    Cell(_repeats(fit)),
                 ]
             )
         head = ("joint", "repeats, before", "repeats, after", "does not repeat", "p", "")
@@ -228,16 +234,25 @@ def _left_blocks(diagnosis: Diagnosis) -> list[Block]:
             paragraph("From repetitions: what of the residual repeats from run to run, which a model could explain, against what does not (rms)."),
             table(head, rows, numeric=(1, 2, 3, 4)),
         ]
-    if diagnosis.dependences:
+    telling = [item for item in diagnosis.dependences if item.explained > 0.0][:6]
+    if diagnosis.dependences and not telling:
+        blocks.append(paragraph("On no signal or pair of signals does the remainder depend in a way that holds on trajectories that it was not taken from."))
+    if telling:
         rows = [
             [Cell(escape(item.joint), "name"), " and ".join(item.signals), Cell(f"{item.explained:.1%}", "num", max(0.0, min(1.0, item.explained))), f"{item.rms:.3g}"]
-            for item in diagnosis.dependences[:6]
+            for item in telling
         ]
         blocks += [
             paragraph("What the remainder depends on: share of its square that means over signals explain on trajectories that they were not taken from."),
             table(("joint", "signals", "explained", "rms"), rows, numeric=(2, 3)),
         ]
     return blocks
+
+
+def _repeats(fit: LackOfFit) -> str:
+    if fit.p_value > 0.01:
+        return tag("nothing repeats", "good")
+    return tag("repeats, below the noise") if fit.missing <= fit.noise else tag("repeats, above the noise", "bad")
 
 
 def _candidate_blocks(content: dict[str, Any]) -> list[Block]:
@@ -248,18 +263,23 @@ def _candidate_blocks(content: dict[str, Any]) -> list[Block]:
         helps, voting = row["helps_in"]
         rows.append(
             [
-                Cell(escape(row["label"]), "name"),
-                Cell(f"{bar(row['gain'] / most)} {row['gain']:.2%}"),
+                Cell(f"<b>{escape(row['label'])}</b>", "words"),
+                Cell(f"{bar(row['gain'] / most)} {row['gain']:.2%}", "unit"),
                 f"{row['p_value']:.1e}",
                 f"{helps} of {voting}",
                 Cell(tag(row["decision"], "good" if good else "plain")),
                 Cell(escape(row["why"]), "words"),
             ]
         )
-    return [
+    head = ("candidate", "gain", "p", "helps in", "decision", "why")
+    blocks: list[Block] = [
         paragraph("What else was tried beside the effects found, best member of every family: share of the squared residual removed on data not fitted to, p corrected for all that was tried."),
-        table(("candidate", "gain", "p", "helps in", "decision", "why"), rows, numeric=(2,)),
+        table(head, rows[:SHOWN_CANDIDATES], numeric=(2,)),
     ]
+    if len(rows) > SHOWN_CANDIDATES:
+        rest = table(head, rows[SHOWN_CANDIDATES:], numeric=(2,))
+        blocks.append(folded(f"{len(rows) - SHOWN_CANDIDATES} more candidates", rest))
+    return blocks
 
 
 def _limit_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:

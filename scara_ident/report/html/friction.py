@@ -51,12 +51,10 @@ def friction_curve(term: Friction, estimate: Estimate, j: int, v: Array) -> tupl
 
 def _figures(estimate: Estimate, term: Friction, traces: Sequence[Trace], j: int) -> list[Figure]:
     robot = estimate.model.robot
-    v = np.concatenate([trace.motion.v[j, :: trace.step[j]][trace.used[j, :: trace.step[j]]] for trace in traces])
+    v = np.concatenate([trace.kept(trace.motion.v[j], j) for trace in traces])
     if len(v) < COVERAGE_BINS:
         return []
-    partial = np.concatenate(
-        [(trace.residual + trace.friction)[j, :: trace.step[j]][trace.used[j, :: trace.step[j]]] for trace in traces]
-    )
+    partial = np.concatenate([trace.kept(trace.residual[j] + trace.friction[j], j) for trace in traces])
     low, high = middle_range(v, 0.999)
     most = BEYOND * max(abs(low), abs(high))
     side = np.linspace(0.0, most, POINTS)

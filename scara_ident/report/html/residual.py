@@ -154,11 +154,7 @@ def _signals_group(robot: Robot, sets: Sets, prefix: str) -> Group:
 
 def _kept(traces: Sequence[Trace], j: int, signal: Callable[[Trace], Array]) -> Array:
     """Gather a signal over the samples of a joint that the estimate uses, as many as the band leaves independent."""
-    parts = []
-    for trace in traces:
-        used = trace.used[j, :: trace.step[j]]
-        parts.append(signal(trace)[:: trace.step[j]][used])
-    return np.concatenate(parts)
+    return np.concatenate([trace.kept(signal(trace), j) for trace in traces])
 
 
 def _scatter(x: Array, y: Array, label: str, unit: str) -> Plot:

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects import EffectTerm
-from scara_ident.estimators import Estimate
-from scara_ident.motion import low_pass
+from scara_ident.diagnosis.search import DELAY
 from scara_ident.report.html.bins import binned_means, middle_range
 from scara_ident.report.html.page import Group
-from scara_ident.report.html.plot import Band, Figure, Grid, Layer, Line, Panel, Plot, single
+from scara_ident.report.html.plot import Band, Figure, Layer, Line, Panel, Plot, single
 from scara_ident.report.html.spectra import orders, spectrum
-from scara_ident.report.html.torque import DRAWN_PER_PERIOD
+from scara_ident.report.html.torque import banded
 from scara_ident.report.html.traces import Trace
 from scara_ident.robot import Robot
 
@@ -64,6 +62,7 @@ VIEWS = {
         "rate of the predicted torque", lambda robot, trace, j: np.gradient(trace.predicted[j]) * trace.motion.rate
     ),
 }
+ADDED = "what it adds to the prediction"
 BY_ORDER = ("torque_ripple", "encoder_eccentricity")
 BY_FREQUENCY = ("vibration",)
 
@@ -79,10 +78,7 @@ class Chapter:
     joint : int
         The joint whose residual is shown.
     before, after : sequence of Trace
-    term : EffectTerm or None
-        None for an effect that is corrected in the data.
-    estimate : Estimate
-        With the effect.
+        Of the same recordings in the same order.
     bands : sequence of float or None
     """
 
@@ -91,51 +87,51 @@ class Chapter:
     joint: int
     before: Sequence[Trace]
     after: Sequence[Trace]
-    term: EffectTerm | None
-    estimate: Estimate
     bands: Sequence[float | None]
 
-    def torque(self, trace: Trace) -> Array | None:
-        """Torque of the effect on the shown joint within the band, shape (N,)."""
-        if self.term is None:
+    @property
+    def added(self) -> list[Array] | None:
+        """What the effect adds to the prediction, net of what the other parameters give back, (N,) per part.
+
+        None for an effect that was corrected in the data, which changes no prediction.
+        """
+        if self.effect == DELAY:
             return None
-        value = self.estimate.value[self.estimate.model.place(self.term)]
-        raw = self.term.regressor(trace.motion)[self.joint].T @ value
-        return low_pass(raw, trace.motion.rate, self.bands[self.joint])
+        return [after.predicted[self.joint] - before.predicted[self.joint] for before, after in zip(self.before, self.after, strict=True)]
 
 
 def chapter_group(robot: Robot, chapter: Chapter) -> Group:
     """Return the figures that show an effect before and after."""
-    effects = [chapter.torque(trace) for trace in chapter.after]
-    figures = [figure for figure in (_telling(robot, chapter, effects), _own(robot, chapter, effects)) if figure]
+    figures = [figure for figure in (_telling(robot, chapter), _own(robot, chapter)) if figure]
     return Group(f"effect-{chapter.number}", figures, (), "two")
 
 
 def moment_group(robot: Robot, chapter: Chapter) -> Group:
     """Return the residual over time before and after on the recording where the effect is strongest."""
-    j = chapter.joint
-    gains = [float(np.mean(a.residual[j] ** 2) - np.mean(b.residual[j] ** 2)) for a, b in zip(chapter.before, chapter.after, strict=True)]
+    j, added = chapter.joint, chapter.added
+    gains = [_squares(a, j) - _squares(b, j) for a, b in zip(chapter.before, chapter.after, strict=True)]
     k = int(np.argmax(gains))
     before, after = chapter.before[k], chapter.after[k]
     layers: list[Layer] = []
-    effect = chapter.torque(after)
     for trace, signal, color, name, dash in (
         (before, before.residual[j], "vermillion", "residual before", ""),
         (after, after.residual[j], "blue", "residual after", ""),
-        (after, effect, "black", "torque of the effect", "4 3"),
+        (after, None if added is None else added[k], "black", ADDED, "4 3"),
     ):
-        if signal is None:
-            continue
-        band = chapter.bands[j]
-        every = 1 if band is None else max(1, int(trace.motion.rate / (DRAWN_PER_PERIOD * band)))
-        grid = Grid(float(trace.time[0]), every / trace.motion.rate, -(-len(signal) // every))
-        layers.append(Line(grid, signal[::every], color, name, 1.3, dash))
+        if signal is not None:
+            grid, values = banded(trace, signal, chapter.bands[j])
+            layers.append(Line(grid, values, color, name, 1.3, dash))
     panel = Panel(f"torque [{robot.torque_unit(j)}]", layers, 190)
     title = f"{robot.joints[j]} on {after.recording}, where it removes most"
-    return Group(f"effect-{chapter.number}-time", (single(f"effect-{chapter.number}-time", title, "", Plot("time [s]", (panel,))),))
+    figure = single(f"effect-{chapter.number}-time", title, "", Plot("time [s]", (panel,)))
+    return Group(f"effect-{chapter.number}-time-group", (figure,))
 
 
-def _telling(robot: Robot, chapter: Chapter, effects: Sequence[Array | None]) -> Figure | None:
+def _squares(trace: Trace, j: int) -> float:
+    return float(np.sum(trace.residual[j][trace.used[j]] ** 2)) / max(1, trace.motion.samples)
+
+
+def _telling(robot: Robot, chapter: Chapter) -> Figure | None:
     name, unit = f"effect-{chapter.number}-view", robot.torque_unit(chapter.joint)
     if chapter.effect in BY_ORDER:
         return _by_order(robot, chapter, name, unit)
@@ -145,55 +141,41 @@ def _telling(robot: Robot, chapter: Chapter, effects: Sequence[Array | None]) ->
     if view is None:
         return None
     j = chapter.joint
-    plot = _means_plot(
-        robot, chapter, lambda trace: view.signal(robot, trace, j), effects, _with_unit(robot, view, j), view.along, view.share
-    )
+    plots = [[view.signal(robot, trace, j) for trace in traces] for traces in (chapter.before, chapter.after)]
+    plot = _means_plot(robot, chapter, plots[0], plots[1], _with_unit(robot, view, j), view)
     words = "Means with two standard errors; residual in the direction of motion." if view.along else "Means with two standard errors."
     return single(name, f"{robot.joints[j]}: residual over {view.label.split(' [')[0]}", words, plot)
 
 
-def _own(robot: Robot, chapter: Chapter, effects: Sequence[Array | None]) -> Figure | None:
-    if chapter.term is None:
+def _own(robot: Robot, chapter: Chapter) -> Figure | None:
+    added = chapter.added
+    if added is None:
         return None
-    places = {id(trace): k for k, trace in enumerate(chapter.after)}
-    before = {id(trace): k for k, trace in enumerate(chapter.before)}
-
-    def signal(trace: Trace) -> Array:
-        effect = effects[places.get(id(trace), before.get(id(trace), 0))]
-        assert effect is not None
-        return effect[: trace.motion.samples]
-
-    unit = robot.torque_unit(chapter.joint)
-    plot = _means_plot(robot, chapter, signal, effects, f"torque of the effect [{unit}]", False, 0.995)
-    words = "Before, the residual rises with the torque that the effect adds; after, nothing should be left of that."
-    return single(f"effect-{chapter.number}-own", "Residual over the effect's own torque", words, plot)
+    label = f"added to the prediction [{robot.torque_unit(chapter.joint)}]"
+    plot = _means_plot(robot, chapter, added, added, label, View(label, TORQUE.signal))
+    words = "If the effect is real, the residual before follows the dashed line, and nothing of it is left after."
+    return single(f"effect-{chapter.number}-own", "Residual over what the effect adds", words, plot)
 
 
 def _means_plot(
-    robot: Robot,
-    chapter: Chapter,
-    signal: Callable[[Trace], Array],
-    effects: Sequence[Array | None],
-    label: str,
-    along: bool,
-    share: float,
+    robot: Robot, chapter: Chapter, x_before: Sequence[Array], x_after: Sequence[Array], label: str, view: View
 ) -> Plot:
     j = chapter.joint
-    x_after = _kept(chapter.after, j, signal)
-    limits = middle_range(x_after, share)
-    if along and share < 0.9:
-        limits = (0.0, limits[1])
+    limits = middle_range(_kept(chapter.after, j, x_after), view.share)
     layers: list[Layer] = []
-    for traces, color, name in ((chapter.before, "vermillion", "before"), (chapter.after, "blue", "after")):
-        y = _kept(traces, j, lambda trace: trace.residual[j] * _direction(trace, j, along))
-        means = binned_means(_kept(traces, j, signal), y, limits, 30)
+    for traces, signals, color, name in (
+        (chapter.before, x_before, "vermillion", "residual before"),
+        (chapter.after, x_after, "blue", "residual after"),
+    ):
+        y = _kept(traces, j, [trace.residual[j] * _direction(trace, j, view.along) for trace in traces])
+        means = binned_means(_kept(traces, j, signals), y, limits, 30)
         layers.append(Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, color))
-        layers.append(Line(means.x, means.y, color, f"residual {name}", 1.8))
-    if chapter.term is not None:
-        own = {id(trace): effect for trace, effect in zip(chapter.after, effects, strict=True)}
-        y = _kept(chapter.after, j, lambda trace: own[id(trace)] * _direction(trace, j, along))
-        means = binned_means(x_after, y, limits, 30)
-        layers.append(Line(means.x, means.y, "black", "torque of the effect", 1.2, "4 3"))
+        layers.append(Line(means.x, means.y, color, name, 1.8))
+    added = chapter.added
+    if added is not None:
+        turned = [part * _direction(trace, j, view.along) for part, trace in zip(added, chapter.after, strict=True)]
+        means = binned_means(_kept(chapter.after, j, x_after), _kept(chapter.after, j, turned), limits, 30)
+        layers.append(Line(means.x, means.y, "black", ADDED, 1.2, "4 3"))
     return Plot(label, (Panel(f"residual [{robot.torque_unit(j)}]", layers, 220),), limits)
 
 
@@ -201,8 +183,8 @@ def _direction(trace: Trace, j: int, along: bool) -> Array | float:
     return np.sign(trace.motion.v[j]) if along else 1.0
 
 
-def _kept(traces: Sequence[Trace], j: int, signal: Callable[[Trace], Array]) -> Array:
-    return np.concatenate([signal(trace)[:: trace.step[j]][trace.used[j, :: trace.step[j]]] for trace in traces])
+def _kept(traces: Sequence[Trace], j: int, signals: Sequence[Array]) -> Array:
+    return np.concatenate([trace.kept(signal, j) for trace, signal in zip(traces, signals, strict=True)])
 
 
 def _with_unit(robot: Robot, view: View, j: int) -> str:

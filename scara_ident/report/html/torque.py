@@ -60,14 +60,21 @@ def _plot(robot: Robot, traces: Sequence[Trace], j: int, band: float | None, buc
     for trace in traces:
         above.append(_line(trace, trace.recorded[j], bucket, "grey", "recorded", 0.8))
     for trace in traces:
-        every = 1 if band is None else max(1, int(trace.motion.rate / (DRAWN_PER_PERIOD * band)))
-        grid = _grid(trace, every)
-        measured, predicted = trace.measured[j, ::every], trace.predicted[j, ::every]
+        grid, measured = banded(trace, trace.measured[j], band)
+        _, predicted = banded(trace, trace.predicted[j], band)
         above.append(Line(grid, measured, "blue", "measured", 1.6))
         above.append(Line(grid, predicted, "vermillion", "predicted", 1.4, "5 3"))
         below.append(Line(grid, measured - predicted, "green", "residual", 1.2))
     unit = robot.torque_unit(j)
     return Plot("time [s]", (Panel(f"torque [{unit}]", above, 260), Panel(f"residual [{unit}]", below, 130)))
+
+
+def banded(trace: Trace, signal: Array, band: float | None) -> tuple[Grid, Array]:
+    """Return a signal within a band without its ends, at as many samples as straight lines between them need."""
+    every = 1 if band is None else max(1, int(trace.motion.rate / (DRAWN_PER_PERIOD * band)))
+    inner = np.full(len(signal), np.nan)
+    inner[trace.core] = signal[trace.core]
+    return _grid(trace, every), inner[::every]
 
 
 def _grid(trace: Trace, every: int) -> Grid:

@@ -76,6 +76,11 @@ class Trace:
         """Recorded minus predicted torque, nothing filtered."""
         return self.recorded - self.raw_predicted
 
+    def kept(self, signal: Array, joint: int) -> Array:
+        """Return a signal at the samples of a joint that the estimate uses, as many as the band leaves independent."""
+        step = self.step[joint]
+        return np.asarray(signal[::step][self.used[joint, ::step]])
+
     @property
     def recorded(self) -> Array:
         """Torque as recorded."""

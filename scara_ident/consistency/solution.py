@@ -1,0 +1,219 @@
+"""From a triangular factor to the possible arm that explains it best, in two steps.
+
+First the parameters. Where plain least squares belongs to an arm that can exist, it is the answer and no prior pulls
+at it. Else the programme finds the best possible arm, with the prior's weak pull so that directions which the data
+hardly determine do not follow the noise to the edge of what is possible.
+
+Then what torque cannot tell: with all that it can tell held, the bodies nearest to the nominal ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.consistency.matching import fixed, is_allowed, margin_of, match, sizes
+from scara_ident.consistency.prior import nearest_to_nominal, null_space
+from scara_ident.consistency.programme import MARGIN, Point, Programme
+from scara_ident.consistency.pull import prior_rows
+from scara_ident.consistency.unknowns import Unknowns
+from scara_ident.errors import EstimationError
+from scara_ident.information import UNDETERMINED, Information, Solution
+
+Array = NDArray[np.float64]
+
+# Data without noise are not weighted beyond this share of the torque.
+LEAST_NOISE = 1e-6
+# The solver keeps its constraints to so many digits, relative to the nominal bodies.
+DIGITS = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class StandardPrior:
+    """Priors on standard parameters.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (k, 11 n)
+        Each divided by its standard deviation.
+    target : ndarray, shape (k,)
+    """
+
+    rows: Array
+    target: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ConsistentSolution:
+    """The best possible arm for one factor.
+
+    Attributes
+    ----------
+    x : ndarray
+        See `Unknowns`; what torque cannot tell is not yet filled.
+    value : ndarray, shape (p,)
+        The model's parameters.
+    point : Point or None
+        What the solver found; None where plain least squares is possible.
+    """
+
+    x: Array
+    value: Array
+    point: Point | None
+
+    @property
+    def was_possible(self) -> bool:
+        """Whether plain least squares is possible."""
+        return self.point is None
+
+
+def solve_consistent(
+    programme: Programme,
+    information: Information,
+    *,
+    noise: float | None = None,
+    standard_prior: StandardPrior | None = None,
+) -> ConsistentSolution:
+    """Find the best possible parameters for one factor; what Monte Carlo and cross-validation repeat.
+
+    Parameters
+    ----------
+    programme : Programme
+    information : Information
+        All rows, weighted, with those of priors on the model's parameters.
+    noise : float, optional
+        Standard deviation of the rows; by default their residual.
+    standard_prior : StandardPrior, optional
+
+    Returns
+    -------
+    ConsistentSolution
+
+    Raises
+    ------
+    EstimationError
+        If the programme cannot be solved.
+    """
+    u = programme.unknowns
+    least_squares = information.solve()
+    determined = least_squares.null.shape[1] == 0
+    if standard_prior is None and determined:
+        x = _determined(programme, least_squares.value)
+        if x is not None:
+            return ConsistentSolution(x, u.parameters(x), None)
+    noise = noise_of(information, least_squares) if noise is None else noise
+    rows = information.regressor_factor @ u.to_parameters / noise
+    target = information.projected_torque / noise
+    if standard_prior is not None:
+        extra = np.zeros((len(standard_prior.target), u.size))
+        extra[:, u.rigid] = standard_prior.rows @ u.nominal.to_standard
+        rows, target = np.vstack([rows, extra]), np.concatenate([target, standard_prior.target])
+    point = programme.solve_rows(rows, target, prior_rows(u, rows, target, programme.options.prior_weight))
+    if standard_prior is None and not determined:
+        x = _partly_determined(programme, least_squares, point)
+        if x is not None:
+            return ConsistentSolution(x, u.parameters(x), None)
+    margin = margin_of(u, point.x)
+    x = _inside(u, point.x, margin) if margin > -DIGITS else None
+    if x is None:
+        raise EstimationError(
+            f"the programme's solution misses its constraints by {-margin:.1g}; try richer motion, a larger "
+            "prior_weight or wider limits"
+        )
+    return ConsistentSolution(x, u.parameters(x), point)
+
+
+def fill(
+    programme: Programme,
+    information: Information,
+    x: Array,
+    *,
+    standard_prior: StandardPrior | None = None,
+) -> Array:
+    """Fill what torque cannot tell of the bodies from the nominal ones.
+
+    Parameters
+    ----------
+    programme : Programme
+    information : Information
+        The rows that x was found from.
+    x : ndarray
+        See `Unknowns`.
+    standard_prior : StandardPrior, optional
+        Standard parameters that are known and stay.
+
+    Returns
+    -------
+    ndarray
+        The same arm in all that its rows can tell, nearest to nominal in the rest.
+
+    Raises
+    ------
+    EstimationError
+        If it is not found.
+    """
+    u = programme.unknowns
+    factor = information.regressor_factor[:, u.place]
+    size = np.linalg.norm(factor, axis=0)
+    size[size == 0.0] = 1.0
+    _, singular, right = np.linalg.svd(factor / size)
+    seen = singular > UNDETERMINED * singular[0]
+    if np.all(seen) and standard_prior is None:
+        free = u.unseen
+    else:
+        rows = [right[seen] * size @ u.to_parameters[u.place, u.rigid], u.held[:, u.rigid]]
+        if standard_prior is not None:
+            rows.append(standard_prior.rows @ u.nominal.to_standard)
+        stacked = np.vstack(rows)
+        length = np.linalg.norm(stacked, axis=1, keepdims=True)
+        free = null_space(stacked / np.where(length > 0.0, length, 1.0))
+    result = x.copy()
+    result[u.rigid] = nearest_to_nominal(x[u.rigid], free, u.limits)
+    return result
+
+
+def noise_of(information: Information, solution: Solution) -> float:
+    """Return the residual of the rows, but no less than a millionth of the torque."""
+    return max(information.rms(solution.value), LEAST_NOISE * information.torque_rms) or 1.0
+
+
+def _determined(programme: Programme, value: Array) -> Array | None:
+    """Return an arm that has these parameters, None where there is none."""
+    u = programme.unknowns
+    if np.any(value[u.sums] < 0.0) or not is_allowed(u, value, programme.options.friction):
+        return None
+    found = programme.matcher.find(value)
+    return None if found is None else _inside(u, found.x, found.margin)
+
+
+def _partly_determined(programme: Programme, least_squares: Solution, point: Point) -> Array | None:
+    """Return an arm that explains the rows as well as least squares does, None where there is none.
+
+    What the rows leave open may take any value that makes the rest possible. The arm that the programme found is
+    nearest to nominal there; where one step from it is no arm, one that is furthest inside is taken.
+    """
+    u, friction = programme.unknowns, programme.options.friction
+    size = sizes(u, least_squares.value)
+    what = fixed(u, null_space((least_squares.null / size[:, None]).T).T / size)
+    target = np.concatenate([what.combinations @ least_squares.value, np.zeros(len(u.held))])
+    x = point.x + what.inverse @ (target - what.rows @ point.x)
+    if margin_of(u, x) > MARGIN and is_allowed(u, u.parameters(x), friction):
+        return x
+    found = match(u, least_squares.value, what)
+    if not found.possible or not is_allowed(u, u.parameters(found.x), friction):
+        return None
+    return _inside(u, found.x, found.margin)
+
+
+def _inside(u: Unknowns, x: Array, margin: float) -> Array | None:
+    """Move an arm at the very edge, or out by the solver's last digits, inside by the margin that all estimates keep.
+
+    It goes towards the nominal arm by a share of the distance that is no more than that margin and those digits.
+    """
+    if margin >= 0.5 * MARGIN:
+        return x
+    moved = x.copy()
+    moved[u.rigid] += (2.0 * MARGIN - margin) * (u.nominal.relative - x[u.rigid])
+    return moved if margin_of(u, moved) > 0.0 else None

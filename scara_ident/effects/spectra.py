@@ -1,0 +1,222 @@
+"""Spectra of a residual over motor angle and over time, and which of their lines stand out of their surroundings.
+
+The sums over samples are formed on a uniform grid of angle or time and transformed at once, so that a thousand
+orders cost as much as one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.motion import _fast_length as fast_length
+
+Array = NDArray[np.float64]
+
+# Points of the angle grid per period of twice the highest order; each sample is shared by its two neighbours.
+GRID_POINTS = 8
+# Points of the transform per line width: between them it is interpolated linearly.
+FINENESS = 16
+# The noise floor at a line is taken from this many line widths on either side, without the nearest few.
+NEIGHBOURS = 40.0
+GUARD = 3.0
+# At angles of which the samples do not tell cosine and sine apart a line cannot be seen.
+LEAST_DETERMINANT = 1e-3
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of a spectrum that stands out.
+
+    Attributes
+    ----------
+    position : float
+        Order or frequency, between the points of the spectrum.
+    power : float
+        In the spectrum's unit.
+    floor : float
+        Mean power of the noise around it.
+    p_value : float
+        Probability that noise alone has such a line anywhere in the spectrum.
+    """
+
+    position: float
+    power: float
+    floor: float
+    p_value: float
+
+
+def order_spectrum(residual: Array, motor_angle: Array, orders: Array) -> Array:
+    """Return how much of a residual each order of an angle explains.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (N,)
+        Of one joint; recordings whose angles have one origin are put behind each other.
+    motor_angle : ndarray, shape (N,)
+        rad, continuous over turns.
+    orders : ndarray, shape (K,)
+        Periods per turn, positive.
+
+    Returns
+    -------
+    ndarray, shape (K,)
+        Fall of the mean square when a constant, cosine and sine of ``order * motor_angle`` are fitted instead of a
+        constant: half the squared amplitude of a line.
+    """
+    wanted = np.atleast_1d(np.asarray(orders, dtype=np.float64))
+    centred = np.asarray(residual, dtype=np.float64) - np.mean(residual)
+    low, high = float(np.min(motor_angle)), float(np.max(motor_angle))
+    if not high > low:
+        return np.zeros_like(wanted)
+    # The sums are also needed at twice the orders, for the products of cosine and sine.
+    step = 2.0 * np.pi / (GRID_POINTS * 2.0 * float(np.max(wanted)))
+    first = _transform(centred, motor_angle - low, step, wanted)
+    once = _transform(np.ones_like(centred), motor_angle - low, step, wanted)
+    twice = _transform(np.ones_like(centred), motor_angle - low, step, 2.0 * wanted)
+    count = float(len(centred))
+    # Normal equations of cosine and sine once their means are taken out.
+    cc = 0.5 * (count + twice.real) - once.real**2 / count
+    ss = 0.5 * (count - twice.real) - once.imag**2 / count
+    cs = 0.5 * twice.imag - once.real * once.imag / count
+    c, s = first.real, first.imag
+    determinant = cc * ss - cs**2
+    seen = determinant > LEAST_DETERMINANT * (0.5 * count) ** 2
+    explained = np.divide(ss * c**2 - 2.0 * cs * c * s + cc * s**2, determinant, out=np.zeros_like(c), where=seen)
+    return np.asarray(np.maximum(explained, 0.0) / count)
+
+
+def frequency_spectrum(residuals: Sequence[Array], rate: float, frequencies: Array) -> Array:
+    """Return the power of lines at frequencies, whatever their phase in each recording.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, each of shape (N_r,)
+        Of one joint, one per stretch of uniform samples.
+    rate : float
+        Samples per second.
+    frequencies : ndarray, shape (K,)
+        Hz.
+
+    Returns
+    -------
+    ndarray, shape (K,)
+        Half the squared amplitude of a line, averaged over the stretches by their lengths. A Hann window keeps what
+        is strong at low frequency from leaking, and doubles the width of a line.
+    """
+    wanted = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
+    power, samples = np.zeros_like(wanted), 0
+    for residual in residuals:
+        count = len(residual)
+        window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(count) + 0.5) / count)
+        length = fast_length(FINENESS * count)
+        shape = np.asarray(residual, dtype=np.float64) - np.average(residual, weights=window)
+        spectrum = np.abs(np.fft.rfft(window * shape, length)) * 2.0 / np.sum(window)
+        amplitude = np.interp(wanted, np.arange(len(spectrum)) * (rate / length), spectrum)
+        power += 0.5 * count * amplitude**2
+        samples += count
+    return np.asarray(power / max(samples, 1))
+
+
+def order_width(motor_angle: Array) -> float:
+    """Return how far apart orders must be to be told apart: one over the turns covered."""
+    return float(2.0 * np.pi / max(float(np.ptp(motor_angle)), 1e-12))
+
+
+def frequency_width(residuals: Sequence[Array], rate: float) -> float:
+    """Return how far apart frequencies must be to be told apart under the Hann window, Hz."""
+    return 2.0 * rate / max(len(residual) for residual in residuals)
+
+
+def lines(positions: Array, power: Array, width: float, *, degrees: int = 2, significance: float = 0.01) -> list[Line]:
+    """Find the lines that noise of a smooth spectrum would not have.
+
+    Around a position the power of noise in ``degrees`` degrees of freedom is chi-squared about a local mean, taken
+    from the median of the neighbours, which a few other lines do not move. The largest over all positions is judged:
+    the p-value is for as many independent positions as there are line widths.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (K,)
+        Increasing, a few per line width.
+    power : ndarray, shape (K,)
+    width : float
+        Line width in the unit of the positions.
+    degrees : int
+        2 for a sum over all samples, 2 R for an average over R recordings of about the same length.
+    significance : float
+
+    Returns
+    -------
+    list of Line
+        The most significant first.
+    """
+    from scipy.ndimage import maximum_filter1d
+    from scipy.stats import chi2
+
+    spacing = float(np.median(np.diff(positions)))
+    floor = noise_floor(positions, power, width, degrees=degrees)
+    reach = max(1, round(width / spacing))
+    ratio = np.divide(power, floor, out=np.zeros_like(power), where=floor > 0.0)
+    top = np.flatnonzero((power == maximum_filter1d(power, 2 * reach + 1)) & (power > 0.0))
+    trials = 1.0 + (positions[-1] - positions[0]) / width
+    found = []
+    for k in top:
+        single = float(chi2.sf(degrees * ratio[k], degrees))
+        p_value = float(-np.expm1(trials * np.log1p(-min(single, 1.0 - 1e-16))))
+        if p_value <= significance:
+            found.append(Line(_between(positions, power, int(k)), float(power[k]), float(floor[k]), p_value))
+    return sorted(found, key=lambda line: (line.p_value, -line.power / line.floor))
+
+
+def noise_floor(positions: Array, power: Array, width: float, *, degrees: int = 2) -> Array:
+    """Return the mean power of noise around every position, shape (K,), from the median of its neighbours."""
+    from scipy.special import gammaincinv
+
+    spacing = float(np.median(np.diff(positions)))
+    guard, reach = round(GUARD * width / spacing), round(NEIGHBOURS * width / spacing)
+    # Every half line width is enough for a median.
+    stride = max(1, round(0.5 * width / spacing))
+    # Median over mean of chi-squared with that many degrees of freedom.
+    to_mean = 0.5 * degrees / float(gammaincinv(0.5 * degrees, 0.5))
+    floor = np.empty_like(power)
+    grid = np.arange(0, len(power), stride)
+    for k in grid:
+        below = power[max(0, k - reach) : max(0, k - guard) : stride]
+        above = power[k + guard + 1 : k + reach + 1 : stride]
+        around = np.concatenate([below, above])
+        floor[k] = np.median(around) * to_mean if len(around) else np.nan
+    held = np.isfinite(floor[grid])
+    return np.interp(np.arange(len(power)), grid[held], floor[grid][held]) if np.any(held) else np.zeros_like(power)
+
+
+def _transform(weights: Array, angle: Array, step: float, orders: Array) -> NDArray[np.complex128]:
+    """Return ``sum weights exp(i order angle)`` for angles from zero on."""
+    place = angle / step
+    left = np.floor(place).astype(np.intp)
+    share = place - left
+    size = int(left.max()) + 2
+    grid = np.bincount(left, weights * (1.0 - share), size) + np.bincount(left + 1, weights * share, size)
+    length = fast_length(FINENESS * size)
+    spectrum = np.conj(np.fft.rfft(grid, length))
+    # Turned to the middle of the angles the transform is smooth enough to interpolate.
+    spacing = 2.0 * np.pi / (length * step)
+    own = np.arange(len(spectrum)) * spacing
+    middle = 0.5 * (size - 1) * step
+    smooth = spectrum * np.exp(-1j * own * middle)
+    value = np.interp(orders, own, smooth.real) + 1j * np.interp(orders, own, smooth.imag)
+    # Sharing a sample between two points smooths by a triangle.
+    return np.asarray(value * np.exp(1j * orders * middle) / np.sinc(orders * step / (2.0 * np.pi)) ** 2)
+
+
+def _between(positions: Array, power: Array, k: int) -> float:
+    """Return the top of the parabola through a point and its neighbours."""
+    if not 0 < k < len(power) - 1:
+        return float(positions[k])
+    below, here, above = power[k - 1 : k + 2]
+    bend = below - 2.0 * here + above
+    shift = 0.5 * (below - above) / bend if bend < 0.0 else 0.0
+    return float(positions[k] + np.clip(shift, -0.5, 0.5) * (positions[k + 1] - positions[k]))

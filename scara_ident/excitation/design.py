@@ -1,0 +1,251 @@
+"""Design of excitation: the trajectory from which the parameters of a model can be told best."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.errors import UsageError
+from scara_ident.excitation.criteria import Criterion, LogDet
+from scara_ident.excitation.curves import ExcitationTrajectory, Family, make_basis
+from scara_ident.excitation.limits import Limits, limits_of, nominal_parameters, resting_posture
+from scara_ident.excitation.problem import NARROWEST, Task
+from scara_ident.excitation.search import Effort, Progress, search
+from scara_ident.excitation.sensitivity import SmoothModel
+from scara_ident.excitation.verification import Reached, reached
+from scara_ident.information import Information, merge
+from scara_ident.model import TorqueModel
+
+Array = NDArray[np.float64]
+
+# Samples of a trajectory in the criterion: those of Indri et al. 2002.
+SAMPLES = 2500
+# Highest frequency of a motion by default, Hz: controllers still follow it and arms do not yet swing.
+HIGHEST_FREQUENCY = 1.6
+# Coefficients that a search handles quickly.
+MANY_COEFFICIENTS = 160
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Trajectories with what they promise.
+
+    Attributes
+    ----------
+    model : TorqueModel
+    criterion : Criterion
+    trajectories : tuple of ExcitationTrajectory
+    limits : Limits
+    reached : tuple of Reached
+        Every limit and how much of it is used, over all trajectories.
+    verified : int
+        Samples per trajectory at which that was found.
+    information : Information
+        Of all trajectories, their samples and weights, with torque zero; without what was known before.
+    prior : Information or None
+        What was known before.
+    samples : int
+        Samples of each trajectory in the information.
+    costs : tuple of float
+        Of every local search, as they were started.
+    effort : Effort
+    seconds : float
+        What the search took.
+    """
+
+    model: TorqueModel
+    criterion: Criterion
+    trajectories: tuple[ExcitationTrajectory, ...]
+    limits: Limits
+    reached: tuple[Reached, ...]
+    verified: int
+    information: Information
+    prior: Information | None
+    samples: int
+    costs: tuple[float, ...]
+    effort: Effort
+    seconds: float
+
+    @property
+    def total(self) -> Information:
+        """Information of the trajectories and of what was known before."""
+        return self.information if self.prior is None else merge([self.prior, self.information])
+
+    @property
+    def log_det(self) -> float:
+        """J_d: ln det(H^T H) of the trajectories alone."""
+        return self.information.log_det()
+
+    @property
+    def condition(self) -> float:
+        """J_k: cond(H^T H) of the trajectories alone, columns as they are."""
+        return self.information.condition()
+
+    def relative_std(self) -> Array:
+        """Return the std of every parameter per unit of torque noise on every row, shape (p,); inf where unknown."""
+        total = self.total
+        variance = np.diag(total.inverse()).copy()
+        variance[total.solve().undetermined] = np.inf
+        return np.sqrt(variance)
+
+
+def default_harmonics(duration: float, joints: int, trajectories: int = 1) -> int:
+    """Return how many harmonics a design has by default: up to 1.6 Hz, fewer where there are many joints."""
+    most = MANY_COEFFICIENTS // (2 * joints * trajectories)
+    return max(5, min(round(HIGHEST_FREQUENCY * duration), most))
+
+
+def design(
+    model: TorqueModel,
+    *,
+    duration: float = 25.0,
+    harmonics: int | None = None,
+    criterion: Criterion | None = None,
+    limits: Limits | None = None,
+    known: Mapping[str, float] | None = None,
+    trajectories: int = 1,
+    prior: Information | None = None,
+    torque_std: Array | None = None,
+    start: Array | None = None,
+    family: Family = "fourier",
+    samples: int = SAMPLES,
+    name: str = "excitation",
+    effort: Effort | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Design:
+    """Design trajectories that excite the parameters of a model within the limits of the robot.
+
+    Parameters
+    ----------
+    model : TorqueModel
+        Its columns must depend on present position, velocity and acceleration alone.
+    duration : float
+        Of each trajectory, s.
+    harmonics : int, optional
+        See `default_harmonics`.
+    criterion : Criterion, optional
+        By default the log determinant.
+    limits : Limits, optional
+        By default those of `limits_of`.
+    known : mapping from parameter to value, optional
+        What torques are foreseen with besides the URDF; see `nominal_parameters`.
+    trajectories : int
+        How many are designed together, so that each fills what the others lack.
+    prior : Information, optional
+        Of existing recordings, with the columns of the model; rows weighted as those of the design are.
+    torque_std : ndarray, shape (n,), optional
+        Noise of every joint's torque; without it every row has weight one.
+    start : ndarray, shape (n,), optional
+        Posture to start in (and, for harmonics, to end in), rad or m.
+    family : {"fourier", "spline"}
+    samples : int
+        Samples of each trajectory in the criterion.
+    name : str
+        Of the trajectories; several get ``_1``, ``_2``, ... without becoming repetitions: ``a``, ``b``, ... .
+    effort : Effort, optional
+    progress : callable, optional
+        Called after every local search.
+
+    Returns
+    -------
+    Design
+
+    Raises
+    ------
+    InfeasibleLimits
+        If the limits, or the start, leave no motion.
+    RobotError
+        If a joint has no limits.
+    UsageError
+        If the arguments do not fit the model.
+
+    References
+    ----------
+    J. Swevers et al., "Optimal robot excitation and identification", IEEE Transactions on Robotics and Automation
+    13(5), 1997. G. Calafiore, M. Indri, B. Bona, "Robot dynamic calibration: optimal excitation trajectories and
+    experimental parameter estimation", Journal of Robotic Systems 18(2), 2001.
+    """
+    begun = time.perf_counter()
+    robot, count = model.robot, len(model.names)
+    if trajectories < 1:
+        raise UsageError(f"trajectories {trajectories}: expected at least 1")
+    if samples < 2:
+        raise UsageError(f"samples {samples}: expected at least 2")
+    if prior is not None and prior.parameters != count:
+        raise UsageError(
+            f"existing information is about {prior.parameters} parameters, the model {model.name} has {count}; "
+            "gather it with the same model"
+        )
+    effort = Effort() if effort is None else effort
+    criterion = LogDet() if criterion is None else criterion
+    limits = limits_of(robot) if limits is None else limits
+    weights = _weights(torque_std, robot.n)
+    nominal = nominal_parameters(model, known)
+    if harmonics is None:
+        harmonics = default_harmonics(duration, robot.n, trajectories)
+    task = Task(
+        smooth=SmoothModel(model, NARROWEST * limits.velocity),
+        limits=limits,
+        nominal=nominal,
+        criterion=criterion,
+        basis=make_basis(duration, harmonics, family, fixed_start=start is not None),
+        posture=resting_posture(model, limits, nominal, start=start, seed=effort.seed),
+        trajectories=trajectories,
+        samples=samples,
+        weights=weights,
+        prior=np.zeros((count, count)) if prior is None else prior.regressor_factor.T @ prior.regressor_factor,
+    )
+    found = search(task, effort, progress)
+    units = tuple(robot.torque_unit(j) for j in range(robot.n))
+    suffixes = [""] if trajectories == 1 else [f"-{chr(ord('a') + k)}" for k in range(trajectories)]
+    designed = tuple(
+        ExcitationTrajectory(name + suffix, robot.joints, task.basis, task.posture, x)
+        for suffix, x in zip(suffixes, found.x, strict=True)
+    )
+    return Design(
+        model=model,
+        criterion=criterion,
+        trajectories=designed,
+        limits=limits,
+        reached=reached(task, robot.joints, units, found.x, found.times),
+        verified=found.times,
+        information=merge([information_of(model, each, samples, weights) for each in designed]),
+        prior=prior,
+        samples=samples,
+        costs=found.costs,
+        effort=effort,
+        seconds=time.perf_counter() - begun,
+    )
+
+
+def information_of(
+    model: TorqueModel, trajectory: ExcitationTrajectory, samples: int = SAMPLES, weights: Array | None = None
+) -> Information:
+    """Return the information of equally spaced samples of a trajectory, with torque zero.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    trajectory : ExcitationTrajectory
+    samples : int
+    weights : ndarray, shape (n,), optional
+        Of every joint's rows; 1 by default.
+    """
+    regressor = model.regressor(trajectory.motion(samples))
+    if weights is not None:
+        regressor = regressor * weights[:, None, None]
+    rows = regressor.transpose(2, 0, 1).reshape(-1, regressor.shape[1])
+    return Information.empty(rows.shape[1]).absorb(rows, np.zeros(len(rows)))
+
+
+def _weights(torque_std: Array | None, joints: int) -> Array:
+    if torque_std is None:
+        return np.ones(joints)
+    std = np.asarray(torque_std, dtype=float)
+    if std.shape != (joints,) or not np.all(std > 0.0):
+        raise UsageError(f"torque noise: expected {joints} positive numbers, given {std.tolist()}")
+    return 1.0 / std

@@ -1,0 +1,60 @@
+"""Independent searches on all cores, in one order whatever the number of processes."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any, TypeVar
+
+from scara_ident.threads import one_blas_thread
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+_work: Callable[[Any], Any] | None = None
+
+
+def available_cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def map_in_order(
+    work: Callable[[Item], Result], items: Iterable[Item], processes: int | None = None
+) -> Iterator[Result]:
+    """Apply a function to items, several at a time, and give the results in the order of the items.
+
+    Workers are forked, so that the function may hold what cannot be sent to another process; where the system cannot
+    fork, the items are worked on one after the other. Each worker has one BLAS thread.
+
+    Parameters
+    ----------
+    work : callable
+    items : iterable
+        Sent to the workers, as are the results to the caller.
+    processes : int, optional
+        Default: as many as there are cores.
+    """
+    wanted = list(items)
+    count = min(available_cores() if processes is None else processes, len(wanted))
+    if count <= 1 or "fork" not in multiprocessing.get_all_start_methods():
+        with one_blas_thread():
+            yield from map(work, wanted)
+        return
+    context = multiprocessing.get_context("fork")
+    with ProcessPoolExecutor(count, mp_context=context, initializer=_adopt, initargs=(work,)) as pool:
+        yield from pool.map(_apply, wanted)
+
+
+def _adopt(work: Callable[[Any], Any]) -> None:
+    global _work
+    _work = work
+    one_blas_thread().__enter__()
+
+
+def _apply(item: Any) -> Any:
+    if _work is None:
+        raise RuntimeError("the worker was not given its function")
+    return _work(item)

@@ -1,0 +1,197 @@
+"""The search: many starts, the best of them changed and searched again, and the winner brought within its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.excitation.interior_point import Minimum, Schedule, minimise, shrunk_inside
+from scara_ident.excitation.limits import InfeasibleLimits
+from scara_ident.excitation.parallel import map_in_order
+from scara_ident.excitation.problem import Problem, Task, row_names
+from scara_ident.excitation.verification import extremes, grid
+from scara_ident.threads import one_blas_thread
+
+Array = NDArray[np.float64]
+
+# Times of the limits per period of the highest frequency, in the search and for the winner.
+COARSE, FINE = 12, 48
+LEAST_TIMES = 120
+# Times of the verification per time of the winner's limits.
+FINER = 10
+# Bounds of the design, as shares; what this leaves is for rounding.
+BOUND, SPARE = 0.999, 1e-6
+# Size of changes of a good motion, as shares of it.
+CHANGES = (0.1, 0.2, 0.3)
+ELITE = 3
+# Random starts have this share of the highest frequency as their bandwidth, and this share of the velocity limits.
+SLOW, GENTLE = 0.25, 0.5
+CORRECTIONS = 5
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long to search. The result depends on nothing else: not on the number of processes, nor on time.
+
+    Attributes
+    ----------
+    starts : int
+        Searches from random motions, and as many per round.
+    rounds : int
+        Rounds of searches from changes of the best motions so far.
+    seed : int
+    processes : int or None
+        None: as many as there are cores.
+    """
+
+    starts: int = 8
+    rounds: int = 2
+    seed: int = 0
+    processes: int | None = None
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a search is: searches done and in all, and the least cost so far."""
+
+    done: int
+    total: int
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search found.
+
+    Attributes
+    ----------
+    x : ndarray, shape (k, n, m)
+        Within all limits.
+    costs : tuple of float
+        Of every local search, as they were started.
+    times : int
+        Samples per trajectory at which the limits were verified.
+    """
+
+    x: Array
+    costs: tuple[float, ...]
+    times: int
+
+
+def search(task: Task, effort: Effort, progress: Callable[[Progress], None] | None = None) -> Found:
+    """Search for the best motion.
+
+    Parameters
+    ----------
+    task : Task
+    effort : Effort
+    progress : callable, optional
+        Called after every local search.
+
+    Raises
+    ------
+    InfeasibleLimits
+        If no motion within the limits shows all parameters.
+    """
+    problem = _problem(task, COARSE, 1, np.full(_rows(task), BOUND))
+    total = effort.starts * (1 + effort.rounds)
+    costs: list[float] = []
+    elite: list[Minimum] = []
+
+    def work(item: tuple[int, Array | None]) -> Minimum | None:
+        return _from(problem, effort.seed, *item)
+
+    for generation in range(1 + effort.rounds):
+        first = generation * effort.starts
+        parents = [elite[k % len(elite)].x if elite else None for k in range(effort.starts)]
+        for result in map_in_order(work, enumerate(parents, first), effort.processes):
+            if result is not None:
+                elite.append(result)
+            costs.append(np.inf if result is None else result.cost)
+            if progress is not None:
+                progress(Progress(len(costs), total, min(costs)))
+        if not elite:
+            raise InfeasibleLimits(_narrow(problem, task))
+        elite = sorted(elite, key=lambda found: found.cost)[:ELITE]
+    with one_blas_thread():
+        x, times = _finish(task, elite[0].x)
+    return Found(x, tuple(costs), times)
+
+
+def _rows(task: Task) -> int:
+    return len(row_names(task.limits, len(task.posture)))
+
+
+def _problem(task: Task, density: int, stride: int, bounds: Array) -> Problem:
+    periods = task.basis.bandwidth * task.basis.duration
+    counted = max(LEAST_TIMES, int(np.ceil(density / stride * periods)))
+    return Problem(task, grid(task.basis, stride * counted), stride, bounds)
+
+
+def _from(problem: Problem, seed: int, index: int, parent: Array | None) -> Minimum | None:
+    """Search from a random motion, or from a change of a parent."""
+    random = np.random.default_rng([seed, index])
+    drawn = _random_motion(problem.task, random)
+    if parent is not None:
+        size = CHANGES[index % len(CHANGES)] * np.linalg.norm(parent) / np.linalg.norm(drawn)
+        drawn = parent + size * drawn
+    start = shrunk_inside(problem.sharpened(0.0), drawn)
+    return None if start is None else minimise(problem, start)
+
+
+def _random_motion(task: Task, random: np.random.Generator) -> Array:
+    """Draw a slow motion of about half the velocity limits."""
+    k, n, _ = task.shape
+    basis = task.basis
+    time = basis.duration * (np.arange(8 * basis.size) + 0.5) / (8 * basis.size)
+    top = max(3.0, SLOW * basis.bandwidth * basis.duration)
+    orders = np.arange(1, int(np.ceil(top)) + 1)
+    phases = 2.0 * np.pi / basis.duration * np.outer(orders, time)
+    sizes = random.normal(size=(2, k, n, len(orders))) / np.sqrt(len(orders))
+    velocity = sizes[0] @ np.cos(phases) + sizes[1] @ np.sin(phases)
+    velocity *= GENTLE * task.limits.velocity[:, None]
+    # The motion of the basis whose velocity is nearest to that.
+    fit, *_ = np.linalg.lstsq(basis.rows(time, 1), velocity.reshape(k * n, -1).T, rcond=1e-9)
+    return np.asarray(fit.T.reshape(task.shape))
+
+
+def _finish(task: Task, x: Array) -> tuple[Array, int]:
+    """Take a motion to a fine grid, and tighten bounds until it keeps its limits between the samples as well."""
+    bounds = np.full(_rows(task), 1.0 - SPARE)
+    plan = Schedule(first=0.6, last=2e-3, steps=150)
+    problem = _problem(task, FINE, FINE // COARSE, bounds)
+    times = FINER * problem.rows.shape[1] + 1
+    for _ in range(CORRECTIONS):
+        start = shrunk_inside(problem.sharpened(0.0), x, room=1e-3, factor=0.998)
+        if start is None:
+            break
+        x = minimise(problem, start, plan).x
+        excess = _excess(task, x, times)
+        if np.all(excess <= 1.0):
+            return x, times
+        bounds = bounds * np.where(excess > 1.0, (1.0 - SPARE) / excess, 1.0)
+        problem = _problem(task, FINE, FINE // COARSE, bounds)
+        plan = Schedule(first=0.06, last=2e-3, steps=60)
+    while np.any(_excess(task, x, times) > 1.0):
+        x = 0.999 * x
+    return x, times
+
+
+def _excess(task: Task, x: Array, times: int) -> Array:
+    """Largest value of every row, as a share of its bound."""
+    largest, smallest = extremes(task, x, times)
+    one_sided = np.array([name.startswith("tool") for name, _ in row_names(task.limits, len(task.posture))])
+    return np.where(one_sided, largest, np.maximum(largest, -smallest))
+
+
+def _narrow(problem: Problem, task: Task) -> str:
+    values = np.abs(problem.limited(np.zeros(task.shape))).max(axis=1)
+    kind, joint = row_names(task.limits, len(task.posture))[int(np.argmax(values))]
+    where = kind.replace("_", " ") + ("" if joint is None else f" of {task.smooth.model.robot.joints[joint]}")
+    return (
+        f"no motion within the limits shows all parameters; the narrowest, at rest, is the {where} "
+        f"({100 * values.max():.0f} % used); widen it, use more harmonics, or a model with fewer parameters"
+    )

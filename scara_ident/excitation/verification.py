@@ -1,0 +1,134 @@
+"""What a motion really reaches, between the times of the design too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.excitation.curves import Basis
+from scara_ident.excitation.limits import Limits
+from scara_ident.excitation.problem import Problem, Task, row_names
+
+Array = NDArray[np.float64]
+
+# Speeds below this share of the limit count as standing when the sign of friction is taken.
+STANDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Reached:
+    """A limit and how much of it a motion uses.
+
+    Attributes
+    ----------
+    name : str
+        ``<joint>.position.lower``, ``<joint>.position.upper``, ``<joint>.velocity``, ``<joint>.torque``,
+        ``tool.acceleration``, ``tool.speed`` or ``tool.height``.
+    bound : float
+    reached : float
+        The largest value, the smallest of lower bounds and of height; between the samples too.
+    unit : str
+    share : float
+        Of the bound that is used, of a range's half from its middle; above 1 the limit is broken.
+    """
+
+    name: str
+    bound: float
+    reached: float
+    unit: str
+    share: float
+
+    @property
+    def kept(self) -> bool:
+        """Whether the limit holds."""
+        return self.share <= 1.0
+
+    @property
+    def active(self) -> bool:
+        """Whether the limit holds the motion back."""
+        return self.share > 0.99
+
+
+def grid(basis: Basis, times: int) -> Array:
+    """Return the basis and its two derivatives at equally spaced times, shape (3, times, m)."""
+    step = basis.duration / times
+    # A period closes on itself; otherwise the middles of the intervals, where a sum is a good integral.
+    time = step * (np.arange(times) + (0.0 if basis.periodic else 0.5))
+    return np.array([basis.rows(time, order) for order in range(3)])
+
+
+def extremes(task: Task, x: Array, times: int) -> tuple[Array, Array]:
+    """Return the largest and the smallest value of every row of limits over continuous time.
+
+    Between two samples a function exceeds both by at most ``h^2 / 8`` times its second derivative, which is taken
+    from second differences around; the grid must be fine enough for these to be small.
+
+    Parameters
+    ----------
+    task : Task
+    x : ndarray, shape (k, n, m)
+    times : int
+        Samples per trajectory.
+
+    Returns
+    -------
+    largest, smallest : ndarray, shape (R,)
+    """
+    time = np.linspace(0.0, task.basis.duration, times)
+    rows = np.array([task.basis.rows(time, order) for order in range(3)])
+    smooth = replace(task.smooth, width=STANDING * task.limits.velocity)
+    problem = Problem(replace(task, smooth=smooth), rows, 1, np.ones(0))
+    values = problem.limited(x).reshape(-1, task.trajectories, times)
+    second = np.abs(np.diff(values, n=2, axis=2))
+    around = np.zeros_like(values)
+    around[..., 1:-1] = second
+    beyond = np.maximum(around, np.maximum(np.roll(around, 1, axis=2), np.roll(around, -1, axis=2))) / 8.0
+    return (values + beyond).max(axis=(1, 2)), (values - beyond).min(axis=(1, 2))
+
+
+def reached(task: Task, joints: tuple[str, ...], units: tuple[str, ...], x: Array, times: int) -> tuple[Reached, ...]:
+    """Say for every limit how much of it a motion uses.
+
+    Parameters
+    ----------
+    task : Task
+    joints, units : tuple of str
+        Names of the joints, and units of their torques.
+    x : ndarray, shape (k, n, m)
+    times : int
+        Samples per trajectory.
+    """
+    limits = task.limits
+    largest, smallest = extremes(task, x, times)
+    found = []
+    robot = task.smooth.model.robot
+    for (kind, joint), high, low in zip(row_names(limits, len(joints)), largest, smallest, strict=True):
+        if joint is None:
+            found.append(_of_tool(limits, kind, float(high)))
+            continue
+        name, length = joints[joint], "m" if robot.prismatic[joint] else "rad"
+        both = float(max(high, -low))
+        if kind == "position":
+            centre, half = limits.centre[joint], 0.5 * (limits.upper[joint] - limits.lower[joint])
+            for side, bound, value in (("lower", limits.lower, -low), ("upper", limits.upper, high)):
+                place = centre + (half if side == "upper" else -half) * value
+                found.append(Reached(f"{name}.position.{side}", float(bound[joint]), float(place), length, float(value)))
+        elif kind == "velocity":
+            bound = float(limits.velocity[joint])
+            found.append(Reached(f"{name}.velocity", bound, both * bound, f"{length}/s", both))
+        else:
+            bound = float(limits.torque[joint])
+            found.append(Reached(f"{name}.torque", bound, both * bound, units[joint], both))
+    return tuple(found)
+
+
+def _of_tool(limits: Limits, kind: str, value: float) -> Reached:
+    if kind == "tool_height":
+        return Reached("tool.height", limits.floor, limits.floor + 1.0 - value, "m", value)
+    # These rows are squares.
+    share = float(np.sqrt(value))
+    if kind == "tool_speed":
+        return Reached("tool.speed", limits.tool_speed, share * limits.tool_speed, "m/s", share)
+    return Reached("tool.acceleration", limits.tool_acceleration, share * limits.tool_acceleration, "m/s^2", share)

@@ -1,0 +1,181 @@
+"""The report of an excitation trajectory: the motion within its limits, and the arm moving in the plane."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.motion import Motion
+from scara_ident.report.html.page import Arm, Block, Cell, Group, Page, Section, bar, escape, listing, paragraph, table, tag
+from scara_ident.report.html.plot import Dots, Figure, Grid, Layer, Level, Line, Panel, Plot, single
+from scara_ident.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Pictures of the arm per second, and at the most.
+FRAME_RATE = 25.0
+MOST_FRAMES = 750
+# Points at which a motion is drawn, at the most.
+MOST_POINTS = 4000
+
+
+def excitation_report(path: Path, content: Mapping[str, Any], robot: Robot, motions: Sequence[Motion]) -> None:
+    """Write the report of designed trajectories as one HTML file.
+
+    Parameters
+    ----------
+    path : Path
+    content : mapping
+        The content of ``excitation.json``.
+    robot : Robot
+    motions : sequence of Motion
+        The trajectories; torque, where there is one, is what the design expects.
+
+    Raises
+    ------
+    ScaraIdentError
+        If the file cannot be written.
+    """
+    excitation_page(content, robot, motions).write(path)
+
+
+def excitation_page(content: Mapping[str, Any], robot: Robot, motions: Sequence[Motion]) -> Page:
+    """Assemble the report of designed trajectories."""
+    limits = list(_limits(content.get("limits") or {}))
+    broken = [name for name, limit in limits if (limit.get("share") or 0.0) > 1.0]
+    verdict = list(content.get("summary") or ())
+    if not verdict:
+        verdict = [f"J_d {_number(content.get('log_det'), 4)}, J_k {_number(content.get('condition'))} in {_number(content.get('duration'))} s."]
+        verdict.append(f"Broken limits: {', '.join(broken)}." if broken else "All limits hold.")
+    sections = [
+        Section(f"motion-{k}", "Motion" if len(motions) == 1 else f"Motion {motion.name}", _motion_blocks(robot, motion, k))
+        for k, motion in enumerate(motions)
+    ]
+    if limits:
+        sections.append(Section("limits", "Limits", _limit_blocks(limits)))
+    if content.get("notes"):
+        sections.append(Section("notes", "Notes", (listing(content["notes"]),)))
+    subtitle = f"{len(motions)} trajectories of {_number(content.get('duration'))} s" if len(motions) > 1 else f"{_number(content.get('duration'))} s"
+    return Page(f"Excitation of {robot.name}", subtitle, verdict, sections, bool(broken))
+
+
+def _motion_blocks(robot: Robot, motion: Motion, number: int) -> list[Block]:
+    figures = [_joint_figure(robot, motion, j, number) for j in range(robot.n)]
+    return [
+        arm_in_plane(robot, motion, f"arm-{number}"),
+        Group(f"motion-group-{number}", figures, (), "two"),
+        paragraph("Where the joints go: what the data will cover."),
+        Group(f"cover-group-{number}", [_cover_figure(robot, motion, j, number) for j in range(robot.n)], (), "three"),
+    ]
+
+
+def _joint_figure(robot: Robot, motion: Motion, j: int, number: int) -> Figure:
+    every = max(1, motion.samples // MOST_POINTS)
+    grid = Grid(float(motion.time[0]), every / motion.rate, -(-motion.samples // every))
+    length = "m" if robot.prismatic[j] else "rad"
+    speed = float(robot.velocity_limit[j])
+    panels = []
+    for label, signal, bounds in (
+        (f"position [{length}]", motion.q[j], (float(robot.lower[j]), float(robot.upper[j]))),
+        (f"velocity [{length}/s]", motion.v[j], (-speed, speed)),
+        (f"accel. [{length}/s²]", motion.a[j], ()),
+        (f"torque [{robot.torque_unit(j)}]", None if motion.torque is None else motion.torque[j], (-float(robot.torque_limit[j]), float(robot.torque_limit[j]))),
+    ):  # fmt: skip
+        if signal is None:
+            continue
+        layers: list[Layer] = [Line(grid, signal[::every], "blue", label.split(" [")[0], 1.5)]
+        layers += [Level(bound, "vermillion", "limit") for bound in bounds if np.isfinite(bound)]
+        panels.append(Panel(label, layers, 110))
+    return single(f"motion-{number}-{j}", robot.joints[j], "", Plot("time [s]", panels))
+
+
+def _cover_figure(robot: Robot, motion: Motion, j: int, number: int) -> Figure:
+    length = "m" if robot.prismatic[j] else "rad"
+    every = max(1, motion.samples // MOST_POINTS)
+    turn = int(np.argmax(motion.v[j]))
+    line = Line(motion.q[j, ::every], motion.v[j, ::every], "blue", path=True)
+    fastest = Dots([float(motion.q[j, turn])], [float(motion.v[j, turn])], "vermillion")
+    panel = Panel(f"velocity [{length}/s]", (line, fastest), 170)
+    return single(f"cover-{number}-{j}", robot.joints[j], "", Plot(f"position [{length}]", (panel,), small=True), quiet=True)
+
+
+def arm_in_plane(robot: Robot, motion: Motion, name: str) -> Arm:
+    """Return the arm's joints over time in the coordinate plane in which they move most.
+
+    Parameters
+    ----------
+    robot : Robot
+    motion : Motion
+    name : str
+        Unique on the page.
+    """
+    count = int(min(MOST_FRAMES, max(2, motion.time[-1] - motion.time[0]) * FRAME_RATE))
+    places = np.linspace(0, motion.samples - 1, count).astype(int)
+    points = joint_points(robot, motion.q[:, places])
+    spread = np.ptp(points.reshape(-1, 3), axis=0)
+    plane = sorted(np.argsort(-spread, kind="stable")[:2].tolist())
+    period = float(motion.time[-1] - motion.time[0]) / (count - 1)
+    return Arm(name, points[:, :, plane], period)
+
+
+def joint_points(robot: Robot, q: Array) -> Array:
+    """Return where the base, the joints and the arm's end are.
+
+    Parameters
+    ----------
+    robot : Robot
+    q : ndarray, shape (n, N)
+        In the robot's order, rad or m.
+
+    Returns
+    -------
+    ndarray, shape (N, points, 3)
+        m, in the base frame, from the base outwards.
+    """
+    import pinocchio as pin
+
+    model = robot.model
+    data = model.createData()
+    last = model.njoints - 1
+    ends = [frame.placement.translation for frame in model.frames if frame.parentJoint == last]
+    end = max(ends, key=lambda point: float(np.linalg.norm(point)), default=np.zeros(3))
+    neutral, velocity = pin.neutral(model), np.zeros(model.nv)
+    frames = []
+    for column in q.T:
+        velocity[robot.order] = column
+        # From neutral, a displacement of the joints is their position, continuous joints included.
+        pin.forwardKinematics(model, data, pin.integrate(model, neutral, velocity))
+        points = [placement.translation.copy() for placement in data.oMi]
+        frames.append([*points, data.oMi[last].act(end)])
+    return np.array(frames)
+
+
+def _limits(limits: Mapping[str, Any], name: str = "") -> Iterator[tuple[str, Mapping[str, Any]]]:
+    if "bound" in limits:
+        yield name, limits
+        return
+    for key, item in limits.items():
+        if isinstance(item, Mapping):
+            yield from _limits(item, f"{name}.{key}" if name else key)
+
+
+def _limit_blocks(limits: Sequence[tuple[str, Mapping[str, Any]]]) -> list[Block]:
+    rows: list[list[Cell | str]] = []
+    for name, limit in limits:
+        share = limit.get("share")
+        words = "" if share is None else f"{bar(share, weak=share > 1.0)} {share:.0%}"
+        if share is not None and share > 1.0:
+            words += " " + tag("broken", "bad")
+        rows.append([Cell(escape(name), "name"), _number(limit.get("reached")), _number(limit.get("bound")), str(limit.get("unit", "")), Cell(words)])
+    return [
+        paragraph("What the motion reaches of each limit, between its samples too."),
+        table(("limit", "reached", "bound", "unit", "used"), rows, numeric=(1, 2)),
+    ]
+
+
+def _number(value: Any, digits: int = 3) -> str:
+    return "–" if value is None else f"{value:.{digits}g}"

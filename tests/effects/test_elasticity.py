@@ -1,0 +1,133 @@
+"""Elastic gears and clearance: the link's motion against closed forms, torques against Pinocchio, recovery."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from scara_ident.effects import Member, Signals
+from scara_ident.effects.elasticity import Backlash, JointElasticity, flank, swing
+from scara_ident.effects.links import lagging, link_inertia, usual_link_inertia
+from scara_ident.model import build_model
+from scara_ident.robot import load_robot
+from scara_ident.virtual import parse_effect, simulate, virtual_arm
+from tests.arms import example_urdf, rnea
+from tests.effects.scenes import columns, fit, moving, scene_of, wandering
+
+
+@pytest.mark.parametrize("frequency", [3.0, 40.0])
+def test_a_forced_link_swings_as_the_closed_form_says(frequency: float):
+    step, inertia, stiffness, damping = 5e-4, 2.0, 2.0 * (2 * np.pi * 12.0) ** 2, 30.0
+    time = np.arange(8000) * step
+    w = 2 * np.pi * frequency
+    x, first, second = swing(np.cos(w * time), np.full(8000, inertia), stiffness, damping, step)
+    gain = 1.0 / (stiffness - inertia * w**2 + 1j * w * damping)
+    steady = slice(4000, 7990)
+    for part, order in ((x, 0), (first, 1), (second, 2)):
+        expected = np.real(gain * (1j * w) ** order * np.exp(1j * w * time))
+        assert np.abs(part - expected)[steady].max() < 0.01 * np.abs(gain) * w**order
+
+
+def test_a_slow_load_winds_the_gear_up_by_load_over_stiffness():
+    load = 5.0 + 3.0 * np.sin(np.arange(2000) / 300.0)
+    x, _, second = swing(load, np.full(2000, 0.5), 8e4, 20.0, 1e-3)
+    assert x == pytest.approx(load / 8e4, rel=1e-3)
+    assert np.all(np.isfinite(second))
+
+
+def test_a_free_link_crosses_its_clearance_as_a_falling_body():
+    step, width = 1e-4, 2e-3
+    drift = np.where(np.arange(4000) < 1000, 1.0, -0.7)
+    place = flank(drift, width, step)
+    assert np.all(place[:1000] == 0.5)
+    time = (np.arange(4000) - 999) * step
+    landing = np.sqrt(2.0 * width / 0.7)
+    flight = (time > 0.0) & (time < landing - 2 * step)
+    assert np.abs(place - (0.5 - 0.5 * 0.7 * time**2 / width))[flight].max() < 0.01
+    assert np.all(place[time > landing + 2 * step] == -0.5)
+
+
+def test_a_push_too_short_to_cross_brings_the_link_back_to_its_flank():
+    drift = np.ones(3000)
+    drift[1000:1010] = -1.0
+    place = flank(drift, 1e-2, 1e-3)
+    assert np.all(place[:1000] == 0.5)
+    assert 0.45 < place[1000:1100].min() < 0.5
+    assert np.all(place[1100:] == 0.5)
+    assert np.all(flank(drift[::-1].copy() * -1.0, 1e-2, 1e-3)[:1900] == -0.5)
+
+
+@pytest.mark.parametrize("name", ["scara03", "ur5"])
+def test_a_lagging_link_loads_all_joints_as_pinocchio_says(name: str):
+    robot = load_robot() if name == "scara03" else load_robot(example_urdf("ur5_robot.urdf"))
+    scene, item = scene_of(robot), moving(robot, 1.0)
+    joint, w = 1, 30.0
+    lag = (1e-3 * np.sin(w * item.time), 1e-3 * w * np.cos(w * item.time), -1e-3 * w**2 * np.sin(w * item.time))
+    changed = lagging(Signals(scene, item), joint, lag)
+    size = 1e-3
+    ends = []
+    for side in (1.0, -1.0):
+        moved = [part.copy() for part in (item.q, item.v, item.a)]
+        for part, change in zip(moved, lag, strict=True):
+            part[joint] -= side * size * change
+        ends.append(rnea(robot, *moved))
+    expected = (ends[0] - ends[1]) / (2.0 * size) * robot.row_scale[:, None]
+    assert np.abs(changed - expected).max() < 1e-3 * np.abs(expected).max()
+
+
+def test_inertia_of_the_link_is_the_mass_matrix_without_the_rotor():
+    robot = load_robot()
+    scene, item = scene_of(robot), moving(robot, 0.1)
+    data = robot.model.createData()
+    expected = [pin.crba(robot.model, data, item.q[:, k])[0, 0] for k in range(item.samples)]
+    assert link_inertia(Signals(scene, item), 0) == pytest.approx(expected)
+    assert 2.0 < usual_link_inertia(scene, 0) < 4.0
+
+
+def test_far_below_its_frequency_the_column_is_minus_inertia_times_the_loads_second_derivative():
+    scene = scene_of(load_robot(), band=60.0)
+    item = moving(scene.robot, 3.0, rate=1000.0)
+    signals = Signals(scene, item)
+    column = columns(JointElasticity(), scene, item, Member(1, (150.0,)))[:, 0]
+    load = signals.load(1) / 0.01
+    lag = [load]
+    for _ in range(2):
+        lag.append(np.gradient(lag[-1], 1e-3))
+    expected = lagging(signals, 1, (lag[0], lag[1], lag[2]))
+    inside = slice(300, -300)
+    assert np.abs(column - expected)[:, inside].max() < 0.05 * np.abs(expected[:, inside]).max()
+
+
+@pytest.mark.parametrize(("joint", "stiffness"), [("joint1", 60000.0), ("joint2", 12000.0)])
+def test_the_stiffness_is_recovered(joint: str, stiffness: float):
+    arm = virtual_arm()
+    effect = parse_effect(f"joint_elasticity:{joint}:stiffness={stiffness}")
+    data = [simulate(arm, wandering(arm, f"t{k}", k), effects=[effect], seed=k).recording for k in (1, 2)]
+    family, j = JointElasticity(), arm.robot.joints.index(joint)
+    frequency = np.sqrt(stiffness / usual_link_inertia(scene_of(arm.robot), j)) / (2 * np.pi)
+    member = Member(j, (float(frequency),))
+    scene, value, covariance = fit(build_model(arm.robot), data, family, member, rounds=2)
+    found = family.parameters(scene, member, value, covariance)["stiffness"]
+    assert found.value == pytest.approx(stiffness, rel=0.15)
+    assert family.inadmissible(scene, member, value, np.sqrt(np.diag(covariance))) is None
+
+
+def test_the_width_is_recovered():
+    arm = virtual_arm()
+    effect = parse_effect("backlash:joint2:width=0.002")
+    data = [simulate(arm, wandering(arm, f"t{k}", k), effects=[effect], seed=k).recording for k in (1, 2)]
+    family, member = Backlash(), Member(1, (0.002,))
+    scene, value, covariance = fit(build_model(arm.robot), data, family, member, rounds=2)
+    found = family.parameters(scene, member, value, covariance)["width"]
+    assert found.value == pytest.approx(0.002, rel=0.1)
+
+
+def test_what_no_gear_can_have_is_refused():
+    scene = scene_of(load_robot())
+    std = np.array([1e-7])
+    assert "negative" in str(JointElasticity().inadmissible(scene, Member(0, (30.0,)), np.array([-1e-5]), std))
+    assert "Hz" in str(JointElasticity().inadmissible(scene, Member(0, (30.0,)), np.array([1e-2]), std))
+    assert JointElasticity().inadmissible(scene, Member(0, (30.0,)), np.array([1.2e-5]), std) is None
+    assert "negative" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([-1e-4]), std))
+    assert "rattle" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.2]), std))

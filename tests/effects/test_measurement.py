@@ -1,0 +1,147 @@
+"""Errors of the torque's measurement: columns, recovery, and shifting a recording."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.effects import Member, Signals
+from scara_ident.effects.measurement import (
+    TimeDelay,
+    TorqueGainMismatch,
+    TorqueSensorNonlinearity,
+    shifted,
+    within_sampling,
+)
+from scara_ident.model import build_model
+from scara_ident.recording import Recording
+from scara_ident.robot import load_robot
+from tests.arms import recorded_torque, recording, sines
+from tests.effects.scenes import columns, fit, moving, scene_of
+
+FRICTION = ((0.1, 0.05, -0.004, 0.0, 0.02), (0.04, 0.03, 0.0, 0.0, -0.01))
+
+
+def recordings(change, noise: float = 0.01) -> list[Recording]:
+    """Recordings of the SCARA03 whose torque goes through ``change(u, time)``."""
+    robot, rng = load_robot(), np.random.default_rng(3)
+    time = np.arange(8000) / 500.0
+    made = []
+    for k in range(2):
+        q, v, a = sines(rng, time, 2, size=0.8, lowest=0.35)
+        u = change(recorded_torque(robot, q, v, a, FRICTION), time)
+        made.append(recording(robot, f"t{k}_1", time, q, u + noise * rng.standard_normal(u.shape)))
+    return made
+
+
+def test_columns_are_the_cube_the_torque_and_its_slope():
+    scene = scene_of(load_robot())
+    item = moving(scene.robot, 2.0, rate=2000.0)
+    u = np.einsum("jpn,p->jn", scene.model.regressor(item), scene.value)
+    assert columns(TorqueSensorNonlinearity(), scene, item, Member(1))[1, 0] == pytest.approx(u[1] ** 3)
+    assert columns(TorqueGainMismatch(), scene, item, Member(1))[1, 0] == pytest.approx(u[1])
+    # Without the steps of dry friction the slope is smooth.
+    smooth = replace(scene, value=np.where(np.char.startswith(scene.model.names, "a"), 0.0, scene.value))
+    u = Signals(smooth, item).predicted
+    slope = np.gradient(u, 1.0 / item.rate, axis=1)
+    inside = slice(400, -400)
+    both = columns(TimeDelay(), smooth, item, Member(None))[:, 0]
+    assert np.abs(both + slope)[:, inside].max() < 1e-3 * np.abs(slope).max()
+    assert np.array_equal(columns(TimeDelay(), smooth, item, Member(1))[1, 0], both[1])
+
+
+def test_members_are_those_that_can_be_told():
+    scene = scene_of(load_robot())
+    assert [member.joint for member in TorqueGainMismatch().members(scene)] == [1]
+    assert [member.joint for member in TimeDelay().members(scene)] == [None, 0, 1]
+
+
+@pytest.mark.parametrize("cubic", [0.002, -0.002])
+def test_the_cubic_is_recovered(cubic: float):
+    # Up to 10 % at the largest torques.
+    data = recordings(lambda u, t: np.array([u[0] + cubic * u[0] ** 3, u[1]]))
+    effect, member = TorqueSensorNonlinearity(), Member(0)
+    scene, value, covariance = fit(build_model(load_robot()), data, effect, member, rounds=3)
+    found = effect.parameters(scene, member, value, covariance)["cubic"]
+    assert found.value == pytest.approx(cubic, rel=0.02)
+    assert found.unit == "1/(N m)^2"
+
+
+def test_the_ratio_is_recovered_from_what_the_joints_share():
+    data = recordings(lambda u, t: np.array([u[0], 1.12 * u[1]]), noise=0.002)
+    effect, member = TorqueGainMismatch(), Member(1)
+    scene, value, covariance = fit(build_model(load_robot()), data, effect, member, rounds=3)
+    found = effect.parameters(scene, member, value, covariance)["ratio"]
+    assert found.value == pytest.approx(1.12, abs=4.0 * found.std)
+    assert found.std < 0.02
+
+
+def test_the_delay_is_recovered_and_shifting_removes_it():
+    def late(u, t):
+        return np.array([np.interp(t - 0.004, t, row) for row in u])
+
+    data = recordings(late)
+    effect, member = TimeDelay(), Member(None)
+    model = build_model(load_robot())
+    scene, value, covariance = fit(model, data, effect, member, rounds=1)
+    first = effect.parameters(scene, member, value, covariance)["delay"]
+    assert first.value == pytest.approx(0.004, abs=3e-4)
+    again = [shifted(item, first.value) for item in data]
+    scene, value, covariance = fit(model, again, effect, member, rounds=1)
+    second = effect.parameters(scene, member, value, covariance)["delay"]
+    assert first.value + second.value == pytest.approx(0.004, abs=1e-4)
+
+
+def test_impossible_sizes_are_refused():
+    scene = scene_of(load_robot())
+    std = np.array([1e-4])
+    assert TimeDelay().inadmissible(scene, Member(None), np.array([0.2]), std)
+    assert TimeDelay().inadmissible(scene, Member(None), np.array([-0.004]), std) is None
+    assert TorqueGainMismatch().inadmissible(scene, Member(1), np.array([-0.8]), std)
+    # At 2 N m, the limit, nothing of the torque would be left.
+    assert TorqueSensorNonlinearity().inadmissible(scene, Member(0), np.array([-0.3]), std)
+    assert TorqueSensorNonlinearity().inadmissible(scene, Member(0), np.array([-0.1]), std) is None
+
+
+def tones(time: np.ndarray) -> np.ndarray:
+    return np.array([np.sin(40.0 * time) + 0.3 * np.sin(1900.0 * time), 2.0 + 0.5 * time + np.cos(7.0 * time)])
+
+
+@pytest.mark.parametrize("delay", [0.0042, -0.00073, 0.0005])
+def test_shifting_is_exact_at_every_frequency(delay: float):
+    robot, time = load_robot(), np.arange(4000) / 1000.0
+    item = recording(robot, "t_1", time, np.zeros((2, 4000)), tones(time - delay))
+    back = shifted(item, delay)
+    assert np.abs(back.effort - tones(time))[:, 300:-300].max() < 2e-3
+    assert np.array_equal(back.position, item.position)
+
+
+def test_shifting_serves_one_joint_and_leaves_the_other():
+    robot, time = load_robot(), np.arange(2000) / 1000.0
+    item = recording(robot, "t_1", time, np.zeros((2, 2000)), tones(time))
+    moved = shifted(item, 0.003, [1])
+    assert np.array_equal(moved.effort[0], item.effort[0])
+    assert np.abs(moved.effort[1] - tones(time + 0.003)[1])[100:-100].max() < 1e-3
+    assert shifted(item, 0.0) is item
+
+
+def test_shifting_copes_with_jitter_and_does_not_cross_gaps():
+    robot, rng = load_robot(), np.random.default_rng(0)
+    time = np.arange(3000) / 1000.0 + rng.uniform(-2e-4, 2e-4, 3000)
+    time[1500:] += 4.0
+
+    def slow(t):
+        return np.array([np.sin(30.0 * t), np.where(t < 3.0, 0.0, 1.0)])
+
+    item = recording(robot, "t_1", time, np.zeros((2, 3000)), slow(time - 0.0026))
+    back = shifted(item, 0.0026)
+    inside = np.r_[50:1450, 1550:2950]
+    assert np.abs(back.effort - slow(time))[0, inside].max() < 1e-4
+    assert np.abs(back.effort[1] - slow(time)[1]).max() < 1e-9
+
+
+def test_a_sample_more_or_less_is_how_torque_is_sampled():
+    assert within_sampling(-0.0007, 1000.0)
+    assert not within_sampling(0.0014, 1000.0)

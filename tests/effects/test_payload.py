@@ -1,0 +1,160 @@
+"""Payloads and counterbalances: columns against Pinocchio with another body, recovery of mass and time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from scara_ident.effects import Member
+from scara_ident.effects.links import point_mass, tool_of
+from scara_ident.effects.payload import FreePayloadChange, GravityCounterbalance, PayloadChange, PayloadOfRecordings
+from scara_ident.model import build_model
+from scara_ident.robot import Robot, load_robot
+from tests.arms import PLANAR_2R, example_urdf, recorded_torque, recording, rnea, sines, write_urdf
+from tests.effects.scenes import columns, fit, moving, scene_of
+from tests.virtual.made import tree
+
+FRICTION = ((0.1, 0.05, -0.004, 0.0, 0.02), (0.04, 0.03, 0.0, 0.0, -0.01))
+
+
+def laden(robot: Robot, mass: float, point: np.ndarray) -> Robot:
+    """The robot with a ball of no size at a point of its last joint's frame."""
+    model = robot.model.copy()
+    model.appendBodyToJoint(model.njoints - 1, pin.Inertia(mass, point, np.zeros((3, 3))), pin.SE3.Identity())
+    return replace(robot, model=model)
+
+
+def test_the_tool_of_the_scara_is_at_the_end_of_its_second_link():
+    tool = tool_of(load_robot())
+    assert tool.joint == 1
+    assert tool.point[:2] == pytest.approx([0.33, 0.0])
+
+
+@pytest.mark.parametrize("name", ["scara03", "ur5", "tree"])
+def test_the_column_is_the_torque_of_a_ball_at_the_tool(name: str, tmp_path: Path):
+    robot = {
+        "scara03": load_robot,
+        "ur5": lambda: load_robot(example_urdf("ur5_robot.urdf")),
+        "tree": lambda: tree(tmp_path),
+    }[name]()
+    item = moving(robot, 1.0)
+    point = tool_of(robot).point
+    state = (item.q, item.v, item.a)
+    added = (rnea(laden(robot, 1.5, point), *state) - rnea(robot, *state)) * robot.row_scale[:, None]
+    scene = scene_of(robot)
+    column = columns(PayloadChange(), scene, item, Member(None, (0.5,)))[:, 0]
+    late = item.time > 0.501
+    early = item.time < 0.499
+    assert np.abs(1.5 * column - added)[:, late].max() < 1e-9 * np.abs(added).max()
+    assert np.all(column[:, early] == 0.0)
+    always = columns(PayloadOfRecordings(), scene_of(robot, start={"other": -1.0, "m": 0.0}), item, Member(None, (), 0))
+    assert np.abs(1.5 * always[:, 0] - added).max() < 1e-9 * np.abs(added).max()
+
+
+def test_a_payload_mounted_anyhow_has_the_columns_that_its_torque_shows():
+    scene = scene_of(load_robot())
+    free = FreePayloadChange()
+    member = Member(None, (0.0,))
+    names = [column.name for column in free.columns(scene, member)]
+    assert names == ["payload_m", "payload_mx", "payload_my", "payload_Izz"]
+    item = moving(scene.robot, 1.0)
+    point = np.array([0.2, -0.1, 0.05])
+    state = (item.q, item.v, item.a)
+    added = (rnea(laden(scene.robot, 2.0, point), *state) - rnea(scene.robot, *state)) * 0.01
+    body = 2.0 * point_mass(point)[[0, 1, 2, 9]]
+    column = columns(free, scene, item, member)
+    assert np.abs(np.einsum("jkn,k->jn", column, body) - added)[:, 1:].max() < 1e-9 * np.abs(added).max()
+    found = free.parameters(scene, member, body, np.diag(np.full(4, 0.01)))
+    assert found["mass"].value == 2.0
+    assert found["mx"].value == pytest.approx(0.4)
+    assert found["mx"].unit == "kg m"
+
+
+def made(robot: Robot, seed: int, name: str, mass: float, since: float = 0.0):
+    rng = np.random.default_rng(seed)
+    time = np.arange(6000) / 500.0
+    q, v, a = sines(rng, time, 2, size=0.9, lowest=0.3)
+    u = recorded_torque(robot, q, v, a, FRICTION)
+    after = recorded_torque(laden(robot, mass, tool_of(robot).point), q, v, a, FRICTION)
+    u = np.where(time < since, u, after)
+    return recording(robot, name, time, q, u + 0.02 * rng.standard_normal(u.shape))
+
+
+def test_mass_and_time_are_recovered():
+    robot = load_robot()
+    data = [made(robot, k, f"t{k}_1", 1.2, since=5.3) for k in range(2)]
+    effect = PayloadChange()
+    rest = {}
+    for time in (5.0, 5.3, 5.6):
+        scene, value, covariance = fit(build_model(robot), data, effect, Member(None, (time,)), rounds=1)
+        rest[time] = value[0]
+        if time == 5.3:
+            found = effect.parameters(scene, Member(None, (time,)), value, covariance)["mass"]
+            assert found.value == pytest.approx(1.2, abs=4.0 * found.std)
+            assert found.std < 0.02
+    # At the right time the mass is largest: before and after, part of it is not there.
+    assert max(rest, key=lambda time: rest[time]) == 5.3
+
+
+def test_the_instants_cover_the_run_and_a_shift_of_less_than_a_sample_changes_the_column():
+    scene = scene_of(load_robot())
+    times = [member.knobs[0] for member in PayloadChange().members(scene)]
+    assert np.diff([0.0, *times, scene.duration]).max() < 1.2
+    item = moving(scene.robot, 1.0)
+    near = [columns(PayloadChange(), scene, item, Member(None, (t,))) for t in (0.4, 0.4003)]
+    assert np.any(near[0] != near[1])
+
+
+def test_groups_of_recordings_are_those_that_share_a_word_or_follow_each_other():
+    names = ["a_load_1", "a_free_1", "b_load_1", "b_free_1"]
+    scene = scene_of(load_robot(), start={name: float(k) for k, name in enumerate(names)})
+    effect = PayloadOfRecordings()
+    words = {effect.description(scene, member) for member in effect.members(scene)}
+    assert "a payload in a_free_1, b_free_1, not in the others" in words
+    assert "a payload in b_free_1, b_load_1, not in the others" in words
+    # The first recording is what the others are compared with.
+    assert not any("a_load_1" in text for text in words)
+    assert PayloadOfRecordings().members(scene_of(load_robot(), start={"a_1": 0.0})) == ()
+
+
+def test_the_payload_of_some_recordings_is_recovered():
+    robot = load_robot()
+    data = [made(robot, 3 * k + r, f"t{k}_{r + 1}", 0.8 * r) for k in range(2) for r in range(2)]
+    start = {item.name: float(item.time[0]) for item in data}
+    scene = scene_of(robot, start=start)
+    effect = PayloadOfRecordings()
+    member = next(m for m in effect.members(scene) if "t0_2, t1_2," in effect.description(scene, m))
+    scene, value, covariance = fit(build_model(robot), data, effect, member, rounds=1)
+    found = effect.parameters(scene, member, value, covariance)["mass"]
+    assert found.value == pytest.approx(0.8, abs=4.0 * found.std)
+    assert found.std < 0.02
+
+
+def test_no_arm_carries_more_than_it_weighs():
+    scene = scene_of(load_robot())
+    std = np.array([0.1])
+    assert "more than" in str(PayloadChange().inadmissible(scene, Member(None, (1.0,)), np.array([80.0]), std))
+    assert PayloadChange().inadmissible(scene, Member(None, (1.0,)), np.array([-2.0]), std) is None
+    body, spread = np.array([1.0, 0.3, 0.0, -0.1]), np.full(4, 0.01)
+    assert "opposite" in str(FreePayloadChange().inadmissible(scene, Member(None, (1.0,)), body, spread))
+
+
+def test_a_counterbalance_is_tried_where_gravity_acts(tmp_path: Path):
+    assert GravityCounterbalance().members(scene_of(load_robot())) == ()
+    scene = scene_of(load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R)))
+    effect = GravityCounterbalance()
+    assert [member.joint for member in effect.members(scene)] == [0, 1]
+    item = moving(scene.robot, 1.0)
+    column = columns(effect, scene, item, Member(1))
+    assert column[1, 0] == pytest.approx(np.sin(item.q[1]))
+    value = np.array([3.0 * np.cos(0.4), 3.0 * np.sin(0.4)])
+    found = effect.parameters(scene, Member(1), value, np.diag([0.01, 0.01]))
+    assert found["torque"].value == pytest.approx(3.0)
+    assert found["phase"].value == pytest.approx(0.4)
+    assert found["torque"].std == pytest.approx(0.1)
+    assert found["phase"].std == pytest.approx(0.1 / 3.0)
+    assert column[1].T @ value == pytest.approx(3.0 * np.sin(item.q[1] + 0.4))
