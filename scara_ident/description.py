@@ -186,13 +186,24 @@ def read_description(path: Path) -> RobotDescription:
         where = f", line {mark.line + 1}" if mark else ""
         reason = " ".join(str(getattr(error, "problem", error)).split())
         raise RobotError(f"{path}{where}: not YAML: {reason}") from None
+    description = check_description(content, path)
+    return description.model_copy(update={"urdf": (path.parent / description.urdf).resolve()})
+
+
+def check_description(content: Any, path: Path) -> RobotDescription:
+    """Check the contents of a robot description; ``path`` is named in errors.
+
+    Raises
+    ------
+    RobotError
+        In one line: file, key and what was expected.
+    """
     if not isinstance(content, dict):
         raise RobotError(f"{path}: expected a mapping with the key urdf, found {type(content).__name__}")
     try:
-        description = RobotDescription.model_validate(content)
+        return RobotDescription.model_validate(content)
     except ValidationError as error:
         raise RobotError(f"{path}: {_first_problem(error)}") from None
-    return description.model_copy(update={"urdf": (path.parent / description.urdf).resolve()})
 
 
 def _first_problem(error: ValidationError) -> str:

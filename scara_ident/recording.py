@@ -142,6 +142,8 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
     optional, findings = _optional_channels(path, channels, names, () if need_effort else ("effort",))
     wanted = [channel.column for channel in (*needed, *chain.from_iterable(optional.values()))]
     columns = read_columns(path, wanted, channels.topic)
+    if shares_clock(path, channels.time.column):
+        columns = _rows_of_the_arm(columns, [channel.column for channel in needed[1:]])
 
     def rows(wanted: Sequence[Channel]) -> Array:
         return np.array([channel.si(columns.pop(channel.column)) for channel in wanted])
@@ -155,8 +157,6 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
         effort=rows(channels.effort) if need_effort else None,
         row=np.arange(1, len(time) + 1),
     )
-    if shares_clock(path, channels.time.column):
-        samples = samples.kept(_of_this_arm(samples))
     samples, audited = audit(samples)
     findings += audited
     signals = {"effort": samples.effort}
@@ -257,10 +257,13 @@ def write_recording(recording: Recording, path: Path | str, *, effort_gain: Arra
     write_columns(Path(path), columns)
 
 
-def _of_this_arm(samples: Samples) -> NDArray[np.bool_]:
-    """Tell which rows hold any number of the arm, shape (N,); the others are other signals' samples."""
-    channels = samples.position if samples.effort is None else np.vstack((samples.position, samples.effort))
-    return np.asarray(np.isfinite(channels).any(axis=0))
+def _rows_of_the_arm(columns: dict[str, Array], wanted: Sequence[str]) -> dict[str, Array]:
+    """Leave out the samples of other signals, in which all that is wanted of the arm is empty.
+
+    The rows that are left count from 1, as if the others were not in the file.
+    """
+    keep = np.isfinite([columns[name] for name in wanted]).any(axis=0)
+    return columns if keep.all() else {name: values[keep] for name, values in columns.items()}
 
 
 def _refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str], channels: Channels) -> None:

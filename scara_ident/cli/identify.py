@@ -92,9 +92,11 @@ def identify(
         console.print(sentence, markup=False)
     if output is not None:
         from scara_ident.report.figure import torque_figure
+        from scara_ident.report.html import identification_report
 
         write_whole(output / "torque.png", lambda path: torque_figure(path, result, (*training, *held_out)))
         write_json(output / "identification.json", content)
-        console.print(
-            f"written: {output / 'identification.json'}, {output / 'torque.png'}", markup=False, soft_wrap=True
-        )
+        identification_report(output / "report.html", result, training, held_out)
+        names = ("identification.json", "report.html", "torque.png")
+        written = ", ".join(str(output / name) for name in names)
+        console.print(f"written: {written}", markup=False, soft_wrap=True)

@@ -14,6 +14,7 @@ from scara_ident.cli.compare import compare
 from scara_ident.cli.console import errors_console
 from scara_ident.cli.diagnose import diagnose
 from scara_ident.cli.identify import identify
+from scara_ident.cli.inspect import inspect
 from scara_ident.cli.paper import paper
 from scara_ident.cli.simulate import simulate
 from scara_ident.errors import ScaraIdentError
@@ -45,7 +46,7 @@ def program(
     """Identify the dynamic model of a robot arm from measured motion, and find what the model lacks."""
 
 
-_COMMANDS: tuple[Callable[..., Any], ...] = (identify, diagnose, compare, simulate, base, paper)
+_COMMANDS: tuple[Callable[..., Any], ...] = (identify, diagnose, compare, simulate, inspect, base, paper)
 for _command in _COMMANDS:
     app.command()(_command)
 
@@ -79,6 +80,15 @@ def run(arguments: list[str]) -> int:
         return 0
     except MemoryError:
         _complain("out of memory; give fewer recordings at a time")
+        return 1
+    except (ArithmeticError, LookupError, TypeError, ValueError, RuntimeError) as error:
+        # A fault of ours: one line for the user, the whole trace for who wants to report it.
+        if os.environ.get("SCARA_IDENT_TRACEBACK"):
+            raise
+        _complain(
+            f"internal error, {type(error).__name__}: {' '.join(str(error).split())}; please report it with what "
+            "SCARA_IDENT_TRACEBACK=1 prints"
+        )
         return 1
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""

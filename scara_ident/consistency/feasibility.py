@@ -99,7 +99,7 @@ def check_possible(
     reasons += [_column_reason(model.columns[k], value[k]) for k in u.nonnegative if value[k] < 0.0]
     for polynomial in u.polynomials:
         faults = friction_faults(polynomial, value[list(polynomial.columns)])
-        reasons += [friction_reason(fault, polynomial, _speed_unit(model, polynomial)) for fault in faults]
+        reasons += [_friction_reason(model, fault, polynomial) for fault in faults]
     distance_std = None
     if information is not None:
         distance_std = 0.0 if not reasons else _distance_std(model, value, information)
@@ -166,22 +166,17 @@ def _together_reason(columns: Sequence[Column], values: Array) -> str:
     return f"{listed} cannot all be true: no bodies with mass have them together"
 
 
-def friction_reason(fault: FrictionFault, polynomial: BrakingPolynomial, unit: str) -> str:
-    """Write a friction fault in words."""
-    until = "above" if not np.isfinite(fault.stop) or fault.stop >= polynomial.speed * (1.0 - 1e-9) else "between"
-    where = (
-        f"above {fault.start:.3g} {unit}"
-        if until == "above"
-        else f"between {fault.start:.3g} and {fault.stop:.3g} {unit}"
-    )
-    if fault.start == 0.0 and until == "above":
+def _friction_reason(model: TorqueModel, fault: FrictionFault, polynomial: BrakingPolynomial) -> str:
+    joint = model.robot.joints.index(fault.joint)
+    unit = "m/s" if model.robot.prismatic[joint] else "rad/s"
+    to_the_end = fault.stop >= polynomial.speed * (1.0 - 1e-9)
+    if fault.start == 0.0 and to_the_end:
         where = "at every speed"
+    elif to_the_end:
+        where = f"above {fault.start:.3g} {unit}"
+    else:
+        where = f"between {fault.start:.3g} and {fault.stop:.3g} {unit}"
     if fault.kind == "pushes":
         return f"friction of {fault.joint} pushes {where}"
-    torque = "N" if "m/s" in unit and polynomial.limit else "N m"
-    return f"friction of {fault.joint} exceeds the motor's limit of {polynomial.limit:.3g} {torque} {where}"
-
-
-def _speed_unit(model: TorqueModel, polynomial: BrakingPolynomial) -> str:
-    joint = model.robot.joints.index(polynomial.joint)
-    return "m/s" if model.robot.prismatic[joint] else "rad/s"
+    limit = f"{polynomial.limit:.3g} {model.robot.torque_unit(joint)}"
+    return f"friction of {fault.joint} exceeds the motor's limit of {limit} {where}"

@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from scara_ident.base_parameters import pseudo_inertia
-from scara_ident.consistency.bodies import PACKED_IDENTITY, packed_pseudo_inertia, unpacking
+from scara_ident.consistency.bodies import PACKED_IDENTITY, pack, packed_pseudo_inertia, unpacking
 from scara_ident.robot import Robot
 
 Array = NDArray[np.float64]
@@ -131,14 +131,10 @@ def _moved(robot: Robot, matrices: Array) -> Array:
     model = robot.model.copy()
     to_parameters = np.linalg.inv(packed_pseudo_inertia())
     for place, k in enumerate(robot.order):
-        parameters = to_parameters @ _packed(matrices[place])
+        parameters = to_parameters @ pack(matrices[place])
         model.inertias[int(k) + 1] = pin.Inertia.FromDynamicParameters(parameters)
     mass_matrix = pin.crba(model, model.createData(), pin.neutral(model))
     return np.array(np.diag(mass_matrix)[robot.order], dtype=float)
-
-
-def _packed(matrix: Array) -> Array:
-    return np.linalg.lstsq(unpacking(), matrix.ravel(), rcond=None)[0]
 
 
 def _to_standard(matrices: Array, armature: Array) -> Array:

@@ -13,7 +13,7 @@ from scara_ident.errors import UsageError
 
 Array = NDArray[np.float64]
 FrictionShape = Literal["free", "dissipative", "lubricated"]
-Weighting = Literal["equal", "noise"]
+Weighting = Literal["auto", "equal", "noise"]
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,12 @@ class ConsistentOptions:
     priors : mapping of str to (float, float)
         Mean and standard deviation of parameters, by the name of the model's parameter or of a standard
         parameter such as ``m2``.
-    weighting : {"equal", "noise"}
-        Every joint's rows count the same, as in ordinary least squares, or are divided by the joint's noise.
+    weighting : {"auto", "equal", "noise"}
+        Every joint's rows count the same, as in ordinary least squares, or are divided by the joint's noise. By
+        default ordinary least squares is the answer where it is possible; where something has to give, it gives
+        where the data are least sure, which takes each joint's noise.
     noise : ndarray, shape (n,), optional
-        Standard deviation of each joint's torque for ``weighting="noise"``; by default its residual.
+        Standard deviation of each joint's torque; by default its residual in ordinary least squares.
     prior_weight : float
         Weight of the nominal bodies against the data, where one is a change of a body by its own size against one
         standard deviation of the torque's noise. The default of 0.01 pulls a direction that the data determine
@@ -70,7 +72,7 @@ class ConsistentOptions:
     link_mass: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     com: Literal["free", "visual"] | Mapping[str, Ellipsoid] = "free"
     priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    weighting: Weighting = "equal"
+    weighting: Weighting = "auto"
     noise: Array | None = None
     prior_weight: float = 0.01
 

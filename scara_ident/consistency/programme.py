@@ -13,11 +13,11 @@ disciplined parametrised programme (Agrawal et al. 2019), so cvxpy's canonical f
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dtrtri
 
 from scara_ident.consistency.bodies import unpack, unpacking
 from scara_ident.consistency.matching import Matcher
@@ -103,47 +103,29 @@ class Programme:
     ----------
     unknowns : Unknowns
     matcher : Matcher
-    problem : cvxpy.Problem
-        The parametrised problem.
     """
 
     def __init__(self, model: TorqueModel, options: ConsistentOptions | None = None) -> None:
         self.options = options or ConsistentOptions()
         self.unknowns: Unknowns = build_unknowns(model, self.options)
         self.matcher = Matcher(self.unknowns)
-        self.problem, self._root, self._centre = self._build()
         self._solver: Any = None
 
-    def _build(self) -> tuple[Any, Any, Any]:
+    @cached_property
+    def problem(self) -> Any:
+        """The parametrised cvxpy problem, built when it is first needed."""
         import cvxpy as cp
 
         u = self.unknowns
         size = u.size
-        whole: Any
         w, auxiliary = cp.Variable(size, name="w"), cp.Variable(u.auxiliary, name="auxiliary")
         # The triangle's entries as one vector: a parameter's value then goes into the canonical form as it is.
         entries = cp.Parameter(size * (size + 1) // 2, name="root")
         centre = cp.Parameter(size, name="centre")
         root = cp.reshape(_triangle(size) @ entries, (size, size), order="C")
-        x: Any = centre + root @ w
-        whole = cp.hstack([x, auxiliary]) if u.auxiliary else x
-        matrix = unpacking()
-        constraints = [
-            cp.reshape(matrix @ x[10 * i : 10 * i + 10], (4, 4), order="C") >> MARGIN * np.eye(4) for i in range(u.n)
-        ]
-        cones = u.cones
-        if len(cones.nonnegative):
-            constraints.append(_sparse(cones.nonnegative.matrix) @ whole + cones.nonnegative.offset >= MARGIN)
-        if len(cones.small):
-            d, e, f = (_sparse(cones.small.matrix[k::3]) @ whole + cones.small.offset[k::3] for k in range(3))
-            constraints.append(cp.SOC(d + f, cp.vstack([d - f, 2.0 * e]), axis=0))
-        if len(cones.ball):
-            t, *parts = (_sparse(cones.ball.matrix[k::4]) @ whole + cones.ball.offset[k::4] for k in range(4))
-            constraints.append(cp.SOC(t - MARGIN, cp.vstack(parts), axis=0))
-        if len(u.held):
-            constraints.append(_sparse(u.held) @ x == 0.0)
-        self._w, self._auxiliary = w, auxiliary
-        return cp.Problem(cp.Minimize(cp.sum_squares(w)), constraints), entries, centre
+        constraints = constraints_on(u, centre + root @ w, auxiliary)
+        self._w, self._auxiliary, self._root, self._centre = w, auxiliary, entries, centre
+        return cp.Problem(cp.Minimize(cp.sum_squares(w)), constraints)
 
     def solve(self, factor: Array, target: Array, prior: Array) -> Point:
         """Solve for one set of data.
@@ -170,6 +152,8 @@ class Programme:
 
     def solve_rows(self, rows: Array, target: Array, prior: Array) -> Point:
         """Solve with rows that act on x instead of the model's parameters; see `solve`."""
+        from scipy.linalg.lapack import dtrtri
+
         u = self.unknowns
         stacked = np.vstack([np.column_stack([rows, target]), np.column_stack([prior, prior @ u.reference])])
         triangular: Array = np.asarray(np.linalg.qr(stacked, mode="r"))
@@ -185,9 +169,10 @@ class Programme:
     def _run(self, root: Array, centre: Array) -> tuple[Array, Array, Array, Any]:
         import cvxpy as cp
 
+        problem = self.problem
         self._root.value = root[np.triu_indices(root.shape[0])]
         self._centre.value = centre
-        data = self.problem.get_problem_data(cp.CLARABEL)[0]
+        data = problem.get_problem_data(cp.CLARABEL)[0]
         result = self._attempt(data, _FAST)
         if not self._is_good(result, strict=True):
             result = self._attempt(data, _CAREFUL)
@@ -245,6 +230,39 @@ class Programme:
             iterations=int(result.iterations),
             seconds=float(result.solve_time),
         )
+
+
+def constraints_on(unknowns: Unknowns, x: Any, auxiliary: Any) -> list[Any]:
+    """Write all constraints on cvxpy expressions.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    x : cvxpy.Expression, shape (size,)
+    auxiliary : cvxpy.Expression, shape (auxiliary,)
+
+    Returns
+    -------
+    list of cvxpy.Constraint
+        The bodies' linear matrix inequalities first, each one constant matrix times its body's ten unknowns.
+    """
+    import cvxpy as cp
+
+    u, cones, matrix = unknowns, unknowns.cones, unpacking()
+    whole = cp.hstack([x, auxiliary]) if u.auxiliary else x
+    bodies = [cp.reshape(matrix @ x[10 * i : 10 * i + 10], (4, 4), order="C") for i in range(u.n)]
+    constraints: list[Any] = [body >> MARGIN * np.eye(4) for body in bodies]
+    if len(cones.nonnegative):
+        constraints.append(_sparse(cones.nonnegative.matrix) @ whole + cones.nonnegative.offset >= MARGIN)
+    if len(cones.small):
+        d, e, f = (_sparse(cones.small.matrix[k::3]) @ whole + cones.small.offset[k::3] for k in range(3))
+        constraints.append(cp.SOC(d + f, cp.vstack([d - f, 2.0 * e]), axis=0))
+    if len(cones.ball):
+        t, *parts = (_sparse(cones.ball.matrix[k::4]) @ whole + cones.ball.offset[k::4] for k in range(4))
+        constraints.append(cp.SOC(t - MARGIN, cp.vstack(parts), axis=0))
+    if len(u.held):
+        constraints.append(_sparse(u.held) @ x == 0.0)
+    return constraints
 
 
 def _triangle(size: int) -> Any:

@@ -1,14 +1,16 @@
 """How the prior pulls where the data leave a choice.
 
-The entropic divergence D (see `scara_ident.consistency.prior`) pulls a body Q, relative to nominal, with the force
-1 - Q^-1: no harder than its weight however much heavier than nominal the body is. A least-squares programme needs a
-quadratic form instead. With A near Q,
+Near the nominal arm the entropic divergence (see `scara_ident.consistency.prior`) is half the squared length of the
+bodies' difference from nominal, as matrices relative to nominal. In that length every direction has a standard
+deviation s that the data leave it, and a distance z from nominal that they ask for, both in units of the nominal
+body itself. A prior of weight w moves the direction by w s z of its standard deviations. So the weight is
 
-    tr((Q - 1) A^-1 (Q - 1)) / 2
+- as given where the data do not tell the direction from nominal: it keeps what they hardly determine from following
+  the noise;
+- reduced where they do, so that the direction moves by no more than a twentieth of its standard deviation, however
+  wrong the nominal body is.
 
-has that force at Q = A. A is taken from the data: the body that they ask for without constraints, with its eigenvalues
-counted from 1 upwards, so that a body lighter than nominal is not pulled harder either. It depends neither on frame
-nor on unit.
+Lengths and directions depend neither on frame nor on unit.
 """
 
 from __future__ import annotations
@@ -16,13 +18,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.consistency.bodies import pack, unpack
 from scara_ident.consistency.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 
-# The bodies that the data ask for depend on the pull, hardly; so many rounds settle that.
-ROUNDS = 3
+# The data tell a direction from nominal at this many standard deviations.
+TOLD_APART = 4.0
+# Then it may be moved by this share of one.
+MOST_BIAS = 0.05
 
 
 def prior_rows(u: Unknowns, rows: Array, target: Array, weight: float) -> Array:
@@ -35,42 +38,27 @@ def prior_rows(u: Unknowns, rows: Array, target: Array, weight: float) -> Array:
         Data on x, divided by the noise.
     target : ndarray, shape (r,)
     weight : float
-        Cost, in squared standard deviations, of a rotor that differs from nominal by its own inertia.
+        Cost, in squared standard deviations of the noise, of a rotor that differs from nominal by its own inertia.
 
     Returns
     -------
     ndarray, shape (size, size)
         Rows W on x less its reference; the prior is ``|W (x - reference)|^2``.
     """
-    n = u.n
     scales = np.ones(u.size)
-    scales[11 * n :] = _other_scales(u, rows, target)
-    prior = np.diag(1.0 / scales)
-    normal, force = rows.T @ rows, rows.T @ target
-    for _ in range(ROUNDS):
-        form = weight * prior.T @ prior
-        # Scaled to a unit diagonal for the sake of digits; only the size of x is wanted.
-        size = np.sqrt(np.diag(normal) + np.diag(form))
-        x = np.linalg.solve((normal + form) / np.outer(size, size), (force + form @ u.reference) / size) / size
-        for i, body in enumerate(unpack(x[: 10 * n].reshape(n, 10))):
-            prior[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = _metric(body)
-        rotors = np.arange(10 * n, 11 * n)
-        prior[rotors, rotors] = 1.0 / np.sqrt(np.maximum(np.abs(x[rotors]), 1.0))
-    return np.asarray(np.sqrt(weight) * prior)
-
-
-def _metric(body: Array) -> Array:
-    """Rows whose squared length is tr(E A^-1 E) for a packed symmetric E, shape (10, 10)."""
-    values, vectors = np.linalg.eigh(body)
-    inverse = 1.0 / np.maximum(np.abs(values), 1.0)
-    rotated = vectors.T @ unpack(np.eye(10)) @ vectors
-    return np.asarray((pack(rotated) * np.sqrt(pack_mean(inverse))).T)
-
-
-def pack_mean(values: Array) -> Array:
-    """Mean of two eigenvalues for every entry of a packed matrix, shape (10,)."""
-    mean = 0.5 * (values[:, None] + values[None, :])
-    return np.asarray(pack(mean) / pack(np.ones((4, 4))))
+    scales[11 * u.n :] = _other_scales(u, rows, target)
+    scaled = rows * scales
+    precision, directions = np.linalg.eigh(scaled.T @ scaled)
+    # Rounding may leave a precision below 0: nothing is known of that direction.
+    precision = np.clip(precision, 0.0, None)
+    score = directions.T @ (scaled.T @ (target - rows @ u.reference))
+    root = np.sqrt(precision)
+    # Distance from nominal in standard deviations, z / s, and s z = (z / s) / precision.
+    apart = np.abs(score) / np.where(root > 0.0, root, np.inf)
+    told = apart > TOLD_APART
+    weights = np.full(u.size, weight)
+    weights[told] = np.minimum(weight, MOST_BIAS * precision[told] / apart[told])
+    return np.asarray(np.sqrt(weights)[:, None] * directions.T / scales)
 
 
 def _other_scales(u: Unknowns, rows: Array, target: Array) -> Array:

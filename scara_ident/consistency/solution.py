@@ -9,6 +9,7 @@ Then what torque cannot tell: with all that it can tell held, the bodies nearest
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,8 +20,8 @@ from scara_ident.consistency.prior import nearest_to_nominal, null_space
 from scara_ident.consistency.programme import MARGIN, Point, Programme
 from scara_ident.consistency.pull import prior_rows
 from scara_ident.consistency.unknowns import Unknowns
-from scara_ident.errors import EstimationError
-from scara_ident.information import UNDETERMINED, Information, Solution
+from scara_ident.errors import EstimationError, UsageError
+from scara_ident.information import UNDETERMINED, Information, Solution, merge
 
 Array = NDArray[np.float64]
 
@@ -69,12 +70,74 @@ class ConsistentSolution:
         return self.point is None
 
 
-def solve_consistent(
+def solve_joints(
     programme: Programme,
-    information: Information,
+    joints: Sequence[Information],
     *,
-    noise: float | None = None,
+    parameter_prior: Information | None = None,
     standard_prior: StandardPrior | None = None,
+) -> tuple[ConsistentSolution, Information, Array]:
+    """Find the best possible parameters for the rows of all joints, weighted as the options say.
+
+    Parameters
+    ----------
+    programme : Programme
+    joints : sequence of Information
+        All rows of each joint.
+    parameter_prior : Information, optional
+        Rows of priors on the model's parameters.
+    standard_prior : StandardPrior, optional
+
+    Returns
+    -------
+    solution : ConsistentSolution
+    information : Information
+        The rows that it was found from.
+    weights : ndarray, shape (n,)
+        Weight of each joint's rows.
+
+    Raises
+    ------
+    EstimationError
+        If the programme cannot be solved.
+    UsageError
+        If the noise in the options does not fit the joints.
+    """
+    options = programme.options
+    weights = np.ones(len(joints))
+    if options.weighting != "noise":
+        information = _weighted(joints, weights, parameter_prior)
+        if options.weighting == "equal":
+            found = solve_consistent(programme, information, standard_prior=standard_prior)
+            return found, information, weights
+        possible = None if standard_prior is not None else least_squares_arm(programme, information)
+        if possible is not None:
+            return possible, information, weights
+    weights = 1.0 / _joint_noise(joints, options.noise)
+    information = _weighted(joints, weights, parameter_prior)
+    return solve_consistent(programme, information, standard_prior=standard_prior), information, weights
+
+
+def _weighted(joints: Sequence[Information], weights: Array, prior: Information | None) -> Information:
+    information = merge(joint.scaled(float(w)) for joint, w in zip(joints, weights, strict=True))
+    if prior is None:
+        return information
+    return merge([information, prior.scaled(noise_of(information, information.solve()))])
+
+
+def _joint_noise(joints: Sequence[Information], given: Array | None) -> Array:
+    if given is not None:
+        noise = np.asarray(given, dtype=float)
+        if noise.shape != (len(joints),) or not np.all(noise > 0.0):
+            raise UsageError(f"noise: expected {len(joints)} numbers above 0, one per joint")
+        return noise
+    value = merge(joints).solve().value
+    # An exact fit would give an infinite weight; rounding is the floor.
+    return np.array([max(j.rms(value), LEAST_NOISE * j.torque_rms) or 1.0 for j in joints])
+
+
+def solve_consistent(
+    programme: Programme, information: Information, *, standard_prior: StandardPrior | None = None
 ) -> ConsistentSolution:
     """Find the best possible parameters for one factor; what Monte Carlo and cross-validation repeat.
 
@@ -83,8 +146,6 @@ def solve_consistent(
     programme : Programme
     information : Information
         All rows, weighted, with those of priors on the model's parameters.
-    noise : float, optional
-        Standard deviation of the rows; by default their residual.
     standard_prior : StandardPrior, optional
 
     Returns
@@ -97,24 +158,11 @@ def solve_consistent(
         If the programme cannot be solved.
     """
     u = programme.unknowns
-    least_squares = information.solve()
-    determined = least_squares.null.shape[1] == 0
-    if standard_prior is None and determined:
-        x = _determined(programme, least_squares.value)
-        if x is not None:
-            return ConsistentSolution(x, u.parameters(x), None)
-    noise = noise_of(information, least_squares) if noise is None else noise
-    rows = information.regressor_factor @ u.to_parameters / noise
-    target = information.projected_torque / noise
-    if standard_prior is not None:
-        extra = np.zeros((len(standard_prior.target), u.size))
-        extra[:, u.rigid] = standard_prior.rows @ u.nominal.to_standard
-        rows, target = np.vstack([rows, extra]), np.concatenate([target, standard_prior.target])
-    point = programme.solve_rows(rows, target, prior_rows(u, rows, target, programme.options.prior_weight))
-    if standard_prior is None and not determined:
-        x = _partly_determined(programme, least_squares, point)
-        if x is not None:
-            return ConsistentSolution(x, u.parameters(x), None)
+    if standard_prior is None:
+        possible = least_squares_arm(programme, information)
+        if possible is not None:
+            return possible
+    point = _best(programme, information, standard_prior)
     margin = margin_of(u, point.x)
     x = _inside(u, point.x, margin) if margin > -DIGITS else None
     if x is None:
@@ -123,6 +171,43 @@ def solve_consistent(
             "prior_weight or wider limits"
         )
     return ConsistentSolution(x, u.parameters(x), point)
+
+
+def least_squares_arm(programme: Programme, information: Information) -> ConsistentSolution | None:
+    """Return an arm that plain least squares describes, None where there is none.
+
+    Parameters
+    ----------
+    programme : Programme
+    information : Information
+
+    Returns
+    -------
+    ConsistentSolution or None
+
+    Raises
+    ------
+    EstimationError
+        If that cannot be decided.
+    """
+    least_squares = information.solve()
+    if least_squares.null.shape[1] == 0:
+        x = _determined(programme, least_squares.value)
+    else:
+        x = _partly_determined(programme, least_squares, _best(programme, information, None))
+    return None if x is None else ConsistentSolution(x, programme.unknowns.parameters(x), None)
+
+
+def _best(programme: Programme, information: Information, standard_prior: StandardPrior | None) -> Point:
+    u = programme.unknowns
+    noise = noise_of(information, information.solve())
+    rows = information.regressor_factor @ u.to_parameters / noise
+    target = information.projected_torque / noise
+    if standard_prior is not None:
+        extra = np.zeros((len(standard_prior.target), u.size))
+        extra[:, u.rigid] = standard_prior.rows @ u.nominal.to_standard
+        rows, target = np.vstack([rows, extra]), np.concatenate([target, standard_prior.target])
+    return programme.solve_rows(rows, target, prior_rows(u, rows, target, programme.options.prior_weight))
 
 
 def fill(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scara_ident.diagnosis.bank import Candidate
 from scara_ident.diagnosis.examination import ABSORBED, WEAK, Examination
 from scara_ident.effects import Scene
+from scara_ident.effects.measurement import within_sampling
 
 # Probability of letting any effect in when nothing is missing, over all candidates tried.
 FAMILY_ERROR = 0.01
@@ -69,9 +70,14 @@ def _objection(candidate: Candidate, examination: Examination, scene: Scene, tri
     if examination.p_value * tried > FAMILY_ERROR:
         return f"not significant: p = {examination.p_value:.1e} with {tried} candidates tried"
     std = np.sqrt(np.clip(np.diag(examination.covariance), 0.0, None))
-    unphysical = candidate.effect.inadmissible(scene, candidate.member, examination.value, std)
+    # Judged beside the parameters that the model has once the candidate is in it.
+    after = replace(scene, value=examination.model_value[: len(scene.value)])
+    unphysical = candidate.effect.inadmissible(after, candidate.member, examination.value, std)
     if unphysical is not None:
         return unphysical
+    if candidate.effect.name == "time_delay" and candidate.member.joint is not None:
+        if within_sampling(float(examination.value[0]), scene.rate):
+            return "less than one sample: the place of a sample within its period"
     if gain < LEAST_GAIN:
         return f"below the detection limit: removes {max(gain, 0.0):.1%} of the squared residual, {LEAST_GAIN:.0%} is asked"
     helps, voting = examination.votes

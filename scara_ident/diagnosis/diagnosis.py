@@ -17,7 +17,7 @@ from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, is_delay, model_with, search, weighted_fit
 from scara_ident.effects import CATALOGUE, Effect, Parameter
 from scara_ident.effects.aliases import Alias, aliases
-from scara_ident.effects.measurement import shifted
+from scara_ident.effects.measurement import shifted, within_sampling
 from scara_ident.estimators import Estimate, JointError
 from scara_ident.estimators.estimate import joint_error
 from scara_ident.evidence import Evidence, gather_all
@@ -276,7 +276,7 @@ def _effects(found: Search, after: Estimate) -> list[FoundEffect]:
 
 def _is_effect(found: Search) -> bool:
     """Whether a delay is more than the place of a sample within its period."""
-    return found.delay is not None and abs(found.delay[0]) * found.scene.rate > 1.0
+    return found.delay is not None and not within_sampling(found.delay[0], found.scene.rate)
 
 
 def joint_rms(value: Array, evidence: Sequence[Evidence]) -> list[float | None]:

@@ -43,6 +43,8 @@ class Examination:
         Per fold; None where the fold abstains.
     contribution : float
         Weighted sum of squares of what it adds.
+    model_value : ndarray, shape (m,)
+        The model's own parameters when the candidate is added.
     """
 
     value: Array
@@ -53,6 +55,7 @@ class Examination:
     held_out: float
     fold_gains: tuple[float | None, ...]
     contribution: float
+    model_value: Array
 
     @property
     def votes(self) -> tuple[int, int]:
@@ -86,7 +89,7 @@ def examine(stack: Stack, model: Sequence[int], groups: Sequence[Sequence[int]])
     # What is left of a column that the model spans is rounding, and must not be scaled up.
     residual[:, np.sum(residual**2, axis=0) < ABSORBED * sizes] = 0.0
     folds = [factor[:, wanted] - factor[:, model] @ sums for factor in stack.fold_factors]
-    return [_examine_one(stack, residual, sizes, folds, [place[k] for k in group], len(model)) for group in groups]
+    return [_examine_one(stack, residual, sizes, folds, sums, [place[k] for k in group]) for group in groups]
 
 
 def _sums(factor: Array, model: Sequence[int], wanted: Sequence[int]) -> Array:
@@ -104,7 +107,7 @@ def _solve(columns: Array, target: Array) -> Array:
 
 
 def _examine_one(
-    stack: Stack, residual: Array, sizes: Array, folds: Sequence[Array], group: list[int], used: int
+    stack: Stack, residual: Array, sizes: Array, folds: Sequence[Array], sums: Array, group: list[int]
 ) -> Examination:
     columns, error = residual[:, group], residual[:, -1]
     left = np.sum(columns**2, axis=0)
@@ -113,11 +116,11 @@ def _examine_one(
     k = len(group)
     if outside < ABSORBED or before == 0.0:
         nothing = np.zeros(k)
-        return Examination(nothing, np.full((k, k), np.inf), 1.0, outside, 0.0, 0.0, (None,) * len(folds), 0.0)
+        return Examination(nothing, np.full((k, k), np.inf), 1.0, outside, 0.0, 0.0, (None,) * len(folds), 0.0, sums[:, -1])
     value = _solve(columns, error)
     added = columns @ value
     after = error - added
-    p_value, covariance = _block_test(stack, columns, after, value, used)
+    p_value, covariance = _block_test(stack, columns, after, value, len(sums))
     products = [fold[:, group].T @ fold[:, group] for fold in folds]
     aims = [fold[:, group].T @ fold[:, -1] for fold in folds]
     mean = np.mean([np.trace(product) for product in products])
@@ -142,6 +145,7 @@ def _examine_one(
         saved / before,
         tuple(gains),
         float(added @ added),
+        sums[:, -1] - sums[:, group] @ value,
     )
 
 

@@ -30,6 +30,9 @@ MOST_REFINED = 4
 # Points on the line between neighbouring scan points, and rounds of narrowing.
 LINE_POINTS = 7
 LINE_ROUNDS = 4
+# Effects that act on predicted loads are fitted again until no base parameter moves by this many std.
+SETTLING_ROUNDS = 4
+SETTLED = 0.1
 # A delay is corrected in the data until a further correction is below this, s.
 DELAY_STEP = 2e-5
 DELAY = "time_delay"
@@ -165,6 +168,7 @@ def search(
         if repeated and delay is not None and abs(winner.examination.value[0]) < DELAY_STEP:
             candidates = [item for item in candidates if item.label(scene) != winner.label]
     kept = _backward(scene, data, bands, weights, chosen, tried)
+    scene = _settle(scene, data, bands, kept)
     steps = [step for step in steps if step.decision.candidate in kept or is_delay(step.decision.candidate)]
     return Search(
         model, scene, tuple(bands), start, start_evidence, tuple(steps), tuple(kept), delay,
@@ -181,6 +185,21 @@ def weighted_fit(model: TorqueModel, evidence: Sequence[Evidence]) -> Estimate:
     """Fit with each joint weighted by its residual, which is found in two rounds."""
     first = least_squares(model, evidence, np.ones(model.robot.n), "wls")
     return least_squares(model, evidence, 1.0 / residual_noise(first, evidence), "wls")
+
+
+def _settle(
+    scene: Scene, recordings: Sequence[Recording], bands: Sequence[float | None], chosen: Sequence[Candidate]
+) -> Scene:
+    """Repeat the fit until the loads that the effects are predicted from are those of the estimate."""
+    for _ in range(SETTLING_ROUNDS if chosen else 0):
+        model = model_with(scene, chosen)
+        estimate = weighted_fit(model, gather_all(model, recordings, bands))
+        value = estimate.value[: len(scene.model.columns)]
+        moved = np.max(np.abs(value - scene.value) / np.maximum(estimate.std[: len(value)], np.finfo(float).tiny))
+        scene = replace(scene, value=value)
+        if moved < SETTLED:
+            break
+    return scene
 
 
 def _scene(model: TorqueModel, value: Array, recordings: Sequence[Recording], bands: Sequence[float | None]) -> Scene:

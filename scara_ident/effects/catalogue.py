@@ -10,6 +10,7 @@ from scara_ident.effects.friction import AsymmetricFriction, FrictionCoupling, P
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import TimeDelay, TorqueGainMismatch, TorqueSensorNonlinearity
 from scara_ident.effects.payload import FreePayloadChange, GravityCounterbalance, PayloadChange, PayloadOfRecordings
+from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
 from scara_ident.effects.tilt import BaseTilt, NominalBaseTilt
@@ -25,6 +26,9 @@ CATALOGUE: tuple[Effect, ...] = (
     FrictionCoupling("sum"),
     FrictionCoupling("difference"),
     OffsetDrift(),
+    TorqueRipple(),
+    EncoderEccentricity(),
+    Vibration(),
     Spring(),
     BaseTilt(),
     NominalBaseTilt(),

@@ -42,7 +42,7 @@ def friction_torque(signals: Signals, joint: int) -> Array:
     torque = np.zeros_like(v)
     for power, value in friction_of(signals.scene, joint).items():
         torque += value * np.sign(v) * np.abs(v) ** power
-    return torque
+    return np.asarray(torque)
 
 
 def friction_slope(signals: Signals, joint: int) -> Array:
@@ -52,7 +52,7 @@ def friction_slope(signals: Signals, joint: int) -> Array:
     for power, value in friction_of(signals.scene, joint).items():
         if power:
             slope += power * value * speed ** (power - 1)
-    return slope * signals.scene.robot.drive_sign[joint]
+    return np.asarray(slope * signals.scene.robot.drive_sign[joint])
 
 
 def moving(scene: Scene) -> list[int]:

@@ -12,16 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.motion import _fast_length as fast_length
-
 Array = NDArray[np.float64]
 
 # Points of the angle grid per period of twice the highest order; each sample is shared by its two neighbours.
 GRID_POINTS = 8
 # Points of the transform per line width: between them it is interpolated linearly.
 FINENESS = 16
-# The noise floor at a line is taken from this many line widths on either side, without the nearest few.
+# The noise floor at a line is taken from this many line widths on either side, without the nearest few. Noise changes
+# faster over frequency, where the loop and the trajectory shape it, than over order.
 NEIGHBOURS = 40.0
+NEIGHBOURS_IN_TIME = 12.0
 GUARD = 3.0
 # At angles of which the samples do not tell cosine and sine apart a line cannot be seen.
 LEAST_DETERMINANT = 1e-3
@@ -107,18 +107,60 @@ def frequency_spectrum(residuals: Sequence[Array], rate: float, frequencies: Arr
         Half the squared amplitude of a line, averaged over the stretches by their lengths. A Hann window keeps what
         is strong at low frequency from leaking, and doubles the width of a line.
     """
+    from scipy.fft import next_fast_len
+
     wanted = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
     power, samples = np.zeros_like(wanted), 0
     for residual in residuals:
         count = len(residual)
         window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(count) + 0.5) / count)
-        length = fast_length(FINENESS * count)
+        length = next_fast_len(FINENESS * count)
         shape = np.asarray(residual, dtype=np.float64) - np.average(residual, weights=window)
         spectrum = np.abs(np.fft.rfft(window * shape, length)) * 2.0 / np.sum(window)
         amplitude = np.interp(wanted, np.arange(len(spectrum)) * (rate / length), spectrum)
         power += 0.5 * count * amplitude**2
         samples += count
     return np.asarray(power / max(samples, 1))
+
+
+def whitened(
+    residuals: Sequence[Array], rate: float, *, smoothing: float = 0.5, highest: float | None = None
+) -> list[Array]:
+    """Divide residuals by the smooth part of their common amplitude spectrum, without phase.
+
+    Noise that grows with frequency otherwise hides a line in the motor's angle, which passes many frequencies. The
+    result has the same lines, weighted by where they stand out of the noise, and no unit.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, each of shape (N_r,)
+    rate : float
+        Samples per second.
+    smoothing : float
+        Hz over which the spectrum is averaged.
+    highest : float, optional
+        Hz above which nothing is kept: the residual's own low-pass.
+
+    Returns
+    -------
+    list of ndarray
+        Shapes as given.
+    """
+    from scipy.fft import next_fast_len
+    from scipy.ndimage import uniform_filter1d
+
+    length = next_fast_len(max(len(residual) for residual in residuals))
+    spectra = [np.fft.rfft(np.asarray(residual) - np.mean(residual), length) for residual in residuals]
+    power = np.sum([np.abs(spectrum) ** 2 for spectrum in spectra], axis=0) / sum(map(len, residuals))
+    reach = max(1, round(smoothing * length / rate))
+    smooth = uniform_filter1d(power, 2 * reach + 1, mode="nearest")
+    gain = np.divide(1.0, np.sqrt(smooth), out=np.zeros_like(smooth), where=smooth > 0.0)
+    if highest is not None:
+        gain[np.fft.rfftfreq(length, 1.0 / rate) > highest] = 0.0
+    return [
+        np.fft.irfft(spectrum * gain, length)[: len(residual)]
+        for spectrum, residual in zip(spectra, residuals, strict=True)
+    ]
 
 
 def order_width(motor_angle: Array) -> float:
@@ -131,7 +173,15 @@ def frequency_width(residuals: Sequence[Array], rate: float) -> float:
     return 2.0 * rate / max(len(residual) for residual in residuals)
 
 
-def lines(positions: Array, power: Array, width: float, *, degrees: int = 2, significance: float = 0.01) -> list[Line]:
+def lines(
+    positions: Array,
+    power: Array,
+    width: float,
+    *,
+    degrees: int = 2,
+    neighbours: float = NEIGHBOURS,
+    significance: float = 0.01,
+) -> list[Line]:
     """Find the lines that noise of a smooth spectrum would not have.
 
     Around a position the power of noise in ``degrees`` degrees of freedom is chi-squared about a local mean, taken
@@ -147,24 +197,29 @@ def lines(positions: Array, power: Array, width: float, *, degrees: int = 2, sig
         Line width in the unit of the positions.
     degrees : int
         2 for a sum over all samples, 2 R for an average over R recordings of about the same length.
+    neighbours : float
+        Line widths on either side that give the mean.
     significance : float
 
     Returns
     -------
     list of Line
-        The most significant first.
+        The most significant first. A strong line has lesser ones beside it that go when it is fitted; one at a time.
     """
     from scipy.ndimage import maximum_filter1d
     from scipy.stats import chi2
 
     spacing = float(np.median(np.diff(positions)))
-    floor = noise_floor(positions, power, width, degrees=degrees)
+    floor = noise_floor(positions, power, width, degrees=degrees, neighbours=neighbours)
     reach = max(1, round(width / spacing))
     ratio = np.divide(power, floor, out=np.zeros_like(power), where=floor > 0.0)
     top = np.flatnonzero((power == maximum_filter1d(power, 2 * reach + 1)) & (power > 0.0))
     trials = 1.0 + (positions[-1] - positions[0]) / width
     found = []
     for k in top:
+        if k in (0, len(power) - 1):
+            # The edge of a slope is no line.
+            continue
         single = float(chi2.sf(degrees * ratio[k], degrees))
         p_value = float(-np.expm1(trials * np.log1p(-min(single, 1.0 - 1e-16))))
         if p_value <= significance:
@@ -172,12 +227,14 @@ def lines(positions: Array, power: Array, width: float, *, degrees: int = 2, sig
     return sorted(found, key=lambda line: (line.p_value, -line.power / line.floor))
 
 
-def noise_floor(positions: Array, power: Array, width: float, *, degrees: int = 2) -> Array:
+def noise_floor(
+    positions: Array, power: Array, width: float, *, degrees: int = 2, neighbours: float = NEIGHBOURS
+) -> Array:
     """Return the mean power of noise around every position, shape (K,), from the median of its neighbours."""
     from scipy.special import gammaincinv
 
     spacing = float(np.median(np.diff(positions)))
-    guard, reach = round(GUARD * width / spacing), round(NEIGHBOURS * width / spacing)
+    guard, reach = round(GUARD * width / spacing), round(neighbours * width / spacing)
     # Every half line width is enough for a median.
     stride = max(1, round(0.5 * width / spacing))
     # Median over mean of chi-squared with that many degrees of freedom.
@@ -195,12 +252,14 @@ def noise_floor(positions: Array, power: Array, width: float, *, degrees: int = 
 
 def _transform(weights: Array, angle: Array, step: float, orders: Array) -> NDArray[np.complex128]:
     """Return ``sum weights exp(i order angle)`` for angles from zero on."""
+    from scipy.fft import next_fast_len
+
     place = angle / step
     left = np.floor(place).astype(np.intp)
     share = place - left
     size = int(left.max()) + 2
     grid = np.bincount(left, weights * (1.0 - share), size) + np.bincount(left + 1, weights * share, size)
-    length = fast_length(FINENESS * size)
+    length = next_fast_len(FINENESS * size)
     spectrum = np.conj(np.fft.rfft(grid, length))
     # Turned to the middle of the angles the transform is smooth enough to interpolate.
     spacing = 2.0 * np.pi / (length * step)

@@ -14,15 +14,16 @@ from scara_ident.consistency.feasibility import Possibility, check_possible
 from scara_ident.consistency.matching import sizes
 from scara_ident.consistency.options import ConsistentOptions
 from scara_ident.consistency.programme import MARGIN, Programme
-from scara_ident.consistency.solution import StandardPrior, fill, noise_of, solve_consistent
+from scara_ident.consistency.solution import StandardPrior, fill, solve_joints
 from scara_ident.consistency.unknowns import Unknowns
 from scara_ident.covariance import block_covariance
-from scara_ident.errors import UsageError
-from scara_ident.estimators.estimate import Estimate, pooled_information, weighted_blocks
-from scara_ident.estimators.least_squares import ols, residual_noise
+from scara_ident.errors import EstimationError, UsageError
+from scara_ident.estimators.estimate import Estimate, weighted_blocks
 from scara_ident.evidence import Evidence
 from scara_ident.information import UNDETERMINED, Information, merge
 from scara_ident.model import TorqueModel
+
+__all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "possibility"]
 
 Array = NDArray[np.float64]
 
@@ -93,14 +94,14 @@ def consistent(
     if programme is None:
         programme = Programme(model, options)
     options = programme.options
-    weights = _weights(model, evidence, options)
-    information = pooled_information(evidence, weights)
-    noise = noise_of(information, information.solve())
+    if not evidence:
+        raise EstimationError("no recording to estimate from")
     u = programme.unknowns
     parameter_prior, standard_prior = _priors(u, options)
-    if parameter_prior is not None:
-        information = merge([information, parameter_prior.scaled(noise)])
-    found = solve_consistent(programme, information, noise=noise, standard_prior=standard_prior)
+    joints = [merge(item.joint(j) for item in evidence) for j in range(model.robot.n)]
+    found, information, weights = solve_joints(
+        programme, joints, parameter_prior=parameter_prior, standard_prior=standard_prior
+    )
     x = fill(programme, information, found.x, standard_prior=standard_prior)
     value = u.parameters(x)
     held, labels = active(u, found.point) if found.point is not None else (np.zeros((0, u.size + u.auxiliary)), ())
@@ -155,15 +156,6 @@ def possibility(estimate: Estimate) -> Possibility:
     Possibility
     """
     return check_possible(estimate.model, estimate.value, information=estimate.information)
-
-
-def _weights(model: TorqueModel, evidence: Sequence[Evidence], options: ConsistentOptions) -> Array:
-    if options.weighting == "equal":
-        return np.ones(model.robot.n)
-    noise = residual_noise(ols(model, evidence), evidence) if options.noise is None else np.asarray(options.noise)
-    if noise.shape != (model.robot.n,) or not np.all(noise > 0.0):
-        raise UsageError(f"noise: expected {model.robot.n} numbers above 0, one per joint")
-    return 1.0 / noise
 
 
 def _priors(u: Unknowns, options: ConsistentOptions) -> tuple[Information | None, StandardPrior | None]:

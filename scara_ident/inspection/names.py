@@ -19,13 +19,17 @@ QUANTITIES = {
 """Words that loggers use for each quantity."""
 
 _WORDS = {word: quantity for quantity, words in QUANTITIES.items() for word in words.split()}
-COMMANDED = frozenset("target desired des command commanded cmd ref reference setpoint goal planned".split())
-MEASURED = frozenset("actual measured meas feedback fb sensor".split())
+COMMANDED = frozenset(
+    ["target", "desired", "des", "command", "commanded", "cmd", "ref", "reference", "setpoint", "goal", "planned"]
+)
+MEASURED = frozenset(["actual", "measured", "meas", "feedback", "fb", "sensor"])
 # Of such columns no channel of a joint is made.
-OTHER = frozenset("error err std min max limit limits tcp tool cartesian pose gripper imu".split())
+OTHER = frozenset(
+    ["error", "err", "std", "min", "max", "limit", "limits", "tcp", "tool", "cartesian", "pose", "gripper", "imu"]
+)
 GENERIC = frozenset(("joint", "link", "axis", "motor"))
 CURRENT = frozenset(("current", "currents", "curr"))
-TORQUE = frozenset("torque torques trq tau moment moments force forces".split())
+TORQUE = frozenset(["torque", "torques", "trq", "tau", "moment", "moments", "force", "forces"])
 
 _TOKEN = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+")
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*?)\s*[\])>}]")
@@ -33,8 +37,10 @@ _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*?)\s*[\])>}]")
 _ENDINGS = {
     "rad": "rad", "radians": "rad", "deg": "deg", "degrees": "deg", "turns": "turn", "rev": "turn", "counts": "count",
     "ticks": "count", "mm": "mm", "um": "um", "ms": "ms", "us": "us", "ns": "ns", "msec": "ms", "usec": "us",
-    "nsec": "ns", "sec": "s", "seconds": "s", "rpm": "rpm", "nm": "N m", "amps": "A", "ma": "mA", "percent": "%",
+    "nsec": "ns", "sec": "s", "seconds": "s", "rpm": "rpm", "nm": "N m", "amps": "A", "percent": "%",
 }  # fmt: skip
+# Units that their capitals tell from other words.
+_CAPITALS = re.compile(r"(?:^|[_ .])(mA|A|mNm|Nm|N)(?=$|[_ .\[])")
 
 
 @dataclass(frozen=True)
@@ -111,8 +117,9 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
 
 def _unit(name: str, words: Sequence[str], quantity: str) -> str | None:
     tables = [table_of(quantity, linear=linear) for linear in (False, True)]
-    spelled = [_ENDINGS[words[-1]]] if words and words[-1] in _ENDINGS else []
-    for word in (*_BRACKETS.findall(name), *spelled):
+    last = next((word for word in reversed(words) if not word.isdigit()), "")
+    spelled = [_ENDINGS[last]] if last in _ENDINGS else []
+    for word in (*_BRACKETS.findall(name), *_CAPITALS.findall(name), *spelled):
         # A speed called deg is in deg/s.
         for ending in ("", "/s", "/s^2"):
             for table in tables:
@@ -143,7 +150,8 @@ def _forms(joints: Sequence[str]) -> list[list[tuple[str, ...]]]:
     for words in full:
         mine = [words]
         # panda_joint1 is called joint1, and shoulder_pan_joint shoulder_pan; a number alone is no name.
-        for shorter in (words[shared:], tuple(word for word in words if word not in GENERIC)):
+        shortened = [words[k:] for k in range(1, shared + 1)]
+        for shorter in (*shortened, tuple(word for word in words if word not in GENERIC)):
             if shorter not in mine and any(not word.isdigit() and word not in _WORDS for word in shorter):
                 mine.append(shorter)
         forms.append(mine)

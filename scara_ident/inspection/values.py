@@ -103,7 +103,7 @@ def velocity_reading(slope: Array, velocity: Array, reduction: Array, *, linear:
     return None
 
 
-def slopes(time: Array, values: Array) -> tuple[Array, Array]:
+def slopes(time: Array, values: Array) -> tuple[Array, NDArray[np.intp]]:
     """Return the slope of signals (k, N) over a few samples, shape (k, M), and the rows at which it stands."""
     rows = max(1, min(ROWS // 2, len(time) // 8))
     middle = np.arange(rows, len(time) - rows)

@@ -8,7 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from scara_ident.report.html.page import Block, Cell, Group, Page, Section, escape, heading, listing, paragraph, superscripts, table
+from scara_ident.report.html.page import (
+    Block,
+    Cell,
+    Group,
+    Page,
+    Section,
+    escape,
+    heading,
+    listing,
+    paragraph,
+    superscripts,
+    table,
+)
 from scara_ident.report.html.plot import Figure, Layer, Line, Panel, Plot, single
 
 COLORS = ("blue", "vermillion", "green", "orange", "purple", "black")
@@ -46,19 +58,29 @@ def comparison_page(content: Mapping[str, Any]) -> Page:
         sections.insert(0, Section("trajectories", "Trajectories", _characteristics(content, names, joints)))
     if content.get("friction"):
         words = "Friction as every trajectory sees it: dotted where it goes beyond the trajectory's own speeds, which is extrapolation."
-        sections.append(Section("friction", "Friction", (paragraph(words), _friction_group(content["friction"], names))))
+        sections.append(
+            Section("friction", "Friction", (paragraph(words), _friction_group(content["friction"], names)))
+        )
     if content.get("notes"):
         sections.append(Section("notes", "Notes on the data", (listing(content["notes"]),)))
-    subtitle = f"{content.get('model', '')} model by {content.get('method', 'least squares')}; {len(names)} trajectories"
+    subtitle = (
+        f"{content.get('model', '')} model by {content.get('method', 'least squares')}; {len(names)} trajectories"
+    )
     verdict = content.get("summary") or (f"{len(names)} trajectories compared.",)
-    return Page(f"Comparison of trajectories, {content.get('robot', '')}".rstrip(", "), subtitle.strip(), verdict, sections)
+    return Page(
+        f"Comparison of trajectories, {content.get('robot', '')}".rstrip(", "), subtitle.strip(), verdict, sections
+    )
 
 
 def _characteristics(content: Mapping[str, Any], names: Sequence[str], joints: Sequence[str]) -> list[Block]:
     rows: list[list[Cell | str]] = []
     for name in names:
         what = content["characteristics"][name]
-        row: list[Cell | str] = [Cell(escape(name), "name"), _number(what.get("log_det"), 4), _number(what.get("condition"))]
+        row: list[Cell | str] = [
+            Cell(escape(name), "name"),
+            _number(what.get("log_det"), 4),
+            _number(what.get("condition")),
+        ]
         for key in ("sigma", "peak_velocity", "peak_acceleration"):
             values = what.get(key) or {}
             row += [_number(values.get(joint)) for joint in joints]
@@ -137,7 +159,11 @@ def _friction_group(friction: Mapping[str, Any], names: Sequence[str]) -> Group:
             own = speed <= float(curves["fastest"][name]) * (1.0 + 1e-9)
             layers.append(Line(speed, np.where(own, torque, np.nan), color, name, 2.0, dash))
             layers.append(Line(speed, np.where(own, np.nan, torque), color, "", 1.2, "2 4"))
-        figures.append(single(f"friction-{len(figures)}", f"Friction of {joint}", "", Plot("speed", (Panel("friction", layers, 230),))))
+        figures.append(
+            single(
+                f"friction-{len(figures)}", f"Friction of {joint}", "", Plot("speed", (Panel("friction", layers, 230),))
+            )
+        )
     return Group("friction-group", figures, (), "two")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,6 @@ from scara_ident.report.html.torque import torque_group
 from scara_ident.report.html.traces import Trace, traces
 from scara_ident.threads import one_blas_thread
 
-
 # Candidates shown at once, the best first; the others unfold.
 SHOWN_CANDIDATES = 10
 
@@ -57,7 +57,10 @@ def diagnosis_report(
     ScaraIdentError
         If the file cannot be written.
     """
-    diagnosis_page(diagnosis, recordings, validation).write(path)
+    # Many small matrices: threads of BLAS would only wait for each other.
+    with one_blas_thread():
+        page = diagnosis_page(diagnosis, recordings, validation)
+    page.write(path)
 
 
 def diagnosis_page(diagnosis: Diagnosis, recordings: Sequence[Recording], validation: Sequence[Recording] = ()) -> Page:
@@ -66,15 +69,16 @@ def diagnosis_page(diagnosis: Diagnosis, recordings: Sequence[Recording], valida
     robot, bands = diagnosis.robot, diagnosis.search.bands
     delay = diagnosis.search.delay[0] if diagnosis.search.delay else 0.0
     held_out = tuple(shifted(recording, delay) for recording in validation) if delay else tuple(validation)
-    with one_blas_thread():
-        story = _story_blocks(diagnosis, content, recordings)
-        parts = {
-            recording.name: traces(diagnosis.after.model, diagnosis.after.value, recording, bands)
-            for recording in (*held_out, *diagnosis.search.recordings)
-        }
-    fitted = [part for recording in recordings for part in parts[recording.name]]
-    kept = [part for recording in validation for part in parts[recording.name]]
-    names = {recording.name for recording in validation}
+    story = _story_blocks(diagnosis, content, recordings)
+    kept, fitted = (
+        [traces(diagnosis.after.model, diagnosis.after.value, recording, bands) for recording in group]
+        for group in (held_out, diagnosis.search.recordings)
+    )
+    parts = [
+        *((f"{recording.name} (held out)", found) for recording, found in zip(validation, kept, strict=True)),
+        *((f"{recording.name} (training)", found) for recording, found in zip(recordings, fitted, strict=True)),
+    ]
+    sets = {"training": list(chain.from_iterable(fitted)), "held out": list(chain.from_iterable(kept))}
     experiments = next_experiments(diagnosis)
     sections = [
         Section("gain", "Before and after", _gain_blocks(diagnosis, content)),
@@ -82,10 +86,22 @@ def diagnosis_page(diagnosis: Diagnosis, recordings: Sequence[Recording], valida
         Section(
             "next",
             "What to do next",
-            (listing(experiments) if experiments else paragraph("Nothing in these recordings asks for another experiment."),),
+            (
+                listing(experiments)
+                if experiments
+                else paragraph("Nothing in these recordings asks for another experiment."),
+            ),
         ),
-        Section("left", "What is left", (*_left_blocks(diagnosis), *residual_blocks(robot, {"training": fitted, "held out": kept}, bands))),
-        Section("torque-section", "Torque", (paragraph("Predicted by the model with the effects found."), torque_group(robot, parts, bands, names))),
+        Section(
+            "left",
+            "What is left",
+            (*_left_blocks(diagnosis), *residual_blocks(robot, sets, bands)),
+        ),
+        Section(
+            "torque-section",
+            "Torque",
+            (paragraph("Predicted by the model with the effects found."), torque_group(robot, parts, bands)),
+        ),
         Section("candidates", "Candidates", _candidate_blocks(content)),
         Section("limits", "What cannot be known", _limit_blocks(diagnosis, content)),
     ]
@@ -95,7 +111,9 @@ def diagnosis_page(diagnosis: Diagnosis, recordings: Sequence[Recording], valida
         f"{diagnosis.before.model.name} model; {len(recordings)} recordings, {len(validation)} held out; "
         f"{diagnosis.search.tried} candidates and scan points tried; verdict: {diagnosis.verdict}"
     )
-    return Page(f"Diagnosis of {robot.name}", subtitle, content["summary"], sections, diagnosis.verdict == "unexplained")
+    return Page(
+        f"Diagnosis of {robot.name}", subtitle, content["summary"], sections, diagnosis.verdict == "unexplained"
+    )
 
 
 def _gain_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
@@ -105,7 +123,7 @@ def _gain_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
         part = content[kind]
         for j, joint in enumerate(robot.joints if part["before"] else ()):
             before, after = part["before"][joint], part["after"][joint]
-            floor = content["noise_floor"][joint] if joint in content["noise_floor"] else None
+            floor = content["noise_floor"].get(joint)
             rows.append(
                 [
                     words,
@@ -119,13 +137,29 @@ def _gain_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
                     robot.torque_unit(j),
                 ]
             )
-    head = ("recordings", "joint", "before", "after", "", "before, of torque", "after, of torque", "noise floor", "unit")
+    head = (
+        "recordings",
+        "joint",
+        "before",
+        "after",
+        "",
+        "before, of torque",
+        "after, of torque",
+        "noise floor",
+        "unit",
+    )
     blocks: list[Block] = [
-        paragraph("Rms residual within the band. Held-out recordings took no part in any choice; the noise floor is what does not repeat."),
+        paragraph(
+            "Rms residual within the band. Held-out recordings took no part in any choice; the noise floor is what does not repeat."
+        ),
         table(head, rows, numeric=(2, 3, 5, 6, 7)),
     ]
-    detail = [
-        [Cell(escape(name), "name"), kind, *(x for joint in robot.joints for x in (_number(row["before"][joint]), _number(row["after"][joint])))]
+    detail: list[list[Cell | str]] = [
+        [
+            Cell(escape(name), "name"),
+            kind,
+            *(x for joint in robot.joints for x in (_number(row["before"][joint]), _number(row["after"][joint]))),
+        ]
         for kind in ("validation", "training")
         for name, row in content["recordings"][kind].items()
     ]
@@ -136,12 +170,17 @@ def _gain_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
 def _change(before: float | None, after: float | None) -> Cell:
     if not before or after is None:
         return Cell("")
-    return Cell(f"{bar(after / before)} {round(100.0 * (after / before - 1.0)):+d} %")
+    change = round(100.0 * (after / before - 1.0))
+    return Cell(f"{bar(after / before)} {f'{change:+d}' if change else '0'} %", "unit")
 
 
 def _story_blocks(diagnosis: Diagnosis, content: dict[str, Any], recordings: Sequence[Recording]) -> list[Block]:
     if not diagnosis.effects:
-        return [paragraph(f"{diagnosis.search.tried} candidates were tried and none was let in; their reasons stand under Candidates.")]
+        return [
+            paragraph(
+                f"{diagnosis.search.tried} candidates were tried and none was let in; their reasons stand under Candidates."
+            )
+        ]
     search = diagnosis.search
     bands = search.bands
     blocks: list[Block] = []
@@ -168,7 +207,10 @@ def _story_blocks(diagnosis: Diagnosis, content: dict[str, Any], recordings: Seq
         blocks += [chapter_group(diagnosis.robot, chapter), moment_group(diagnosis.robot, chapter)]
         before = after
     if content["moved"]:
-        rows = [[Cell(escape(m["name"]), "name"), f"{m['before']:.4g}", f"{m['after']:.4g}", f"{m['in_std']:+.1f}"] for m in content["moved"]]
+        rows: list[list[Cell | str]] = [
+            [Cell(escape(m["name"]), "name"), f"{m['before']:.4g}", f"{m['after']:.4g}", f"{m['in_std']:+.1f}"]
+            for m in content["moved"]
+        ]
         blocks += [
             heading("Parameters that the missing effects had bent"),
             table(("name", "before", "after", "change / std"), rows, numeric=(1, 2, 3)),
@@ -195,19 +237,23 @@ def _title(effect: FoundEffect) -> str:
 
 def _effect_words(effect: FoundEffect) -> list[Block]:
     helps, voting = effect.votes
-    gains = ", ".join(f"{joint} {_number(effect.before[joint])} to {_number(effect.after[joint])}" for joint in effect.before)
+    gains = ", ".join(
+        f"{joint} {_number(effect.before[joint])} to {_number(effect.after[joint])}" for joint in effect.before
+    )
     words = (
         f"{effect.description[:1].upper()}{effect.description[1:]}. It removes {effect.gain:.0%} of the squared residual on data that it was not "
         f"fitted to, helps in {helps} of {voting} trajectories that excite it, and would come about by chance with p = {effect.p_value:.1e}. "
         f"Rms on the training recordings: {gains}."
     )
-    rows = [
+    rows: list[list[Cell | str]] = [
         [Cell(escape(name), "name"), f"{parameter.value:.4g}", f"{parameter.std:.2g}", superscripts(parameter.unit)]
         for name, parameter in effect.parameters.items()
     ]
     blocks: list[Block] = [paragraph(words), table(("parameter", "value", "std", "unit"), rows, numeric=(1, 2))]
     if effect.confounded_with:
-        others = ", ".join(f"{rival.label} (would remove {rival.gain:.0%} in its place)" for rival in effect.confounded_with)
+        others = ", ".join(
+            f"{rival.label} (would remove {rival.gain:.0%} in its place)" for rival in effect.confounded_with
+        )
         blocks.append(paragraph(f"These recordings cannot tell it from: {others}."))
     return blocks
 
@@ -216,10 +262,10 @@ def _left_blocks(diagnosis: Diagnosis) -> list[Block]:
     blocks: list[Block] = []
     if diagnosis.fit_after:
         earlier = {fit.joint: fit for fit in diagnosis.fit_before}
-        rows = []
+        repeats: list[list[Cell | str]] = []
         for fit in diagnosis.fit_after:
             before = earlier.get(fit.joint)
-            rows.append(
+            repeats.append(
                 [
                     Cell(escape(fit.joint), "name"),
                     _number(before.missing if before else None),
@@ -231,19 +277,32 @@ def _left_blocks(diagnosis: Diagnosis) -> list[Block]:
             )
         head = ("joint", "repeats, before", "repeats, after", "does not repeat", "p", "")
         blocks += [
-            paragraph("From repetitions: what of the residual repeats from run to run, which a model could explain, against what does not (rms)."),
-            table(head, rows, numeric=(1, 2, 3, 4)),
+            paragraph(
+                "From repetitions: what of the residual repeats from run to run, which a model could explain, against what does not (rms)."
+            ),
+            table(head, repeats, numeric=(1, 2, 3, 4)),
         ]
     telling = [item for item in diagnosis.dependences if item.explained > 0.0][:6]
     if diagnosis.dependences and not telling:
-        blocks.append(paragraph("On no signal or pair of signals does the remainder depend in a way that holds on trajectories that it was not taken from."))
+        blocks.append(
+            paragraph(
+                "On no signal or pair of signals does the remainder depend in a way that holds on trajectories that it was not taken from."
+            )
+        )
     if telling:
-        rows = [
-            [Cell(escape(item.joint), "name"), " and ".join(item.signals), Cell(f"{item.explained:.1%}", "num", max(0.0, min(1.0, item.explained))), f"{item.rms:.3g}"]
+        rows: list[list[Cell | str]] = [
+            [
+                Cell(escape(item.joint), "name"),
+                " and ".join(item.signals),
+                Cell(f"{item.explained:.1%}", "num", max(0.0, min(1.0, item.explained))),
+                f"{item.rms:.3g}",
+            ]
             for item in telling
         ]
         blocks += [
-            paragraph("What the remainder depends on: share of its square that means over signals explain on trajectories that they were not taken from."),
+            paragraph(
+                "What the remainder depends on: share of its square that means over signals explain on trajectories that they were not taken from."
+            ),
             table(("joint", "signals", "explained", "rms"), rows, numeric=(2, 3)),
         ]
     return blocks
@@ -273,7 +332,9 @@ def _candidate_blocks(content: dict[str, Any]) -> list[Block]:
         )
     head = ("candidate", "gain", "p", "helps in", "decision", "why")
     blocks: list[Block] = [
-        paragraph("What else was tried beside the effects found, best member of every family: share of the squared residual removed on data not fitted to, p corrected for all that was tried."),
+        paragraph(
+            "What else was tried beside the effects found, best member of every family: share of the squared residual removed on data not fitted to, p corrected for all that was tried."
+        ),
         table(head, rows[:SHOWN_CANDIDATES], numeric=(2,)),
     ]
     if len(rows) > SHOWN_CANDIDATES:
@@ -286,12 +347,21 @@ def _limit_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
     blocks: list[Block] = [heading("Groups that these recordings cannot tell apart")]
     groups = [effect for effect in diagnosis.effects if effect.confounded_with]
     if groups:
-        blocks.append(listing(f"{_title(effect)} | {' | '.join(dict.fromkeys(rival.label for rival in effect.confounded_with))}" for effect in groups))
+        blocks.append(
+            listing(
+                f"{_title(effect)} | {' | '.join(dict.fromkeys(rival.label for rival in effect.confounded_with))}"
+                for effect in groups
+            )
+        )
     else:
         blocks.append(paragraph("None among the effects found." if diagnosis.effects else "No effect was found."))
     if content["not_identifiable"]:
-        rows = [
-            [Cell(escape(row["effect"]), "name"), Cell(escape(", ".join(row["absorbed_by"]) or "no torque at all"), "words"), Cell(escape(row["opened_by"]), "words")]
+        rows: list[list[Cell | str]] = [
+            [
+                Cell(escape(row["effect"]), "name"),
+                Cell(escape(", ".join(row["absorbed_by"]) or "no torque at all"), "words"),
+                Cell(escape(row["opened_by"]), "words"),
+            ]
             for row in content["not_identifiable"]
         ]
         blocks += [

@@ -10,7 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.motion import Motion
-from scara_ident.report.html.page import Arm, Block, Cell, Group, Page, Section, bar, escape, listing, paragraph, table, tag
+from scara_ident.report.html.page import (
+    Arm,
+    Block,
+    Cell,
+    Group,
+    Page,
+    Section,
+    bar,
+    escape,
+    listing,
+    paragraph,
+    table,
+    tag,
+)
 from scara_ident.report.html.plot import Dots, Figure, Grid, Layer, Level, Line, Panel, Plot, single
 from scara_ident.robot import Robot
 
@@ -49,17 +62,25 @@ def excitation_page(content: Mapping[str, Any], robot: Robot, motions: Sequence[
     broken = [name for name, limit in limits if (limit.get("share") or 0.0) > 1.0]
     verdict = list(content.get("summary") or ())
     if not verdict:
-        verdict = [f"J_d {_number(content.get('log_det'), 4)}, J_k {_number(content.get('condition'))} in {_number(content.get('duration'))} s."]
+        verdict = [
+            f"J_d {_number(content.get('log_det'), 4)}, J_k {_number(content.get('condition'))} in {_number(content.get('duration'))} s."
+        ]
         verdict.append(f"Broken limits: {', '.join(broken)}." if broken else "All limits hold.")
     sections = [
-        Section(f"motion-{k}", "Motion" if len(motions) == 1 else f"Motion {motion.name}", _motion_blocks(robot, motion, k))
+        Section(
+            f"motion-{k}", "Motion" if len(motions) == 1 else f"Motion {motion.name}", _motion_blocks(robot, motion, k)
+        )
         for k, motion in enumerate(motions)
     ]
     if limits:
         sections.append(Section("limits", "Limits", _limit_blocks(limits)))
     if content.get("notes"):
         sections.append(Section("notes", "Notes", (listing(content["notes"]),)))
-    subtitle = f"{len(motions)} trajectories of {_number(content.get('duration'))} s" if len(motions) > 1 else f"{_number(content.get('duration'))} s"
+    subtitle = (
+        f"{len(motions)} trajectories of {_number(content.get('duration'))} s"
+        if len(motions) > 1
+        else f"{_number(content.get('duration'))} s"
+    )
     return Page(f"Excitation of {robot.name}", subtitle, verdict, sections, bool(broken))
 
 
@@ -100,7 +121,9 @@ def _cover_figure(robot: Robot, motion: Motion, j: int, number: int) -> Figure:
     line = Line(motion.q[j, ::every], motion.v[j, ::every], "blue", path=True)
     fastest = Dots([float(motion.q[j, turn])], [float(motion.v[j, turn])], "vermillion")
     panel = Panel(f"velocity [{length}/s]", (line, fastest), 170)
-    return single(f"cover-{number}-{j}", robot.joints[j], "", Plot(f"position [{length}]", (panel,), small=True), quiet=True)
+    return single(
+        f"cover-{number}-{j}", robot.joints[j], "", Plot(f"position [{length}]", (panel,), small=True), quiet=True
+    )
 
 
 def arm_in_plane(robot: Robot, motion: Motion, name: str) -> Arm:
@@ -170,7 +193,15 @@ def _limit_blocks(limits: Sequence[tuple[str, Mapping[str, Any]]]) -> list[Block
         words = "" if share is None else f"{bar(share, weak=share > 1.0)} {share:.0%}"
         if share is not None and share > 1.0:
             words += " " + tag("broken", "bad")
-        rows.append([Cell(escape(name), "name"), _number(limit.get("reached")), _number(limit.get("bound")), str(limit.get("unit", "")), Cell(words)])
+        rows.append(
+            [
+                Cell(escape(name), "name"),
+                _number(limit.get("reached")),
+                _number(limit.get("bound")),
+                str(limit.get("unit", "")),
+                Cell(words),
+            ]
+        )
     return [
         paragraph("What the motion reaches of each limit, between its samples too."),
         table(("limit", "reached", "bound", "unit", "used"), rows, numeric=(1, 2)),

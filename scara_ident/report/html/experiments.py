@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from scara_ident.diagnosis.decision import FAMILY_ERROR
+import numpy as np
+
+from scara_ident.diagnosis.decision import FAMILY_ERROR, Decision
 from scara_ident.diagnosis.diagnosis import Diagnosis
 from scara_ident.diagnosis.examination import WEAK
 from scara_ident.report.diagnosis import best_by_label
@@ -53,14 +55,16 @@ def next_experiments(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.fit_after:
         found.append("To know the noise floor: record every trajectory at least twice.")
     if not diagnosis.validation_before:
-        found.append("To trust the result: record a trajectory that takes no part in the diagnosis and give it with --validate.")
+        found.append(
+            "To trust the result: record a trajectory that takes no part in the diagnosis and give it with --validate."
+        )
     hidden, faint = [], []
     for decision in best_by_label(diagnosis.search.decisions):
         if decision.accepted:
             continue
         if decision.examination.outside < WEAK:
             hidden.append(decision)
-        elif decision.examination.p_value * diagnosis.search.tried < FAMILY_ERROR and decision.gain > 0.0:
+        elif decision.gain > 0.0 and _significant(decision, diagnosis) and _possible(decision, diagnosis):
             faint.append(decision)
     found += [
         f"To judge {decision.label}, significant but not accepted ({decision.why}): {_experiment(decision.candidate.effect.name)}."
@@ -71,6 +75,17 @@ def next_experiments(diagnosis: Diagnosis) -> list[str]:
         for decision in hidden[:MOST]
     ]
     return found
+
+
+def _significant(decision: Decision, diagnosis: Diagnosis) -> bool:
+    return decision.examination.p_value * diagnosis.search.tried < FAMILY_ERROR
+
+
+def _possible(decision: Decision, diagnosis: Diagnosis) -> bool:
+    """Whether a real arm can have the coefficients found."""
+    examination, candidate = decision.examination, decision.candidate
+    std = np.sqrt(np.clip(np.diag(examination.covariance), 0.0, None))
+    return candidate.effect.inadmissible(diagnosis.search.scene, candidate.member, examination.value, std) is None
 
 
 def _label(effect: str, joint: str | None) -> str:

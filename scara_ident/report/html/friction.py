@@ -11,7 +11,7 @@ from scara_ident.estimators import Estimate
 from scara_ident.report.html.bins import binned_means, middle_range
 from scara_ident.report.html.page import Group
 from scara_ident.report.html.plot import Band, Dots, Figure, Layer, Line, Panel, Plot, Region, single
-from scara_ident.report.html.traces import Trace
+from scara_ident.report.html.traces import Trace, kept
 from scara_ident.terms import Friction
 
 Array = NDArray[np.float64]
@@ -44,17 +44,19 @@ def friction_curve(term: Friction, estimate: Estimate, j: int, v: Array) -> tupl
     start = estimate.model.place(term).start + j * k
     place = slice(start, start + k)
     speed = robot.drive_sign[j] * v
-    columns = np.array([speed**power if power % 2 else np.sign(speed) * np.abs(speed) ** power for power in term.powers])
+    columns = np.array(
+        [speed**power if power % 2 else np.sign(speed) * np.abs(speed) ** power for power in term.powers]
+    )
     variance = np.einsum("kn,kl,ln->n", columns, estimate.covariance[place, place], columns)
     return estimate.value[place] @ columns, np.sqrt(np.clip(variance, 0.0, None))
 
 
 def _figures(estimate: Estimate, term: Friction, traces: Sequence[Trace], j: int) -> list[Figure]:
     robot = estimate.model.robot
-    v = np.concatenate([trace.kept(trace.motion.v[j], j) for trace in traces])
+    v = kept(traces, [trace.motion.v[j] for trace in traces], j)
     if len(v) < COVERAGE_BINS:
         return []
-    partial = np.concatenate([trace.kept(trace.residual[j] + trace.friction[j], j) for trace in traces])
+    partial = kept(traces, [trace.residual[j] + trace.friction[j] for trace in traces], j)
     low, high = middle_range(v, 0.999)
     most = BEYOND * max(abs(low), abs(high))
     side = np.linspace(0.0, most, POINTS)
@@ -67,8 +69,12 @@ def _figures(estimate: Estimate, term: Friction, traces: Sequence[Trace], j: int
     layers: list[Layer] = [*_coverage(v, most)]
     layers.append(Band(grid, value - 2.0 * std, value + 2.0 * std, "blue", "± 2 std", fit=False))
     means = binned_means(v, partial, (low, high), 40)
-    kept = np.isfinite(means.y)
-    layers.append(Dots(means.x[kept], means.y[kept], "vermillion", "measured, rest subtracted", 2.0 * means.error[kept], 2.0))
+    filled = np.isfinite(means.y)
+    layers.append(
+        Dots(
+            means.x[filled], means.y[filled], "vermillion", "measured, rest subtracted", 2.0 * means.error[filled], 2.0
+        )
+    )
     layers.append(Line(grid, np.where(inside, value, np.nan), "blue", "friction", 2.0))
     layers.append(Line(grid, np.where(inside, np.nan, value), "blue", "beyond the data", 1.6, "3 4"))
     unit = robot.torque_unit(j)
@@ -88,7 +94,13 @@ def _coverage(v: Array, most: float) -> list[Layer]:
     counts, edges = np.histogram(v, COVERAGE_BINS, (-most, most))
     most_counted = int(counts.max())
     return [
-        Region((float(a), float(b)), "orange", "velocities in the data", round(0.08 + 0.85 * float(count / most_counted) ** 0.5, 3), 0.06)
+        Region(
+            (float(a), float(b)),
+            "orange",
+            "velocities in the data",
+            round(0.08 + 0.85 * float(count / most_counted) ** 0.5, 3),
+            0.06,
+        )
         for count, a, b in zip(counts, edges[:-1], edges[1:], strict=True)
         if count
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 from scara_ident.identification import Identification, undetermined
@@ -21,7 +22,6 @@ from scara_ident.report.html.torque import error_table, torque_group
 from scara_ident.report.html.traces import traces
 from scara_ident.report.identification import sentences
 from scara_ident.threads import one_blas_thread
-
 
 STD_WORDS = {
     "block": "the scatter of blocks of time, which holds when residuals are correlated",
@@ -46,7 +46,10 @@ def identification_report(
     ScaraIdentError
         If the file cannot be written.
     """
-    identification_page(identification, recordings, validation).write(path)
+    # Many small matrices: threads of BLAS would only wait for each other.
+    with one_blas_thread():
+        page = identification_page(identification, recordings, validation)
+    page.write(path)
 
 
 def identification_page(
@@ -56,14 +59,16 @@ def identification_page(
     estimate = identification.estimate
     robot = identification.model.robot
     bands = identification.bands
-    with one_blas_thread():
-        parts = {
-            recording.name: traces(estimate.model, estimate.value, recording, bands)
-            for recording in (*validation, *recordings)
-        }
-    held_out = {recording.name for recording in validation}
-    fitted = [part for recording in recordings for part in parts[recording.name]]
-    kept = [part for recording in validation for part in parts[recording.name]]
+    kept, fitted = (
+        [traces(estimate.model, estimate.value, recording, bands) for recording in group]
+        for group in (validation, recordings)
+    )
+    parts = [
+        *((f"{recording.name} (held out)", found) for recording, found in zip(validation, kept, strict=True)),
+        *((f"{recording.name} (fitted)", found) for recording, found in zip(recordings, fitted, strict=True)),
+    ]
+    errors = [estimate.errors(item) for item in (*identification.validation, *identification.training)]
+    sets = {"fitted": list(chain.from_iterable(fitted)), "held out": list(chain.from_iterable(kept))}
     band_words = ", ".join(
         f"{joint} {'unfiltered' if band is None else f'{band:.3g} Hz'}"
         for joint, band in zip(robot.joints, bands, strict=True)
@@ -73,21 +78,29 @@ def identification_page(
             "prediction",
             "Prediction",
             (
-                paragraph(f"Rms residual within the band ({band_words}), and as a share of the rms torque. A click on a number shows it below."),
-                error_table(robot, identification.training_errors(), identification.validation_errors(), tuple(parts)),
-                torque_group(robot, parts, bands, held_out),
+                paragraph(
+                    f"Rms residual within the band ({band_words}), and as a share of the rms torque. A click on a number shows it below."
+                ),
+                error_table(robot, [name for name, _ in parts], errors),
+                torque_group(robot, parts, bands),
             ),
         ),
         Section("parameters", "Parameters", _parameter_blocks(identification)),
-        Section("residual", "Residual", residual_blocks(robot, {"fitted": fitted, "held out": kept}, bands)),
+        Section("residual", "Residual", residual_blocks(robot, sets, bands)),
     ]
-    friction = friction_group(estimate, fitted)
+    friction = friction_group(estimate, sets["fitted"])
     if friction is not None:
         words = "Where the strip below is dark the data hold many samples; beyond it the curve is an extrapolation. The dots are the measured torque less everything but friction, over velocity, ± 2 standard errors."
         sections.insert(2, Section("friction", "Friction", (paragraph(words), friction)))
     history = identification.history or cheap_history(estimate, identification.training)
     words = "The recursive estimate as samples come in, with two standard deviations for white residuals; dashed the final value, dotted where a recording ends."
-    sections.append(Section("convergence", "Convergence", (paragraph(words), convergence_group(estimate, history, identification.training))))
+    sections.append(
+        Section(
+            "convergence",
+            "Convergence",
+            (paragraph(words), convergence_group(estimate, history, identification.training)),
+        )
+    )
     if identification.notes:
         sections.append(Section("notes", "Notes on the data", (listing(identification.notes),)))
     samples = sum(item.samples for item in identification.training)
@@ -97,7 +110,11 @@ def identification_page(
         f"J_d {identification.log_det:.2f}, J_k {identification.condition:.3g}"
     )
     return Page(
-        f"Identification of {robot.name}", subtitle, sentences(identification), sections, bool(undetermined(identification))
+        f"Identification of {robot.name}",
+        subtitle,
+        sentences(identification),
+        sections,
+        bool(undetermined(identification)),
     )
 
 

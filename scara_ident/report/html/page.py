@@ -10,8 +10,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from scara_ident.report.files import plain, write_whole
+from scara_ident.report.files import write_whole
 from scara_ident.report.html.plot import Figure, Matrix
+
+# A space at which no line ends.
+_TIED = "\u00a0"
 
 
 def escape(text: object) -> str:
@@ -66,9 +69,13 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Cell | str]], numeric: Se
     """Return a table; strings are escaped, columns in ``numeric`` are set to the right."""
 
     def cell(k: int, value: Cell | str) -> str:
-        return value.render() if isinstance(value, Cell) else Cell(escape(value), "num" if k in numeric else "").render()
+        return (
+            value.render() if isinstance(value, Cell) else Cell(escape(value), "num" if k in numeric else "").render()
+        )
 
-    top = "".join(f'<th{_class("num" if k in numeric else "")} scope="col">{escape(word)}</th>' for k, word in enumerate(head))
+    top = "".join(
+        f'<th{_class("num" if k in numeric else "")} scope="col">{escape(word)}</th>' for k, word in enumerate(head)
+    )
     body = "".join("<tr>" + "".join(cell(k, value) for k, value in enumerate(row)) + "</tr>" for row in rows)
     return Text(f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>')
 
@@ -162,9 +169,11 @@ class Page:
         figures = {figure.name: figure.spec() for group in self._blocks(Group) for figure in group.figures}
         arms = {arm.name: _arm_spec(arm) for arm in self._blocks(Arm)}
         # A script element ends at the first "</script", whatever surrounds it.
-        data = json.dumps(plain({"figures": figures, "arms": arms}), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+        data = json.dumps({"figures": figures, "arms": arms}, separators=(",", ":"), allow_nan=False).replace(
+            "<", "\\u003c"
+        )
         links = "".join(f'<a href="#{section.name}">{escape(section.title)}</a>' for section in self.sections)
-        verdict = "".join(f"<p>{escape(sentence)}</p>" for sentence in self.verdict)
+        verdict = "".join(f"<p>{escape(sentence).replace(' N m', f' N{_TIED}m')}</p>" for sentence in self.verdict)
         return (
             '<!DOCTYPE html>\n<html lang="en" data-theme="auto">\n<head>\n<meta charset="utf-8">\n'
             '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -174,7 +183,7 @@ class Page:
             f'<div class="verdict{" warn" if self.warn else ""}" id="verdict">{verdict}</div></header>\n'
             f'<nav aria-label="contents"><div>{links}<button type="button" id="theme">theme: auto</button></div></nav>\n<main>\n'
             + "\n".join(_section(section) for section in self.sections)
-            + '\n</main>\n<footer>Drag along x to zoom, double-click to see all; shift-drag or two fingers to move; with a figure in focus '
+            + "\n</main>\n<footer>Drag along x to zoom, double-click to see all; shift-drag or two fingers to move; with a figure in focus "
             "also + − ← → 0. A click on a legend hides a line. SI units throughout."
             "<noscript> The figures need JavaScript; tables and words do not.</noscript></footer>\n"
             f'<script type="application/json" id="report-data">{data}</script>\n'

@@ -35,9 +35,18 @@ def parameter_table(estimate: Estimate) -> Text:
             weak = relative > 0.5
             interval = Cell(f"{_digits(value - 1.96 * std, std)} … {_digits(value + 1.96 * std, std)}", "num")
             words = f"{100.0 * relative:.2g} %" if relative < 10.0 else "over 1000 %"
-            share = Cell(f"{bar(relative, weak=weak)} {escape(words)}{' ' + tag('not told from 0', 'bad') if weak else ''}")
+            share = Cell(
+                f"{bar(relative, weak=weak)} {escape(words)}{' ' + tag('not told from 0', 'bad') if weak else ''}"
+            )
         rows.append(
-            [Cell(escape(column.name), "name"), Cell(_digits(value, std), "num"), interval, Cell(escape(superscripts(column.unit)), "unit"), share, Cell(escape(superscripts(column.meaning)), "words")]
+            [
+                Cell(escape(column.name), "name"),
+                Cell(_digits(value, std), "num"),
+                interval,
+                Cell(escape(superscripts(column.unit)), "unit"),
+                share,
+                Cell(escape(superscripts(column.meaning)), "words"),
+            ]
         )
     return table(("name", "value", "95 % interval", "unit", "std / value", "meaning"), rows, numeric=(1, 2))
 
@@ -78,7 +87,9 @@ def strongest_pairs(estimate: Estimate, most: int = 4, least: float = 0.9) -> li
     order = np.argsort(-np.abs(correlation), axis=None)[:most]
     names = estimate.model.names
     pairs = [np.unravel_index(place, correlation.shape) for place in order]
-    return [f"{names[i]} and {names[k]} ({correlation[i, k]:+.3f})" for i, k in pairs if abs(correlation[i, k]) >= least]
+    return [
+        f"{names[i]} and {names[k]} ({correlation[i, k]:+.3f})" for i, k in pairs if abs(correlation[i, k]) >= least
+    ]
 
 
 def cheap_history(estimate: Estimate, evidence: Sequence[Evidence]) -> History:

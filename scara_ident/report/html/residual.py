@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from scara_ident.report.html.bins import binned_means, density, middle_range
 from scara_ident.report.html.page import Block, Group, Selector, heading, paragraph
 from scara_ident.report.html.plot import Band, Density, Drawing, Figure, Layer, Level, Line, Mark, Panel, Plot
 from scara_ident.report.html.spectra import autocorrelation, orders, spectrum
-from scara_ident.report.html.traces import Trace
+from scara_ident.report.html.traces import Trace, kept
 from scara_ident.robot import Robot
 
 Array = NDArray[np.float64]
@@ -35,7 +36,9 @@ def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None], pre
     sets = {name: traces for name, traces in sets.items() if traces}
     return [
         heading("Against signals"),
-        paragraph("Blue: how many samples lie where. Vermillion: their mean over the signal, with two standard errors."),
+        paragraph(
+            "Blue: how many samples lie where. Vermillion: their mean over the signal, with two standard errors."
+        ),
         _signals_group(robot, sets, prefix),
         heading("By frequency, motor angle and lag"),
         _spectra_group(robot, sets, bands, prefix),
@@ -137,24 +140,16 @@ def _signals_group(robot: Robot, sets: Sets, prefix: str) -> Group:
     figures = []
     for name, title, signal, label in signals:
         variants: Variants = {}
-        for s, traces in enumerate(sets.values()):
-            for j in range(robot.n):
-                y = _kept(traces, j, lambda trace, j=j: trace.residual[j])
-                if not len(y):
-                    continue
-                # Time is the same for all joints.
-                for i in range(1 if name == "time" else robot.n):
-                    x = _kept(traces, j, lambda trace, i=i, signal=signal: signal(trace, i))
-                    variants[(j, s) if name == "time" else (j, s, i)] = _scatter(x, y, label(i), robot.torque_unit(j))
+        for (s, traces), j in product(enumerate(sets.values()), range(robot.n)):
+            y = kept(traces, [trace.residual[j] for trace in traces], j)
+            # Time is the same for all joints.
+            for i in range(1 if name == "time" else robot.n) if len(y) else ():
+                x = kept(traces, [signal(trace, i) for trace in traces], j)
+                variants[(j, s) if name == "time" else (j, s, i)] = _scatter(x, y, label(i), robot.torque_unit(j))
         by = (0, 1) if name == "time" else (0, 1, 2)
         figures.append(Figure(f"{prefix}against-{name}", title, "", variants, by, quiet=True))
     selectors = (*_selectors(robot, sets), Selector("signals of", robot.joints))
     return Group(f"{prefix}signals-group", figures, selectors, "three")
-
-
-def _kept(traces: Sequence[Trace], j: int, signal: Callable[[Trace], Array]) -> Array:
-    """Gather a signal over the samples of a joint that the estimate uses, as many as the band leaves independent."""
-    return np.concatenate([trace.kept(signal(trace), j) for trace in traces])
 
 
 def _scatter(x: Array, y: Array, label: str, unit: str) -> Plot:

@@ -155,10 +155,12 @@ def autocorrelation(traces: Sequence[Trace], j: int) -> Autocorrelation | None:
         count += _products(used, lags)
     if count[0] < 0.5 or total[0] <= 0.0:
         return None
-    value = (total / np.maximum(count, 1.0)) / (total[0] / count[0])
-    return Autocorrelation(step * np.arange(lags + 1), value, 1.96 / float(np.sqrt(count[0])))
+    value: Array = (total / np.maximum(count, 1.0)) / (total[0] / count[0])
+    return Autocorrelation(
+        np.asarray(step * np.arange(lags + 1), dtype=np.float64), value, 1.96 / float(np.sqrt(count[0]))
+    )
 
 
 def _products(signal: Array, lags: int) -> Array:
     size = 2 * len(signal)
-    return np.fft.irfft(np.abs(np.fft.rfft(signal, size)) ** 2, size)[: lags + 1]
+    return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(signal, size)) ** 2, size)[: lags + 1], dtype=np.float64)

@@ -14,7 +14,7 @@ from scara_ident.report.html.page import Group
 from scara_ident.report.html.plot import Band, Figure, Layer, Line, Panel, Plot, single
 from scara_ident.report.html.spectra import orders, spectrum
 from scara_ident.report.html.torque import banded
-from scara_ident.report.html.traces import Trace
+from scara_ident.report.html.traces import Trace, kept
 from scara_ident.robot import Robot
 
 Array = NDArray[np.float64]
@@ -97,7 +97,10 @@ class Chapter:
         """
         if self.effect == DELAY:
             return None
-        return [after.predicted[self.joint] - before.predicted[self.joint] for before, after in zip(self.before, self.after, strict=True)]
+        return [
+            after.predicted[self.joint] - before.predicted[self.joint]
+            for before, after in zip(self.before, self.after, strict=True)
+        ]
 
 
 def chapter_group(robot: Robot, chapter: Chapter) -> Group:
@@ -143,7 +146,11 @@ def _telling(robot: Robot, chapter: Chapter) -> Figure | None:
     j = chapter.joint
     plots = [[view.signal(robot, trace, j) for trace in traces] for traces in (chapter.before, chapter.after)]
     plot = _means_plot(robot, chapter, plots[0], plots[1], _with_unit(robot, view, j), view)
-    words = "Means with two standard errors; residual in the direction of motion." if view.along else "Means with two standard errors."
+    words = (
+        "Means with two standard errors; residual in the direction of motion."
+        if view.along
+        else "Means with two standard errors."
+    )
     return single(name, f"{robot.joints[j]}: residual over {view.label.split(' [')[0]}", words, plot)
 
 
@@ -161,30 +168,26 @@ def _means_plot(
     robot: Robot, chapter: Chapter, x_before: Sequence[Array], x_after: Sequence[Array], label: str, view: View
 ) -> Plot:
     j = chapter.joint
-    limits = middle_range(_kept(chapter.after, j, x_after), view.share)
+    limits = middle_range(kept(chapter.after, x_after, j), view.share)
     layers: list[Layer] = []
     for traces, signals, color, name in (
         (chapter.before, x_before, "vermillion", "residual before"),
         (chapter.after, x_after, "blue", "residual after"),
     ):
-        y = _kept(traces, j, [trace.residual[j] * _direction(trace, j, view.along) for trace in traces])
-        means = binned_means(_kept(traces, j, signals), y, limits, 30)
+        y = kept(traces, [trace.residual[j] * _direction(trace, j, view.along) for trace in traces], j)
+        means = binned_means(kept(traces, signals, j), y, limits, 30)
         layers.append(Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, color))
         layers.append(Line(means.x, means.y, color, name, 1.8))
     added = chapter.added
     if added is not None:
         turned = [part * _direction(trace, j, view.along) for part, trace in zip(added, chapter.after, strict=True)]
-        means = binned_means(_kept(chapter.after, j, x_after), _kept(chapter.after, j, turned), limits, 30)
+        means = binned_means(kept(chapter.after, x_after, j), kept(chapter.after, turned, j), limits, 30)
         layers.append(Line(means.x, means.y, "black", ADDED, 1.2, "4 3"))
     return Plot(label, (Panel(f"residual [{robot.torque_unit(j)}]", layers, 220),), limits)
 
 
 def _direction(trace: Trace, j: int, along: bool) -> Array | float:
     return np.sign(trace.motion.v[j]) if along else 1.0
-
-
-def _kept(traces: Sequence[Trace], j: int, signals: Sequence[Array]) -> Array:
-    return np.concatenate([trace.kept(signal, j) for trace, signal in zip(traces, signals, strict=True)])
 
 
 def _with_unit(robot: Robot, view: View, j: int) -> str:

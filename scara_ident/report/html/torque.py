@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.estimators import JointError
 from scara_ident.report.html.page import Cell, Group, Selector, Text, escape, table
-from scara_ident.report.html.plot import Figure, Grid, Layer, Line, Panel, Plot
+from scara_ident.report.html.plot import Drawing, Figure, Grid, Layer, Line, Panel, Plot
 from scara_ident.report.html.traces import Trace
 from scara_ident.robot import Robot
 
@@ -21,29 +21,27 @@ DRAWN_PER_PERIOD = 16.0
 MOST_SAMPLES = 1_500_000
 
 
-def torque_group(
-    robot: Robot, parts: Mapping[str, Sequence[Trace]], bands: Sequence[float | None], held_out: set[str]
-) -> Group:
+def torque_group(robot: Robot, parts: Sequence[tuple[str, Sequence[Trace]]], bands: Sequence[float | None]) -> Group:
     """Return measured, predicted and residual torque over time, selectable by recording and joint.
 
     Parameters
     ----------
     robot : Robot
-    parts : mapping of str to sequence of Trace
-        By recording.
+    parts : sequence of (str, sequence of Trace)
+        Recordings, by the words of the selector.
     bands : sequence of float or None, one per joint
         Hz.
-    held_out : set of str
-        Recordings that were not fitted.
     """
-    total = robot.n * sum(part.motion.samples for traces in parts.values() for part in traces)
-    bucket = max(1, int(np.ceil(2.0 * total / MOST_SAMPLES))) if total > MOST_SAMPLES else 1
-    variants = {
-        (r, j): _plot(robot, traces, j, bands[j], bucket)
-        for r, traces in enumerate(parts.values())
-        for j in range(robot.n)
+    total = sum(
+        trace.motion.samples * (1.0 + 3.0 / _every(trace, band))
+        for _, found in parts
+        for trace in found
+        for band in bands
+    )
+    bucket = int(np.ceil(2.0 * total / MOST_SAMPLES)) if total > MOST_SAMPLES else 1
+    variants: dict[tuple[int, ...], Drawing] = {
+        (r, j): _plot(robot, found, j, bands[j], bucket) for r, (_, found) in enumerate(parts) for j in range(robot.n)
     }
-    names = tuple(f"{name} ({'held out' if name in held_out else 'fitted'})" for name in parts)
     figure = Figure(
         "torque",
         "Measured and predicted torque",
@@ -51,6 +49,7 @@ def torque_group(
         variants,
         (0, 1),
     )
+    names = tuple(name for name, _ in parts)
     return Group("torque-group", (figure,), (Selector("recording", names), Selector("joint", robot.joints)))
 
 
@@ -58,23 +57,27 @@ def _plot(robot: Robot, traces: Sequence[Trace], j: int, band: float | None, buc
     above: list[Layer] = []
     below: list[Layer] = []
     for trace in traces:
-        above.append(_line(trace, trace.recorded[j], bucket, "grey", "recorded", 0.8))
+        above.append(_line(_grid(trace, 1), trace.recorded[j], bucket, "grey", "recorded", 0.8))
     for trace in traces:
         grid, measured = banded(trace, trace.measured[j], band)
         _, predicted = banded(trace, trace.predicted[j], band)
-        above.append(Line(grid, measured, "blue", "measured", 1.6))
-        above.append(Line(grid, predicted, "vermillion", "predicted", 1.4, "5 3"))
-        below.append(Line(grid, measured - predicted, "green", "residual", 1.2))
+        above.append(_line(grid, measured, bucket, "blue", "measured", 1.6))
+        above.append(_line(grid, predicted, bucket, "vermillion", "predicted", 1.4, "5 3"))
+        below.append(_line(grid, measured - predicted, bucket, "green", "residual", 1.2))
     unit = robot.torque_unit(j)
     return Plot("time [s]", (Panel(f"torque [{unit}]", above, 260), Panel(f"residual [{unit}]", below, 130)))
 
 
 def banded(trace: Trace, signal: Array, band: float | None) -> tuple[Grid, Array]:
     """Return a signal within a band without its ends, at as many samples as straight lines between them need."""
-    every = 1 if band is None else max(1, int(trace.motion.rate / (DRAWN_PER_PERIOD * band)))
+    every = _every(trace, band)
     inner = np.full(len(signal), np.nan)
     inner[trace.core] = signal[trace.core]
     return _grid(trace, every), inner[::every]
+
+
+def _every(trace: Trace, band: float | None) -> int:
+    return 1 if band is None else max(1, int(trace.motion.rate / (DRAWN_PER_PERIOD * band)))
 
 
 def _grid(trace: Trace, every: int) -> Grid:
@@ -82,12 +85,12 @@ def _grid(trace: Trace, every: int) -> Grid:
     return Grid(float(trace.time[0]), step, -(-trace.motion.samples // every))
 
 
-def _line(trace: Trace, signal: Array, bucket: int, color: str, name: str, width: float) -> Line:
+def _line(grid: Grid, signal: Array, bucket: int, color: str, name: str, width: float, dash: str = "") -> Line:
     if bucket == 1:
-        return Line(_grid(trace, 1), signal, color, name, width)
-    values = envelope(signal, bucket)
-    step = 0.5 * bucket / trace.motion.rate
-    return Line(Grid(float(trace.time[0]) + 0.5 * step, step, len(values)), values, color, name, width)
+        return Line(grid, signal, color, name, width, dash)
+    values, step = envelope(signal, bucket), 0.5 * bucket * grid.step
+    # Two values stand for a bucket, at its quarter and at its three quarters.
+    return Line(Grid(grid.start + 0.5 * (step - grid.step), step, len(values)), values, color, name, width, dash)
 
 
 def envelope(signal: Array, bucket: int) -> Array:
@@ -109,32 +112,37 @@ def envelope(signal: Array, bucket: int) -> Array:
     return np.column_stack([np.where(rises, low, high), np.where(rises, high, low)]).ravel()
 
 
-def error_table(
-    robot: Robot,
-    fitted: Mapping[str, Sequence[JointError | None]],
-    held_out: Mapping[str, Sequence[JointError | None]],
-    shown: Sequence[str],
-) -> Text:
-    """Return the error of every recording and joint; a click shows it in the torque figure."""
-    found = [error for errors in (*fitted.values(), *held_out.values()) for error in errors if error and error.relative]
-    most = max((error.relative or 0.0 for error in found), default=1.0)
-    rows = []
-    for kind, recordings in (("held out", held_out), ("fitted", fitted)):
-        for name, errors in recordings.items():
-            cells: list[Cell | str] = [Cell(escape(name), "name"), kind]
-            for j, error in enumerate(errors):
-                cells += _error_cells(error, shown.index(name), j, most)
-            rows.append(cells)
-    head = ["recording", ""]
+def error_table(robot: Robot, names: Sequence[str], errors: Sequence[Sequence[JointError | None]]) -> Text:
+    """Return the error of every recording and joint; a click shows it in the torque figure.
+
+    Parameters
+    ----------
+    robot : Robot
+    names : sequence of str
+        In the order of the torque figure's selector.
+    errors : sequence of sequence of JointError or None
+        By recording and joint.
+    """
+    shares = [error.relative for found in errors for error in found if error and error.relative]
+    most = max(shares, default=1.0)
+    rows: list[list[Cell | str]] = []
+    for place, (name, found) in enumerate(zip(names, errors, strict=True)):
+        cells: list[Cell | str] = [Cell(escape(name), "name")]
+        for j, error in enumerate(found):
+            cells += _error_cells(error, place, j, most)
+        rows.append(cells)
+    head = ["recording"]
     for j, joint in enumerate(robot.joints):
         head += [f"{joint} [{robot.torque_unit(j)}]", "of torque"]
-    return table(head, rows, numeric=range(2, len(head)))
+    return table(head, rows, numeric=range(1, len(head)))
 
 
 def _error_cells(error: JointError | None, recording: int, j: int, most: float) -> list[Cell | str]:
     if error is None:
         return ["–", "–"]
-    button = f'<button type="button" data-choose="torque-group" data-values="[{recording},{j}]">{error.rms:.3g}</button>'
+    button = (
+        f'<button type="button" data-choose="torque-group" data-values="[{recording},{j}]">{error.rms:.3g}</button>'
+    )
     if error.relative is None:
         return [Cell(button, "num"), "–"]
     return [Cell(button, "num"), Cell(f"{error.relative:.1%}", "num", error.relative / most)]

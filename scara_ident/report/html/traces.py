@@ -88,9 +88,12 @@ class Trace:
         return self.motion.torque
 
 
-def traces(
-    model: TorqueModel, value: Array, recording: Recording, bands: Sequence[float | None]
-) -> tuple[Trace, ...]:
+def kept(traces: Sequence[Trace], signals: Sequence[Array], joint: int) -> Array:
+    """Gather signals, one per trace, over the samples of a joint that the estimate uses; see `Trace.kept`."""
+    return np.concatenate([trace.kept(signal, joint) for trace, signal in zip(traces, signals, strict=True)])
+
+
+def traces(model: TorqueModel, value: Array, recording: Recording, bands: Sequence[float | None]) -> tuple[Trace, ...]:
     """Predict the torque of a recording, part by part.
 
     Parameters

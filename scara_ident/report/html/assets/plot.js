@@ -229,14 +229,14 @@ const Plot = (() => {
       const [y0, y1] = range, top = y;
       const sy = (v) => top + height - ((v - y0) / (y1 - y0)) * height;
       const clip = `clip${++clips}`;
-      const ticks = panel.log ? logTicks(y0, y1, height / 34) : linearTicks(y0, y1, height / 34);
+      const ticks = panel.log ? logTicks(y0, y1, height / 26) : linearTicks(y0, y1, height / 26);
       const digits = panel.log ? 3 : tickDigits(ticks);
       for (const [v, label] of ticks) {
         const py = sy(v).toFixed(1);
         body += `<line class="grid" x1="${left}" x2="${left + inner}" y1="${py}" y2="${py}"/>`;
         if (label) body += `<text class="tick" x="${left - 6}" y="${py}" dy=".32em" text-anchor="end">${number(panel.log ? 10 ** v : v, digits)}</text>`;
       }
-      const xTicks = (logX ? logTicks : linearTicks)(x0, x1, inner / (small ? 62 : 80)).filter(([v]) => v >= x0 && v <= x1);
+      const xTicks = (logX ? logTicks : linearTicks)(x0, x1, inner / (small ? 48 : 72)).filter(([v]) => v >= x0 && v <= x1);
       const lowest = panel === spec.panels[spec.panels.length - 1];
       for (const [v, label] of xTicks) {
         const px = sx(v).toFixed(1);

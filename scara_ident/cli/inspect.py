@@ -1,0 +1,132 @@
+"""``scara-ident inspect``."""
+
+from __future__ import annotations
+
+from json import dumps
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from scara_ident.cli.console import OutputOption, output_console, progress, table
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from scara_ident.inspection import Inspection
+
+# Of columns that are no channels so many are shown on a terminal; --json has them all.
+OTHERS_SHOWN = 20
+
+
+def inspect(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="A recording: .parquet, .csv, .mat, .h5, .mcap, .db3, or a rosbag2 folder."
+        ),
+    ],
+    urdf: Annotated[
+        Path | None, typer.Option("--urdf", metavar="URDF", help="The arm, to whose joints columns are matched.")
+    ] = None,
+    robot: Annotated[
+        Path | None, typer.Option("--robot", metavar="FILE", help="robot.yaml, to check its mapping on this file.")
+    ] = None,
+    output: OutputOption = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Show what is in a file, guess which columns are the arm's, audit it and write a first robot.yaml."""
+    from scara_ident.errors import ScaraIdentError, UsageError
+    from scara_ident.inspection import inspect_file
+    from scara_ident.report.files import plain, write_text
+
+    target = None if output is None else output / "robot.yaml"
+    if target is not None and urdf is None:
+        raise UsageError("--output: a first robot.yaml is made from a URDF; give --urdf")
+    if target is not None and target.exists():
+        raise ScaraIdentError(f"{target}: exists already and is not overwritten; move it away or give another --output")
+    with progress() as step:
+        step("reading the file")
+        found = inspect_file(file, urdf=urdf, robot=robot, folder=output or ".")
+    if target is not None and found.description is not None:
+        write_text(target, found.description)
+    if json:
+        typer.echo(dumps(plain(inspection_dict(found, target)), indent=1, allow_nan=False))
+        return
+    _show(output_console(), found, target)
+
+
+def inspection_dict(found: Inspection, written: Path | None) -> dict[str, Any]:
+    """Return an inspection as JSON has it."""
+    recording = found.recording
+    audit = None
+    if recording is not None:
+        audit = {
+            "samples": len(recording.time),
+            "duration": recording.time[-1] - recording.time[0],
+            "rate": recording.rate,
+            "findings": [{"kind": f.kind, "message": f.message, "count": f.count} for f in recording.findings],
+        }
+    return {
+        "file": str(found.path),
+        "topics": dict(found.topics),
+        "topic": found.topic,
+        "columns": [vars(column) for column in found.columns],
+        "recording": dict(found.mapping),
+        "notes": list(found.notes),
+        "problems": list(found.problems),
+        "audit": audit,
+        "refusal": found.refusal,
+        "robot_yaml": found.description,
+        "written": None if written is None else str(written),
+    }
+
+
+def _show(console: Console, found: Inspection, written: Path | None) -> None:
+    from scara_ident.audit.samples import several
+
+    rows = table(str(found.path), "column", "kind", "samples", "range", "taken for", right=("samples",))
+    others = 0
+    for column in found.columns:
+        others += not column.channel
+        if not column.channel and others > OTHERS_SHOWN:
+            continue
+        span = "" if column.low is None or column.high is None else f"{column.low:.4g} .. {column.high:.4g}"
+        samples = f"{column.samples}" + (f" (-{column.missing})" if column.missing else "")
+        rows.add_row(column.name, column.kind, samples, span, _meaning(column))
+    console.print(rows)
+    if others > OTHERS_SHOWN:
+        console.print(f"... and {others - OTHERS_SHOWN} other columns; --json lists them", markup=False)
+    if len(found.topics) > 1:
+        listed = ", ".join(f"{topic} ({count})" for topic, count in found.topics.items())
+        console.print(f"topics of joint states: {listed}", markup=False)
+    for note in found.notes:
+        console.print(f"note: {note}", markup=False, style="dim")
+    for problem in found.problems:
+        console.print(f"missing: {problem}", markup=False)
+    recording = found.recording
+    if recording is not None:
+        seconds = recording.time[-1] - recording.time[0]
+        console.print(
+            f"audit: {len(recording.time)} samples, {seconds:.4g} s, {recording.rate:.4g} Hz; "
+            f"{several(len(recording.findings), 'finding')}",
+            markup=False,
+        )
+        for finding in recording.findings:
+            console.print(f"  {finding.message}", markup=False)
+    elif found.refusal is not None:
+        console.print(f"audit: refused: {found.refusal}", markup=False)
+    if written is not None:
+        console.print(f"written: {written}; go through the lines marked STATE", markup=False, soft_wrap=True)
+    elif found.description is not None:
+        console.print("a first robot.yaml is written with --output DIR", markup=False)
+    elif recording is None and found.refusal is None:
+        console.print("with --urdf URDF columns are matched to the arm's joints and audited", markup=False)
+
+
+def _meaning(column: Any) -> str:
+    if column.quantity is None:
+        return ""
+    text = column.quantity if column.joint is None else f"{column.quantity} of {column.joint}"
+    text += f", {column.unit}" if column.unit else ""
+    return text if column.channel else f"({text})"
