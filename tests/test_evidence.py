@@ -11,12 +11,13 @@ from numpy.testing import assert_allclose
 
 from scara_ident.errors import RecordingError
 from scara_ident.estimators import ols
-from scara_ident.evidence import gather, gather_all, position_cuts, row_step, rows_of, standstill
+from scara_ident.evidence import gather, gather_all
 from scara_ident.information import merge
 from scara_ident.model import TorqueModel, build_model
 from scara_ident.motion import low_pass, motion_of, stretches
 from scara_ident.recording import Recording
 from scara_ident.robot import load_robot
+from scara_ident.rows import position_cuts, row_step, rows_of, standstill
 from tests.arms import PLANAR_2R, recorded_torque, recording, sines, write_urdf
 
 RATE = 500.0

@@ -95,8 +95,8 @@ def identify(
         from scara_ident.report.html import identification_report
 
         write_whole(output / "torque.png", lambda path: torque_figure(path, result, (*training, *held_out)))
-        write_json(output / "identification.json", content)
         identification_report(output / "report.html", result, training, held_out)
+        write_json(output / "identification.json", content)
         names = ("identification.json", "report.html", "torque.png")
         written = ", ".join(str(output / name) for name in names)
         console.print(f"written: {written}", markup=False, soft_wrap=True)

@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 
 # Newton's method stops when the divergence is known to this, relative to itself where it is large.
 PRECISION = 1e-10
+# On the way there this is enough, and the way is taken in strides of this factor.
+ROUGH = 1e-2
+STRIDE = 4.0
 MOST_STEPS = 100
 LINE_STEPS = 12
 # Weights of the barrier of limits, the last so small that it moves nothing.
@@ -31,14 +34,17 @@ BARRIER = (1.0, 1e-2, 1e-4, 1e-6, 1e-8)
 DEPENDENT = 1e-9
 
 
-def divergence(x: Array) -> float:
-    """Return the divergence of bodies and rotors relative to nominal, shape (11 n,), from the nominal arm."""
+def divergence(x: Array, pull: float = 1.0) -> float:
+    """Return the divergence of bodies and rotors relative to nominal, shape (11 n,), from the nominal arm.
+
+    With ``pull`` the nominal arm is 1/pull times as heavy (and the result differs by a constant).
+    """
     n = len(x) // 11
-    values = np.linalg.eigvalsh(unpack(x[: 10 * n].reshape(n, 10)))
-    if np.any(values <= 0.0) or np.any(x[10 * n :] <= 0.0):
+    bodies = np.linalg.eigvalsh(unpack(x[: 10 * n].reshape(n, 10)))
+    values = np.concatenate([bodies.ravel(), x[10 * n :]])
+    if np.any(values <= 0.0):
         return np.inf
-    bodies = float(np.sum(values - np.log(values) - 1.0))
-    return bodies + float(np.sum(x[10 * n :] - np.log(x[10 * n :]) - 1.0))
+    return float(np.sum(pull * values - np.log(values) - 1.0))
 
 
 def null_space(rows: Array) -> Array:
@@ -74,29 +80,35 @@ def nearest_to_nominal(start: Array, free: Array, limits: Cones) -> Array:
     if free.shape[1] == 0:
         return start
     bounded = bool(len(limits.nonnegative) or len(limits.ball))
+    n = len(start) // 11
     x = start
+    # A start much heavier than nominal goes there in strides, by nominal arms that get lighter.
+    pull = 5.0 * n / max(5.0 * n, float(np.tile(PACKED_IDENTITY, n) @ start[: 10 * n] + start[10 * n :].sum()))
+    while pull < 1.0:
+        x = _newton(x, free, limits, BARRIER[0] if bounded else 0.0, pull, ROUGH)
+        pull *= STRIDE
     for weight in BARRIER if bounded else (0.0,):
-        x = _newton(x, free, limits, weight)
+        x = _newton(x, free, limits, weight, 1.0, PRECISION)
     return x
 
 
-def _newton(start: Array, free: Array, limits: Cones, weight: float) -> Array:
+def _newton(start: Array, free: Array, limits: Cones, weight: float, pull: float, precision: float) -> Array:
     n = len(start) // 11
     directions = unpack(np.moveaxis(free[: 10 * n].reshape(n, 10, -1), 2, 1))
-    x, value = start, _value(start, limits, weight)
+    x, value = start, _value(start, limits, weight, pull)
     for _ in range(MOST_STEPS):
-        gradient, root, local = _slopes(x, n, directions, free, limits, weight)
+        gradient, root, local = _slopes(x, n, directions, free, limits, weight, pull)
         triangular = np.asarray(np.linalg.qr(root, mode="r"))
         half = np.linalg.solve(triangular.T, gradient)
         step = -np.linalg.solve(triangular, half)
         decrement = float(half @ half)
-        if decrement < PRECISION * max(1.0, abs(value)):
+        if decrement < precision * max(1.0, abs(value)):
             return x
         change = free @ step
-        length = _length(np.tensordot(local, step, axes=(1, 0)), change, x, n)
+        length = _length(np.tensordot(local, step, axes=(1, 0)), change, x, pull)
         while True:
             trial = x + length * change
-            new = _value(trial, limits, weight)
+            new = _value(trial, limits, weight, pull)
             if new < value:
                 break
             length *= 0.5
@@ -111,14 +123,15 @@ def _newton(start: Array, free: Array, limits: Cones, weight: float) -> Array:
     )
 
 
-def _length(local: Array, change: Array, x: Array, n: int) -> float:
+def _length(local: Array, change: Array, x: Array, pull: float) -> float:
     """Length of the step that makes the divergence smallest along it.
 
     Near the edge Newton's own length only doubles the distance from it; along a line the divergence is a sum of
     logarithms, and its best length is the root of a falling function.
     """
+    n = len(local)
     rates = np.concatenate([np.linalg.eigvalsh(local).ravel(), change[10 * n :] / x[10 * n :]])
-    linear = float(np.tile(PACKED_IDENTITY, n) @ change[: 10 * n] + change[10 * n :].sum())
+    linear = pull * float(np.tile(PACKED_IDENTITY, n) @ change[: 10 * n] + change[10 * n :].sum())
     fastest = float(np.min(rates))
     low, high = 0.0, (1.0 / -fastest if fastest < 0.0 else 1e12)
     length = min(1.0, 0.5 * high)
@@ -135,8 +148,8 @@ def _length(local: Array, change: Array, x: Array, n: int) -> float:
     return float(length)
 
 
-def _value(x: Array, limits: Cones, weight: float) -> float:
-    value = divergence(x)
+def _value(x: Array, limits: Cones, weight: float, pull: float) -> float:
+    value = divergence(x, pull)
     if weight == 0.0 or not np.isfinite(value):
         return value
     slack = limits.nonnegative(x)
@@ -148,7 +161,7 @@ def _value(x: Array, limits: Cones, weight: float) -> float:
 
 
 def _slopes(
-    x: Array, n: int, directions: Array, free: Array, limits: Cones, weight: float
+    x: Array, n: int, directions: Array, free: Array, limits: Cones, weight: float, pull: float
 ) -> tuple[Array, Array, Array]:
     """Gradient along the free directions, a square root of the Hessian as rows, and the directions seen from x."""
     inverse_root = np.linalg.inv(np.linalg.cholesky(unpack(x[: 10 * n].reshape(n, 10))))
@@ -157,14 +170,15 @@ def _slopes(
     rotors = free[10 * n :]
     own = rotors / x[10 * n :, None]
     trace = np.trace(local, axis1=2, axis2=3)
-    gradient = np.tile(PACKED_IDENTITY, n) @ free[: 10 * n] - trace.sum(axis=0) + rotors.sum(axis=0) - own.sum(axis=0)
+    linear = np.tile(PACKED_IDENTITY, n) @ free[: 10 * n] + rotors.sum(axis=0)
+    gradient = pull * linear - trace.sum(axis=0) - own.sum(axis=0)
     count = free.shape[1]
     rows = [np.moveaxis(local, 1, 3).reshape(16 * n, count), own]
     if weight > 0.0:
         slack = limits.nonnegative(x)
-        linear = limits.nonnegative.matrix @ free / slack[:, None]
-        gradient = gradient - weight * linear.sum(axis=0)
-        rows.append(np.sqrt(weight) * linear)
+        closing = limits.nonnegative.matrix @ free / slack[:, None]
+        gradient = gradient - weight * closing.sum(axis=0)
+        rows.append(np.sqrt(weight) * closing)
         for first in range(0, len(limits.ball), 4):
             slope, root = _ball(limits.ball.matrix[first : first + 4] @ free, limits.ball(x)[first : first + 4])
             gradient = gradient + weight * slope

@@ -22,10 +22,13 @@ from scara_ident.consistency.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 
-# The data tell a direction from nominal at this many standard deviations.
+# The data tell a direction from nominal at this many standard deviations; then the prior moves it by this share of one.
 TOLD_APART = 4.0
-# Then it may be moved by this share of one.
 MOST_BIAS = 0.05
+# No arm differs from its nominal one by more than this; directions of a larger standard deviation tell nothing.
+FARTHEST = 1e5
+# Singular values below this share of the largest are made of rounding.
+ROUNDING = 1e-12
 
 
 def prior_rows(u: Unknowns, rows: Array, target: Array, weight: float) -> Array:
@@ -48,17 +51,15 @@ def prior_rows(u: Unknowns, rows: Array, target: Array, weight: float) -> Array:
     scales = np.ones(u.size)
     scales[11 * u.n :] = _other_scales(u, rows, target)
     scaled = rows * scales
-    precision, directions = np.linalg.eigh(scaled.T @ scaled)
-    # Rounding may leave a precision below 0: nothing is known of that direction.
-    precision = np.clip(precision, 0.0, None)
-    score = directions.T @ (scaled.T @ (target - rows @ u.reference))
-    root = np.sqrt(precision)
-    # Distance from nominal in standard deviations, z / s, and s z = (z / s) / precision.
-    apart = np.abs(score) / np.where(root > 0.0, root, np.inf)
-    told = apart > TOLD_APART
-    weights = np.full(u.size, weight)
-    weights[told] = np.minimum(weight, MOST_BIAS * precision[told] / apart[told])
-    return np.asarray(np.sqrt(weights)[:, None] * directions.T / scales)
+    left, singular, right = np.linalg.svd(scaled, full_matrices=False)
+    # Distance from nominal in standard deviations, z / s, with s = 1 / singular.
+    apart = np.abs(left.T @ (target - rows @ u.reference))
+    told = (apart > TOLD_APART) & (singular * FARTHEST > 1.0) & (singular > ROUNDING * singular[0])
+    reduced = np.minimum(weight, MOST_BIAS * singular[told] ** 2 / apart[told])
+    directions = right[told]
+    form = np.sqrt(weight) * np.eye(u.size)
+    form += directions.T @ ((np.sqrt(reduced) - np.sqrt(weight))[:, None] * directions)
+    return np.asarray(form / scales)
 
 
 def _other_scales(u: Unknowns, rows: Array, target: Array) -> Array:

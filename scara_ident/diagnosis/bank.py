@@ -1,4 +1,4 @@
-"""All candidates as columns of one regressor, gathered once per recording."""
+"""Candidates: members of families of effects, and all of them as one term."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
-from scara_ident.evidence import Evidence
-from scara_ident.information import triangular
-from scara_ident.model import TorqueModel
 from scara_ident.motion import Motion
 from scara_ident.terms import Column
 
@@ -42,7 +39,9 @@ class Candidate:
         if joint is None:
             # Members without a joint are told apart by what they are.
             several = self.member.partner is not None
-            return f"{self.effect.name} ({self.effect.description(scene, self.member)})" if several else self.effect.name
+            return (
+                f"{self.effect.name} ({self.effect.description(scene, self.member)})" if several else self.effect.name
+            )
         partner = "" if self.member.partner is None else f" by {scene.robot.joints[self.member.partner]}"
         return f"{self.effect.name} of {joint}{partner}"
 
@@ -97,69 +96,3 @@ class Bank:
         for candidate, place in zip(self.candidates, self.places, strict=True):
             result[:, place] = candidate.effect.regressor(signals, candidate.member)
         return result
-
-
-def with_candidates(scene: Scene, candidates: Sequence[Candidate]) -> tuple[TorqueModel, Bank]:
-    """Return the base model with all candidates behind it."""
-    bank = Bank(scene, tuple(candidates))
-    return TorqueModel(f"{scene.model.name} with candidates", scene.robot, (*scene.model.terms, bank)), bank
-
-
-@dataclass(frozen=True, eq=False)
-class Stack:
-    """Rows of all recordings, weighted, with the blocks of time they belong to.
-
-    Attributes
-    ----------
-    rows : ndarray, shape (N, P + 1)
-        Factors of the blocks on top of each other; the last column is the torque.
-    starts : ndarray of int
-        Where each block begins; the rows of all joints of a block follow each other.
-    recording : ndarray of int
-        Recording of each block.
-    fold : ndarray of int
-        Fold of each recording: trajectories, or stretches of time where there is one trajectory only.
-    fold_names : tuple of str
-    fold_of_block : ndarray of int
-    """
-
-    rows: Array
-    starts: NDArray[np.intp]
-    recording: NDArray[np.intp]
-    fold_names: tuple[str, ...]
-    fold_of_block: NDArray[np.intp]
-
-    @cached_property
-    def fold_factors(self) -> tuple[Array, ...]:
-        """Triangular factor of the rows of each fold."""
-        fold_of_row = np.repeat(self.fold_of_block, np.diff([*self.starts, len(self.rows)]))
-        return tuple(triangular(self.rows[fold_of_row == fold]) for fold in range(len(self.fold_names)))
-
-
-# Folds where there is one trajectory only: consecutive parts of it.
-PARTS = 4
-
-
-def stack(evidence: Sequence[Evidence], weights: Array) -> Stack:
-    """Stack the blocks of all recordings, each joint's rows with its weight."""
-    rows: list[Array] = []
-    starts: list[int] = []
-    recording: list[int] = []
-    total = 0
-    for place, item in enumerate(evidence):
-        for block in item.blocks:
-            if not any(part.rows for part in block):
-                continue
-            starts.append(total)
-            recording.append(place)
-            for part, weight in zip(block, weights, strict=True):
-                if part.rows:
-                    rows.append(weight * part.factor)
-                    total += len(part.factor)
-    trajectories = list(dict.fromkeys(item.trajectory for item in evidence))
-    of_recording = np.array([trajectories.index(item.trajectory) for item in evidence])
-    fold = of_recording[recording]
-    if len(trajectories) == 1:
-        trajectories = [f"part {k + 1}" for k in range(PARTS)]
-        fold = np.minimum(np.arange(len(starts)) * PARTS // max(1, len(starts)), PARTS - 1)
-    return Stack(np.vstack(rows), np.array(starts), np.array(recording), tuple(trajectories), fold)

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.bank import Candidate, stack, with_candidates
-from scara_ident.diagnosis.decision import Decision, decide
-from scara_ident.diagnosis.examination import examine, left_over
-from scara_ident.diagnosis.search import Search, refine
-from scara_ident.evidence import gather_all
+from scara_ident.diagnosis.bank import Candidate
+from scara_ident.diagnosis.examination import left_over
+from scara_ident.diagnosis.search import Beside, Search, best_of_each, refine
+from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
 
 Array = NDArray[np.float64]
 
@@ -55,56 +54,60 @@ def rivals(result: Search, weights: Array) -> list[tuple[Rival, ...]]:
     -------
     list of tuple of Rival
     """
-    best: dict[str, Decision] = {}
-    for decision in result.decisions:
-        held = best.get(decision.label)
-        if held is None or decision.examination.gain > held.examination.gain:
-            best[decision.label] = decision
-    others = {label: item.candidate for label, item in best.items()}
-    return [
-        _rivals_of(result, weights, list(result.chosen[:k] + result.chosen[k + 1 :]), found, others)
-        for k, found in enumerate(result.chosen)
-    ]
+    table = tabulate(result.base, result.recordings, result.bands)
+    pool = [decision.candidate for decision in result.decisions]
+    columns, places = tabulate_candidates(result.scene, [*result.chosen, *pool], result.recordings, result.bands)
+    count = len(result.chosen)
+    return [_rivals_of(result, weights, table, columns, places[:count], places[count:], k, pool) for k in range(count)]
 
 
 def _rivals_of(
-    result: Search, weights: Array, rest: list[Candidate], found: Candidate, others: dict[str, Candidate]
+    result: Search,
+    weights: Array,
+    table: Table,
+    columns: Array,
+    chosen: Sequence[slice],
+    others: Sequence[slice],
+    found: int,
+    pool: Sequence[Candidate],
 ) -> tuple[Rival, ...]:
     scene = result.scene
-    # All scan points of the others: without the effect found, another point may be the best.
-    pool = [decision.candidate for decision in result.decisions]
-    candidates = [found, *pool]
-    extended, bank = with_candidates(scene, [*rest, *candidates])
-    rows = stack(gather_all(extended, result.recordings, result.bands), weights)
-    base = len(scene.model.columns)
-    groups = [list(range(base + place.start, base + place.stop)) for place in bank.places]
-    fixed = [*range(base), *(k for group in groups[: len(rest)] for k in group)]
-    tested = groups[len(rest) :]
-    examined = examine(rows, fixed, tested)
-    judged = [decide(item, result_, scene, result.tried) for item, result_ in zip(candidates, examined, strict=True)]
-    own = judged[0]
-    reference = left_over(rows, fixed, tested[0])
-    best: dict[str, tuple[Decision, list[int]]] = {}
-    for decision, group in zip(judged[1:], tested[1:], strict=True):
-        held = best.get(decision.label)
-        if decision.accepted and (held is None or decision.examination.gain > held[0].examination.gain):
-            best[decision.label] = (decision, group)
-    near = {label: item for label, item in best.items() if item[0].gain > 0.5 * LEAST_SHARE * own.gain}
-    refined = refine(
-        scene, result.recordings, result.bands, weights, rest, [item[0] for item in near.values()], result.tried
+    rest = [columns[:, place] for k, place in enumerate(chosen) if k != found]
+    beside = Beside(
+        scene,
+        result.recordings,
+        result.bands,
+        table.beside(np.hstack([table.columns[:, :0], *rest])),
+        weights,
+        result.tried,
     )
+    own = beside.judge([result.chosen[found]], columns, [chosen[found]])[0]
+    judged = beside.judge(pool, columns, others)
+    near = [
+        item for item in best_of_each(judged).values() if item.accepted and item.gain > 0.5 * LEAST_SHARE * own.gain
+    ]
+    refined = refine(beside, near)
+    rows = [_left_over(beside, item.candidate) for item in (own, *refined)]
     found_rivals = []
-    for (label, (_, group)), decision in zip(near.items(), refined, strict=True):
-        worse = left_over(rows, fixed, group) - reference
+    for decision, left in zip(refined, rows[1:], strict=True):
+        worse = left - rows[0]
         error = float(np.sqrt(len(worse) * np.var(worse)))
         alike = decision.gain >= LEAST_SHARE * own.gain and abs(float(np.sum(worse))) < STANDARD_ERRORS * error
-        if alike or decision.gain >= own.gain:
+        if decision.accepted and (alike or decision.gain >= own.gain):
             found_rivals.append(
-                Rival(label, decision.candidate.effect.name, decision.candidate.joint(scene), decision.gain, own.gain)
+                Rival(
+                    decision.label,
+                    decision.candidate.effect.name,
+                    decision.candidate.joint(scene),
+                    decision.gain,
+                    own.gain,
+                )
             )
     return tuple(sorted(found_rivals, key=lambda rival: -rival.gain))
 
 
-def names(groups: Sequence[Rival]) -> list[str]:
-    """Return the names of effects in a group, each once."""
-    return list(dict.fromkeys(rival.effect for rival in groups))
+def _left_over(beside: Beside, candidate: Candidate) -> Array:
+    """Squared residual of every block with a candidate in the model."""
+    columns, _ = tabulate_candidates(beside.scene, [candidate], beside.recordings, beside.bands)
+    rows = beside.table.beside(columns).weighted(beside.weights)
+    return left_over(rows)

@@ -75,9 +75,12 @@ def _objection(candidate: Candidate, examination: Examination, scene: Scene, tri
     unphysical = candidate.effect.inadmissible(after, candidate.member, examination.value, std)
     if unphysical is not None:
         return unphysical
-    if candidate.effect.name == "time_delay" and candidate.member.joint is not None:
-        if within_sampling(float(examination.value[0]), scene.rate):
-            return "less than one sample: the place of a sample within its period"
+    if (
+        candidate.effect.name == "time_delay"
+        and candidate.member.joint is not None
+        and within_sampling(float(examination.value[0]), scene.rate)
+    ):
+        return "less than one sample: the place of a sample within its period"
     if gain < LEAST_GAIN:
         return f"below the detection limit: removes {max(gain, 0.0):.1%} of the squared residual, {LEAST_GAIN:.0%} is asked"
     helps, voting = examination.votes

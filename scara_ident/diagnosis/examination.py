@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.bank import Stack
-from scara_ident.information import triangular
+from scara_ident.diagnosis.table import Table
 
 Array = NDArray[np.float64]
 
@@ -64,12 +63,12 @@ class Examination:
         return sum(gain > 0.0 for gain in voting), len(voting)
 
 
-def examine(stack: Stack, model: Sequence[int], groups: Sequence[Sequence[int]]) -> list[Examination]:
+def examine(table: Table, model: Sequence[int], groups: Sequence[Sequence[int]]) -> list[Examination]:
     """Examine candidates beside a model.
 
     Parameters
     ----------
-    stack : Stack
+    table : Table
     model : sequence of int
         Columns that are in the model.
     groups : sequence of sequence of int
@@ -81,15 +80,14 @@ def examine(stack: Stack, model: Sequence[int], groups: Sequence[Sequence[int]])
     """
     columns = sorted({k for group in groups for k in group})
     place = {k: i for i, k in enumerate(columns)}
-    wanted = [*columns, stack.rows.shape[1] - 1]
-    whole = triangular(np.vstack(stack.fold_factors))
-    sums = _sums(whole, model, wanted)
-    residual = stack.rows[:, wanted] - stack.rows[:, model] @ sums
-    sizes = np.sum(stack.rows[:, wanted] ** 2, axis=0)
+    wanted = [*columns, table.rows.shape[1] - 1]
+    sums = _sums(table.whole, model, wanted)
+    residual = table.rows[:, wanted] - table.rows[:, model] @ sums
+    sizes = np.sum(table.rows[:, wanted] ** 2, axis=0)
     # What is left of a column that the model spans is rounding, and must not be scaled up.
     residual[:, np.sum(residual**2, axis=0) < ABSORBED * sizes] = 0.0
-    folds = [factor[:, wanted] - factor[:, model] @ sums for factor in stack.fold_factors]
-    return [_examine_one(stack, residual, sizes, folds, sums, [place[k] for k in group]) for group in groups]
+    folds = [factor[:, wanted] - factor[:, model] @ sums for factor in table.fold_factors]
+    return [_examine_one(table, residual, sizes, folds, sums, [place[k] for k in group]) for group in groups]
 
 
 def _sums(factor: Array, model: Sequence[int], wanted: Sequence[int]) -> Array:
@@ -107,7 +105,7 @@ def _solve(columns: Array, target: Array) -> Array:
 
 
 def _examine_one(
-    stack: Stack, residual: Array, sizes: Array, folds: Sequence[Array], sums: Array, group: list[int]
+    table: Table, residual: Array, sizes: Array, folds: Sequence[Array], sums: Array, group: list[int]
 ) -> Examination:
     columns, error = residual[:, group], residual[:, -1]
     left = np.sum(columns**2, axis=0)
@@ -116,11 +114,13 @@ def _examine_one(
     k = len(group)
     if outside < ABSORBED or before == 0.0:
         nothing = np.zeros(k)
-        return Examination(nothing, np.full((k, k), np.inf), 1.0, outside, 0.0, 0.0, (None,) * len(folds), 0.0, sums[:, -1])
+        return Examination(
+            nothing, np.full((k, k), np.inf), 1.0, outside, 0.0, 0.0, (None,) * len(folds), 0.0, sums[:, -1]
+        )
     value = _solve(columns, error)
     added = columns @ value
     after = error - added
-    p_value, covariance = _block_test(stack, columns, after, value, len(sums))
+    p_value, covariance = _block_test(table, columns, after, value, len(sums))
     products = [fold[:, group].T @ fold[:, group] for fold in folds]
     aims = [fold[:, group].T @ fold[:, -1] for fold in folds]
     mean = np.mean([np.trace(product) for product in products])
@@ -156,19 +156,19 @@ def _normal(product: Array, aim: Array) -> Array:
     return np.asarray(np.linalg.pinv(product / np.outer(size, size), rcond=1e-9) @ (aim / size) / size)
 
 
-def _block_test(stack: Stack, columns: Array, error: Array, value: Array, used: int) -> tuple[float, Array]:
+def _block_test(table: Table, columns: Array, error: Array, value: Array, used: int) -> tuple[float, Array]:
     """F test that coefficients are zero, and their covariance, from scores of blocks with Bartlett's weights."""
     from scipy.special import fdtrc
 
     size = np.linalg.norm(columns, axis=0)
     size[size == 0.0] = 1.0
     unit = columns / size
-    scores = np.add.reduceat(unit * error[:, None], stack.starts, axis=0)
+    scores = np.add.reduceat(unit * error[:, None], table.starts, axis=0)
     meat = scores.T @ scores
-    follows = stack.recording[1:] == stack.recording[:-1]
+    follows = table.recording[1:] == table.recording[:-1]
     cross = scores[1:][follows].T @ scores[:-1][follows]
     meat = meat + 0.5 * (cross + cross.T)
-    blocks, k = len(stack.starts), columns.shape[1]
+    blocks, k = len(table.starts), columns.shape[1]
     freedom = max(1.0, blocks - used / 2.0 - k)
     meat *= blocks / freedom
     inverse = np.linalg.pinv(unit.T @ unit, rcond=1e-9)
@@ -180,10 +180,8 @@ def _block_test(stack: Stack, columns: Array, error: Array, value: Array, used: 
     return p_value, covariance / np.outer(size, size)
 
 
-def left_over(stack: Stack, model: Sequence[int], group: Sequence[int]) -> Array:
-    """Return the squared residual of every block with a candidate in the model, shape (blocks,)."""
-    wanted = [*model, *group]
-    whole = triangular(np.vstack(stack.fold_factors))
-    sums = _sums(whole, wanted, [stack.rows.shape[1] - 1])[:, 0]
-    residual = stack.rows[:, -1] - stack.rows[:, wanted] @ sums
-    return np.asarray(np.add.reduceat(residual**2, stack.starts))
+def left_over(table: Table) -> Array:
+    """Return the squared residual of every block when all columns are fitted, shape (blocks,)."""
+    count = table.columns.shape[1]
+    sums = _sums(table.whole, range(count), [count])[:, 0]
+    return np.asarray(np.add.reduceat((table.torque - table.columns @ sums) ** 2, table.starts))

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.covariance import block_covariance
-from scara_ident.diagnosis.bank import Candidate, Stack, stack, with_candidates
+from scara_ident.diagnosis.bank import Candidate
+from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
 from scara_ident.effects import Parameter, Scene
-from scara_ident.evidence import gather_all
 from scara_ident.information import Information, triangular
 from scara_ident.recording import Recording
 
@@ -39,15 +39,16 @@ def physical_parameters(
             knobs = list(chosen[i].member.knobs)
             knobs[k] += sign * _step(chosen[i], k)
             variants.append(chosen[i].at(knobs))
-    extended, bank = with_candidates(scene, [*chosen, *variants])
-    rows = stack(gather_all(extended, recordings, bands), weights)
+    model = tabulate(scene.model, recordings, bands)
+    extra, places = tabulate_candidates(scene, [*chosen, *variants], recordings, bands)
+    rows = model.beside(extra).weighted(weights)
     base = len(scene.model.columns)
-    linear = list(range(base + sum(len(candidate.term(scene).columns) for candidate in chosen)))
+    linear = list(range(base + places[len(chosen) - 1].stop))
     value = _solve(rows.rows[:, linear], rows.rows[:, -1])
     derivatives = []
     for place, (i, k) in enumerate(steps):
-        coefficients = value[_shifted(bank.places[i], base)]
-        up, down = (bank.places[len(chosen) + 2 * place + side] for side in (0, 1))
+        coefficients = value[_shifted(places[i], base)]
+        up, down = (places[len(chosen) + 2 * place + side] for side in (0, 1))
         change = rows.rows[:, _shifted(up, base)] - rows.rows[:, _shifted(down, base)]
         derivatives.append(change @ coefficients / (2.0 * _step(chosen[i], k)))
     columns = np.column_stack([rows.rows[:, linear], *derivatives])
@@ -55,7 +56,7 @@ def physical_parameters(
     covariance = _covariance(rows, columns, full)
     found = []
     for i, candidate in enumerate(chosen):
-        own = _shifted(bank.places[i], base)
+        own = _shifted(places[i], base)
         parameters = dict(candidate.effect.parameters(scene, candidate.member, value[own], covariance[own, own]))
         for position, (owner, k) in enumerate(steps):
             if owner == i:
@@ -83,7 +84,7 @@ def _solve(columns: Array, target: Array) -> Array:
     return np.asarray(np.linalg.lstsq(columns / size, target, rcond=1e-10)[0] / size)
 
 
-def _covariance(rows: Stack, columns: Array, value: Array) -> Array:
+def _covariance(rows: Table, columns: Array, value: Array) -> Array:
     """Block covariance of all parameters, columns scaled to unit size meanwhile."""
     size = np.linalg.norm(columns, axis=0)
     size[size == 0.0] = 1.0

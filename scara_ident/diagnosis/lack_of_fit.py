@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.evidence import rows_of, standstill, trim_of
 from scara_ident.model import TorqueModel
 from scara_ident.motion import stretches
 from scara_ident.recording import Recording
 from scara_ident.repeatability import LARGEST_SHIFT, alignment
+from scara_ident.rows import rows_of, standstill, trim_of
 
 Array = NDArray[np.float64]
 

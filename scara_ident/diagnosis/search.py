@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.bank import Candidate, stack, with_candidates
+from scara_ident.diagnosis.bank import Candidate
 from scara_ident.diagnosis.decision import Decision, decide
 from scara_ident.diagnosis.examination import examine
+from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
 from scara_ident.effects import CATALOGUE, Effect, Scene
 from scara_ident.effects.measurement import shifted
 from scara_ident.estimators import Estimate
@@ -140,24 +141,32 @@ def search(
     scene = _scene(model, start.value, data, bands)
     candidates = [Candidate(effect, member) for effect in catalogue for member in effect.members(scene)]
     tried = max(1, len(candidates))
+    progress(f"making the columns of {len(candidates)} candidates")
+    base = tabulate(model, data, bands)
+    columns, places = tabulate_candidates(scene, candidates, data, bands)
     chosen: list[Candidate] = []
     steps: list[Step] = []
     delay: tuple[float, float] | None = None
     weights = start.weights
-    decisions: list[Decision] = []
     while True:
         progress(f"trying {len(candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else ""))
-        decisions = _examine_all(scene, data, bands, weights, chosen, candidates, tried)
+        own, _ = tabulate_candidates(scene, chosen, data, bands)
+        beside = Beside(scene, data, tuple(bands), base.beside(own), weights, tried)
+        decisions = beside.judge(candidates, columns, places)
         if len(steps) >= MOST_EFFECTS:
             break
-        winner = _choose(scene, data, bands, weights, chosen, decisions, tried)
+        winner = _choose(beside, decisions)
         if winner is None:
             break
         if is_delay(winner.candidate):
             data, delay = _correct_delay(data, winner, delay)
+            base = replace(base, torque=tabulate(model, data, bands).torque)
         else:
             chosen.append(winner.candidate)
-            candidates = [item for item in candidates if item.label(scene) != winner.label]
+        done = not is_delay(winner.candidate) or abs(winner.examination.value[0]) < DELAY_STEP
+        if done:
+            left = [k for k, item in enumerate(candidates) if item.label(scene) != winner.label]
+            candidates, places = [candidates[k] for k in left], tuple(places[k] for k in left)
         fitted = model_with(scene, chosen)
         evidence = gather_all(fitted, data, bands)
         estimate = weighted_fit(fitted, evidence)
@@ -165,15 +174,53 @@ def search(
         scene = replace(scene, value=estimate.value[: len(model.columns)])
         repeated = bool(steps) and steps[-1].decision.label == winner.label
         steps[len(steps) - repeated :] = [Step(winner, evidence, estimate)]
-        if repeated and delay is not None and abs(winner.examination.value[0]) < DELAY_STEP:
-            candidates = [item for item in candidates if item.label(scene) != winner.label]
-    kept = _backward(scene, data, bands, weights, chosen, tried)
+    kept = _backward(scene, data, bands, base, weights, chosen, tried)
     scene = _settle(scene, data, bands, kept)
     steps = [step for step in steps if step.decision.candidate in kept or is_delay(step.decision.candidate)]
     return Search(
         model, scene, tuple(bands), start, start_evidence, tuple(steps), tuple(kept), delay,
         tuple(decisions), tried, data,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """The model that candidates are tried beside: its rows, and what judging needs.
+
+    Attributes
+    ----------
+    scene : Scene
+    recordings : tuple of Recording
+    bands : tuple of float or None
+    table : Table
+        Columns of the model and of the effects in it.
+    weights : ndarray, shape (n,)
+    tried : int
+        Candidates and scan points tried.
+    """
+
+    scene: Scene
+    recordings: tuple[Recording, ...]
+    bands: tuple[float | None, ...]
+    table: Table
+    weights: Array
+    tried: int
+
+    def judge(self, candidates: Sequence[Candidate], columns: Array, places: Sequence[slice]) -> list[Decision]:
+        """Examine candidates whose columns are at hand, and decide on each."""
+        if not candidates:
+            return []
+        count = self.table.columns.shape[1]
+        rows = self.table.beside(columns).weighted(self.weights)
+        groups = [list(range(count + place.start, count + place.stop)) for place in places]
+        found = examine(rows, range(count), groups)
+        return [decide(item, result, self.scene, self.tried) for item, result in zip(candidates, found, strict=True)]
+
+    def judge_new(self, candidates: Sequence[Candidate]) -> list[Decision]:
+        """Make the columns of candidates and judge them."""
+        if not candidates:
+            return []
+        return self.judge(candidates, *tabulate_candidates(self.scene, candidates, self.recordings, self.bands))
 
 
 def is_delay(candidate: Candidate) -> bool:
@@ -218,74 +265,36 @@ def _scene(model: TorqueModel, value: Array, recordings: Sequence[Recording], ba
     return Scene(model, value, longest, float(slowest), band, travel, speed, start)
 
 
-def _examine_all(
-    scene: Scene,
-    recordings: Sequence[Recording],
-    bands: Sequence[float | None],
-    weights: Array,
-    chosen: Sequence[Candidate],
-    candidates: Sequence[Candidate],
-    tried: int,
-) -> list[Decision]:
-    """Examine candidates beside the base model and the effects chosen so far."""
-    if not candidates:
-        return []
-    extended, bank = with_candidates(scene, [*chosen, *candidates])
-    rows = stack(gather_all(extended, recordings, bands), weights)
-    base = len(scene.model.columns)
-    groups = [list(range(base + place.start, base + place.stop)) for place in bank.places]
-    fixed = [*range(base), *(k for group in groups[: len(chosen)] for k in group)]
-    found = examine(rows, fixed, groups[len(chosen) :])
-    return [decide(item, result, scene, tried) for item, result in zip(candidates, found, strict=True)]
-
-
-def _choose(
-    scene: Scene,
-    recordings: Sequence[Recording],
-    bands: Sequence[float | None],
-    weights: Array,
-    chosen: Sequence[Candidate],
-    decisions: Sequence[Decision],
-    tried: int,
-) -> Decision | None:
-    """Refine the best families and return the best acceptable member of them."""
+def best_of_each(decisions: Sequence[Decision]) -> dict[str, Decision]:
+    """Return the best scan point of every family and joint, acceptable ones first."""
     best: dict[str, Decision] = {}
     for decision in decisions:
         held = best.get(decision.label)
-        if held is None or (decision.accepted, decision.examination.held_out) > (
-            held.accepted,
-            held.examination.held_out,
-        ):
+        if held is None or (decision.accepted, decision.gain) > (held.accepted, held.gain):
             best[decision.label] = decision
-    accepted = sorted((item for item in best.values() if item.accepted), key=lambda item: -item.examination.held_out)
+    return best
+
+
+def _choose(beside: Beside, decisions: Sequence[Decision]) -> Decision | None:
+    """Refine the best families and return the best acceptable member of them."""
+    accepted = [item for item in best_of_each(decisions).values() if item.accepted]
+    accepted.sort(key=lambda item: -item.examination.held_out)
     if not accepted:
         return None
-    leaders = [item for item in accepted if item.examination.held_out >= NEAR_BEST * accepted[0].examination.held_out][
-        :MOST_REFINED
-    ]
-    refined = refine(scene, recordings, bands, weights, chosen, leaders, tried)
-    sound = [item for item in refined if item.accepted]
+    enough = NEAR_BEST * accepted[0].examination.held_out
+    leaders = [item for item in accepted if item.examination.held_out >= enough][:MOST_REFINED]
+    sound = [item for item in refine(beside, leaders) if item.accepted]
     return max(sound, key=lambda item: item.examination.held_out, default=None)
 
 
-def refine(
-    scene: Scene,
-    recordings: Sequence[Recording],
-    bands: Sequence[float | None],
-    weights: Array,
-    chosen: Sequence[Candidate],
-    leaders: Sequence[Decision],
-    tried: int,
-) -> list[Decision]:
+def refine(beside: Beside, leaders: Sequence[Decision]) -> list[Decision]:
     """Refine the nonlinear parameters of several candidates on lines that narrow about the best point so far."""
     current = list(leaders)
     for round_ in range(LINE_ROUNDS):
         variants = [
-            (place, item) for place, held in enumerate(current) for item in _line(scene, held.candidate, round_)
+            (place, item) for place, held in enumerate(current) for item in _line(beside.scene, held.candidate, round_)
         ]
-        if not variants:
-            break
-        found = _examine_all(scene, recordings, bands, weights, chosen, [item for _, item in variants], tried)
+        found = beside.judge_new([item for _, item in variants])
         for (place, _), decision in zip(variants, found, strict=True):
             held = current[place]
             if decision.examination.gain > held.examination.gain and (decision.accepted or not held.accepted):
@@ -332,6 +341,7 @@ def _backward(
     scene: Scene,
     recordings: Sequence[Recording],
     bands: Sequence[float | None],
+    base: Table,
     weights: Array,
     chosen: Sequence[Candidate],
     tried: int,
@@ -339,10 +349,13 @@ def _backward(
     """Drop, one at a time, effects that the others have made superfluous."""
     kept = list(chosen)
     while len(kept) > 1:
-        decisions = [
-            _examine_all(scene, recordings, bands, weights, kept[:k] + kept[k + 1 :], [kept[k]], tried)[0]
-            for k in range(len(kept))
-        ]
+        columns, places = tabulate_candidates(scene, kept, recordings, bands)
+        decisions = []
+        for k, item in enumerate(kept):
+            rest = np.hstack([columns[:, place] for i, place in enumerate(places) if i != k])
+            beside = Beside(scene, tuple(recordings), tuple(bands), base.beside(rest), weights, tried)
+            own = columns[:, places[k]]
+            decisions += beside.judge([item], own, [slice(0, own.shape[1])])
         weakest = min(range(len(kept)), key=lambda k: decisions[k].gain)
         if decisions[weakest].accepted:
             break

@@ -65,11 +65,6 @@ def deviation(covariance: Array, place: int = 0) -> float:
     return float(np.sqrt(max(covariance[place, place], 0.0)))
 
 
-def worst_deviation(std: Array) -> float:
-    """Return a standard deviation that no direction of two coefficients exceeds by more than their correlation."""
-    return float(np.max(std))
-
-
 @dataclass(frozen=True)
 class Stribeck:
     """More friction at low speed: ``u = amplitude sign(v) exp(-(v/velocity)^2)``.
@@ -226,7 +221,7 @@ class PositionDependentFriction:
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Friction brakes at every position."""
         coulomb = friction_of(scene, member.joint or 0).get(0, 0.0)
-        if float(np.hypot(*value)) - 2.0 * worst_deviation(std) > max(coulomb, 0.0):
+        if float(np.hypot(*value)) - 2.0 * float(np.max(std)) > max(coulomb, 0.0):
             return "friction would push at some position"
         return None
 

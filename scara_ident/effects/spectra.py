@@ -23,6 +23,8 @@ FINENESS = 16
 NEIGHBOURS = 40.0
 NEIGHBOURS_IN_TIME = 12.0
 GUARD = 3.0
+# The largest of a spectrum between its independent positions is that of this many per line width.
+TRIALS_PER_WIDTH = 3.0
 # At angles of which the samples do not tell cosine and sine apart a line cannot be seen.
 LEAST_DETERMINANT = 1e-3
 
@@ -185,8 +187,9 @@ def lines(
     """Find the lines that noise of a smooth spectrum would not have.
 
     Around a position the power of noise in ``degrees`` degrees of freedom is chi-squared about a local mean, taken
-    from the median of the neighbours, which a few other lines do not move. The largest over all positions is judged:
-    the p-value is for as many independent positions as there are line widths.
+    from the median of the neighbours, which a few other lines do not move; with what that mean is unsure by, their
+    ratio is F-distributed. The largest over all positions is judged: the p-value is for `TRIALS_PER_WIDTH` independent
+    positions per line width.
 
     Parameters
     ----------
@@ -207,20 +210,22 @@ def lines(
         The most significant first. A strong line has lesser ones beside it that go when it is fitted; one at a time.
     """
     from scipy.ndimage import maximum_filter1d
-    from scipy.stats import chi2
+    from scipy.special import fdtrc
 
     spacing = float(np.median(np.diff(positions)))
     floor = noise_floor(positions, power, width, degrees=degrees, neighbours=neighbours)
     reach = max(1, round(width / spacing))
     ratio = np.divide(power, floor, out=np.zeros_like(power), where=floor > 0.0)
     top = np.flatnonzero((power == maximum_filter1d(power, 2 * reach + 1)) & (power > 0.0))
-    trials = 1.0 + (positions[-1] - positions[0]) / width
+    trials = 1.0 + TRIALS_PER_WIDTH * (positions[-1] - positions[0]) / width
+    # A median says as much as a mean of half as many.
+    freedom = degrees * max(neighbours - GUARD, 1.0)
     found = []
     for k in top:
         if k in (0, len(power) - 1):
             # The edge of a slope is no line.
             continue
-        single = float(chi2.sf(degrees * ratio[k], degrees))
+        single = float(fdtrc(degrees, freedom, ratio[k]))
         p_value = float(-np.expm1(trials * np.log1p(-min(single, 1.0 - 1e-16))))
         if p_value <= significance:
             found.append(Line(_between(positions, power, int(k)), float(power[k]), float(floor[k]), p_value))

@@ -42,6 +42,8 @@ class Schedule:
         Foreseen decrease below which a stage is done.
     steps : int
         Most Newton steps.
+    sharpness : float
+        Sharpness of the cost at the start; it is 1 at the end. See `Problem.sharpened`.
     """
 
     first: float = 6.0
@@ -49,6 +51,7 @@ class Schedule:
     factor: float = 0.4
     tolerance: float = 0.02
     steps: int = 300
+    sharpness: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +108,7 @@ def minimise(problem: Problem, x: Array, schedule: Schedule | None = None) -> Mi
     multipliers: Array | None = None
     while True:
         share = float(np.clip(np.log(plan.first / gap) / span, 0.0, 1.0)) if span > 0.0 else 1.0
-        stage = problem.sharpened(share)
+        stage = problem.sharpened(plan.sharpness + (1.0 - plan.sharpness) * share)
         cost, values = stage.values(x)
         slack = _slack(stage, values)
         mu = gap / slack.size

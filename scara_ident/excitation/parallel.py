@@ -51,10 +51,10 @@ def map_in_order(
 def _adopt(work: Callable[[Any], Any]) -> None:
     global _work
     _work = work
-    one_blas_thread().__enter__()
 
 
 def _apply(item: Any) -> Any:
     if _work is None:
         raise RuntimeError("the worker was not given its function")
-    return _work(item)
+    with one_blas_thread():
+        return _work(item)

@@ -22,8 +22,8 @@ COARSE, FINE = 12, 48
 LEAST_TIMES = 120
 # Times of the verification per time of the winner's limits.
 FINER = 10
-# Bounds of the design, as shares; what this leaves is for rounding.
-BOUND, SPARE = 0.999, 1e-6
+# Bounds of the search and of the winner, as shares, and what a bound is tightened by besides its excess.
+BOUND, EXACT, MARGIN = 0.999, 1.0 - 1e-6, 2e-4
 # Size of changes of a good motion, as shares of it.
 CHANGES = (0.1, 0.2, 0.3)
 ELITE = 3
@@ -160,21 +160,21 @@ def _random_motion(task: Task, random: np.random.Generator) -> Array:
 
 def _finish(task: Task, x: Array) -> tuple[Array, int]:
     """Take a motion to a fine grid, and tighten bounds until it keeps its limits between the samples as well."""
-    bounds = np.full(_rows(task), 1.0 - SPARE)
-    plan = Schedule(first=0.6, last=2e-3, steps=150)
+    bounds = np.full(_rows(task), EXACT)
+    plan = Schedule(first=2.0, last=2e-3, tolerance=5e-3, steps=300)
     problem = _problem(task, FINE, FINE // COARSE, bounds)
     times = FINER * problem.rows.shape[1] + 1
     for _ in range(CORRECTIONS):
-        start = shrunk_inside(problem.sharpened(0.0), x, room=1e-3, factor=0.998)
+        start = shrunk_inside(problem.sharpened(plan.sharpness), x, room=1e-3, factor=0.998)
         if start is None:
             break
         x = minimise(problem, start, plan).x
         excess = _excess(task, x, times)
         if np.all(excess <= 1.0):
             return x, times
-        bounds = bounds * np.where(excess > 1.0, (1.0 - SPARE) / excess, 1.0)
+        bounds = bounds * np.where(excess > 1.0, (1.0 - MARGIN) / excess, 1.0)
         problem = _problem(task, FINE, FINE // COARSE, bounds)
-        plan = Schedule(first=0.06, last=2e-3, steps=60)
+        plan = Schedule(first=0.5, last=2e-3, tolerance=5e-3, steps=150, sharpness=1.0)
     while np.any(_excess(task, x, times) > 1.0):
         x = 0.999 * x
     return x, times

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.inspection.names import CURRENT, TORQUE, Meaning
+from scara_ident.inspection.names import CURRENT, TORQUE, Meaning, meaning
 from scara_ident.inspection.values import Reading, position_readings, slopes, time_unit, velocity_reading
 from scara_ident.units import COUNT, DRIVE, TIME, Unit, find_unit, table_of
 
@@ -125,17 +125,12 @@ def _find_time(result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping[
 def _find_signal(
     result: Guess, quantity: str, meanings: Mapping[str, Meaning], numbers: Mapping[str, Array], robot: Robot
 ) -> Signal | None:
-    groups: dict[tuple[str, bool], dict[int, str]] = {}
-    for name, said in meanings.items():
-        if said.quantity == quantity:
-            # One arm of one joint needs neither name nor number.
-            by_name = said.joint is not None
-            place = said.joint if said.joint is not None else said.number if said.number is not None else 0
-            groups.setdefault((said.template, by_name), {})[place] = name
-    found: list[tuple[tuple[object, ...], Signal]] = []
-    for order, ((template, by_name), members) in enumerate(groups.items()):
-        signal = _of_group(result, quantity, template, by_name, members, robot)
+    found: list[tuple[tuple[object, ...], Signal, str]] = []
+    short: list[str] = []
+    for order, (template, by_name, members) in enumerate(_groups(quantity, meanings)):
+        signal, note = _of_group(quantity, template, by_name, members, robot)
         if signal is None:
+            short.append(note)
             continue
         said = meanings[next(iter(signal.columns.values()))]
         still = all(_is_still(numbers[column]) for column in signal.columns.values())
@@ -148,37 +143,61 @@ def _find_signal(
             not said.words & TORQUE,
             order,
         )
-        found.append((rank, signal))
+        found.append((rank, signal, note))
     if not found:
+        result.notes += short
         return None
     found.sort(key=lambda item: item[0])
-    best = found[0][1]
-    if len(found) > 1:
-        others = ", ".join(signal.template for _, signal in found[1:4])
-        result.notes.append(f"{quantity}: {best.template} taken, not {others}")
-    if found[0][0][0]:
+    first, best, note = found[0]
+    if note:
+        result.notes.append(note)
+    taken = set(best.columns.values())
+    others = [signal.template for _, signal, _ in found[1:] if not taken & set(signal.columns.values())]
+    if others:
+        result.notes.append(f"{quantity}: {best.template} taken, not {', '.join(others[:3])}")
+    if first[0]:
         result.notes.append(f"{quantity}: {best.template} is by its name a command, not a measurement")
     return best
 
 
+def _groups(quantity: str, meanings: Mapping[str, Meaning]) -> list[tuple[str, bool, dict[int, str]]]:
+    """List the columns that may be one signal: their template, whether joints are told by name, and the columns.
+
+    What is told by name is told by number too: where columns count J0, J1 and joints j1, j2, names mislead.
+    """
+    named: dict[str, dict[int, str]] = {}
+    numbered: dict[str, dict[int, str]] = {}
+    for name, said in meanings.items():
+        if said.quantity != quantity:
+            continue
+        if said.joint is not None:
+            named.setdefault(said.template, {})[said.joint] = name
+        blind = said if said.joint is None else meaning(name)
+        # An arm of one joint needs neither name nor number.
+        if blind.number is not None or said.joint is None:
+            numbered.setdefault(blind.template, {})[blind.number or 0] = name
+    return [(template, True, members) for template, members in named.items()] + [
+        (template, False, members) for template, members in numbered.items()
+    ]
+
+
 def _of_group(
-    result: Guess, quantity: str, template: str, by_name: bool, members: Mapping[int, str], robot: Robot
-) -> Signal | None:
+    quantity: str, template: str, by_name: bool, members: Mapping[int, str], robot: Robot
+) -> tuple[Signal | None, str]:
+    """Return the signal of a group, if it has enough channels, and what there is to say of it."""
     if by_name:
-        return Signal(quantity, dict(sorted(members.items())), template, None)
+        return Signal(quantity, dict(sorted(members.items())), template, None), ""
     numbered = sorted(members)
     first = numbered[0]
-    consecutive = numbered == list(range(first, first + len(numbered)))
-    if len(numbered) < robot.n or not consecutive:
-        result.notes.append(
-            f"{quantity}: {template} has {len(numbered)} channels for {robot.n} joints: not used without a mapping"
-        )
-        return None
+    if len(numbered) < robot.n or numbered != list(range(first, first + len(numbered))):
+        said = f"{quantity}: {template} has {len(numbered)} channels for {robot.n} joints: not used without a mapping"
+        return None, said
+    note = ""
     if len(numbered) > robot.n:
-        result.notes.append(f"{quantity}: {template} has {len(numbered)} channels; the first {robot.n} taken")
-    if robot.n > 1 and quantity == "position":
-        result.notes.append(f"{quantity}: {template} matched to the joints by order; check it")
-    return Signal(quantity, {k: members[first + k] for k in range(robot.n)}, template, first)
+        note = f"{quantity}: {template} has {len(numbered)} channels; the first {robot.n} taken, in the joints' order"
+    elif robot.n > 1:
+        note = f"{quantity}: {template} matched to the joints by order; check it"
+    return Signal(quantity, {k: members[first + k] for k in range(robot.n)}, template, first), note
 
 
 def _find_units(result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping[str, Array], robot: Robot) -> None:

@@ -28,7 +28,7 @@ OTHER = frozenset(
     ["error", "err", "std", "min", "max", "limit", "limits", "tcp", "tool", "cartesian", "pose", "gripper", "imu"]
 )
 GENERIC = frozenset(("joint", "link", "axis", "motor"))
-CURRENT = frozenset(("current", "currents", "curr"))
+CURRENT = frozenset(("current", "currents", "curr", "i"))
 TORQUE = frozenset(["torque", "torques", "trq", "tau", "moment", "moments", "force", "forces"])
 
 _TOKEN = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+")
@@ -99,6 +99,8 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
         number = int(last[0])
         template = f"{name[: last.start()]}{{number}}{name[last.end() :]}"
     found = [_WORDS[word] for word in spoken if word in _WORDS]
+    if not found and "i" in spoken and (joint is not None or number is not None):
+        found = ["effort"]
     signals = [quantity for quantity in found if quantity != "time"]
     quantity = signals[-1] if signals else found[-1] if found else None
     if OTHER & set(spoken) or (quantity == "time" and (joint is not None or number is not None)):

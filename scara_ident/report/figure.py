@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from scara_ident.evidence import rows_of
 from scara_ident.identification import Identification
 from scara_ident.motion import stretches
 from scara_ident.recording import Recording
+from scara_ident.rows import rows_of
 
 # Recordings shown, at the most; the first held-out ones before the fitted ones.
 MOST_RECORDINGS = 4

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scara_ident.estimators import JointError
 from scara_ident.report.html.page import Cell, Group, Selector, Text, escape, table
-from scara_ident.report.html.plot import Drawing, Figure, Grid, Layer, Line, Panel, Plot
+from scara_ident.report.html.plot import Drawing, Figure, Grid, Layer, Line, Panel, Plot, Region
 from scara_ident.report.html.traces import Trace
 from scara_ident.robot import Robot
 
@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 DRAWN_PER_PERIOD = 16.0
 # Samples of recorded torque on the whole page; longer recordings are drawn as envelopes of as many samples as needed.
 MOST_SAMPLES = 1_500_000
+# Times left out that are shorter than this share of a recording are not marked.
+LEAST_SEEN = 400
 
 
 def torque_group(robot: Robot, parts: Sequence[tuple[str, Sequence[Trace]]], bands: Sequence[float | None]) -> Group:
@@ -64,8 +66,20 @@ def _plot(robot: Robot, traces: Sequence[Trace], j: int, band: float | None, buc
         above.append(_line(grid, measured, bucket, "blue", "measured", 1.6))
         above.append(_line(grid, predicted, bucket, "vermillion", "predicted", 1.4, "5 3"))
         below.append(_line(grid, measured - predicted, bucket, "green", "residual", 1.2))
+        below += [Region(limits, "grey", "not used: ends, standstill", 0.25) for limits in _unused(trace, j)]
     unit = robot.torque_unit(j)
     return Plot("time [s]", (Panel(f"torque [{unit}]", above, 260), Panel(f"residual [{unit}]", below, 130)))
+
+
+def _unused(trace: Trace, j: int) -> list[tuple[float, float]]:
+    """Return the times that the estimate leaves out, but for moments that could not be seen."""
+    left_out = np.concatenate([[False], ~trace.used[j], [False]])
+    edges = np.flatnonzero(np.diff(left_out.astype(np.int8))).reshape(-1, 2)
+    seen = max(1, trace.motion.samples // LEAST_SEEN)
+    return [
+        (float(trace.time[start]), float(trace.time[stop - 1]))
+        for start, stop in edges[edges[:, 1] - edges[:, 0] > seen].tolist()
+    ]
 
 
 def banded(trace: Trace, signal: Array, band: float | None) -> tuple[Grid, Array]:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.evidence import position_cuts, row_step, standstill, trim_of
 from scara_ident.model import TorqueModel
 from scara_ident.motion import Motion, Stretch, low_pass, motion_of, stretches, torque_of
 from scara_ident.recording import Recording
+from scara_ident.rows import position_cuts, row_step, standstill, trim_of
 from scara_ident.terms import Friction
 
 Array = NDArray[np.float64]

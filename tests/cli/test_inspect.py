@@ -1,0 +1,122 @@
+"""``scara-ident inspect``: from a file and a URDF to a robot.yaml, whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from scara_ident.cli.main import run
+from scara_ident.robot import embedded_urdf
+from tests.importers.formats import recorded, write_plotjuggler
+from tests.made_recordings import save
+from tests.shared import shared_path
+
+MADE = recorded(600)
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return write_plotjuggler(tmp_path / "log_1.csv", MADE)
+
+
+def answer(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
+    status = run(["inspect", *map(str, words)])
+    said = capsys.readouterr()
+    return status, said.out, said.err
+
+
+def test_a_file_alone_is_listed(log, capsys):
+    status, out, err = answer(capsys, log)
+    assert (status, err) == (0, "")
+    assert "/joint_states/joint1/position" in out
+    assert "--urdf" in out
+
+
+def test_a_first_description_is_written_and_never_overwritten(log, tmp_path, capsys):
+    place = tmp_path / "new" / "place"
+    status, out, _ = answer(capsys, log, "--urdf", embedded_urdf(), "--output", place)
+    assert status == 0
+    assert "position of joint1, rad" in " ".join(out.split())
+    assert [path.name for path in place.iterdir()] == ["robot.yaml"]
+    mine = "# mine\n"
+    (place / "robot.yaml").write_text(mine)
+    status, out, err = answer(capsys, log, "--urdf", embedded_urdf(), "--output", place)
+    assert (status, out) == (1, "")
+    assert "exists already" in err
+    assert err.count("\n") == 1
+    assert (place / "robot.yaml").read_text() == mine
+    assert [path.name for path in place.iterdir()] == ["robot.yaml"]
+
+
+def test_json_on_stdout_is_all_there_is(log, capsys):
+    status, out, err = answer(capsys, log, "--urdf", embedded_urdf(), "--json")
+    assert (status, err) == (0, "")
+    content = json.loads(out)
+    assert content["recording"]["time"] == {"column": "__time", "unit": "s"}
+    assert content["audit"]["samples"] == 600
+    assert content["audit"]["findings"] == []
+    assert {column["name"]: column["unit"] for column in content["columns"]}["/joint_states/joint2/position"] == "rad"
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "said"),
+    [
+        (("absent.csv",), 2, "no such file"),
+        (("log_1.csv", "--output", "out"), 2, "--urdf"),
+        (("log_1.csv", "--urdf", "absent.urdf", "--output", "out"), 1, "absent.urdf"),
+        (("log_1.csv", "--urdf", "log_1.csv", "--output", "out"), 1, "not well-formed XML"),
+        (("log_1.csv", "--robot", "absent.yaml"), 1, "no such robot description"),
+        (("empty.mat",), 1, "empty"),
+        (("log_1.csv", "--urdf", "U", "--output", "log_1.csv"), 1, "log_1.csv"),
+        ((), 2, "FILE"),
+    ],
+)
+def test_wrong_words_and_files_end_in_a_line_and_nothing_written(
+    log, tmp_path, capsys, monkeypatch, words, status, said
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty.mat").write_bytes(b"")
+    before = sorted(path.name for path in tmp_path.iterdir())
+    words = [str(embedded_urdf()) if word == "U" else word for word in words]
+    found, _, err = answer(capsys, *words)
+    assert found == status
+    assert said in err
+    assert err.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == before
+
+
+def test_the_ur10e_goes_from_a_file_and_a_urdf_to_an_identification(tmp_path, capsys):
+    urdf, file = shared_path("data", "ur10e", "ur10e.urdf"), shared_path("data", "ur10e", "ident_20s_5harm.parquet")
+    assert answer(capsys, file, "--urdf", urdf, "--output", tmp_path)[0] == 0
+    words = ["identify", str(file), "--robot", str(tmp_path / "robot.yaml"), "--model", "basic", "--band", "8"]
+    assert run([*words, "--output", str(tmp_path / "out")]) == 0
+    content = json.loads((tmp_path / "out" / "identification.json").read_text())
+    errors = content["errors"]["training"]["ident_20s_5harm"]
+    assert set(errors) == {
+        "shoulder_pan_joint",
+        "shoulder_lift_joint",
+        "elbow_joint",
+        "wrist_1_joint",
+        "wrist_2_joint",
+        "wrist_3_joint",
+    }
+    assert errors["shoulder_lift_joint"]["relative"] < 0.2
+
+
+def test_a_mapped_file_identifies_like_the_contracts(tmp_path, log, capsys):
+    assert answer(capsys, log, "--urdf", embedded_urdf(), "--output", tmp_path)[0] == 0
+    description = tmp_path / "robot.yaml"
+    words = ["--model", "basic", "--band", "20"]
+    assert run(["identify", str(log), "--robot", str(description), *words]) == 1
+    assert "effort_side: missing" in capsys.readouterr().err
+    description.write_text(description.read_text().replace("# effort_side: motor", "effort_side: motor"))
+    assert run(["identify", str(log), "--robot", str(description), *words, "--output", str(tmp_path / "a")]) == 0
+    (tmp_path / "contract").mkdir()
+    contract = save(tmp_path / "contract" / "log_1.parquet", MADE)
+    assert run(["identify", str(contract), *words, "--output", str(tmp_path / "b")]) == 0
+    mapped, plain = (json.loads((tmp_path / k / "identification.json").read_text()) for k in "ab")
+    for one, other in zip(mapped["parameters"], plain["parameters"], strict=True):
+        # The clock of the CSV is rounded to 0.24 us.
+        assert one["value"] == pytest.approx(other["value"], rel=1e-3, abs=1e-2 * other["std"])

@@ -1,0 +1,129 @@
+"""Periodic effects: columns against simulated arms of all kinds, recovery from noisy recordings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scara_ident.effects import Member
+from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
+from scara_ident.model import build_model
+from scara_ident.motion import Motion
+from scara_ident.robot import load_robot
+from scara_ident.virtual import effects as fx
+from scara_ident.virtual import simulate, virtual_arm
+from tests.effects.scenes import columns, fit, moving, scene_of, wandering
+from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
+from tests.virtual.made import left_over
+
+
+@pytest.mark.parametrize("kind", ARMS)
+@pytest.mark.parametrize("which", ["ripple", "vibration"])
+def test_columns_times_true_parameters_are_what_the_simulated_arm_adds(kind: str, which: str, tmp_path: Path):
+    arm = arm_of(kind, tmp_path)
+    joint, unit = arm.robot.joints[0], float(arm.torque_scale[0])
+    size = 0.05 * unit
+    if which == "ripple":
+        switch, effect, member = fx.TorqueRipple(joint, 3.0, size, 0.7), TorqueRipple(), Member(0, (3.0,))
+    else:
+        switch, effect, member = fx.Vibration(joint, 6.0, size, 0.7), Vibration(), Member(0, (6.0,))
+    result = run(arm, switch)
+    scene = true_scene(result)
+    added = left_over(arm, result.true)
+    value = size * np.array([np.cos(0.7), np.sin(0.7)])
+    found = np.einsum("jkn,k->jn", columns(effect, scene, true_motion(result), member), value)
+    # At the very start the arm is held or let go at rest, where the speed has no sign.
+    seen = np.isfinite(added) & np.all(result.true.velocity != 0.0, axis=0)
+    assert np.abs(found - added)[seen].max() < 1e-8 * unit
+    told = effect.parameters(scene, member, value, 1e-6 * np.eye(2))
+    assert [told["amplitude"].value, told["phase"].value] == pytest.approx([size, 0.7])
+    assert told["amplitude"].unit == arm.robot.torque_unit(0)
+
+
+@pytest.mark.parametrize("kind", ARMS)
+def test_an_eccentric_encoder_changes_the_torque_to_first_order(kind: str, tmp_path: Path):
+    arm = arm_of(kind, tmp_path)
+    j, order, size, phase = 1, 2.0, 1e-6, 0.4
+    robot = arm.robot
+    scene = true_scene(run(arm, fx.OffsetDrift(robot.joints[0], 0.0)))
+    item = moving(robot, 1.0)
+    n = order * robot.reduction[j]
+    # The reading errs by e of the true position; q is what is read, so that e's argument is off by e itself.
+    angle, rate = n * item.q[j] + phase, n * item.v[j]
+    error = [
+        size * np.sin(angle),
+        size * rate * np.cos(angle),
+        size * (n * item.a[j] * np.cos(angle) - rate**2 * np.sin(angle)),
+    ]
+    state = [part.copy() for part in (item.q, item.v, item.a)]
+    for part, e in zip(state, error, strict=True):
+        part[j] -= e
+    true = Motion(item.name, item.trajectory, item.time, *state, None, item.rate)
+    same = np.sign(true.v) == np.sign(item.v)
+    torque = [np.einsum("jpn,p->jn", scene.model.regressor(part), scene.value) for part in (item, true)]
+    change = torque[1] - torque[0]
+    value = size * np.array([np.cos(phase), np.sin(phase)])
+    found = np.einsum("jkn,k->jn", columns(EncoderEccentricity(), scene, item, Member(j, (order,))), value)
+    assert np.abs(found - change)[same].max() < 2e-3 * np.abs(change[same]).max()
+    told = EncoderEccentricity().parameters(scene, Member(j, (order,)), value, 1e-16 * np.eye(2))
+    assert told["amplitude"].value == pytest.approx(size)
+    assert told["amplitude"].unit == ("m" if robot.prismatic[j] else "rad")
+
+
+def test_lines_above_half_the_rate_are_left_out():
+    scene = scene_of(load_robot())
+    item = moving(scene.robot, 2.0, rate=200.0)
+    hertz = np.abs(6.0 * 100.0 * item.v[0]) / (2.0 * np.pi)
+    sine = columns(TorqueRipple(), scene, item, Member(0, (6.0,)))[0]
+    assert np.all(sine[:, hertz > 100.0] == 0.0)
+    slow = hertz < 70.0
+    assert np.hypot(*sine[:, slow]) == pytest.approx(np.ones(np.count_nonzero(slow)))
+
+
+def test_members_are_those_that_can_be_seen():
+    scene = scene_of(load_robot())
+    assert Member(0, (2.0,)) in TorqueRipple().members(scene)
+    narrow = replace(scene, band=2.0)
+    assert max(member.knobs[0] for member in TorqueRipple().members(narrow)) < 12.0
+    short = replace(scene, travel=np.array([0.03, 2.0]))
+    assert {member.joint for member in EncoderEccentricity().members(short)} == {1}
+    assert Vibration().members(scene) == ()
+    assert Vibration().at(scene, 1, 7.5) == (Member(1, (7.5,)),)
+    assert Vibration().at(scene, 1, 0.01) == ()
+    assert TorqueRipple().resolution(scene, Member(0, (2.0,)))[0] == pytest.approx(2.0 * np.pi / 200.0)
+
+
+def test_a_free_phase_has_columns_for_each_recording():
+    scene = scene_of(load_robot(), start={"a": 0.0, "m": 0.0})
+    item = moving(scene.robot, 1.0)
+    effect, member = Vibration(free_phase=True), Member(0, (5.0,))
+    found = columns(effect, scene, item, member)[0]
+    assert np.all(found[:2] == 0.0)
+    assert np.array_equal(found[2:], columns(Vibration(), scene, item, member)[0])
+    told = effect.parameters(scene, member, np.array([0.3, 0.4, 0.0, 0.5]), 1e-4 * np.eye(4))
+    assert told["amplitude"].value == pytest.approx(0.5)
+    assert set(told) == {"amplitude"}
+    assert not np.any(columns(effect, scene, replace(item, name="new"), member))
+
+
+@pytest.mark.parametrize(
+    ("switch", "effect", "member"),
+    [
+        (fx.TorqueRipple("joint2", 2.0), TorqueRipple(), Member(1, (2.0,))),
+        (fx.EncoderEccentricity("joint1", 4e-5), EncoderEccentricity(), Member(0, (1.0,))),
+        (fx.Vibration("joint1", 7.3), Vibration(), Member(0, (7.3,))),
+        (fx.Vibration("joint1", 7.3), Vibration(free_phase=True), Member(0, (7.3,))),
+    ],
+)
+def test_parameters_are_recovered_from_noisy_closed_loop_recordings(switch, effect, member):
+    arm = virtual_arm()
+    runs = [simulate(arm, wandering(arm, f"w{k}", k), effects=[switch], seed=k) for k in (1, 2)]
+    model = build_model(arm.robot, "complete")
+    scene, value, covariance = fit(model, [item.recording for item in runs], effect, member, band=25.0, rounds=1)
+    for name, found in effect.parameters(scene, member, value, covariance).items():
+        true = getattr(runs[0].effects[0], name)
+        assert abs(found.value - true) < 4.0 * found.std + 0.01 * abs(true), name
+        assert found.std < 0.2 * abs(true), name
