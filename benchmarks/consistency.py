@@ -181,7 +181,7 @@ def draw(name: str, excitation: str, noise: float, seed: int) -> Draw:
         consistent_parameters=rms((estimate - value)[u.place] / size[u.place]),
         ols_torque=torque_error(held_out, ols.value, clean),
         consistent_torque=torque_error(held_out, estimate, clean),
-        difference=float(np.max(np.abs(estimate / ols.value - 1.0)[u.place])) if possible and determined else None,
+        difference=largest_share(estimate - ols.value, ols.value) if possible and determined else None,
         ols_ms=1e3 * (middle - start),
         consistent_ms=1e3 * (end - middle),
         fill_ms=1e3 * (filled - end),
@@ -190,6 +190,11 @@ def draw(name: str, excitation: str, noise: float, seed: int) -> Draw:
 
 def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
+
+
+def largest_share(difference: Array, value: Array) -> float:
+    told = value != 0.0
+    return float(np.max(np.abs(difference[told] / value[told])))
 
 
 def torque_error(regressor: Array, value: Array, clean: Array) -> float:

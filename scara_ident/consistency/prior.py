@@ -102,9 +102,10 @@ def _newton(start: Array, free: Array, limits: Cones, weight: float, pull: float
         half = np.linalg.solve(triangular.T, gradient)
         step = -np.linalg.solve(triangular, half)
         decrement = float(half @ half)
-        if decrement < precision * max(1.0, abs(value)):
-            return x
         change = free @ step
+        if decrement < precision * max(1.0, abs(value)):
+            # The last step squares what error is left, and too little is gained to measure it.
+            return x + change if np.isfinite(_value(x + change, limits, weight, pull)) else x
         length = _length(np.tensordot(local, step, axes=(1, 0)), change, x, pull)
         while True:
             trial = x + length * change

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from scara_ident.diagnosis.bank import Candidate
 from scara_ident.diagnosis.decision import Decision, decide
 from scara_ident.diagnosis.examination import examine
+from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
-from scara_ident.effects import CATALOGUE, Effect, Scene
+from scara_ident.effects import CATALOGUE, Effect, Resolved, Scene
 from scara_ident.effects.measurement import shifted
 from scara_ident.estimators import Estimate
 from scara_ident.estimators.least_squares import least_squares, residual_noise
@@ -147,12 +148,16 @@ def search(
     chosen: list[Candidate] = []
     steps: list[Step] = []
     delay: tuple[float, float] | None = None
-    weights = start.weights
+    weights, estimate = start.weights, start
     while True:
         progress(f"trying {len(candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else ""))
         own, _ = tabulate_candidates(scene, chosen, data, bands)
         beside = Beside(scene, data, tuple(bands), base.beside(own), weights, tried)
         decisions = beside.judge(candidates, columns, places)
+        fitted = model_with(scene, chosen)
+        seeds = line_candidates(scene, fitted, estimate.value, data, bands, catalogue)
+        taken = {item.label(scene) for item in chosen}
+        decisions += beside.judge_new([item for item in seeds if item.label(scene) not in taken])
         if len(steps) >= MOST_EFFECTS:
             break
         winner = _choose(beside, decisions)
@@ -319,8 +324,14 @@ def _line(scene: Scene, candidate: Candidate, round_: int) -> list[Candidate]:
 
 
 def _spacing(scene: Scene, candidate: Candidate, k: int) -> float:
-    """Distance to the next scan point of a nonlinear parameter, in its logarithm where it is scanned so."""
+    """Distance to the next scan point of a nonlinear parameter, in its logarithm where it is scanned so.
+
+    A family that knows how far apart values must be to be told apart says so by ``resolution``.
+    """
     knob = candidate.effect.knobs[k]
+    if isinstance(candidate.effect, Resolved):
+        width = candidate.effect.resolution(scene, candidate.member)[k]
+        return width / candidate.member.knobs[k] if knob.logarithmic else width
     grid = np.array(sorted({member.knobs[k] for member in candidate.effect.members(scene)}))
     if knob.logarithmic:
         return float(np.min(np.diff(np.log(grid)))) if len(grid) > 1 else float(np.log(2.0))

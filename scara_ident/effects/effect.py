@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +112,15 @@ class Effect(Protocol):
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say in a few words what the effect is, for a person."""
+        ...
+
+
+@runtime_checkable
+class Resolved(Protocol):
+    """A family whose nonlinear parameters have narrow peaks, such as orders and frequencies."""
+
+    def resolution(self, scene: Scene, member: Member) -> tuple[float, ...]:
+        """Return, for every knob, how far apart two values must be to be told apart."""
         ...
 
 

@@ -1,0 +1,143 @@
+"""Lines in the residual's spectra, in motor angle and in time, as candidates with the right order or frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.diagnosis.bank import Candidate
+from scara_ident.effects import Effect, Member, Scene
+from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
+from scara_ident.effects.spectra import (
+    NEIGHBOURS_IN_TIME,
+    Line,
+    frequency_spectrum,
+    frequency_width,
+    lines,
+    order_spectrum,
+    order_width,
+    whitened,
+)
+from scara_ident.model import TorqueModel
+from scara_ident.motion import stretches
+from scara_ident.recording import Recording
+from scara_ident.rows import rows_of, standstill, trim_of
+
+Array = NDArray[np.float64]
+
+# Orders looked at, per motor turn, and points of the spectra per width of a line.
+HIGHEST_ORDER = 13.0
+LOWEST_ORDER = 0.4
+POINTS_PER_WIDTH = 3.0
+# The strongest line is taken; beside it the lesser ones are its sidelobes.
+SIGNIFICANCE = 1e-3
+# Periods in a recording below which a line in time is not told from motion.
+LEAST_PERIODS = 6.0
+
+
+def line_candidates(
+    scene: Scene,
+    model: TorqueModel,
+    value: Array,
+    recordings: Sequence[Recording],
+    bands: Sequence[float | None],
+    catalogue: Sequence[Effect],
+) -> list[Candidate]:
+    """Return periodic effects at the strongest line of each joint's residual, in motor angle and in time.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : TorqueModel
+        With the effects found so far.
+    value : ndarray, shape (p,)
+    recordings : sequence of Recording
+    bands : sequence of float or None, one per joint
+    catalogue : sequence of Effect
+        Only families that are in it are offered.
+    """
+    families = {type(effect) for effect in catalogue}
+    if not families & {TorqueRipple, EncoderEccentricity, Vibration}:
+        return []
+    found: list[Candidate] = []
+    parts = [_residuals(model, value, recording, bands) for recording in recordings]
+    pieces = [piece for part in parts for piece in part]
+    for j in range(scene.robot.n):
+        residuals = [residual[j] for residual, _, _ in pieces]
+        rate = pieces[0][2]
+        if not residuals or not any(np.any(residual) for residual in residuals):
+            continue
+        band = bands[j]
+        white = whitened(residuals, rate, highest=band)
+        order = _strongest_order(white, [turns[j] for _, turns, _ in pieces])
+        if order is not None:
+            found += [
+                Candidate(family, Member(j, (order,)))
+                for family in catalogue
+                if isinstance(family, (TorqueRipple, EncoderEccentricity))
+            ]
+        frequency = _strongest_frequency(white, rate, band or 0.4 * rate)
+        if frequency is not None:
+            found += [
+                Candidate(family, member)
+                for family in catalogue
+                if isinstance(family, Vibration)
+                for member in family.at(scene, j, frequency)
+            ]
+    return found
+
+
+def _residuals(
+    model: TorqueModel, value: Array, recording: Recording, bands: Sequence[float | None]
+) -> list[tuple[list[Array], list[Array], float]]:
+    """Residual of every joint within its band and its motor angle, per stretch; zero where the joint stands."""
+    found = []
+    for part in stretches(recording):
+        trim = trim_of(part, bands)
+        if len(part.time) <= 4 * trim:
+            continue
+        rows = rows_of(model, part, bands)
+        rest = standstill(part, rows.motion, bands)
+        inside = slice(trim, len(part.time) - trim)
+        residual = [
+            np.where(rest[j], 0.0, banded[-1] - value @ banded[:-1])[inside] for j, banded in enumerate(rows.banded)
+        ]
+        turns = [(model.robot.reduction[j] * rows.motion.q[j])[inside] for j in range(model.robot.n)]
+        found.append((residual, turns, part.rate))
+    return found
+
+
+def _strongest_order(residuals: Sequence[Array], turns: Sequence[Array]) -> float | None:
+    angle = np.concatenate(turns)
+    width = order_width(angle)
+    if width > 0.3 * LOWEST_ORDER:
+        return None
+    orders = np.arange(LOWEST_ORDER, HIGHEST_ORDER, width / POINTS_PER_WIDTH)
+    power = order_spectrum(np.concatenate(residuals), angle, orders)
+    return _strongest(lines(orders, power, width, significance=SIGNIFICANCE))
+
+
+def _strongest_frequency(residuals: Sequence[Array], rate: float, highest: float) -> float | None:
+    width = frequency_width(residuals, rate)
+    lowest = LEAST_PERIODS * 0.5 * width
+    if highest < 3.0 * lowest:
+        return None
+    frequencies = np.arange(lowest, highest, width / POINTS_PER_WIDTH)
+    power = frequency_spectrum(residuals, rate, frequencies)
+    return _strongest(
+        lines(
+            frequencies,
+            power,
+            width,
+            degrees=2 * len(residuals),
+            neighbours=NEIGHBOURS_IN_TIME,
+            significance=SIGNIFICANCE,
+        )
+    )
+
+
+def _strongest(found: Sequence[Line]) -> float | None:
+    best = max(found, key=lambda line: line.power / line.floor, default=None)
+    return None if best is None else float(best.position)
