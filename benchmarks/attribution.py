@@ -183,14 +183,16 @@ def one_set(task: tuple[str, int]) -> dict:
 def true_model_error(result, training, held_out, effects) -> list[float] | None:
     """Held-out error of the same recordings fitted with the true model and its true nonlinear parameters."""
     scene, bands = result.search.scene, result.search.bands
-    families = {family.name: family for family in CATALOGUE}
     chosen, delay = [], 0.0
     for effect in effects:
         values = effect.as_dict()["parameters"]
         if effect.name == "time_delay":
             delay = values["delay"]
             continue
-        family = families.get(effect.name)
+        # The family whose nonlinear parameters are those that the effect has.
+        family = next(
+            (f for f in CATALOGUE if f.name == effect.name and all(knob.name in values for knob in f.knobs)), None
+        )
         if family is None:
             return None
         joint = None if effect.joint is None else scene.robot.joints.index(effect.joint)

@@ -29,6 +29,9 @@ ROUNDING = 1e-9
 REST_SHARE = 3e-3
 REST_NOISE = 5.0
 REST_PERIODS = 0.05
+# What happens at rest reaches so many periods of the band beyond it, through the low-pass; left in, it looks like a delay
+# of minus 0.7 ms on a virtual arm that has none.
+REST_WIDEN = 0.5
 # Blocks are long against the band's memory, so that scores of different blocks are nearly independent.
 BLOCK_PERIODS = 4.0
 BLOCK_SECONDS = 0.5
@@ -150,7 +153,8 @@ def standstill(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) 
         v = motion.v[j]
         threshold = max(REST_SHARE * float(np.max(np.abs(v))), REST_NOISE * _velocity_noise(stretch, motion, j, band))
         span = 1 if band is None else max(1, int(REST_PERIODS * stretch.rate / band))
-        result[j] = _runs_longer_than(np.abs(v) <= threshold, span, widen=span)
+        widen = 1 if band is None else max(1, int(REST_WIDEN * stretch.rate / band))
+        result[j] = _runs_longer_than(np.abs(v) <= threshold, span, widen=widen)
     return result
 
 

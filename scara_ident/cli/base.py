@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from scara_ident.cli.console import OutputOption, RobotOption, output_console, table
+from scara_ident.cli.console import JsonOption, OutputOption, RobotOption, output_console, print_json, table
 
 
-def base(robot: RobotOption = None, output: OutputOption = None) -> None:
+def base(robot: RobotOption = None, output: OutputOption = None, json: JsonOption = False) -> None:
     """Print the base parameters: what each is made of, what is not identifiable and why."""
     from scara_ident.report.base import base_dict
-    from scara_ident.report.files import write_json
+    from scara_ident.report.files import check_output, write_json
     from scara_ident.robot import load_robot
 
+    check_output(output)
     arm = load_robot(robot)
     content = base_dict(arm)
-    console = output_console()
+    if json:
+        print_json(content)
+    console = output_console(quiet=json)
     bodies = table("bodies", "number", "joint", "link", "reduction", right=("reduction",))
     for body in content["bodies"]:
         bodies.add_row(str(body["number"]), body["joint"], body["link"], f"{body['reduction']:g}")

@@ -6,7 +6,18 @@ from typing import Annotated, Literal
 
 import typer
 
-from scara_ident.cli.console import OutputOption, RecordingArguments, RobotOption, output_console, progress, table
+from scara_ident.cli.console import (
+    JsonOption,
+    OutputOption,
+    RecordingArguments,
+    RobotOption,
+    VerboseOption,
+    output_console,
+    print_json,
+    progress,
+    show_recordings,
+    table,
+)
 
 
 def compare(
@@ -17,20 +28,28 @@ def compare(
     ] = "complete",
     method: Annotated[Literal["ols", "wls", "rls"], typer.Option(help="Estimator.")] = "ols",
     output: OutputOption = None,
+    json: JsonOption = False,
+    verbose: VerboseOption = False,
 ) -> None:
     """Set every trajectory's parameters against every trajectory."""
     from scara_ident.comparison import compare as run
     from scara_ident.recording import read_recordings
     from scara_ident.report.comparison import comparison_dict
-    from scara_ident.report.files import write_json
+    from scara_ident.report.files import check_output, write_json
     from scara_ident.robot import load_robot
 
+    check_output(output)
     arm = load_robot(robot)
     with progress() as step:
         step("reading the recordings")
-        result = run(arm, read_recordings(recordings, arm), model=model, method=method, progress=step)
+        given = read_recordings(recordings, arm)
+        result = run(arm, given, model=model, method=method, progress=step)
     content = comparison_dict(result)
-    console = output_console()
+    if json:
+        print_json(content)
+    console = output_console(quiet=json)
+    if verbose:
+        show_recordings(console, given)
     for note in result.notes:
         console.print(f"note: {note}", markup=False, style="dim")
     names = content["trajectories"]

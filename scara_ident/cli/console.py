@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 from rich.console import Console
 from rich.table import Table
+
+if TYPE_CHECKING:
+    from scara_ident.recording import Recording
+
+# Of a pipe or a file, which have no width of their own.
+PIPE_WIDTH = 80
 
 RecordingArguments = Annotated[
     list[str], typer.Argument(metavar="RECORDING...", help="Recordings (.parquet, .csv), folders or globs of them.")
@@ -20,23 +28,28 @@ RobotOption = Annotated[
 OutputOption = Annotated[
     Path | None, typer.Option("--output", metavar="DIR", help="Folder for the results; made if needed.")
 ]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, and nothing else there.")]
+VerboseOption = Annotated[
+    bool, typer.Option("--verbose", help="Also list what every file holds and what its audit found.")
+]
 
 
 class PlainConsole(Console):
-    """A console that prints names as they are, brackets included, and stops quietly when nobody reads any more."""
+    """A console that prints names as they are, brackets included, and falls silent when nobody reads any more."""
 
-    def __init__(self, *, stderr: bool = False, width: int | None = None) -> None:
-        super().__init__(stderr=stderr, width=width, highlight=False, markup=False)
+    def __init__(self, *, stderr: bool = False, width: int | None = None, quiet: bool = False) -> None:
+        super().__init__(stderr=stderr, width=width, quiet=quiet, highlight=False, markup=False)
 
     def on_broken_pipe(self) -> None:
-        """Leave it to the program what a reader that has gone means; rich would exit with status 1."""
-        raise BrokenPipeError
+        """Go on without the reader: results are still to be written to files; rich would exit with status 1."""
+        self.quiet = True
+        _drain(sys.stderr if self.stderr else sys.stdout)
 
 
-def output_console() -> Console:
-    """Return a console on stdout; 100 columns where it is not a terminal."""
-    console = PlainConsole()
-    return console if console.is_terminal else PlainConsole(width=100)
+def output_console(*, quiet: bool = False) -> Console:
+    """Return a console on stdout, silent if wanted; 80 columns where it is not a terminal."""
+    console = PlainConsole(quiet=quiet)
+    return console if console.is_terminal else PlainConsole(width=PIPE_WIDTH, quiet=quiet)
 
 
 def errors_console() -> Console:
@@ -61,6 +74,36 @@ def table(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
     for column in columns:
         result.add_column(column, justify="right" if column in right else "left", overflow="fold")
     return result
+
+
+def print_json(content: dict[str, Any]) -> None:
+    """Print a result as JSON for scripts; files are still written when nobody reads it."""
+    from scara_ident.report.files import json_text
+
+    try:
+        typer.echo(json_text(content))
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _drain(sys.stdout)
+
+
+def _drain(stream: TextIO) -> None:
+    """Send what is still written to a stream whose reader has gone to nowhere."""
+    with open(os.devnull, "wb") as sink:
+        os.dup2(sink.fileno(), stream.fileno())
+
+
+def show_recordings(console: Console, recordings: Sequence[Recording]) -> None:
+    """Print what every recording holds and what its audit found."""
+    columns = ("samples", "s", "Hz", "findings")
+    rows = table("recordings", "recording", *columns, right=columns)
+    for item in recordings:
+        seconds = item.time[-1] - item.time[0]
+        rows.add_row(item.name, str(len(item.time)), f"{seconds:.4g}", f"{item.rate:.4g}", str(len(item.findings)))
+    console.print(rows)
+    for item in recordings:
+        for finding in item.findings:
+            console.print(f"{item.name}: {finding.message}", markup=False)
 
 
 def number(value: float, std: float | None = None) -> str:

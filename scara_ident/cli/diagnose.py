@@ -6,7 +6,18 @@ from typing import Annotated, Literal
 
 import typer
 
-from scara_ident.cli.console import OutputOption, RecordingArguments, RobotOption, output_console, progress, table
+from scara_ident.cli.console import (
+    JsonOption,
+    OutputOption,
+    RecordingArguments,
+    RobotOption,
+    VerboseOption,
+    output_console,
+    print_json,
+    progress,
+    show_recordings,
+    table,
+)
 
 
 def diagnose(
@@ -17,14 +28,17 @@ def diagnose(
         list[str] | None, typer.Option("--validate", metavar="RECORDING", help="Recording held out; may be repeated.")
     ] = None,
     output: OutputOption = None,
+    json: JsonOption = False,
+    verbose: VerboseOption = False,
 ) -> None:
     """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
     from scara_ident.diagnosis import diagnose as run
     from scara_ident.recording import read_recordings
     from scara_ident.report.diagnosis import diagnosis_dict, diagnosis_markdown
-    from scara_ident.report.files import write_json, write_text
+    from scara_ident.report.files import check_output, write_json, write_text, written_together
     from scara_ident.robot import load_robot
 
+    check_output(output)
     arm = load_robot(robot)
     with progress() as step:
         step("reading the recordings")
@@ -32,7 +46,11 @@ def diagnose(
         held_out = read_recordings(validate, arm) if validate else ()
         result = run(arm, model, training, held_out, progress=step)
     content = diagnosis_dict(result)
-    console = output_console()
+    if json:
+        print_json(content)
+    console = output_console(quiet=json)
+    if verbose:
+        show_recordings(console, (*training, *held_out))
     for note in result.notes:
         console.print(f"note: {note}", markup=False, style="dim")
     console.print(f"{arm.name}: {result.verdict}", markup=False, style="bold")
@@ -45,12 +63,13 @@ def diagnose(
             errors.add_row(kind, joint, _number(before), _number(after))
     console.print(errors)
     rows = table("candidates", "candidate", "gain", "p", "why", right=("gain", "p"))
-    for row in content["candidates"][:8]:
+    for row in content["candidates"] if verbose else content["candidates"][:8]:
         rows.add_row(row["label"], f"{row['gain']:.1%}", f"{row['p_value']:.0e}", row["why"])
     console.print(rows)
     if output is not None:
-        write_text(output / "diagnosis.md", diagnosis_markdown(result))
-        write_json(output / "diagnosis.json", content)
+        with written_together(output) as place:
+            write_text(place / "diagnosis.md", diagnosis_markdown(result))
+            write_json(place / "diagnosis.json", content)
         console.print(f"written: {output / 'diagnosis.json'}, {output / 'diagnosis.md'}", markup=False, soft_wrap=True)
 
 

@@ -7,12 +7,16 @@ from typing import Annotated, Literal
 import typer
 
 from scara_ident.cli.console import (
+    JsonOption,
     OutputOption,
     RecordingArguments,
     RobotOption,
+    VerboseOption,
     number,
     output_console,
+    print_json,
     progress,
+    show_recordings,
     table,
 )
 
@@ -32,14 +36,17 @@ def identify(
         typer.Option("--band", metavar="HZ", min=1e-3, help="Low-pass for all joints; default: chosen from the data."),
     ] = None,
     output: OutputOption = None,
+    json: JsonOption = False,
+    verbose: VerboseOption = False,
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
     from scara_ident.identification import identify as run
     from scara_ident.recording import read_recordings
-    from scara_ident.report.files import write_json, write_whole
+    from scara_ident.report.files import check_output, write_json, write_whole, written_together
     from scara_ident.report.identification import identification_dict, sentences
     from scara_ident.robot import load_robot
 
+    check_output(output)
     arm = load_robot(robot)
     with progress() as step:
         step("reading the recordings")
@@ -55,7 +62,11 @@ def identify(
             progress=step,
         )
     content = identification_dict(result)
-    console = output_console()
+    if json:
+        print_json(content)
+    console = output_console(quiet=json)
+    if verbose:
+        show_recordings(console, (*training, *held_out))
     for note in result.notes:
         console.print(f"note: {note}", markup=False, style="dim")
     parameters = table(
@@ -94,9 +105,10 @@ def identify(
         from scara_ident.report.figure import torque_figure
         from scara_ident.report.html import identification_report
 
-        write_whole(output / "torque.png", lambda path: torque_figure(path, result, (*training, *held_out)))
-        identification_report(output / "report.html", result, training, held_out)
-        write_json(output / "identification.json", content)
+        with written_together(output) as place:
+            write_whole(place / "torque.png", lambda path: torque_figure(path, result, (*training, *held_out)))
+            identification_report(place / "report.html", result, training, held_out)
+            write_json(place / "identification.json", content)
         names = ("identification.json", "report.html", "torque.png")
         written = ", ".join(str(output / name) for name in names)
         console.print(f"written: {written}", markup=False, soft_wrap=True)

@@ -38,13 +38,14 @@ def inspect(
     """Show what is in a file, guess which columns are the arm's, audit it and write a first robot.yaml."""
     from scara_ident.errors import ScaraIdentError, UsageError
     from scara_ident.inspection import inspect_file
-    from scara_ident.report.files import plain, write_text
+    from scara_ident.report.files import check_output, plain, write_text
 
     target = None if output is None else output / "robot.yaml"
     if target is not None and urdf is None:
         raise UsageError("--output: a first robot.yaml is made from a URDF; give --urdf")
     if target is not None and target.exists():
         raise ScaraIdentError(f"{target}: exists already and is not overwritten; move it away or give another --output")
+    check_output(output)
     with progress() as step:
         step("reading the file")
         found = inspect_file(file, urdf=urdf, robot=robot, folder=output or ".")

@@ -72,7 +72,7 @@ def run(arguments: list[str]) -> int:
     except typer.Exit as error:
         return error.exit_code
     except (typer.Abort, KeyboardInterrupt):
-        _complain("interrupted; nothing was written")
+        _complain("interrupted; no file is left half-written")
         return 130
     except BrokenPipeError:
         # The reader of our output has gone, as `| head` does.

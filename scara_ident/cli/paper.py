@@ -11,8 +11,9 @@ _IN_FULL = ("Table 1", "Limits", "Torque rms from Table 5")
 def paper(output: OutputOption = None) -> None:
     """Set the tables of Indri et al. (2002) beside what the program computes, and mark which agree."""
     from scara_ident.indri2002 import check_paper
-    from scara_ident.report.files import write_json
+    from scara_ident.report.files import check_output, write_json
 
+    check_output(output)
     report = check_paper()
     console = output_console()
     for section in report.sections:

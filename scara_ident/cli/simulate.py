@@ -25,11 +25,13 @@ def simulate(
     output: Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the recordings.")] = Path("."),
 ) -> None:
     """Record the virtual arm in closed loop, with what it really was in a JSON beside."""
+    from scara_ident.report.files import check_output, written_together
     from scara_ident.robot import load_robot
     from scara_ident.virtual import parse_effect, virtual_arm, write_simulation
     from scara_ident.virtual import simulate as run
     from scara_ident.virtual.named import named_motion
 
+    check_output(output)
     arm = virtual_arm(load_robot(robot))
     effects = [parse_effect(text) for text in effect or ()]
     motions = [named_motion(word, arm.robot) for word in trajectory]
@@ -39,5 +41,6 @@ def simulate(
             for repetition in range(1, repetitions + 1):
                 step(f"simulating {motion.name}, run {repetition}")
                 result = run(arm, motion, effects=effects, seed=seed, repetition=repetition)
-                path = write_simulation(result, output)
-                console.print(f"written: {path}", markup=False, soft_wrap=True)
+                with written_together(output) as place:
+                    path = write_simulation(result, place)
+                console.print(f"written: {output / path.name}", markup=False, soft_wrap=True)

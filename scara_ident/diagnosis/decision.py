@@ -14,7 +14,7 @@ from scara_ident.effects.measurement import within_sampling
 # Probability of letting any effect in when nothing is missing, over all candidates tried.
 FAMILY_ERROR = 0.01
 # Share of the squared residual of its joints that an effect must remove on rows that it was not fitted to.
-LEAST_GAIN = 0.04
+LEAST_GAIN = 0.05
 # Share of the voting folds in which it must help.
 LEAST_VOTES = 0.75
 

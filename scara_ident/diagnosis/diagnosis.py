@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 Verdict = Literal["complete", "explained", "unexplained"]
 
 # Share of the squared residual that signals must explain on held-out trajectories to be called a remainder.
-REMAINDER = 0.05
+REMAINDER = 0.08
 # A repeatable remainder larger than the noise, within the band, is one whatever it depends on.
 REMAINDER_TO_NOISE = 1.0
 

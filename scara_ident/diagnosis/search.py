@@ -21,6 +21,7 @@ from scara_ident.evidence import Evidence, gather_all
 from scara_ident.model import TorqueModel
 from scara_ident.motion import motion_of, stretches
 from scara_ident.recording import Recording
+from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,7 @@ MOST_REFINED = 4
 # Points on the line between neighbouring scan points, and rounds of narrowing.
 LINE_POINTS = 7
 LINE_ROUNDS = 4
+WEIGHTING_ROUNDS = 3
 # Effects that act on predicted loads are fitted again until no base parameter moves by this many std.
 SETTLING_ROUNDS = 4
 SETTLED = 0.1
@@ -234,9 +236,12 @@ def is_delay(candidate: Candidate) -> bool:
 
 
 def weighted_fit(model: TorqueModel, evidence: Sequence[Evidence]) -> Estimate:
-    """Fit with each joint weighted by its residual, which is found in two rounds."""
-    first = least_squares(model, evidence, np.ones(model.robot.n), "wls")
-    return least_squares(model, evidence, 1.0 / residual_noise(first, evidence), "wls")
+    """Fit with each joint weighted by its residual, in rounds: a bad joint first spoils the good one's residual."""
+    with one_blas_thread():
+        fit = least_squares(model, evidence, np.ones(model.robot.n), "wls")
+        for _ in range(WEIGHTING_ROUNDS):
+            fit = least_squares(model, evidence, 1.0 / residual_noise(fit, evidence), "wls")
+    return fit
 
 
 def _settle(

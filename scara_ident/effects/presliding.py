@@ -21,6 +21,7 @@ METRES_PER_RADIAN = 0.1
 # A distance above this share of the travel is a spring rather than friction.
 LONGEST_SHARE = 0.15
 # Friction in the state cannot be more than this many times what slides.
+LEAST_OF_COULOMB = 0.4
 MOST_OF_COULOMB = 1.5
 # Reversals shorter than this share of the distance change the state by less, and are noise of the position.
 LEAST_REVERSAL = 0.02
@@ -75,6 +76,8 @@ class Presliding:
         if member.knobs[0] > LONGEST_SHARE * scene.travel[j]:
             return "over so long a way it is a spring, not friction"
         coulomb = friction_of(scene, j).get(0)
+        if coulomb is not None and value[0] + 2.0 * std[0] < LEAST_OF_COULOMB * max(coulomb, 0.0):
+            return "only a small part of the Coulomb friction would build up over a distance; all of it does"
         if coulomb is not None and value[0] - 2.0 * std[0] > MOST_OF_COULOMB * max(coulomb, 0.0):
             return f"it would be more than {MOST_OF_COULOMB:g} times the Coulomb friction"
         return None

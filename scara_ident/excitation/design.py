@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.verification import Reached, reached
 from scara_ident.information import Information, merge
 from scara_ident.model import TorqueModel
+from scara_ident.motion import Motion
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,8 @@ class Design:
     criterion : Criterion
     trajectories : tuple of ExcitationTrajectory
     limits : Limits
+    nominal : ndarray, shape (p,)
+        Parameters with which torques were foreseen.
     reached : tuple of Reached
         Every limit and how much of it is used, over all trajectories.
     verified : int
@@ -50,6 +53,8 @@ class Design:
         What was known before.
     samples : int
         Samples of each trajectory in the information.
+    weights : ndarray, shape (n,)
+        Weight of every joint's rows in it.
     costs : tuple of float
         Of every local search, as they were started.
     effort : Effort
@@ -61,11 +66,13 @@ class Design:
     criterion: Criterion
     trajectories: tuple[ExcitationTrajectory, ...]
     limits: Limits
+    nominal: Array
     reached: tuple[Reached, ...]
     verified: int
     information: Information
     prior: Information | None
     samples: int
+    weights: Array
     costs: tuple[float, ...]
     effort: Effort
     seconds: float
@@ -85,8 +92,18 @@ class Design:
         """J_k: cond(H^T H) of the trajectories alone, columns as they are."""
         return self.information.condition()
 
-    def relative_std(self) -> Array:
-        """Return the std of every parameter per unit of torque noise on every row, shape (p,); inf where unknown."""
+    def motion(self, number: int = 0, rate: float = 1000.0) -> Motion:
+        """Return samples of a trajectory with the torque that is foreseen for it."""
+        trajectory = self.trajectories[number]
+        motion = trajectory.motion(round(trajectory.duration * rate) + 1)
+        torque = np.einsum("jpN,p->jN", self.model.regressor(motion), self.nominal)
+        return replace(motion, torque=np.asarray(torque))
+
+    def std(self) -> Array:
+        """Return the std that every parameter will have, shape (p,); infinite where it stays unknown.
+
+        For the given noise of the torques, or per unit of it on every row, white and at the design's samples.
+        """
         total = self.total
         variance = np.diag(total.inverse()).copy()
         variance[total.solve().undetermined] = np.inf
@@ -99,7 +116,7 @@ def default_harmonics(duration: float, joints: int, trajectories: int = 1) -> in
     return max(5, min(round(HIGHEST_FREQUENCY * duration), most))
 
 
-def design(
+def design_excitation(
     model: TorqueModel,
     *,
     duration: float = 25.0,
@@ -145,7 +162,7 @@ def design(
     samples : int
         Samples of each trajectory in the criterion.
     name : str
-        Of the trajectories; several get ``_1``, ``_2``, ... without becoming repetitions: ``a``, ``b``, ... .
+        Of the trajectories; of several ``name-a``, ``name-b``, ... .
     effort : Effort, optional
     progress : callable, optional
         Called after every local search.
@@ -211,11 +228,13 @@ def design(
         criterion=criterion,
         trajectories=designed,
         limits=limits,
+        nominal=nominal,
         reached=reached(task, robot.joints, units, found.x, found.times),
         verified=found.times,
         information=merge([information_of(model, each, samples, weights) for each in designed]),
         prior=prior,
         samples=samples,
+        weights=weights,
         costs=found.costs,
         effort=effort,
         seconds=time.perf_counter() - begun,

@@ -164,7 +164,7 @@ class _Direction:
             try:
                 dx = np.array([cho_solve(cho_factor(a), b) for a, b in zip(damped, force, strict=True)])
             except LinAlgError:
-                damping = max(10.0 * damping, 1e-12 * scale)
+                damping = 10.0 * damping + 1e-12 * float(scale)
                 continue
             closing = _unfold(self.slopes.push(dx), two)
             near = closing > 0.0
@@ -179,7 +179,7 @@ class _Direction:
                     usual = mu / room
                     wanted = np.where(wanted > 0.0, wanted, usual)
                     held = np.clip(wanted, usual / MULTIPLIER_RANGE, usual * MULTIPLIER_RANGE)
-                    eased = damping * (0.3 if halving == 0 else 2.0)
+                    eased: float = damping * (0.3 if halving == 0 else 2.0)
                     return _Step(moved, there, room, held, max(eased, LEAST_DAMPING), slope)
                 length *= 0.5
             damping *= 10.0

@@ -94,7 +94,9 @@ class Slopes:
         k, _, width = self.shared.shape[1:]
         m = self.rows.shape[2]
         u = u.reshape(len(u), k, -1)
-        result = np.einsum("rkM,rkMx->kx", u[len(self.own) :], self.shared) if len(self.shared) else np.zeros((k, width))
+        result = (
+            np.einsum("rkM,rkMx->kx", u[len(self.own) :], self.shared) if len(self.shared) else np.zeros((k, width))
+        )
         for row, (kind, joint, scale) in enumerate(self.own):
             result[:, joint * m : (joint + 1) * m] += scale * (u[row] @ self.rows[kind])
         return np.asarray(result)
@@ -152,9 +154,7 @@ class Problem:
         task = self.task
         width = WIDEST * (NARROWEST / WIDEST) ** share
         smooth = replace(task.smooth, width=width * task.limits.velocity)
-        return replace(
-            self, width=width, task=replace(task, smooth=smooth, criterion=task.criterion.sharpened(share))
-        )
+        return replace(self, width=width, task=replace(task, smooth=smooth, criterion=task.criterion.sharpened(share)))
 
     @property
     def two_sided(self) -> NDArray[np.bool_]:
@@ -185,7 +185,7 @@ class Problem:
     def slopes(self, x: Array) -> Slopes:
         """Return cost and limits with their derivatives."""
         task, motion = self.task, self.motion(x)
-        k, n, m = x.shape
+        k, n = x.shape[:2]
         regressor = task.smooth.regressor(motion)
         torques = self._torques(regressor)
         cost, gradient = self._cost(regressor)
@@ -213,7 +213,7 @@ class Problem:
     @property
     def _share(self) -> float:
         """Samples of the criterion that one sample of the grid stands for."""
-        return self.task.samples / (self.rows.shape[1] / self.stride)
+        return self.task.samples * self.stride / int(self.rows.shape[1])
 
     def _own_rows(self) -> tuple[tuple[int, int, float], ...]:
         limits = self.task.limits
@@ -265,7 +265,7 @@ class Problem:
         result = np.einsum("rnkM,Mm->rkMnm", parts[:, 0], self.rows[0])
         for kind in (1, 2):
             result += np.einsum("rnkM,Mm->rkMnm", parts[:, kind], self.rows[kind])
-        return result.reshape(count, k, self.rows.shape[1], -1)
+        return np.asarray(result.reshape(count, k, self.rows.shape[1], -1))
 
 
 def row_names(limits: Limits, joints: int) -> list[tuple[str, int | None]]:

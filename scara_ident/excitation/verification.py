@@ -55,7 +55,8 @@ def grid(basis: Basis, times: int) -> Array:
     """Return the basis and its two derivatives at equally spaced times, shape (3, times, m)."""
     step = basis.duration / times
     # A period closes on itself; otherwise the middles of the intervals, where a sum is a good integral.
-    time = step * (np.arange(times) + (0.0 if basis.periodic else 0.5))
+    offset = 0.0 if basis.periodic else 0.5 * step
+    time: Array = step * np.arange(times, dtype=np.float64) + offset
     return np.array([basis.rows(time, order) for order in range(3)])
 
 
@@ -76,7 +77,7 @@ def extremes(task: Task, x: Array, times: int) -> tuple[Array, Array]:
     -------
     largest, smallest : ndarray, shape (R,)
     """
-    time = np.linspace(0.0, task.basis.duration, times)
+    time: Array = np.asarray(np.linspace(0.0, task.basis.duration, times), dtype=np.float64)
     rows = np.array([task.basis.rows(time, order) for order in range(3)])
     smooth = replace(task.smooth, width=STANDING * task.limits.velocity)
     problem = Problem(replace(task, smooth=smooth), rows, 1, np.ones(0))
@@ -112,9 +113,9 @@ def reached(task: Task, joints: tuple[str, ...], units: tuple[str, ...], x: Arra
         both = float(max(high, -low))
         if kind == "position":
             centre, half = limits.centre[joint], 0.5 * (limits.upper[joint] - limits.lower[joint])
-            for side, bound, value in (("lower", limits.lower, -low), ("upper", limits.upper, high)):
+            for side, ends, value in (("lower", limits.lower, -low), ("upper", limits.upper, high)):
                 place = centre + (half if side == "upper" else -half) * value
-                found.append(Reached(f"{name}.position.{side}", float(bound[joint]), float(place), length, float(value)))
+                found.append(Reached(f"{name}.position.{side}", float(ends[joint]), float(place), length, float(value)))
         elif kind == "velocity":
             bound = float(limits.velocity[joint])
             found.append(Reached(f"{name}.velocity", bound, both * bound, f"{length}/s", both))

@@ -2,16 +2,122 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from scara_ident.errors import ScaraIdentError
+
+
+# A small result file needs about so much; where this does not fit, no result does.
+PROBE = 4096
+
+
+def check_output(folder: Path | None) -> None:
+    """Refuse a folder that results cannot be written into, before the work that they come from.
+
+    Parameters
+    ----------
+    folder : Path or None
+        It may be still to be made, and is as it was afterwards. None is no output and always right.
+
+    Raises
+    ------
+    ScaraIdentError
+        In one line: it cannot be made or not be written into, or the disk is full.
+    """
+    if folder is None:
+        return
+    made: list[Path] = []
+    try:
+        made = _make(folder)
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            probe.write(bytes(PROBE))
+    except OSError as error:
+        raise _refused(folder, error) from None
+    finally:
+        _unmake(made)
+
+
+@contextmanager
+def written_together(folder: Path) -> Iterator[Path]:
+    """Write several results whole or not at all.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they are to stand; made if needed.
+
+    Yields
+    ------
+    Path
+        A folder to write them into. Its files move into `folder` together when the block ends; where it ends in an
+        error, `folder` is as it was before.
+
+    Raises
+    ------
+    ScaraIdentError
+        In one line, if they cannot be written.
+    """
+    made: list[Path] = []
+    stage: Path | None = None
+    try:
+        made = _make(folder)
+        stage = Path(tempfile.mkdtemp(prefix=".scara-ident-", dir=folder))
+        yield stage
+        files = sorted(stage.iterdir())
+        for file in files:
+            if (folder / file.name).is_dir():
+                raise ScaraIdentError(f"{folder / file.name}: cannot be written: a folder has this name; move it away")
+        for file in files:
+            os.replace(file, folder / file.name)
+    except OSError as error:
+        raise _refused(folder, error) from None
+    except ScaraIdentError as error:
+        if stage is None or str(stage) not in str(error):
+            raise
+        # The place where the file was to stand, not the one where it waited.
+        raise ScaraIdentError(str(error).replace(str(stage), str(folder))) from None
+    finally:
+        if stage is not None:
+            shutil.rmtree(stage, ignore_errors=True)
+        _unmake(made)
+
+
+def _make(folder: Path) -> list[Path]:
+    """Make a folder and those above it; return what was made, the deepest first."""
+    missing = []
+    for place in (folder, *folder.parents):
+        if place.exists():
+            break
+        missing.append(place)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        _unmake(missing)
+        raise
+    return missing
+
+
+def _unmake(made: list[Path]) -> None:
+    """Remove folders that are still empty."""
+    for place in made:
+        with suppress(OSError):
+            place.rmdir()
+
+
+def _refused(folder: Path, error: OSError) -> ScaraIdentError:
+    what = "is a file" if isinstance(error, FileExistsError | NotADirectoryError) else error.strerror or str(error)
+    remedy = "make room or " if error.errno in (errno.ENOSPC, errno.EDQUOT) else ""
+    return ScaraIdentError(f"{folder}: results cannot be written here: {what}; {remedy}give another folder")
 
 
 def write_whole(path: Path, write: Callable[[Path], None]) -> None:
@@ -48,7 +154,12 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
     """Write a result as JSON; numbers that JSON does not know become null."""
-    write_text(path, json.dumps(plain(content), indent=1, allow_nan=False) + "\n")
+    write_text(path, json_text(content) + "\n")
+
+
+def json_text(content: dict[str, Any]) -> str:
+    """Return a result as JSON; numbers that JSON does not know become null."""
+    return json.dumps(plain(content), indent=1, allow_nan=False)
 
 
 def write_text(path: Path, text: str) -> None:

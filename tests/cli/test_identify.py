@@ -56,7 +56,7 @@ def test_it_says_parameters_errors_and_the_result_in_words(command, folder: Path
         "It generalises worst to CI_1",
     ):
         assert text in result.out
-    assert max(len(line) for line in result.out.splitlines()) <= 100
+    assert max(len(line) for line in result.out.splitlines()) <= 80
 
 
 @pytest.mark.parametrize("model", ["reduced", "basic"])

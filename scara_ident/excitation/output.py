@@ -1,0 +1,228 @@
+"""Designed trajectories as files: CSV for controllers, YAML for ROS 2, and what is known of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.columns import write_columns
+from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.excitation.criteria import BlockLogDet, Condition
+from scara_ident.excitation.curves import Basis, ExcitationTrajectory
+from scara_ident.excitation.design import Design, information_of
+from scara_ident.information import Information
+
+Array = NDArray[np.float64]
+
+RATE = 1000.0
+# Points of a JointTrajectory are splined by the controller that gets them.
+ROS_RATE = 100.0
+
+
+def file_names(design: Design, suffix: str) -> tuple[str, ...]:
+    """Return a file name for every trajectory: ``trajectory.csv``, then ``trajectory-b.csv`` and so on."""
+    return tuple(
+        f"trajectory{'' if k == 0 else '-' + chr(ord('a') + k)}{suffix}" for k in range(len(design.trajectories))
+    )
+
+
+def write_trajectory(trajectory: ExcitationTrajectory, path: Path | str, rate: float = RATE) -> None:
+    """Write ``time`` and position, velocity and acceleration of every joint, both ends included.
+
+    Parameters
+    ----------
+    trajectory : ExcitationTrajectory
+    path : path
+        A ``.csv`` or ``.parquet`` file.
+    rate : float
+        Samples per second; where they do not fill the duration, the nearest rate that does.
+
+    Raises
+    ------
+    UsageError
+        If the rate is too low to tell the motion.
+    RecordingError
+        If the file cannot be written.
+    """
+    time = sample_times(trajectory, rate)
+    columns = {"time": time}
+    for name, *signals in zip(trajectory.joints, *trajectory.at(time), strict=True):
+        for kind, signal in zip(("position", "velocity", "acceleration"), signals, strict=True):
+            columns[f"{name}.{kind}"] = signal
+    path = Path(path)
+    _make_folder(path)
+    write_columns(path, columns)
+
+
+def sample_times(trajectory: ExcitationTrajectory, rate: float) -> Array:
+    """Return equally spaced times from 0 to the duration at about a rate, s."""
+    least = 4.0 * trajectory.basis.bandwidth
+    if not rate >= least:
+        raise UsageError(f"rate {rate:g} Hz: this motion reaches {0.25 * least:g} Hz and needs at least {least:g} Hz")
+    return np.linspace(0.0, trajectory.duration, round(trajectory.duration * rate) + 1)
+
+
+def joint_trajectory_yaml(trajectory: ExcitationTrajectory, rate: float = ROS_RATE) -> str:
+    """Return a ROS 2 ``trajectory_msgs/msg/JointTrajectory`` as YAML, as ``ros2 topic pub`` takes it."""
+    time = sample_times(trajectory, rate)
+    q, v, a = trajectory.at(time)
+    lines = [
+        "header:",
+        "  stamp: {sec: 0, nanosec: 0}",
+        "  frame_id: ''",
+        f"joint_names: [{', '.join(repr(str(name)) for name in trajectory.joints)}]",
+        "points:",
+    ]
+    for k, t in enumerate(time):
+        seconds, rest = divmod(round(t * 1e9), 1_000_000_000)
+        lines += [
+            f"- positions: {_numbers(q[:, k])}",
+            f"  velocities: {_numbers(v[:, k])}",
+            f"  accelerations: {_numbers(a[:, k])}",
+            "  effort: []",
+            f"  time_from_start: {{sec: {seconds}, nanosec: {rest}}}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def write_joint_trajectory(trajectory: ExcitationTrajectory, path: Path | str, rate: float = ROS_RATE) -> None:
+    """Write a ROS 2 ``JointTrajectory``; see `joint_trajectory_yaml`."""
+    path = Path(path)
+    text = joint_trajectory_yaml(trajectory, rate)
+    _make_folder(path)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ScaraIdentError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def excitation_dict(design: Design) -> dict[str, Any]:
+    """Return the content of ``excitation.json``.
+
+    Parameters
+    ----------
+    design : Design
+
+    Returns
+    -------
+    dict
+        Plain values; infinite numbers where something is not known.
+    """
+    basis, effort = design.trajectories[0].basis, design.effort
+    scaled = scaled_condition(design.information)
+    criterion: dict[str, Any] = {"name": design.criterion.name}
+    columns = design.criterion.columns if isinstance(design.criterion, (BlockLogDet, Condition)) else None
+    if columns is not None:
+        criterion["parameters"] = [design.model.names[k] for k in columns]
+    finite = [cost for cost in design.costs if np.isfinite(cost)]
+    return {
+        "summary": summary(design),
+        "notes": notes(design),
+        "robot": design.model.robot.name,
+        "model": design.model.name,
+        "criterion": criterion,
+        "log_det": design.log_det,
+        "condition": design.condition,
+        "condition_of_regressor": float(np.sqrt(design.condition)),
+        "condition_of_scaled_regressor": scaled,
+        "log_det_with_prior": None if design.prior is None else design.total.log_det(),
+        "duration": basis.duration,
+        "samples": design.samples,
+        "family": basis.family,
+        "harmonics": _harmonics(basis),
+        "intervals": basis.orders[0] if basis.family == "spline" else None,
+        "bandwidth_hz": basis.bandwidth,
+        "limits": {
+            each.name: {"bound": each.bound, "reached": each.reached, "unit": each.unit, "share": each.share}
+            for each in design.reached
+        },
+        "active_limits": [each.name for each in design.reached if each.active],
+        "verified_samples": design.verified,
+        "noise_weights": dict(zip(design.model.robot.joints, design.weights.tolist(), strict=True)),
+        "parameters": [
+            {"name": column.name, "joint": column.joint, "unit": column.unit, "std": float(std)}
+            for column, std in zip(design.model.columns, design.std(), strict=True)
+        ],
+        "trajectories": [
+            {
+                "name": each.name,
+                "file": file,
+                "log_det": alone.log_det(),
+                "condition": alone.condition(),
+                "joints": dict(zip(each.joints, each.series(), strict=True)),
+            }
+            for each, file in zip(design.trajectories, file_names(design, ".csv"), strict=True)
+            for alone in [information_of(design.model, each, design.samples, design.weights)]
+        ],
+        "search": {
+            "seed": effort.seed,
+            "starts": effort.starts,
+            "rounds": effort.rounds,
+            "failed": len(design.costs) - len(finite),
+            "cost_best": min(finite),
+            "cost_median": float(np.median(finite)),
+            "seconds": design.seconds,
+        },
+    }
+
+
+def summary(design: Design) -> list[str]:
+    """Say in a few sentences what was designed."""
+    count = len(design.trajectories)
+    what = "A trajectory" if count == 1 else f"{count} trajectories"
+    held = [each.name for each in design.reached if each.active]
+    broken = [each.name for each in design.reached if not each.kept]
+    condition = np.sqrt(design.condition)
+    return [
+        f"{what} of {design.trajectories[0].duration:g} s: ln det {design.log_det:.2f} over {design.samples} samples"
+        f"{'' if count == 1 else ' each'}, condition of the regressor {condition:.4g}.",
+        f"Limits broken: {', '.join(broken)}."
+        if broken
+        else f"All limits hold, at {design.verified} samples and between them.",
+        f"Held back by {', '.join(held)}." if held else "No limit holds it back: use more harmonics.",
+    ]
+
+
+def notes(design: Design) -> list[str]:
+    """Say what the design rests on."""
+    said = ["Collisions of the arm with itself or its surroundings were not looked for: rehearse it slowly."]
+    if np.any(np.isfinite(design.limits.torque)):
+        frictionless = not np.any(np.delete(design.nominal, np.r_[design.model.place(design.model.rigid_body)]))
+        said.append(
+            "Torques were foreseen with the URDF's bodies and rotors"
+            + (", without friction." if frictionless else " and the friction that was given.")
+        )
+    if not design.trajectories[0].basis.periodic:
+        said.append("The motion does not end where it starts.")
+    return said
+
+
+def _harmonics(basis: Basis) -> int | list[int] | None:
+    if basis.family != "fourier":
+        return None
+    count = len(basis.orders)
+    return count if basis.orders[-1] == count else list(basis.orders)
+
+
+def scaled_condition(information: Information) -> float:
+    """Return the condition of the regressor with columns scaled to unit length; inf without full rank."""
+    factor = information.regressor_factor
+    size = np.linalg.norm(factor, axis=0)
+    if np.any(size == 0.0):
+        return np.inf
+    singular = np.linalg.svd(factor / size, compute_uv=False)
+    return float(singular[0] / singular[-1]) if singular[-1] > 0.0 else np.inf
+
+
+def _numbers(values: Array) -> str:
+    return "[" + ", ".join(f"{value:.9g}" if value % 1.0 else f"{value:.1f}" for value in values) + "]"
+
+
+def _make_folder(path: Path) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ScaraIdentError(f"{path.parent}: cannot be made: {error.strerror or error}") from error
