@@ -3,8 +3,8 @@
 Run ``python benchmarks/campaign.py [--effect NAME:JOINT:KEY=VALUE ...] [--output FILE.json]``; the figures of the
 JSON are made by ``campaign_figures.py``.
 
-1. Scan: one noise-free repetition of the five trajectories for every effect of the catalogue at three sizes on every
-   joint that can have it. Tables 2, 4 and 5 follow as the paper made them, least squares on 2500 unfiltered samples,
+1. Scan: one noise-free repetition of the five trajectories for every effect of the catalogue at three or four sizes on all
+   joints that can have it. Tables 2, 4 and 5 follow as the paper made them, least squares on 2500 unfiltered samples,
    with noise of Table 1's size drawn on top: on the parameters, where white noise ends up by
    ``A^-1 sum_j sigma_j W_j' e_j``, and on the torque that is predicted. All scenes share the same draws. Their distance
    from the printed tables is the rms of log10(virtual / printed) over the error cells.
@@ -17,35 +17,41 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
-from functools import partial
-from itertools import permutations
+from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from campaign_tables import (
+    campaign_tables,
+    conclusions,
+    distances,
+    drawn_tables,
+    printed,
+    sigma_of,
+)
 from numpy.typing import NDArray
 
 from scara_ident.comparison import Comparison, compare
 from scara_ident.evidence import Evidence, gather_all
-from scara_ident.indri2002 import REDUCED, TABLE_1, TABLE_2, TABLE_4, TABLE_5, TORQUE_RMS, TRAJECTORIES
+from scara_ident.indri2002 import REDUCED, TRAJECTORIES
 from scara_ident.information import merge
 from scara_ident.model import build_model
 from scara_ident.recording import Recording
-from scara_ident.virtual import CATALOGUE, Effect, VirtualArm, parse_effect, simulate, virtual_arm
+from scara_ident.virtual import CATALOGUE, Effect, ReferenceMotion, VirtualArm, parse_effect, simulate, virtual_arm
 from scara_ident.virtual.named import named_motion
 
 Array = NDArray[np.float64]
 
 METHODS = (("complete", "ols"), ("reduced", "ols"), ("complete", "consistent"))
-PAPER_SAMPLES = 2500
 DRAWS = 200
-SIGNIFICANT = 0.05
+READINGS = {"one_run": 1.0, "mean_of_six": 1.0 / np.sqrt(6.0)}
 # How often each default size; a negative factor where the effect's sign matters.
 FACTORS = (0.5, 1.0, 3.0)
-SIGNED_FACTORS = (-1.0, 1.0, 3.0)
+SIGNED_FACTORS = (-3.0, -1.0, 1.0, 3.0)
 FINER = (0.6, 1.7)
 REFINED = 3
 SIGNED = (
@@ -82,51 +88,6 @@ SIZE: dict[str, tuple[str, ...]] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Tables:
-    """What the paper prints of a campaign; trajectories in the order they were given.
-
-    Attributes
-    ----------
-    log_det, condition : ndarray, shape (t,)
-        J_d and J_k of the complete model.
-    torque_rms : ndarray, shape (t, n)
-    complete, reduced : ndarray, shape (t, t, n)
-        ``[i, k, j]``: rms error on trajectory i, joint j, of the parameters from trajectory k (Tables 2 and 4).
-    parameters : ndarray, shape (10, t)
-        Of the reduced model (Table 5).
-    """
-
-    log_det: Array
-    condition: Array
-    torque_rms: Array
-    complete: Array
-    reduced: Array
-    parameters: Array
-
-    def as_dict(self) -> dict[str, Any]:
-        return {name: np.asarray(getattr(self, name)).tolist() for name in self.__dataclass_fields__}
-
-
-def printed(names: Sequence[str] = TRAJECTORIES) -> Tables:
-    """Return the printed tables for some of the trajectories."""
-    t = [TRAJECTORIES.index(name) for name in names]
-    cells = [np.moveaxis(np.array(table.errors), 0, -1)[np.ix_(t, t)] for table in (TABLE_2, TABLE_4)]
-    return Tables(
-        np.array(TABLE_1.log_det)[t],
-        np.array(TABLE_1.condition)[t],
-        np.array(TORQUE_RMS).T[t],
-        cells[0],
-        cells[1],
-        np.array(TABLE_5)[:, t],
-    )
-
-
-def sigma_of(names: Sequence[str]) -> Array:
-    """Return Table 1's noise, shape (t, n)."""
-    return np.array(TABLE_1.sigma).T[[TRAJECTORIES.index(name) for name in names]]
-
-
 def sized(arm: VirtualArm, kind: type[Effect], factor: float) -> tuple[Effect, ...]:
     """Return an effect at a multiple of its default size, on every joint that can have it."""
     joints: Sequence[str | None] = arm.robot.joints
@@ -150,6 +111,11 @@ def sized(arm: VirtualArm, kind: type[Effect], factor: float) -> tuple[Effect, .
     return tuple(effects)
 
 
+@cache
+def _motion(name: str) -> ReferenceMotion:
+    return named_motion(name, virtual_arm().robot)
+
+
 def repetitions(
     arm: VirtualArm, names: Sequence[str], effects: Sequence[Effect], count: int, *, noisy: bool, seed: int = 0
 ) -> list[Recording]:
@@ -158,7 +124,7 @@ def repetitions(
     return [
         simulate(
             replace(arm, torque_noise=noise[k]),
-            named_motion(name, arm.robot),
+            _motion(name),
             effects=effects,
             seed=seed + k,
             repetition=repetition,
@@ -166,83 +132,6 @@ def repetitions(
         for k, name in enumerate(names)
         for repetition in range(1, count + 1)
     ]
-
-
-def drawn_tables(evidence: Sequence[Evidence], sigma: Array, draws: Array) -> Tables:
-    """Make Tables 2, 4 and 5 as the paper did, once per draw of the noise.
-
-    Parameters
-    ----------
-    evidence : sequence of Evidence
-        One noise-free recording per trajectory, complete model.
-    sigma : ndarray, shape (t, n)
-        Standard deviation of the torque, white.
-    draws : ndarray, shape (d, t, n, p)
-        Standard normal numbers.
-
-    Returns
-    -------
-    Tables
-        With the draws as first axis of the errors and the parameters.
-    """
-    joints, size = sigma.shape[1], draws.shape[-1]
-    names = build_model(virtual_arm().robot, "complete").names
-    kept = [names.index(name) for name in REDUCED]
-    errors, values = {}, {}
-    for model, columns in (("complete", list(range(size))), ("reduced", kept)):
-        mean = np.zeros((len(evidence), size))
-        noise = np.zeros((len(draws), len(evidence), size))
-        for k, item in enumerate(evidence):
-            parts = [part.select(columns) for part in item.unfiltered]
-            pooled = merge(parts)
-            mean[k, columns] = pooled.solve().value
-            for j, part in enumerate(parts):
-                # White noise of the paper's 2500 samples does more than that of all N.
-                scale = sigma[k, j] * np.sqrt(part.rows / PAPER_SAMPLES)
-                rows = part.regressor_factor
-                noise[:, k, columns] += scale * draws[:, k, j, : len(rows)] @ rows @ pooled.inverse()
-        values[model] = mean + noise
-        errors[model] = np.zeros((len(draws), len(evidence), len(evidence), joints))
-        for i, item in enumerate(evidence):
-            # On its own rows least squares does not err by what noise did to it: it fits that noise.
-            used = values[model].copy()
-            used[:, i] = mean[i]
-            for j, part in enumerate(item.unfiltered):
-                left = used @ part.factor[:, :-1].T - part.factor[:, -1]
-                errors[model][:, i, :, j] = np.sqrt(np.sum(left**2, axis=-1) / part.rows + sigma[i, j] ** 2)
-    pooled = [merge(item.unfiltered) for item in evidence]
-    return Tables(
-        np.array([item.log_det() + size * np.log(PAPER_SAMPLES * joints / item.rows) for item in pooled]),
-        np.array([item.condition() for item in pooled]),
-        np.hypot([[part.torque_rms for part in item.unfiltered] for item in evidence], sigma),
-        errors["complete"],
-        errors["reduced"],
-        np.swapaxes(values["reduced"][:, :, kept], 1, 2),
-    )
-
-
-def distances(tables: Tables, paper: Tables) -> dict[str, Array]:
-    """Return how far tables are from the printed ones, per draw.
-
-    ``table2``, ``table4`` and both together: rms of log10(virtual / printed) over the cells; ``joint1``, ``joint2``
-    likewise. ``table5``: rms of the difference in what trajectories disagree about, each parameter's departure from
-    its OJD value, as a share of the printed departure: 0 is the same, 1 is what no disagreement at all would give.
-    """
-    logs = np.stack([np.log10(tables.complete / paper.complete), np.log10(tables.reduced / paper.reduced)], axis=-1)
-
-    def rms(values: Array) -> Array:
-        return np.asarray(np.sqrt(np.mean(values**2, axis=(-4, -3, -2, -1))))
-
-    apart = [t.parameters[..., :-1] - t.parameters[..., -1:] for t in (tables, paper)]
-    scale = np.sqrt(np.mean(apart[1] ** 2, axis=-1, keepdims=True))
-    return {
-        "both": rms(logs),
-        "table2": rms(logs[..., :1]),
-        "table4": rms(logs[..., 1:]),
-        "joint1": rms(logs[..., :1, :]),
-        "joint2": rms(logs[..., 1:, :]),
-        "table5": np.sqrt(np.mean(((apart[0] - apart[1]) / scale) ** 2, axis=(-2, -1))),
-    }
 
 
 def scene(task: tuple[str, float], names: Sequence[str], bands: Sequence[float | None], seed: int) -> dict[str, Any]:
@@ -258,7 +147,7 @@ def scene(task: tuple[str, float], names: Sequence[str], bands: Sequence[float |
     draws = np.random.default_rng(seed).standard_normal(shape)
     found: dict[str, Any] = {"name": name, "factor": factor, "effects": [effect.as_dict() for effect in effects]}
     # Table 1's sigma is the scatter between runs; whether the tables use one run or the mean of six is not said.
-    for reading, share in (("one_run", 1.0), ("mean_of_six", 1.0 / np.sqrt(6.0))):
+    for reading, share in READINGS.items():
         tables = drawn_tables(evidence, share * sigma_of(names), draws)
         apart = distances(tables, printed(names))
         found[reading] = {
@@ -286,27 +175,29 @@ def scan(
     refined: int = REFINED,
 ) -> list[dict[str, Any]]:
     """Try every effect at its sizes, the best ones at sizes between; nearest to the printed tables first."""
-    run = partial(scene, names=names, bands=bands, seed=seed)
+    each = partial(scene, names=names, bands=bands, seed=seed)
     tasks = [("none", 0.0)]
     for kind in kinds:
         tasks += [(kind.name, factor) for factor in (SIGNED_FACTORS if kind.name in SIGNED else FACTORS)[:sizes]]
-    results = _each(run, tasks, processes)
+    results = _each(each, tasks, processes)
     results.sort(key=_distance)
     best = list(dict.fromkeys(item["name"] for item in results if item["name"] != "none"))[:refined]
     finer = []
     for name in best:
         first = next(item for item in results if item["name"] == name)
         finer += [(name, first["factor"] * step) for step in FINER]
-    results += _each(run, finer, processes)
+    results += _each(each, finer, processes)
     results.sort(key=_distance)
     none = next(item for item in results if item["name"] == "none")
+    nearest = next((item for item in results if item["name"] != "none"), none)
+    for reading in READINGS:
+        zero, first = (np.array(item[reading]["draws"]) for item in (none, nearest))
+        for item in results:
+            draws = np.array(item[reading]["draws"])
+            item[reading]["nearer_than_none"] = float(np.mean(draws < zero))
+            item[reading]["farther_than_nearest"] = float(np.mean(draws > first))
     for item in results:
-        for reading in ("one_run", "mean_of_six"):
-            item[reading]["share_nearer_than_none"] = float(
-                np.mean(np.array(item[reading]["draws"]) < np.array(none[reading]["draws"]))
-            )
-    for item in results:
-        for reading in ("one_run", "mean_of_six"):
+        for reading in READINGS:
             del item[reading]["draws"]
     return results
 
@@ -346,7 +237,10 @@ def campaign(
         if model == "complete":
             found["torque_rms"] = np.array(
                 [
-                    [merge(item.unfiltered[j] for item in evidence if item.trajectory == name).torque_rms for j in range(2)]
+                    [
+                        merge(item.unfiltered[j] for item in evidence if item.trajectory == name).torque_rms
+                        for j in range(2)
+                    ]
                     for name in names
                 ]
             )
@@ -359,7 +253,9 @@ def unfiltered_errors(result: Comparison, evidence: Sequence[Evidence]) -> Array
         [
             [
                 [
-                    merge(item.unfiltered[j] for item in evidence if item.trajectory == row.name).rms(column.estimate.value)
+                    merge(item.unfiltered[j] for item in evidence if item.trajectory == row.name).rms(
+                        column.estimate.value
+                    )
                     for j in range(result.model.robot.n)
                 ]
                 for column in result.trajectories
@@ -369,15 +265,119 @@ def unfiltered_errors(result: Comparison, evidence: Sequence[Evidence]) -> Array
     )
 
 
-def campaign_tables(found: dict[str, Any]) -> Tables:
-    """Return the campaign as the paper's tables."""
-    complete, reduced = found["complete ols"], found["reduced ols"]
-    kept = [reduced.model.names.index(name) for name in REDUCED]
-    return Tables(
-        np.array([item.log_det for item in complete.trajectories]),
-        np.array([item.condition for item in complete.trajectories]),
-        found["torque_rms"],
-        found["complete ols errors"],
-        found["reduced ols errors"],
-        np.array([item.estimate.value[kept] for item in reduced.trajectories]).T,
+def report(
+    scenes: list[dict[str, Any]], runs: dict[str, dict[str, Any]], names: Sequence[str], chosen: str
+) -> dict[str, Any]:
+    """Print everything and return it for JSON."""
+    paper = printed(names)
+    content: dict[str, Any] = {"trajectories": list(names), "chosen": chosen, "printed": paper.as_dict()}
+    print("Distance from the printed tables: rms of log10(virtual / printed) over the cells of Tables 2 and 4")
+    print(
+        f"{'effect':34}{'times':>6}{'both':>7}{'5-95 %':>14}{'T2':>6}{'T4':>6}{'j1':>6}{'j2':>6}{'T5':>7}{'/sqrt6':>8}{'nearer':>8}"
     )
+    for item in scenes:
+        one, mean = item["one_run"], item["mean_of_six"]
+        d = one["distance"]
+        print(
+            f"{item['name']:34}{item['factor']:6.2f}{d['both']:7.3f}{one['range'][0]:7.3f}{one['range'][1]:7.3f}"
+            f"{d['table2']:6.2f}{d['table4']:6.2f}{d['joint1']:6.2f}{d['joint2']:6.2f}{d['table5']:7.2f}"
+            f"{mean['distance']['both']:8.3f}{one['nearer_than_none']:8.0%}"
+        )
+    content["scan"] = scenes
+    columns = {"printed": paper} | {key: campaign_tables(found) for key, found in runs.items()}
+    for label, field in (("Table 2, complete", "complete"), ("Table 4, reduced", "reduced")):
+        print(f"\n{label}: printed | " + " | ".join(runs))
+        for i, predicted in enumerate(names):
+            for j in range(2):
+                cells = ["".join(f"{x:8.3f}" for x in getattr(t, field)[i, :, j]) for t in columns.values()]
+                print(f"{predicted + f' ({j + 1})':9}" + "  |".join(cells))
+        for j in range(2):
+            cells = ["".join(f"{x:8.3f}" for x in getattr(t, field)[:, :, j].mean(axis=0)) for t in columns.values()]
+            print(f"{f'Aver. ({j + 1})':9}" + "  |".join(cells))
+    print("\nTable 5: printed | " + " | ".join(runs))
+    for row, name in enumerate(REDUCED):
+        print(f"{name:9}" + "  |".join("".join(f"{x:8.3f}" for x in t.parameters[row]) for t in columns.values()))
+    print("\nJ_d, J_k of each, and the paper's conclusions")
+    content["conclusions"] = {}
+    for key, tables in columns.items():
+        print(f"{key}: J_d {np.round(tables.log_det, 2).tolist()}, J_k {[f'{x:.3g}' for x in tables.condition]}")
+        found = conclusions(tables, names)
+        content["conclusions"][key] = [item.__dict__ for item in found]
+        for item in found:
+            print(f"  {'holds' if item.holds else 'FAILS':6} {item.name}: {item.figures}")
+    content["campaigns"] = {}
+    for key, found in runs.items():
+        errors, free = found["complete consistent errors"], found["complete ols errors"]
+        off = ~np.eye(len(names), dtype=bool)
+        ratio = np.exp(np.mean(np.log(errors[off] / free[off]), axis=0))
+        print(
+            f"{key}: consistent / OLS complete on other trajectories, geometric mean {ratio.round(2).tolist()}, averages:"
+        )
+        for j in range(2):
+            print(f"Aver. ({j + 1})" + "".join(f"{x:8.3f}" for x in errors[:, :, j].mean(axis=0)))
+        content["campaigns"][key] = columns[key].as_dict() | {
+            "consistent": errors.tolist(),
+            "consistent_to_ols": ratio.tolist(),
+            "predicted_by_covariance": found["complete ols"].expected.tolist(),
+            "in_band": found["complete ols"].errors.tolist(),
+            "bands": list(found["complete ols"].bands),
+            "sigma": [item.sigma.tolist() for item in found["complete ols"].trajectories if item.sigma is not None],
+            "distance": {k: float(v) for k, v in distances(columns[key], paper).items()},
+        }
+        print("distance", {k: round(v, 3) for k, v in content["campaigns"][key]["distance"].items()})
+    return content
+
+
+def run(
+    kinds: Sequence[type[Effect]] = CATALOGUE,
+    names: Sequence[str] = TRAJECTORIES,
+    *,
+    given: Sequence[Effect] = (),
+    count: int = 6,
+    sizes: int = 3,
+    refined: int = REFINED,
+    processes: int = 1,
+    seed: int = 0,
+) -> dict[str, Any]:
+    """Run all stages and return what was found."""
+    began = time.perf_counter()
+    arm = virtual_arm()
+    runs = {"no effect": campaign(arm, names, (), count, seed=seed)}
+    # One processing for all, as the paper's: the bands that the campaign without effects chose.
+    bands = runs["no effect"]["complete ols"].bands
+    scenes = scan(kinds, names, bands, seed=seed, processes=processes, sizes=sizes, refined=refined)
+    nearest = next(item for item in scenes if item["name"] != "none")
+    effects: tuple[Effect, ...] = tuple(given)
+    chosen = ", ".join(effect.name for effect in given)
+    if not effects:
+        kind = next(kind for kind in CATALOGUE if kind.name == nearest["name"])
+        effects = sized(arm, kind, nearest["factor"])
+        chosen = f"{nearest['name']} x {nearest['factor']:g}"
+    runs[chosen] = campaign(arm, names, effects, count, bands=bands, seed=seed)
+    content = report(scenes, runs, list(names), chosen)
+    content["effects"] = [effect.resolve(arm).as_dict() for effect in effects]
+    content["seconds"] = time.perf_counter() - began
+    print(f"\n{content['seconds']:.0f} s with {processes} process(es)")
+    return content
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--effect", action="append", default=[], help="effect of the campaign, NAME:JOINT:KEY=VALUE")
+    parser.add_argument("--repetitions", type=int, default=6)
+    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--output", type=Path, default=Path("benchmarks/results/campaign.json"))
+    options = parser.parse_args()
+    content = run(
+        given=[parse_effect(text) for text in options.effect],
+        count=options.repetitions,
+        processes=options.processes,
+        seed=options.seed,
+    )
+    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options.output.write_text(json.dumps(content) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 from scara_ident.bands import choose_bands
 from scara_ident.errors import UsageError
+from scara_ident.consistency.feasibility import Possibility
+from scara_ident.consistency.options import ConsistentOptions
 from scara_ident.estimators import Estimate, History, JointError, ols, rls, wls
+from scara_ident.estimators.consistent import ConsistentEstimate, consistent, possibility
 from scara_ident.estimators.estimate import paper_criteria, pooled_information
 from scara_ident.evidence import Evidence, gather_all
 from scara_ident.model import ModelName, TorqueModel, build_model
@@ -22,7 +25,7 @@ from scara_ident.robot import Robot
 from scara_ident.velocity import audit_velocity
 
 Array = NDArray[np.float64]
-Method = Literal["ols", "wls", "rls"]
+Method = Literal["ols", "wls", "rls", "consistent"]
 METHODS: tuple[str, ...] = get_args(Method)
 
 
@@ -41,6 +44,8 @@ class Identification:
         What each recording says; validation took no part in any choice.
     noise : mapping of str to ndarray
         Repeatability of the torque per trajectory, see `repeatability`.
+    possibility : Possibility
+        Whether an arm with these parameters can exist, and what contradicts it.
     log_det, condition : float
         J_d and J_k of the training recordings for the paper's 2500 samples.
     notes : tuple of str
@@ -53,6 +58,7 @@ class Identification:
     training: tuple[Evidence, ...]
     validation: tuple[Evidence, ...]
     noise: Mapping[str, Array]
+    possibility: Possibility
     log_det: float
     condition: float
     notes: tuple[str, ...]
@@ -79,6 +85,7 @@ def identify(
     method: Method = "ols",
     validation: Sequence[Recording] = (),
     bands: Sequence[float | None] | None = None,
+    options: ConsistentOptions | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Identification:
     """Identify a robot from recordings of its motion.
@@ -89,11 +96,13 @@ def identify(
     recordings : sequence of Recording
         The recordings to fit.
     model : {"complete", "reduced", "basic"} or TorqueModel, optional
-    method : {"ols", "wls", "rls"}, optional
+    method : {"ols", "wls", "rls", "consistent"}, optional
     validation : sequence of Recording, optional
         Recordings that take no part in the fit nor in any choice.
     bands : sequence of float or None, one per joint, optional
         Low-pass on both sides of each joint's equation, Hz; chosen from the recordings by default.
+    options : ConsistentOptions, optional
+        Of the method ``consistent``: friction's shape, masses, centres of mass, priors.
     progress : callable, optional
         Called with the name of every step.
 
@@ -128,10 +137,29 @@ def identify(
     held_out = gather_all(equation, validation, bands)
     progress("estimating")
     noise = repeatability(recordings)
-    estimate, history = estimate_by(method, equation, training, _joint_noise(noise))
+    estimate, history = estimate_by(method, equation, training, _joint_noise(noise), options)
+    if isinstance(estimate, ConsistentEstimate):
+        notes += estimate.notes
+    progress("checking whether such an arm can exist")
+    possible = possibility(estimate)
     unweighted = pooled_information(training, np.ones(robot.n))
     log_det, condition = paper_criteria(unweighted, training)
-    return Identification(estimate, history, tuple(bands), training, held_out, noise, log_det, condition, tuple(notes))
+    return Identification(
+        estimate, history, tuple(bands), training, held_out, noise, possible, log_det, condition, tuple(notes)
+    )
+
+
+def identified_arm(identification: Identification) -> ConsistentEstimate | None:
+    """Return the estimate with all standard parameters of the links, None where no such arm can exist.
+
+    Where plain least squares belongs to an arm that can exist, that arm has its base parameters.
+    """
+    estimate = identification.estimate
+    if isinstance(estimate, ConsistentEstimate):
+        return estimate
+    if not identification.possibility.possible:
+        return None
+    return consistent(identification.model, identification.training)
 
 
 def _check_bands(robot: Robot, bands: Sequence[float | None]) -> None:
@@ -143,9 +171,15 @@ def _check_bands(robot: Robot, bands: Sequence[float | None]) -> None:
 
 
 def estimate_by(
-    method: Method, model: TorqueModel, evidence: Sequence[Evidence], noise: Array | None = None
+    method: Method,
+    model: TorqueModel,
+    evidence: Sequence[Evidence],
+    noise: Array | None = None,
+    options: ConsistentOptions | None = None,
 ) -> tuple[Estimate, History | None]:
     """Estimate by a method given by name; ``noise`` is each joint's, where repetitions tell it."""
+    if method == "consistent":
+        return consistent(model, evidence, options=options), None
     if method == "rls":
         return rls(model, evidence)
     if method == "wls":

@@ -26,7 +26,7 @@ def compare(
     model: Annotated[
         Literal["complete", "reduced", "basic"], typer.Option(help="Terms of the torque equation.")
     ] = "complete",
-    method: Annotated[Literal["ols", "wls", "rls"], typer.Option(help="Estimator.")] = "ols",
+    method: Annotated[Literal["ols", "wls", "rls", "consistent"], typer.Option(help="Estimator.")] = "ols",
     output: OutputOption = None,
     json: JsonOption = False,
     verbose: VerboseOption = False,

@@ -27,7 +27,13 @@ def identify(
     model: Annotated[
         Literal["complete", "reduced", "basic"], typer.Option(help="Terms of the torque equation.")
     ] = "complete",
-    method: Annotated[Literal["ols", "wls", "rls"], typer.Option(help="Estimator.")] = "ols",
+    method: Annotated[
+        Literal["ols", "wls", "rls", "consistent"], typer.Option(help="Estimator; consistent: an arm that can exist.")
+    ] = "ols",
+    friction: Annotated[
+        Literal["dissipative", "lubricated", "free"],
+        typer.Option(help="Friction of the method consistent: takes energy out; also grows and flattens; anything."),
+    ] = "dissipative",
     validate: Annotated[
         list[str] | None, typer.Option("--validate", metavar="RECORDING", help="Recording held out; may be repeated.")
     ] = None,
@@ -40,6 +46,8 @@ def identify(
     verbose: VerboseOption = False,
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
+    from scara_ident.consistency.options import ConsistentOptions
+    from scara_ident.identification import identified_arm
     from scara_ident.identification import identify as run
     from scara_ident.recording import read_recordings
     from scara_ident.report.files import check_output, write_json, write_whole, written_together
@@ -59,6 +67,7 @@ def identify(
             method=method,
             validation=held_out,
             bands=None if band is None else [band] * arm.n,
+            options=ConsistentOptions(friction=friction),
             progress=step,
         )
     content = identification_dict(result)
@@ -104,11 +113,17 @@ def identify(
     if output is not None:
         from scara_ident.report.figure import torque_figure
         from scara_ident.report.html import identification_report
+        from scara_ident.report.robots import write_robots
 
+        arm_found = identified_arm(result)
         with written_together(output) as place:
+            if arm_found is not None:
+                for note in write_robots(place, arm_found):
+                    console.print(f"note: {note}", markup=False, style="dim")
             write_whole(place / "torque.png", lambda path: torque_figure(path, result, (*training, *held_out)))
             identification_report(place / "report.html", result, training, held_out)
             write_json(place / "identification.json", content)
-        names = ("identification.json", "report.html", "torque.png")
+        robots = (f"{arm.name}_identified.urdf", f"{arm.name}_identified.xml") if arm_found is not None else ()
+        names = ("identification.json", "report.html", "torque.png", *robots)
         written = ", ".join(str(output / name) for name in names)
         console.print(f"written: {written}", markup=False, soft_wrap=True)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from scara_ident.cli.console import OutputOption, output_console, progress, table
+from scara_ident.cli.console import OutputOption, output_console, print_json, progress, table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
 
 # Of columns that are no channels so many are shown on a terminal; --json has them all.
 OTHERS_SHOWN = 20
+# Of longer names the rest goes into the next line, so that the other columns keep room.
+LONGEST_NAME = 40
 
 
 def inspect(
@@ -38,7 +39,7 @@ def inspect(
     """Show what is in a file, guess which columns are the arm's, audit it and write a first robot.yaml."""
     from scara_ident.errors import ScaraIdentError, UsageError
     from scara_ident.inspection import inspect_file
-    from scara_ident.report.files import check_output, plain, write_text
+    from scara_ident.report.files import check_output, write_text
 
     target = None if output is None else output / "robot.yaml"
     if target is not None and urdf is None:
@@ -52,7 +53,7 @@ def inspect(
     if target is not None and found.description is not None:
         write_text(target, found.description)
     if json:
-        typer.echo(dumps(plain(inspection_dict(found, target)), indent=1, allow_nan=False))
+        print_json(inspection_dict(found, target))
         return
     _show(output_console(), found, target)
 
@@ -86,7 +87,9 @@ def inspection_dict(found: Inspection, written: Path | None) -> dict[str, Any]:
 def _show(console: Console, found: Inspection, written: Path | None) -> None:
     from scara_ident.audit.samples import several
 
-    rows = table(str(found.path), "column", "kind", "samples", "range", "taken for", right=("samples",))
+    rows = table(str(found.path), "column", "samples", "range", "taken for", right=("samples",))
+    # Names are copied into robot.yaml: the other columns fold first.
+    rows.columns[0].min_width = min(max((len(column.name) for column in found.columns), default=0), LONGEST_NAME)
     others = 0
     for column in found.columns:
         others += not column.channel
@@ -94,7 +97,8 @@ def _show(console: Console, found: Inspection, written: Path | None) -> None:
             continue
         span = "" if column.low is None or column.high is None else f"{column.low:.4g} .. {column.high:.4g}"
         samples = f"{column.samples}" + (f" (-{column.missing})" if column.missing else "")
-        rows.add_row(column.name, column.kind, samples, span, _meaning(column))
+        said = [_meaning(column)] + ([] if column.kind == "numbers" else [column.kind])
+        rows.add_row(column.name, samples, span, "; ".join(filter(None, said)))
     console.print(rows)
     if others > OTHERS_SHOWN:
         console.print(f"... and {others - OTHERS_SHOWN} other columns; --json lists them", markup=False)

@@ -19,6 +19,9 @@ from scara_ident.cli.paper import paper
 from scara_ident.cli.simulate import simulate
 from scara_ident.errors import ScaraIdentError
 
+# Exit status after Ctrl-C, as shells have it; typer gives it back for a command that was interrupted.
+INTERRUPTED = 130
+
 app = typer.Typer(
     name="scara-ident",
     help="Identify the dynamic model of a robot arm from measured motion, and find what the model lacks.",
@@ -60,20 +63,23 @@ def run(arguments: list[str]) -> int:
     """Run the program and return its exit status: 0 done, 1 cannot be given, 2 bad usage."""
     try:
         result = app(args=arguments, standalone_mode=False)
-        return int(result) if isinstance(result, int) else 0
+        status = int(result) if isinstance(result, int) else 0
+        if status == INTERRUPTED:
+            _complain("interrupted; no file is left half-written")
+        return status
     except ScaraIdentError as error:
         _complain(" ".join(str(error).split()))
         return error.exit_status
     except typer.TyperException as error:
         text = error.format_message()
         # Without any word the message is the help, which keeps its lines.
-        _complain(" ".join(text.split())) if arguments else errors_console().print(text, markup=False)
+        _complain(_with_help(error, text)) if arguments else errors_console().print(text, markup=False)
         return 2
     except typer.Exit as error:
         return error.exit_code
     except (typer.Abort, KeyboardInterrupt):
         _complain("interrupted; no file is left half-written")
-        return 130
+        return INTERRUPTED
     except BrokenPipeError:
         # The reader of our output has gone, as `| head` does.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -81,7 +87,11 @@ def run(arguments: list[str]) -> int:
     except MemoryError:
         _complain("out of memory; give fewer recordings at a time")
         return 1
-    except (ArithmeticError, LookupError, TypeError, ValueError, RuntimeError) as error:
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        _complain(f"{where}{error.strerror or error}")
+        return 1
+    except Exception as error:
         # A fault of ours: one line for the user, the whole trace for who wants to report it.
         if os.environ.get("SCARA_IDENT_TRACEBACK"):
             raise
@@ -90,10 +100,14 @@ def run(arguments: list[str]) -> int:
             "SCARA_IDENT_TRACEBACK=1 prints"
         )
         return 1
-    except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        _complain(f"{where}{error.strerror or error}")
-        return 1
+
+
+def _with_help(error: typer.TyperException, text: str) -> str:
+    """Return a message of the parser as one line that ends with where to read more."""
+    context = getattr(error, "ctx", None)
+    words = ["scara-ident", *([context.info_name] if context is not None and context.parent else []), "--help"]
+    said = " ".join(text.replace("Value error, ", "").split()).rstrip(".")
+    return f"{said}{' ' if said.endswith('?') else '; '}see {' '.join(words)}"
 
 
 def _complain(message: str) -> None:

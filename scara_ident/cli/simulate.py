@@ -20,7 +20,7 @@ def simulate(
         list[str] | None,
         typer.Option("--effect", metavar="NAME[:JOINT][:KEY=VALUE,..]", help="Effect to switch on; may be repeated."),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of noise and encoder zero.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of noise and encoder zero.")] = 0,
     repetitions: Annotated[int, typer.Option(min=1, help="Recordings of each trajectory.")] = 1,
     output: Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the recordings.")] = Path("."),
 ) -> None:

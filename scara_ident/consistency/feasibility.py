@@ -18,6 +18,7 @@ from scara_ident.information import Information
 from scara_ident.model import TorqueModel
 from scara_ident.terms.constraints import BrakingPolynomial
 from scara_ident.terms.term import Column
+from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
@@ -50,6 +51,7 @@ class Possibility:
     distance_std: float | None
 
 
+@one_blas_thread()
 def check_possible(
     model: TorqueModel,
     value: Array,

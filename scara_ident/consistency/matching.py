@@ -34,6 +34,13 @@ PROOFS = 32
 PROVEN = 1e-5
 # The solver's slack, well below ROUNDING.
 TOLERANCE = 1e-9
+# The programme has no quadratic term that would bound its free directions, so that the solver's first step may fail
+# by the way it scales or regularises; the answer does not depend on either.
+_ATTEMPTS: tuple[dict[str, Any], ...] = (
+    {"iterative_refinement_enable": False},
+    {"static_regularization_constant": 1e-7},
+    {"equilibrate_enable": False},
+)
 # Where it cannot keep that, it is believed to this.
 CLOSE = 1e-6
 
@@ -266,11 +273,12 @@ def _solve(blocks: list[tuple[Affine, Array, str]], whole: Array, along: Array) 
     goal[-1] = -1.0
     cones = [kinds[kind](len(block)) for block, _, kind in blocks]
     result: Any = None
-    for refined in (False, True):
+    for attempt in _ATTEMPTS:
         settings = clarabel.DefaultSettings()
         settings.verbose, settings.max_threads = False, 1
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-        settings.iterative_refinement_enable = refined
+        for name, setting in attempt.items():
+            setattr(settings, name, setting)
         nothing = sp.csc_matrix((size, size))
         solver = clarabel.DefaultSolver(nothing, goal, sp.csc_matrix(matrix), offset / scale, cones, settings)
         result = solver.solve()

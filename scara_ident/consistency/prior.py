@@ -106,7 +106,7 @@ def _newton(start: Array, free: Array, limits: Cones, weight: float, pull: float
         if decrement < precision * max(1.0, abs(value)):
             # The last step squares what error is left, and too little is gained to measure it.
             return x + change if np.isfinite(_value(x + change, limits, weight, pull)) else x
-        length = _length(np.tensordot(local, step, axes=(1, 0)), change, x, pull)
+        length = 1.0 if weight else _length(np.tensordot(local, step, axes=(1, 0)), change, x, pull)
         while True:
             trial = x + length * change
             new = _value(trial, limits, weight, pull)
@@ -128,7 +128,7 @@ def _length(local: Array, change: Array, x: Array, pull: float) -> float:
     """Length of the step that makes the divergence smallest along it.
 
     Near the edge Newton's own length only doubles the distance from it; along a line the divergence is a sum of
-    logarithms, and its best length is the root of a falling function.
+    logarithms, and its best length is the root of a rising function. Limits are not seen.
     """
     n = len(local)
     rates = np.concatenate([np.linalg.eigvalsh(local).ravel(), change[10 * n :] / x[10 * n :]])

@@ -22,6 +22,7 @@ from scara_ident.consistency.pull import prior_rows
 from scara_ident.consistency.unknowns import Unknowns
 from scara_ident.errors import EstimationError, UsageError
 from scara_ident.information import UNDETERMINED, Information, Solution, merge
+from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
@@ -70,6 +71,7 @@ class ConsistentSolution:
         return self.point is None
 
 
+@one_blas_thread()
 def solve_joints(
     programme: Programme,
     joints: Sequence[Information],
@@ -136,6 +138,7 @@ def _joint_noise(joints: Sequence[Information], given: Array | None) -> Array:
     return np.array([max(j.rms(value), LEAST_NOISE * j.torque_rms) or 1.0 for j in joints])
 
 
+@one_blas_thread()
 def solve_consistent(
     programme: Programme, information: Information, *, standard_prior: StandardPrior | None = None
 ) -> ConsistentSolution:
@@ -210,6 +213,7 @@ def _best(programme: Programme, information: Information, standard_prior: Standa
     return programme.solve_rows(rows, target, prior_rows(u, rows, target, programme.options.prior_weight))
 
 
+@one_blas_thread()
 def fill(
     programme: Programme,
     information: Information,

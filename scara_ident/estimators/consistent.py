@@ -22,6 +22,7 @@ from scara_ident.estimators.estimate import Estimate, weighted_blocks
 from scara_ident.evidence import Evidence
 from scara_ident.information import UNDETERMINED, Information, merge
 from scara_ident.model import TorqueModel
+from scara_ident.threads import one_blas_thread
 
 __all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "possibility"]
 
@@ -56,6 +57,7 @@ class ConsistentEstimate(Estimate):
     notes: tuple[str, ...]
 
 
+@one_blas_thread()
 def consistent(
     model: TorqueModel,
     evidence: Sequence[Evidence],

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.excitation.criteria import Condition
 from scara_ident.excitation.interior_point import Minimum, Schedule, minimise, shrunk_inside
 from scara_ident.excitation.limits import InfeasibleLimits
 from scara_ident.excitation.parallel import map_in_order
 from scara_ident.excitation.problem import Problem, Task, row_names
 from scara_ident.excitation.verification import extremes, grid
+from scara_ident.motion import Motion
 from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -30,6 +32,8 @@ ELITE = 3
 # Random starts have this share of the highest frequency as their bandwidth, and this share of the velocity limits.
 SLOW, GENTLE = 0.25, 0.5
 CORRECTIONS = 5
+# Combinations of parameters whose columns, of unit length, sum up to less than this share are not seen.
+UNSEEN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -94,8 +98,14 @@ def search(task: Task, effort: Effort, progress: Callable[[Progress], None] | No
     Raises
     ------
     InfeasibleLimits
-        If no motion within the limits shows all parameters.
+        If no motion, or none within the limits, shows all parameters.
     """
+    alike = _told_apart_by_nothing(task)
+    if alike:
+        raise InfeasibleLimits(
+            f"no motion can tell {', '.join(alike)} apart in the model {task.smooth.model.name}; use a model without "
+            "one of them, or give information about them"
+        )
     problem = _problem(task, COARSE, 1, np.full(_rows(task), BOUND))
     total = effort.starts * (1 + effort.rounds)
     costs: list[float] = []
@@ -114,7 +124,7 @@ def search(task: Task, effort: Effort, progress: Callable[[Progress], None] | No
             if progress is not None:
                 progress(Progress(len(costs), total, min(costs)))
         if not elite:
-            raise InfeasibleLimits(_narrow(problem, task))
+            raise InfeasibleLimits(_narrowest(problem, task))
         elite = sorted(elite, key=lambda found: found.cost)[:ELITE]
     with one_blas_thread():
         x, times = _finish(task, elite[0].x)
@@ -187,7 +197,7 @@ def _excess(task: Task, x: Array, times: int) -> Array:
     return np.where(one_sided, largest, np.maximum(largest, -smallest))
 
 
-def _narrow(problem: Problem, task: Task) -> str:
+def _narrowest(problem: Problem, task: Task) -> str:
     values = np.abs(problem.limited(np.zeros(task.shape))).max(axis=1)
     kind, joint = row_names(task.limits, len(task.posture))[int(np.argmax(values))]
     where = kind.replace("_", " ") + ("" if joint is None else f" of {task.smooth.model.robot.joints[joint]}")
@@ -195,3 +205,25 @@ def _narrow(problem: Problem, task: Task) -> str:
         f"no motion within the limits shows all parameters; the narrowest, at rest, is the {where} "
         f"({100 * values.max():.0f} % used); widen it, use more harmonics, or a model with fewer parameters"
     )
+
+
+def _told_apart_by_nothing(task: Task) -> list[str]:
+    """Return the parameters of combinations that the regressor of no state shows, and that nobody told."""
+    model, limits = task.smooth.model, task.limits
+    random = np.random.default_rng(0)
+    count = max(60, 4 * len(model.names))
+    q = random.uniform(limits.lower[:, None], limits.upper[:, None], (len(task.posture), count))
+    v = limits.velocity[:, None] * random.uniform(-1.0, 1.0, q.shape)
+    a = limits.velocity[:, None] * random.uniform(-10.0, 10.0, q.shape)
+    regressor = model.regressor(Motion("states", "states", np.arange(count, dtype=float), q, v, a, None, 1.0))
+    rows = np.vstack([regressor.transpose(2, 0, 1).reshape(-1, len(model.names)), task.prior])
+    wanted = task.criterion.columns if isinstance(task.criterion, Condition) else None
+    kept = np.arange(len(model.names)) if wanted is None else np.array(wanted)
+    rows = rows[:, kept]
+    size = np.linalg.norm(rows, axis=0)
+    unseen = size == 0.0
+    rows = rows / np.where(unseen, 1.0, size)
+    _, singular, right = np.linalg.svd(rows, full_matrices=False)
+    blind = right[singular < UNSEEN * singular[0]]
+    alike = np.max(np.abs(blind), axis=0, initial=0.0) > np.sqrt(UNSEEN)
+    return [name for name, of in zip([model.names[k] for k in kept], alike | unseen, strict=True) if of]

@@ -16,7 +16,6 @@ import numpy as np
 
 from scara_ident.errors import ScaraIdentError
 
-
 # A small result file needs about so much; where this does not fit, no result does.
 PROBE = 4096
 
@@ -135,9 +134,10 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     ScaraIdentError
         In one line, if it cannot be written; nothing is left behind.
     """
+    made: list[Path] = []
     temporary: Path | None = None
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        made = _make(path.parent)
         handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
         os.close(handle)
         temporary = Path(name)
@@ -150,6 +150,7 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
+        _unmake(made)
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:

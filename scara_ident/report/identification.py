@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from scara_ident.estimators import JointError
+from scara_ident.estimators.consistent import ConsistentEstimate, links
 from scara_ident.estimators.estimate import PAPER_SAMPLES
 from scara_ident.evidence import Evidence
 from scara_ident.identification import Identification, not_told_from_zero, undetermined, worst_validation
@@ -16,7 +17,8 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
     """Return the content of ``identification.json``."""
     estimate = identification.estimate
     robot = identification.model.robot
-    return {
+    possible = identification.possibility
+    content: dict[str, Any] = {
         "robot": robot.name,
         "model": identification.model.name,
         "method": estimate.method,
@@ -37,6 +39,9 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         "log_det": identification.log_det,
         "condition": identification.condition,
         "criteria_samples": PAPER_SAMPLES,
+        "physically_consistent": possible.possible,
+        "contradictions": list(possible.reasons),
+        "distance_to_possible_std": possible.distance_std,
         "band_hz": dict(zip(robot.joints, identification.bands, strict=True)),
         "errors": {
             "training": _errors(robot, identification.training_errors()),
@@ -53,6 +58,13 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         "summary": list(sentences(identification)),
         "notes": list(identification.notes),
     }
+    if isinstance(estimate, ConsistentEstimate):
+        content["links"] = [
+            {"name": link.name, "mass": link.mass, "com": link.com, "inertia": link.inertia} for link in links(estimate)
+        ]
+        content["armature"] = dict(zip(robot.joints, estimate.standard[10 * robot.n :], strict=True))
+        content["held_by"] = list(estimate.active)
+    return content
 
 
 def _errors(robot: Robot, errors: Mapping[str, tuple[JointError | None, ...]]) -> dict[str, Any]:
@@ -100,6 +112,13 @@ def sentences(identification: Identification) -> tuple[str, ...]:
         )
     else:
         found.append("Every parameter is determined.")
+    possible = identification.possibility
+    if possible.possible:
+        found.append("An arm with these parameters can exist.")
+    else:
+        found.append(
+            f"No real arm has these parameters: {'; '.join(possible.reasons)}. Use --method consistent for one that can exist."
+        )
     small = not_told_from_zero(identification)
     if small:
         found.append(f"Within two standard deviations of zero: {_listed(small)}.")

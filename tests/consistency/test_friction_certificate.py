@@ -86,7 +86,7 @@ def test_the_lubricated_shape_rises_ever_less(seed):
 
 
 def test_the_lubricated_shape_needs_a_velocity_limit():
-    with pytest.raises(UsageError, match="elbow.*velocity limit"):
+    with pytest.raises(UsageError, match=r"elbow.*velocity limit"):
         certificate(polynomial(speed=np.inf, limit=1.0), "lubricated")
 
 

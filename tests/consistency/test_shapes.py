@@ -50,7 +50,7 @@ def test_what_has_no_shape_is_one_line(tmp_path):
     with pytest.raises(RobotError, match="link l1 has no visual shape"):
         visual_boxes(wrist_model(tmp_path).robot)
     mesh = '<visual><geometry><mesh filename="package://nowhere/l.stl"/></geometry></visual>'
-    with pytest.raises(RobotError, match="mesh package://nowhere/l.stl is not found"):
+    with pytest.raises(RobotError, match=r"mesh package://nowhere/l\.stl is not found"):
         visual_boxes(one_link(tmp_path, mesh))
     (tmp_path / "bad.stl").write_bytes(b"solid nothing")
     mesh = '<visual><geometry><mesh filename="bad.stl"/></geometry></visual>'

@@ -1,0 +1,264 @@
+"""Results reach the disk whole or not at all, scripts get JSON, and tables fit 80 columns."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from scara_ident.cli.main import run
+from scara_ident.report.files import check_output, written_together
+from scara_ident.robot import embedded_urdf
+from tests.made_recordings import columns, save
+
+SMALL = 65536
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder, and every folder as nothing."""
+    return {str(path.relative_to(folder)): path.read_bytes() if path.is_file() else b"" for path in folder.rglob("*")}
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 64 KiB with earlier results on it."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    _mount(place, f"size={SMALL}")
+    try:
+        for name in ("base.json", "identification.json", "torque.png", "comparison.json", "OJK_1.parquet"):
+            (place / name).write_text(f"earlier {name}")
+        yield place
+    finally:
+        subprocess.run(["umount", str(place)], check=True)
+
+
+def _mount(place: Path, options: str) -> None:
+    if sys.platform != "linux" or os.geteuid() != 0:
+        pytest.skip("needs a small file system, which only root may mount on Linux")
+    done = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", options, "none", str(place)], capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        pytest.skip(f"needs a small file system, which may not be mounted here: {done.stderr.strip()}")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["identify", "nowhere.csv"],
+        ["diagnose", "nowhere.csv"],
+        ["compare", "nowhere.csv"],
+        ["simulate", "nowhere.csv"],
+        ["base"],
+        ["paper"],
+        ["inspect", "nowhere.csv", "--urdf", embedded_urdf()],
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_full_disk_is_said_before_the_work(command, disk: Path, words: list[str | Path]):
+    with open(disk / "ballast", "wb", buffering=0) as ballast, pytest.raises(OSError, match="No space"):
+        while True:
+            ballast.write(bytes(4096))
+    before = contents(disk)
+    for folder in (disk, disk / "new"):
+        result = command(*words, "--output", folder)
+        assert result.status == 1
+        assert result.out == ""
+        assert f"{folder}: results cannot be written here: No space left on device; make room" in result.err
+        assert contents(disk) == before
+
+
+# Room for a small file, as the check before the work finds, or for the first of two, but not for the results.
+@pytest.mark.parametrize(
+    ("words", "room"),
+    [
+        (["identify", "{runs}/OJD_1.parquet", "--band", "15"], 40960),
+        (["compare", "{runs}"], 4096),
+        (["simulate", "OJK"], 40960),
+    ],
+    ids=["identify", "compare", "simulate"],
+)
+def test_a_disk_that_fills_up_keeps_the_earlier_results(command, disk: Path, folder: Path, words: list[str], room: int):
+    before = _leave(disk, room)
+    result = command(*(word.replace("{runs}", str(folder)) for word in words), "--output", disk)
+    assert result.status == 1
+    assert "no space left on device" in result.err.lower()
+    assert ".scara-ident-" not in result.err
+    assert contents(disk) == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["identify", "{runs}/OJD_1.parquet", "--band", "15"],
+        pytest.param(
+            ["simulate", "OJK"],
+            marks=pytest.mark.xfail(
+                strict=True, reason="columns.write_columns does not catch what polars raises for a Parquet file"
+            ),
+        ),
+    ],
+    ids=["identify", "simulate"],
+)
+def test_the_file_that_does_not_fit_is_named(command, disk: Path, folder: Path, words: list[str]):
+    _leave(disk, 40960)
+    result = command(*(word.replace("{runs}", str(folder)) for word in words), "--output", disk)
+    assert result.err.startswith(f"scara-ident: {disk}{os.sep}")
+    assert "cannot be written" in result.err
+
+
+def _leave(disk: Path, room: int) -> dict[str, bytes]:
+    """Fill a disk up to some room and return what is on it."""
+    used = sum(-(-path.stat().st_size // 4096) * 4096 for path in disk.iterdir())
+    (disk / "ballast").write_bytes(bytes(SMALL - used - room))
+    return contents(disk)
+
+
+def test_a_disk_that_may_only_be_read_is_said_before_the_work(command, tmp_path: Path):
+    _mount(tmp_path, "ro,size=64k")
+    try:
+        result = command("identify", "nowhere.csv", "--output", tmp_path / "results")
+        assert result.status == 1
+        assert "results cannot be written here: Read-only file system; give another folder" in result.err
+    finally:
+        subprocess.run(["umount", str(tmp_path)], check=True)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["identify", "{runs}/OJD_1.parquet", "--band", "15"],
+        ["compare", "{runs}"],
+        ["simulate", "{path}"],
+        ["base"],
+        ["inspect", "{runs}/OJD_1.parquet", "--urdf", str(embedded_urdf())],
+    ],
+    ids=lambda words: words[0],
+)
+@pytest.mark.parametrize("there", [True, False], ids=["into results", "into a new folder"])
+def test_ctrl_c_in_the_middle_of_writing_leaves_all_as_it_was(
+    folder: Path, tmp_path: Path, monkeypatch, capfd, words: list[str], there: bool
+):
+    path = tmp_path / "path.csv"
+    pl.DataFrame({"time": [0.0, 0.5, 1.0]} | {
+        f"joint{j}.{kind}": [0.0] * 3 for j in (1, 2) for kind in ("position", "velocity", "acceleration")
+    }).write_csv(path)  # fmt: skip
+    out = tmp_path / "results"
+    if there:
+        out.mkdir()
+        for name in ("identification.json", "torque.png", "report.html", "comparison.json", "base.json"):
+            (out / name).write_text("earlier")
+    whole = Path.write_text
+    before = contents(tmp_path)
+    written: list[str] = []
+
+    def interrupted(self: Path, text: str, *rest: object, **named: object) -> int:
+        whole(self, text[: len(text) // 2])
+        written.append(self.name)
+        signal.raise_signal(signal.SIGINT)
+        raise AssertionError("the signal did not interrupt")
+
+    given = [word.replace("{runs}", str(folder)).replace("{path}", str(path)) for word in words]
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_text", interrupted)
+        status = run([*given, "--output", str(out)])
+    assert status == 130
+    assert len(written) == 1
+    assert capfd.readouterr().err == "scara-ident: interrupted; no file is left half-written\n"
+    assert contents(tmp_path) == before
+
+
+def test_results_move_into_place_together(tmp_path: Path):
+    (tmp_path / "a").write_text("earlier")
+    with pytest.raises(ZeroDivisionError), written_together(tmp_path) as place:
+        (place / "a").write_text("new")
+        (place / "b").write_text(str(1 / 0))
+    assert contents(tmp_path) == {"a": b"earlier"}
+    with written_together(tmp_path) as place:
+        (place / "a").write_text("new")
+        (place / "b").write_text("new")
+        assert (tmp_path / "a").read_text() == "earlier"
+    assert contents(tmp_path) == {"a": b"new", "b": b"new"}
+
+
+def test_a_folder_with_the_name_of_a_result_is_said_and_kept(command, tmp_path: Path, folder: Path):
+    (tmp_path / "torque.png").mkdir()
+    result = command("identify", folder / "OJD_1.parquet", "--band", "15", "--output", tmp_path)
+    assert result.status == 1
+    assert f"{tmp_path / 'torque.png'}: cannot be written: a folder has this name" in result.err
+    assert contents(tmp_path) == {"torque.png": b""}
+
+
+def test_looking_at_an_output_folder_leaves_it_as_it_was(tmp_path: Path):
+    check_output(None)
+    check_output(tmp_path)
+    check_output(tmp_path / "a" / "b" / "c")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "file", "key"),
+    [
+        (["identify", "{runs}/OJD_1.parquet", "--band", "15"], "identification.json", "parameters"),
+        (["diagnose", "{short}", "--model", "basic"], "diagnosis.json", "verdict"),
+        (["compare", "{runs}"], "comparison.json", "errors"),
+        (["base"], "base.json", "base_parameters"),
+    ],
+    ids=lambda words: words[0] if isinstance(words, list) else "",
+)
+def test_json_on_stdout_is_all_there_is_and_what_is_in_the_file(
+    command, folder: Path, tmp_path: Path, words: list[str], file: str, key: str
+):
+    short = save(tmp_path / "short_1.parquet", columns(1500))
+    given = [word.replace("{runs}", str(folder)).replace("{short}", str(short)) for word in words]
+    out = tmp_path / "results"
+    result = command(*given, "--json", "--output", out)
+    assert result.status == 0
+    content = json.loads(result.out)
+    assert key in content
+    assert content == json.loads((out / file).read_text())
+
+
+@pytest.mark.parametrize("form", [[], ["--json"]], ids=["tables", "json"])
+def test_results_are_written_though_nobody_reads_the_output(tmp_path: Path, form: list[str]):
+    program = [sys.executable, "-c", "from scara_ident.cli import main; main()"]
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        [*program, "base", "--output", str(tmp_path), *form],
+        stdout=writer, stderr=subprocess.PIPE, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads((tmp_path / "base.json").read_text())["count"] == 5
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["identify", "{runs}", "--verbose"], ["compare", "{runs}", "--verbose"], ["base"], ["paper"]],
+    ids=lambda words: words[0],
+)
+def test_tables_fit_80_columns(command, folder: Path, words: list[str]):
+    result = command(*(word.replace("{runs}", str(folder)) for word in words))
+    assert result.status == 0
+    assert max(len(line) for line in result.out.splitlines()) <= 80
+
+
+def test_verbose_lists_what_every_file_holds(command, folder: Path, tmp_path: Path):
+    made = columns(3000)
+    gap = save(tmp_path / "gap_1.parquet", {name: values[made["time"] != 1.0] for name, values in made.items()})
+    terse = command("identify", folder / "OJD_1.parquet", gap, "--band", "15")
+    verbose = command("identify", folder / "OJD_1.parquet", gap, "--band", "15", "--verbose")
+    assert (terse.status, verbose.status) == (0, 0)
+    assert terse.out in verbose.out
+    listing = verbose.out.removesuffix(terse.out)
+    assert ["OJD_1", "3000", "12", "250", "0"] in [line.split() for line in listing.splitlines()]
+    assert ["gap_1", "2999", "2.999", "1000"] in [line.split()[:4] for line in listing.splitlines()]

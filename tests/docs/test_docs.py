@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scara_ident.base_parameters import find_base_parameters
+from scara_ident.cli.main import app
+from scara_ident.diagnosis import confounding, decision, examination, search
+from scara_ident.effects import CATALOGUE
+from scara_ident.effects.aliases import OPENED_BY
+from scara_ident.indri2002 import OJD, OJK
+from scara_ident.recording import write_recording
+from scara_ident.robot import embedded_urdf, load_robot
+from scara_ident.virtual import sampled, simulate, virtual_arm
+from tests.docs.pages import PAGES, Block, blocks, run, run_bash
+from tests.shared import ROOT
+
+DOCS = ROOT / "docs"
+README = ROOT / "README.md"
+TUTORIAL = DOCS / "tutorial.md"
+# These are run, and looked at, by tests of their own.
+APART = (README, TUTORIAL, DOCS / "howto" / "my-own-effect.md", DOCS / "howto" / "known-payload.md")
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+@pytest.fixture
+def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The reader's folder, which is the working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    pytest.importorskip("mkdocs", reason="the documentation is built by MkDocs: pip install '.[docs]'")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")],
+        cwd=ROOT, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    theory = (tmp_path / "site" / "theory.html").read_text(encoding="utf-8")
+    assert theory.count("<math ") > 20
+    assert "arithmatex" not in theory
+    api = (tmp_path / "site" / "api.html").read_text(encoding="utf-8")
+    for public in (
+        "identification.identify",
+        "diagnosis.diagnosis.diagnose",
+        "effects.Effect",
+        "virtual.simulate.simulate",
+    ):
+        assert f'id="scara_ident.{public}"' in api
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page not in APART], ids=name_of)
+def test_what_a_page_says_to_type_runs(page: Path, reader: Path) -> None:
+    found = blocks(page)
+    known = {"bash", "python", "yaml", "text", "json"}
+    assert {block.language for block in found} <= known, "a block that is neither run nor known not to be"
+    run(page, reader)
+
+
+def test_the_tutorial_finds_what_it_hid(reader: Path) -> None:
+    names = run(TUTORIAL, reader)
+    diagnosis = json.loads((reader / "out" / "diagnosis.json").read_text())
+    (effect,) = diagnosis["effects"]
+    assert (diagnosis["verdict"], effect["effect"], effect["joint"]) == ("explained", "transmission_loss", "joint1")
+    assert effect["parameters"]["loss_coefficient"]["value"] == pytest.approx(0.25, rel=0.1)
+    held_out = diagnosis["validation"]
+    assert held_out["after"]["joint1"] < 0.7 * held_out["before"]["joint1"]
+    # As the page says, Coulomb friction had stood in for the loss.
+    moved = {row["name"]: row for row in diagnosis["moved"]}
+    assert moved["a01"]["after"] < moved["a01"]["before"]
+    # The identified URDF is nearer to the true arm than the one that the reader began with, and in itself near.
+    base = find_base_parameters(names["robot"])
+    mine, identified, true = (
+        base.grouping @ robot.standard_parameters()
+        for robot in (names["robot"], load_robot(reader / "identified.yaml"), load_robot())
+    )
+    determined = np.array([0, 1, 3, 4])
+    assert np.all(np.abs(identified - true)[determined] < 0.05 * true[determined])
+    assert np.linalg.norm(((identified - true) / true)[determined]) < 0.5 * np.linalg.norm(
+        ((mine - true) / true)[determined]
+    )
+
+
+def test_a_users_own_effect_takes_under_20_lines_and_is_found(reader: Path) -> None:
+    page = DOCS / "howto" / "my-own-effect.md"
+    (own,) = (block for block in blocks(page) if "class CableFriction" in block.text)
+    assert sum(bool(line.strip()) for line in own.text.splitlines()) < 20
+    found = run(page, reader)["found"]
+    (effect,) = found.effects
+    assert (found.verdict, effect.effect, effect.joint) == ("explained", "cable_friction", "joint1")
+    assert effect.parameters["amplitude"].value == pytest.approx(0.06, rel=0.05)
+
+
+def test_a_known_payload_gives_the_torque_constant(reader: Path) -> None:
+    names = run(DOCS / "howto" / "known-payload.md", reader)
+    assert names["gain"] == pytest.approx(0.8, rel=0.05)
+    assert "common_torque_scale" in {alias.effect for alias in names["found"].aliases}
+
+
+def test_what_the_readme_says_to_type_runs(reader: Path) -> None:
+    # The reader's own arm and recordings, by the names that the README gives them.
+    shutil.copy(embedded_urdf(), reader / "my_arm.urdf")
+    (description,) = (block.text for block in blocks(README) if block.language == "yaml")
+    (reader / "robot.yaml").write_text(description, encoding="utf-8")
+    arm = virtual_arm(load_robot(reader / "robot.yaml"))
+    for folder, name, motion, repetitions in (
+        ("train", "OJD", OJD.motion, (1, 2)), ("train", "OJK", OJK.motion, (1,)), ("test", "OJK", OJK.motion, (2,)),
+    ):  # fmt: skip
+        (reader / folder).mkdir(exist_ok=True)
+        path = sampled(name, arm.robot, motion, 12.0)
+        for repetition in repetitions:
+            recording = simulate(arm, path, rate=250.0, repetition=repetition).recording
+            write_recording(recording, reader / folder / f"{recording.name}.parquet")
+    names = run(README, reader)
+    assert "result" in names or any(block.language == "bash" for block in blocks(README))
+
+
+def test_a_block_that_fails_is_a_failure(tmp_path: Path) -> None:
+    page = ROOT / "docs" / "index.md"
+    assert Block("bash", None, "$ scara-ident base\nprinted", 1).commands == "scara-ident base"
+    with pytest.raises(AssertionError, match=r"docs/index\.md, line 7: exit status 2"):
+        run_bash(page, Block("bash", None, "scara-ident identfy\necho reached", 7), tmp_path)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_command_that_a_page_names_exists(page: Path) -> None:
+    commands = {command.name or command.callback.__name__ for command in app.registered_commands if command.callback}
+    named = re.findall(r"\bscara-ident ([a-z]+)\b", page.read_text(encoding="utf-8"))
+    assert set(named) <= commands
+
+
+def test_the_theory_lists_every_effect() -> None:
+    theory = (DOCS / "theory.md").read_text(encoding="utf-8")
+    assert [effect.name for effect in CATALOGUE if f"| `{effect.name}` |" not in theory] == []
+
+
+def test_the_diagnosis_page_lists_every_alias_and_the_limits_of_the_program() -> None:
+    page = (DOCS / "diagnosis.md").read_text(encoding="utf-8")
+    assert [alias for alias in OPENED_BY if f"`{alias}`" not in page] == []
+    for said in (
+        f"| lies outside the model | at least {examination.WEAK:.0e} ",
+        f"| significant | p times candidates tried below {100 * decision.FAMILY_ERROR:g} % |",
+        f"| gain on data not fitted to | at least {100 * decision.LEAST_GAIN:g} % ",
+        f"| helps in | at least {100 * decision.LEAST_VOTES:g} % ",
+        f"At most {search.MOST_EFFECTS} effects",
+        f"at least {100 * confounding.LEAST_SHARE:g} % of what it removes",
+    ):
+        assert said in " ".join(page.split()), said
+    assert confounding.STANDARD_ERRORS == 2.0

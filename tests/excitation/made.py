@@ -1,0 +1,70 @@
+"""Small design problems for tests."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scara_ident.description import JointDescription, RobotDescription
+from scara_ident.excitation.criteria import Criterion, LogDet
+from scara_ident.excitation.curves import make_basis
+from scara_ident.excitation.limits import limits_of, nominal_parameters, resting_posture
+from scara_ident.excitation.problem import Problem, Task, row_names
+from scara_ident.excitation.sensitivity import SmoothModel
+from scara_ident.excitation.verification import grid
+from scara_ident.model import TorqueModel
+from scara_ident.robot import Robot, build_robot, embedded_urdf
+from scara_ident.terms import RigidBody
+from scara_ident.terms.rigid_body import rigid_body
+from tests.arms import example_urdf
+
+
+def panda() -> Robot:
+    """Return the Panda with its fingers locked."""
+    urdf = example_urdf("panda.urdf")
+    joints = {f"panda_joint{k}": JointDescription() for k in range(1, 8)}
+    return build_robot(RobotDescription(urdf=urdf, joints=joints), urdf)
+
+
+def scara_with_quill() -> Robot:
+    """Return the SCARA03 with its prismatic joint and a reversing gear."""
+    joints = {
+        "joint1": JointDescription(reduction=-100.0),
+        "joint2": JointDescription(),
+        "joint3": JointDescription(reduction=50.0),
+    }
+    return build_robot(RobotDescription(urdf=embedded_urdf(), effort_side="motor", joints=joints), embedded_urdf())
+
+
+def rigid_model(robot: Robot) -> TorqueModel:
+    """Return the model of the base parameters alone."""
+    term: RigidBody = rigid_body(robot)
+    return TorqueModel("rigid", robot, (term,))
+
+
+def small_problem(
+    model: TorqueModel,
+    criterion: Criterion | None = None,
+    *,
+    trajectories: int = 1,
+    prior: float = 0.0,
+    **limits: float,
+) -> Problem:
+    """Return a problem of six harmonics over 8 s with a grid of 60 times, every second of them in the criterion."""
+    robot = model.robot
+    bounds = limits_of(robot, **limits)
+    nominal = nominal_parameters(model)
+    count = len(model.names)
+    task = Task(
+        smooth=SmoothModel(model, 0.2 * bounds.velocity),
+        limits=bounds,
+        nominal=nominal,
+        criterion=LogDet() if criterion is None else criterion,
+        basis=make_basis(8.0, 6),
+        posture=resting_posture(model, bounds, nominal),
+        trajectories=trajectories,
+        samples=500,
+        weights=np.linspace(1.0, 2.0, robot.n),
+        prior=prior * np.eye(count),
+    )
+    rows = len(row_names(bounds, robot.n))
+    return Problem(task, grid(task.basis, 60), 2, np.full(rows, 0.999))

@@ -1,0 +1,293 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.errors import RobotError, UsageError
+from scara_ident.excitation import (
+    Condition,
+    Effort,
+    ExcitationTrajectory,
+    InfeasibleLimits,
+    Limits,
+    block_of,
+    default_harmonics,
+    design_excitation,
+    information_of,
+    limits_of,
+)
+from scara_ident.indri2002 import OJD, criteria, regressor, tool_acceleration
+from scara_ident.information import Information
+from scara_ident.model import build_model
+from scara_ident.robot import Robot, load_robot
+from tests.arms import PLANAR_2R, Link, example_urdf, rnea, write_urdf
+from tests.excitation.made import panda, rigid_model, scara_with_quill
+
+SCARA = load_robot()
+COMPLETE = build_model(SCARA)
+QUICK = Effort(starts=1, rounds=0, processes=1)
+SHORT = {"duration": 6.0, "harmonics": 8, "samples": 600}
+
+
+@pytest.fixture(scope="module")
+def paper_length():
+    return design_excitation(COMPLETE, effort=QUICK)
+
+
+@pytest.fixture(scope="module")
+def short():
+    return design_excitation(COMPLETE, **SHORT, effort=Effort(starts=2, rounds=1, seed=3, processes=1))
+
+
+def shares(trajectory: ExcitationTrajectory, limits: Limits, robot: Robot, times: int) -> dict[str, float]:
+    """Shares of limits on a grid, without the code that the design uses."""
+    q, v, a = trajectory.at(np.linspace(0.0, trajectory.duration, times))
+    half = 0.5 * (limits.upper - limits.lower)
+    torque = (rnea(robot, q, v, a) + (robot.reduction**2 * robot.rotor_inertia)[:, None] * a) * robot.row_scale[:, None]
+    return {
+        "position": float(np.max(np.abs(q - limits.centre[:, None]) / half[:, None])),
+        "velocity": float(np.max(np.abs(v) / limits.velocity[:, None])),
+        "torque": float(np.max(np.abs(torque) / limits.torque[:, None])),
+    }
+
+
+def test_25_s_of_the_scara_reach_a_log_det_of_92_within_all_limits(paper_length):
+    trajectory = paper_length.trajectories[0]
+    log_det, condition = criteria(regressor(*trajectory.at(np.linspace(0.0, 25.0, 2500))))
+    assert log_det == pytest.approx(paper_length.log_det, abs=1e-6)
+    assert condition == pytest.approx(paper_length.condition, rel=1e-6)
+    assert log_det >= 92.0
+    # Ten times finer than the design's finest grid, and by other code.
+    found = shares(trajectory, paper_length.limits, SCARA, 5001)
+    assert max(found.values()) <= 1.0
+    assert max(found.values()) > 0.99
+    fine = trajectory.at(np.linspace(0.0, 25.0, 10 * paper_length.verified))
+    assert np.max(tool_acceleration(*fine)) <= 9.0
+    assert np.max(np.abs(fine[1])) <= 3.77
+
+
+def test_what_is_reported_as_reached_is_reached_between_samples_too(short):
+    limits, trajectory = short.limits, short.trajectories[0]
+    time = np.linspace(0.0, trajectory.duration, 200_001)
+    q, v, a = trajectory.at(time)
+    told = {each.name: each for each in short.reached}
+    assert all(each.kept for each in short.reached)
+    assert told["joint1.position.lower"].reached == pytest.approx(q[0].min(), abs=1e-6)
+    assert told["joint2.position.upper"].reached == pytest.approx(q[1].max(), abs=1e-6)
+    assert told["joint2.velocity"].reached == pytest.approx(np.abs(v[1]).max(), rel=1e-5)
+    assert told["tool.acceleration"].reached == pytest.approx(tool_acceleration(q, v, a).max(), rel=1e-5)
+    assert told["tool.acceleration"].reached >= tool_acceleration(q, v, a).max() * (1 - 1e-9)
+    assert told["joint1.torque"].bound == limits.torque[0] == 2.0
+
+
+def test_the_design_depends_on_the_seed_alone(short):
+    again = design_excitation(COMPLETE, **SHORT, effort=Effort(starts=2, rounds=1, seed=3, processes=2))
+    np.testing.assert_array_equal(again.trajectories[0].coefficients, short.trajectories[0].coefficients)
+    other = design_excitation(COMPLETE, **SHORT, effort=replace(QUICK, seed=4))
+    assert np.any(other.trajectories[0].coefficients != short.trajectories[0].coefficients)
+
+
+def test_progress_is_told_after_every_search():
+    seen = []
+    made = design_excitation(COMPLETE, **SHORT, effort=replace(QUICK, rounds=2), progress=seen.append)
+    assert [(each.done, each.total) for each in seen] == [(1, 3), (2, 3), (3, 3)]
+    assert seen[-1].cost == min(made.costs)
+
+
+def test_the_std_of_repetitions_falls_against_ojd_as_the_log_det_promises(paper_length):
+    """White noise on exact regressors, estimated by least squares, 400 times each."""
+    trajectory = paper_length.trajectories[0]
+    rng = np.random.default_rng(0)
+    spreads, log_dets = [], []
+    for moved in (OJD.motion(OJD.times()), trajectory.at(np.linspace(0.0, 25.0, 2500))):
+        at = replace(trajectory.motion(2500), q=moved[0], v=moved[1], a=moved[2])
+        h = COMPLETE.regressor(at).transpose(2, 0, 1).reshape(-1, 15)
+        noise = 0.03 * rng.standard_normal((len(h), 400))
+        estimates = np.linalg.lstsq(h, noise, rcond=None)[0]
+        spreads.append(estimates.std(axis=1))
+        log_dets.append(Information.empty(15).absorb(h, np.zeros(len(h))).log_det())
+        covariance = np.cov(estimates)
+        log_dets.append(-np.linalg.slogdet(covariance / 0.03**2)[1])
+    assert log_dets[0] == pytest.approx(75.5, abs=0.1)
+    promised = np.exp((log_dets[0] - log_dets[2]) / 30.0)
+    seen = np.exp((log_dets[1] - log_dets[3]) / 30.0)
+    assert promised < 0.6
+    assert seen == pytest.approx(promised, rel=0.25)
+    # Each parameter by itself, against the std that the design states.
+    np.testing.assert_allclose(spreads[1], 0.03 * paper_length.std(), rtol=0.25)
+    assert np.exp(np.mean(np.log(spreads[1] / spreads[0]))) < 0.6
+
+
+def test_a_block_can_be_preferred_to_the_rest(short):
+    wanted = block_of(COMPLETE, ["P_d2", "P_d3", "P_d4"])
+    made = design_excitation(COMPLETE, **SHORT, criterion=wanted, effort=short.effort)
+    costs = [
+        wanted.cost(each.information.regressor_factor.T @ each.information.regressor_factor)[0]
+        for each in (made, short)
+    ]
+    assert costs[0] < costs[1] - 0.5
+    assert made.log_det < short.log_det
+
+
+def test_the_condition_can_be_preferred_to_the_log_det(short):
+    made = design_excitation(COMPLETE, **SHORT, criterion=Condition(), effort=short.effort)
+    assert made.condition < 0.5 * short.condition
+    assert made.log_det < short.log_det
+
+
+def test_a_design_fills_what_existing_recordings_lack():
+    still = information_of(COMPLETE, design_excitation(COMPLETE, **SHORT, effort=QUICK).trajectories[0], 600)
+    # Recordings in which friction was seen a thousand times better than bodies.
+    factor = still.regressor_factor.copy()
+    gram = factor.T @ factor
+    friction = COMPLETE.place(COMPLETE.terms[1])
+    gram[friction, friction] *= 1e6
+    known = Information(np.pad(np.linalg.cholesky(gram).T, ((0, 1), (0, 1))), 600.0)
+    bodies = block_of(COMPLETE, ["rigid_body"])
+    made = {}
+    for name, prior in (("alone", None), ("after", known)):
+        made[name] = design_excitation(COMPLETE, **SHORT, prior=prior, effort=Effort(2, 1, processes=1))
+    together = {
+        name: gram + each.information.regressor_factor.T @ each.information.regressor_factor
+        for name, each in made.items()
+    }
+    assert bodies.cost(together["after"])[0] < bodies.cost(together["alone"])[0]
+    assert made["after"].total.log_det() == pytest.approx(np.linalg.slogdet(together["after"])[1], abs=1e-6)
+    assert np.linalg.slogdet(together["after"])[1] > np.linalg.slogdet(together["alone"])[1]
+
+
+def test_trajectories_designed_together_share_the_work():
+    two = design_excitation(COMPLETE, **SHORT, trajectories=2, effort=QUICK)
+    assert [each.name for each in two.trajectories] == ["excitation-a", "excitation-b"]
+    parts = [information_of(COMPLETE, each, 600) for each in two.trajectories]
+    assert two.log_det == pytest.approx(
+        np.linalg.slogdet(sum(p.regressor_factor.T @ p.regressor_factor for p in parts))[1], abs=1e-6
+    )
+    # Twice the same trajectory would give 15 ln 2.
+    assert two.log_det > max(p.log_det() for p in parts) + 15.0 * np.log(2.0)
+
+
+def test_noise_of_the_torques_weights_the_rows(short):
+    std = np.array([0.04, 0.012])
+    made = design_excitation(COMPLETE, **SHORT, torque_std=std, effort=QUICK)
+    h = COMPLETE.regressor(made.trajectories[0].motion(600)) / std[:, None, None]
+    stacked = h.transpose(2, 0, 1).reshape(-1, 15)
+    assert made.log_det == pytest.approx(np.linalg.slogdet(stacked.T @ stacked)[1], abs=1e-6)
+    np.testing.assert_allclose(made.std(), np.sqrt(np.diag(np.linalg.inv(stacked.T @ stacked))), rtol=1e-6)
+
+
+@pytest.mark.parametrize("arm", ["ur5", "panda"])
+def test_arms_of_six_and_seven_joints_are_excited_within_their_limits(arm):
+    robot = panda() if arm == "panda" else load_robot(example_urdf("ur5_joint_limited_robot.urdf"))
+    model = rigid_model(robot)
+    limits = limits_of(robot, floor=0.05)
+    made = design_excitation(
+        model, duration=10.0, harmonics=6, samples=500, criterion=Condition(), limits=limits, effort=QUICK
+    )
+    assert np.sqrt(made.condition) < 100.0
+    assert all(each.kept for each in made.reached)
+    assert max(shares(made.trajectories[0], limits, robot, 2001).values()) <= 1.0
+
+
+def test_splines_do_as_harmonics_do():
+    made = design_excitation(COMPLETE, **SHORT, family="spline", effort=QUICK)
+    assert all(each.kept for each in made.reached)
+    _, v, a = made.trajectories[0].at(np.array([0.0, 6.0]))
+    assert np.max(np.abs(v)) < 1e-12 and np.max(np.abs(a)) < 1e-10
+
+
+def test_the_start_can_be_given():
+    start = np.array([1.0, -0.5])
+    made = design_excitation(COMPLETE, **SHORT, start=start, effort=QUICK)
+    q, v, _ = made.trajectories[0].at(np.array([0.0, 6.0]))
+    np.testing.assert_allclose(q, np.column_stack([start, start]), atol=1e-12)
+    assert np.max(np.abs(v)) < 1e-12
+
+
+def test_a_start_outside_the_limits_is_said():
+    with pytest.raises(InfeasibleLimits, match=r"start: joint2 = 2\.5 lies outside its range -2\.18166\.\.2\.18166"):
+        design_excitation(COMPLETE, start=np.array([0.0, 2.5]))
+    with pytest.raises(InfeasibleLimits, match="joint2 stands at the end of its range"):
+        design_excitation(COMPLETE, start=np.array([0.0, 2.18]))
+    with pytest.raises(UsageError, match="expected 2 positions"):
+        design_excitation(COMPLETE, start=np.zeros(3))
+
+
+def test_limits_that_cannot_hold_the_arm_are_said(tmp_path):
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
+    model = build_model(robot, "basic")
+    hanging = design_excitation(model, duration=4.0, harmonics=5, limits=limits_of(robot), effort=QUICK)
+    assert all(each.kept for each in hanging.reached)
+    low = limits_of(robot, ranges={"j1": (-0.5, 0.5), "j2": (-0.5, 0.5)}, torques={"j1": 3.0})
+    with pytest.raises(InfeasibleLimits, match=r"j1 needs .* of 3 N m to hold the arm; allow j1 more torque"):
+        design_excitation(model, limits=low)
+    with pytest.raises(InfeasibleLimits, match="height is .* where the floor is at 2 m"):
+        design_excitation(COMPLETE, limits=limits_of(SCARA, floor=2.0))
+
+
+def test_a_joint_without_limits_is_said(tmp_path):
+    urdf = write_urdf(tmp_path / "arm.urdf", [Link(kind="continuous"), Link(xyz=(0.3, 0.0, 0.0))])
+    with pytest.raises(RobotError, match="joint 'j1' has no position limits.*range for j1"):
+        design_excitation(build_model(load_robot(urdf)))
+    given = limits_of(load_robot(urdf), ranges={"j1": (-3.0, 3.0)})
+    assert given.upper[0] == 3.0
+    urdf.write_text(urdf.read_text().replace(' velocity="4"', ' velocity="0"'))
+    with pytest.raises(RobotError, match="joint 'j1' has no velocity limit"):
+        limits_of(load_robot(urdf), ranges={"j1": (-3.0, 3.0)})
+
+
+def test_parameters_that_no_motion_tells_apart_are_said():
+    robot = scara_with_quill()
+    with pytest.raises(InfeasibleLimits, match="no motion can tell m3, Ia3, p_o3 apart"):
+        design_excitation(build_model(robot), duration=6.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"ranges": {"joint9": (0.0, 1.0)}}, "'joint9': the robot has no such joint; its joints: joint1, joint2"),
+        ({"ranges": {"joint1": (1.0, 1.0)}}, "range of joint1"),
+        ({"velocities": {"joint1": 0.0}}, "velocity limit of joint1"),
+        ({"tool_acceleration": -1.0}, "tool acceleration -1"),
+        ({"share": 1.5}, "share of the limits 1.5"),
+    ],
+)
+def test_limits_that_make_no_sense_are_said(given, said):
+    with pytest.raises(UsageError, match=said):
+        limits_of(SCARA, **given)
+
+
+def test_the_scara_has_the_papers_tool_acceleration_and_other_arms_none():
+    assert limits_of(SCARA).tool_acceleration == 9.0
+    assert limits_of(SCARA, tool_acceleration=np.inf).tool is None
+    assert limits_of(panda()).tool_acceleration == np.inf
+    half = limits_of(SCARA, share=0.5)
+    np.testing.assert_allclose(half.velocity, 0.5 * SCARA.velocity_limit)
+    np.testing.assert_allclose(half.centre, limits_of(SCARA).centre)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"trajectories": 0}, "trajectories 0"),
+        ({"samples": 1}, "samples 1"),
+        ({"duration": -3.0}, "duration -3"),
+        ({"torque_std": np.array([1.0, 0.0])}, "torque noise: expected 2 positive"),
+        ({"prior": Information.empty(3)}, "about 3 parameters, the model complete has 15"),
+        ({"known": {"a99": 1.0}}, "parameter 'a99'"),
+    ],
+)
+def test_arguments_that_do_not_fit_are_said(given, said):
+    with pytest.raises(UsageError, match=said):
+        design_excitation(COMPLETE, **given)
+
+
+def test_harmonics_are_fewer_for_more_joints():
+    assert default_harmonics(25.0, 2) == 40
+    assert default_harmonics(25.0, 6) == 13
+    assert default_harmonics(1.0, 2) == 5
+
+
+def test_ojd_breaks_the_limits_that_the_design_keeps():
+    assert criteria(regressor(*OJD.motion(OJD.times())))[0] == pytest.approx(75.5, abs=0.1)
+    assert np.max(tool_acceleration(*OJD.motion(OJD.times()))) > 13.0
