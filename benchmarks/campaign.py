@@ -30,6 +30,7 @@ from campaign_tables import (
     conclusions,
     distances,
     drawn_tables,
+    in_scan,
     printed,
     sigma_of,
 )
@@ -221,7 +222,7 @@ def campaign(
     *,
     bands: Sequence[float | None] | None = None,
     seed: int = 0,
-) -> dict[str, Comparison | Array]:
+) -> dict[str, Any]:
     """Run `compare` on noisy repetitions; "complete ols" and so on, and ``... errors`` of the unfiltered torque."""
     recordings = repetitions(arm, names, effects, count, noisy=True, seed=seed)
     found: dict[str, Any] = {}
@@ -273,15 +274,15 @@ def report(
     content: dict[str, Any] = {"trajectories": list(names), "chosen": chosen, "printed": paper.as_dict()}
     print("Distance from the printed tables: rms of log10(virtual / printed) over the cells of Tables 2 and 4")
     print(
-        f"{'effect':34}{'times':>6}{'both':>7}{'5-95 %':>14}{'T2':>6}{'T4':>6}{'j1':>6}{'j2':>6}{'T5':>7}{'/sqrt6':>8}{'nearer':>8}"
+        f"{'effect':34}{'times':>6}{'both':>7}{'5-95 %':>14}{'T2':>6}{'T4':>6}{'j1':>6}{'j2':>6}{'own':>6}{'other':>6}{'T5':>7}{'/sqrt6':>8}{'nearer':>8}{'farther':>8}"
     )
     for item in scenes:
         one, mean = item["one_run"], item["mean_of_six"]
         d = one["distance"]
         print(
             f"{item['name']:34}{item['factor']:6.2f}{d['both']:7.3f}{one['range'][0]:7.3f}{one['range'][1]:7.3f}"
-            f"{d['table2']:6.2f}{d['table4']:6.2f}{d['joint1']:6.2f}{d['joint2']:6.2f}{d['table5']:7.2f}"
-            f"{mean['distance']['both']:8.3f}{one['nearer_than_none']:8.0%}"
+            f"{d['table2']:6.2f}{d['table4']:6.2f}{d['joint1']:6.2f}{d['joint2']:6.2f}{d['own']:6.2f}{d['others']:6.2f}{d['table5']:7.2f}"
+            f"{mean['distance']['both']:8.3f}{one['nearer_than_none']:8.0%}{one['farther_than_nearest']:8.0%}"
         )
     content["scan"] = scenes
     columns = {"printed": paper} | {key: campaign_tables(found) for key, found in runs.items()}
@@ -305,6 +306,10 @@ def report(
         content["conclusions"][key] = [item.__dict__ for item in found]
         for item in found:
             print(f"  {'holds' if item.holds else 'FAILS':6} {item.name}: {item.figures}")
+    content["holds_in_scan"] = in_scan(scenes, names)
+    print(f"in how many of {len(content['holds_in_scan']['scenes'])} effects of the scan, each at its nearest size:")
+    for name, count in content["holds_in_scan"]["counts"].items():
+        print(f"  {count:3d}  {name}")
     content["campaigns"] = {}
     for key, found in runs.items():
         errors, free = found["complete consistent errors"], found["complete ols errors"]
@@ -326,6 +331,15 @@ def report(
         }
         print("distance", {k: round(v, 3) for k, v in content["campaigns"][key]["distance"].items()})
     return content
+
+
+def rounded(value: Any) -> Any:
+    """Return the same with five significant digits, which is more than noise leaves."""
+    if isinstance(value, dict):
+        return {key: rounded(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [rounded(item) for item in value]
+    return float(f"{value:.5g}") if isinstance(value, float) else value
 
 
 def run(
@@ -376,7 +390,7 @@ def main() -> None:
         seed=options.seed,
     )
     options.output.parent.mkdir(parents=True, exist_ok=True)
-    options.output.write_text(json.dumps(content) + "\n", encoding="utf-8")
+    options.output.write_text(json.dumps(rounded(content)) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

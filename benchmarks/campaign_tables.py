@@ -124,8 +124,8 @@ def drawn_tables(evidence: Sequence[Evidence], sigma: Array, draws: Array) -> Ta
 def distances(tables: Tables, paper: Tables) -> dict[str, Array]:
     """Return how far tables are from the printed ones, per draw.
 
-    ``table2``, ``table4`` and both together: rms of log10(virtual / printed) over the cells; ``joint1``, ``joint2``
-    likewise. ``table5``: rms of the difference in what trajectories disagree about, each parameter's departure from
+    ``table2``, ``table4`` and both together: rms of log10(virtual / printed) over the cells; ``joint1``, ``joint2``,
+    ``own`` (trajectories predicted with their own parameters) and ``others`` likewise. ``table5``: rms of the difference in what trajectories disagree about, each parameter's departure from
     its OJD value, as a share of the printed departure: 0 is the same, 1 is what no disagreement at all would give.
     """
     logs = np.stack([np.log10(tables.complete / paper.complete), np.log10(tables.reduced / paper.reduced)], axis=-1)
@@ -133,6 +133,8 @@ def distances(tables: Tables, paper: Tables) -> dict[str, Array]:
     def rms(values: Array) -> Array:
         return np.asarray(np.sqrt(np.mean(values**2, axis=(-4, -3, -2, -1))))
 
+    own = np.eye(logs.shape[-3], dtype=bool)
+    split = [np.sqrt(np.mean(logs[..., chosen, :, :] ** 2, axis=(-3, -2, -1))) for chosen in (own, ~own)]
     apart = [t.parameters[..., :-1] - t.parameters[..., -1:] for t in (tables, paper)]
     scale = np.sqrt(np.mean(apart[1] ** 2, axis=-1, keepdims=True))
     return {
@@ -141,6 +143,8 @@ def distances(tables: Tables, paper: Tables) -> dict[str, Array]:
         "table4": rms(logs[..., 1:]),
         "joint1": rms(logs[..., :1, :]),
         "joint2": rms(logs[..., 1:, :]),
+        "own": split[0],
+        "others": split[1],
         "table5": np.sqrt(np.mean(((apart[0] - apart[1]) / scale) ** 2, axis=(-2, -1))),
     }
 
@@ -222,6 +226,20 @@ def conclusions(tables: Tables, names: Sequence[str]) -> list[Conclusion]:
         )
     )
     return found
+
+
+def in_scan(scenes: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[str, Any]:
+    """Count in how many effects, each at the size nearest to the printed tables, the conclusions hold."""
+    nearest: dict[str, dict[str, Any]] = {}
+    for item in scenes:
+        nearest.setdefault(item["name"], item)
+    nearest.pop("none")
+    counts: dict[str, int] = {}
+    for item in nearest.values():
+        tables = Tables(**{key: np.array(value) for key, value in item["one_run"]["tables"].items()})
+        for found in conclusions(tables, names):
+            counts[found.name] = counts.get(found.name, 0) + found.holds
+    return {"scenes": list(nearest), "counts": counts}
 
 
 def rank_correlation(x: Array, y: Array, expected: float) -> tuple[float, float]:

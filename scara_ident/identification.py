@@ -17,6 +17,7 @@ from scara_ident.estimators import Estimate, History, JointError, ols, rls, wls
 from scara_ident.estimators.consistent import ConsistentEstimate, consistent, possibility
 from scara_ident.estimators.estimate import paper_criteria, pooled_information
 from scara_ident.evidence import Evidence, gather_all
+from scara_ident.information import Information, merge
 from scara_ident.model import ModelName, TorqueModel, build_model
 from scara_ident.motion import stretches
 from scara_ident.recording import Recording
@@ -160,6 +161,25 @@ def identified_arm(identification: Identification) -> ConsistentEstimate | None:
     if not identification.possibility.possible:
         return None
     return consistent(identification.model, identification.training)
+
+
+def known_information(model: TorqueModel, recordings: Sequence[Recording], rate: float) -> Information:
+    """Return what recordings already say of a model, as if sampled at ``rate`` per second.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    recordings : sequence of Recording
+    rate : float
+        Samples per second that the design they are to be joined with counts.
+    """
+    evidence = gather_all(model, recordings, choose_bands(model, recordings).bands)
+    sampled = [
+        item.joint(j).scaled(float(np.sqrt(rate / recording.rate)))
+        for item, recording in zip(evidence, recordings, strict=True)
+        for j in range(model.robot.n)
+    ]
+    return merge(sampled)
 
 
 def _check_bands(robot: Robot, bands: Sequence[float | None]) -> None:

@@ -35,7 +35,7 @@ def compare(
     from scara_ident.comparison import compare as run
     from scara_ident.recording import read_recordings
     from scara_ident.report.comparison import comparison_dict
-    from scara_ident.report.files import check_output, write_json
+    from scara_ident.report.files import check_output, write_json, written_together
     from scara_ident.robot import load_robot
 
     check_output(output)
@@ -76,5 +76,10 @@ def compare(
     for sentence in content["summary"]:
         console.print(sentence, markup=False)
     if output is not None:
-        write_json(output / "comparison.json", content)
-        console.print(f"written: {output / 'comparison.json'}", markup=False, soft_wrap=True)
+        from scara_ident.report.html import comparison_report
+
+        with written_together(output) as place:
+            comparison_report(place / "report.html", content)
+            write_json(place / "comparison.json", content)
+        written = ", ".join(str(output / name) for name in ("comparison.json", "report.html"))
+        console.print(f"written: {written}", markup=False, soft_wrap=True)

@@ -67,10 +67,14 @@ def diagnose(
         rows.add_row(row["label"], f"{row['gain']:.1%}", f"{row['p_value']:.0e}", row["why"])
     console.print(rows)
     if output is not None:
+        from scara_ident.report.html import diagnosis_report
+
         with written_together(output) as place:
             write_text(place / "diagnosis.md", diagnosis_markdown(result))
+            diagnosis_report(place / "report.html", result, training, held_out)
             write_json(place / "diagnosis.json", content)
-        console.print(f"written: {output / 'diagnosis.json'}, {output / 'diagnosis.md'}", markup=False, soft_wrap=True)
+        written = ", ".join(str(output / name) for name in ("diagnosis.json", "diagnosis.md", "report.html"))
+        console.print(f"written: {written}", markup=False, soft_wrap=True)
 
 
 def _number(value: float | None) -> str:

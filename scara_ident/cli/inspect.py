@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 # Of columns that are no channels so many are shown on a terminal; --json has them all.
 OTHERS_SHOWN = 20
-# Of longer names the rest goes into the next line, so that the other columns keep room.
+# Longer names go on in the next line, so that the other columns keep room.
 LONGEST_NAME = 40
 
 
@@ -88,8 +88,10 @@ def _show(console: Console, found: Inspection, written: Path | None) -> None:
     from scara_ident.audit.samples import several
 
     rows = table(str(found.path), "column", "samples", "range", "taken for", right=("samples",))
-    # Names are copied into robot.yaml: the other columns fold first.
-    rows.columns[0].min_width = min(max((len(column.name) for column in found.columns), default=0), LONGEST_NAME)
+    # Only the last column folds, so that names can be copied into robot.yaml.
+    whole = max((len(column.name) for column in found.columns), default=0) <= LONGEST_NAME
+    for place, keep in enumerate((whole, True, True)):
+        rows.columns[place].no_wrap = keep
     others = 0
     for column in found.columns:
         others += not column.channel

@@ -12,7 +12,9 @@ import typer
 from scara_ident.cli.base import base
 from scara_ident.cli.compare import compare
 from scara_ident.cli.console import errors_console
+from scara_ident.cli.demo import demo
 from scara_ident.cli.diagnose import diagnose
+from scara_ident.cli.excite import excite
 from scara_ident.cli.identify import identify
 from scara_ident.cli.inspect import inspect
 from scara_ident.cli.paper import paper
@@ -49,7 +51,7 @@ def program(
     """Identify the dynamic model of a robot arm from measured motion, and find what the model lacks."""
 
 
-_COMMANDS: tuple[Callable[..., Any], ...] = (identify, diagnose, compare, simulate, inspect, base, paper)
+_COMMANDS: tuple[Callable[..., Any], ...] = (identify, diagnose, compare, excite, simulate, inspect, base, paper, demo)
 for _command in _COMMANDS:
     app.command()(_command)
 

@@ -60,10 +60,10 @@ class ConsistentOptions:
     noise : ndarray, shape (n,), optional
         Standard deviation of each joint's torque; by default its residual in ordinary least squares.
     prior_weight : float
-        Weight of the nominal bodies against the data, where one is a change of a body by its own size against one
-        standard deviation of the torque's noise. The default of 0.01 pulls a direction that the data determine
-        better than to the body's own size by less than a tenth of its standard deviation as long as the nominal
-        body is not wrong by more than ten times; where plain least squares is possible it does not pull at all.
+        Weight of the nominal bodies against the data where plain least squares is impossible: a change of a body by
+        its own size against one standard deviation of the noise. The default of 0.01 moves no direction that the
+        data determine by as much as a tenth of its standard deviation, however wrong the URDF is, see
+        `scara_ident.consistency.pull`.
     """
 
     friction: FrictionShape = "dissipative"

@@ -21,9 +21,9 @@ Array = NDArray[np.float64]
 
 # Times of the limits per period of the highest frequency, in the search and for the winner.
 COARSE, FINE = 12, 48
-LEAST_TIMES = 120
-# Times of the verification per time of the winner's limits.
-FINER = 10
+LEAST_TIMES = 60
+# Times of the verification per time of the winner's limits, and at least per second.
+FINER, LEAST_RATE = 10, 1000.0
 # Bounds of the search and of the winner, as shares, and what a bound is tightened by besides its excess.
 BOUND, EXACT, MARGIN = 0.999, 1.0 - 1e-6, 2e-4
 # Size of changes of a good motion, as shares of it.
@@ -171,9 +171,9 @@ def _random_motion(task: Task, random: np.random.Generator) -> Array:
 def _finish(task: Task, x: Array) -> tuple[Array, int]:
     """Take a motion to a fine grid, and tighten bounds until it keeps its limits between the samples as well."""
     bounds = np.full(_rows(task), EXACT)
-    plan = Schedule(first=2.0, last=2e-3, tolerance=5e-3, steps=300)
+    plan = Schedule(first=2.0, last=2e-3, tolerance=1e-2, steps=300)
     problem = _problem(task, FINE, FINE // COARSE, bounds)
-    times = FINER * problem.rows.shape[1] + 1
+    times = max(FINER * problem.rows.shape[1], int(np.ceil(LEAST_RATE * task.basis.duration))) + 1
     for _ in range(CORRECTIONS):
         start = shrunk_inside(problem.sharpened(plan.sharpness), x, room=1e-3, factor=0.998)
         if start is None:
@@ -184,7 +184,7 @@ def _finish(task: Task, x: Array) -> tuple[Array, int]:
             return x, times
         bounds = bounds * np.where(excess > 1.0, (1.0 - MARGIN) / excess, 1.0)
         problem = _problem(task, FINE, FINE // COARSE, bounds)
-        plan = Schedule(first=0.5, last=2e-3, tolerance=5e-3, steps=150, sharpness=1.0)
+        plan = Schedule(first=0.5, last=2e-3, tolerance=1e-2, steps=150, sharpness=1.0)
     while np.any(_excess(task, x, times) > 1.0):
         x = 0.999 * x
     return x, times

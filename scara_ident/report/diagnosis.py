@@ -184,9 +184,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     for effect in diagnosis.effects:
         where = f" on {effect.joint}" if effect.joint else ""
         values = ", ".join(
-            f"{name} {parameter.value:.3g} ± {parameter.std:.1g} {parameter.unit}".rstrip(" 1")
-            if parameter.unit == "1"
-            else f"{name} {parameter.value:.3g} ± {parameter.std:.1g} {parameter.unit}"
+            f"{name} {parameter.value:.3g} ± {parameter.std:.1g}{'' if parameter.unit == '1' else ' ' + parameter.unit}"
             for name, parameter in effect.parameters.items()
         )
         found.append(f"Found {effect.effect}{where}: {effect.description}; {values}.")

@@ -13,7 +13,8 @@ import pytest
 
 from scara_ident.base_parameters import find_base_parameters
 from scara_ident.cli.main import app
-from scara_ident.diagnosis import confounding, decision, examination, search
+from scara_ident.diagnosis import confounding, decision, examination
+from scara_ident.diagnosis.search import MOST_EFFECTS
 from scara_ident.effects import CATALOGUE
 from scara_ident.effects.aliases import OPENED_BY
 from scara_ident.indri2002 import OJD, OJK
@@ -86,11 +87,10 @@ def test_the_tutorial_finds_what_it_hid(reader: Path) -> None:
         base.grouping @ robot.standard_parameters()
         for robot in (names["robot"], load_robot(reader / "identified.yaml"), load_robot())
     )
-    determined = np.array([0, 1, 3, 4])
-    assert np.all(np.abs(identified - true)[determined] < 0.05 * true[determined])
-    assert np.linalg.norm(((identified - true) / true)[determined]) < 0.5 * np.linalg.norm(
-        ((mine - true) / true)[determined]
-    )
+    # All but my2, which is zero.
+    mine, identified = ((values - true)[[0, 1, 3, 4]] / true[[0, 1, 3, 4]] for values in (mine, identified))
+    assert np.all(np.abs(identified) < 0.05)
+    assert np.linalg.norm(identified) < 0.5 * np.linalg.norm(mine)
 
 
 def test_a_users_own_effect_takes_under_20_lines_and_is_found(reader: Path) -> None:
@@ -112,7 +112,7 @@ def test_a_known_payload_gives_the_torque_constant(reader: Path) -> None:
 def test_what_the_readme_says_to_type_runs(reader: Path) -> None:
     # The reader's own arm and recordings, by the names that the README gives them.
     shutil.copy(embedded_urdf(), reader / "my_arm.urdf")
-    (description,) = (block.text for block in blocks(README) if block.language == "yaml")
+    description = next(block.text for block in blocks(README) if block.language == "yaml")
     (reader / "robot.yaml").write_text(description, encoding="utf-8")
     arm = virtual_arm(load_robot(reader / "robot.yaml"))
     for folder, name, motion, repetitions in (
@@ -123,8 +123,8 @@ def test_what_the_readme_says_to_type_runs(reader: Path) -> None:
         for repetition in repetitions:
             recording = simulate(arm, path, rate=250.0, repetition=repetition).recording
             write_recording(recording, reader / folder / f"{recording.name}.parquet")
-    names = run(README, reader)
-    assert "result" in names or any(block.language == "bash" for block in blocks(README))
+    assert any(block.language in ("bash", "python") for block in blocks(README))
+    run(README, reader)
 
 
 def test_a_block_that_fails_is_a_failure(tmp_path: Path) -> None:
@@ -154,7 +154,7 @@ def test_the_diagnosis_page_lists_every_alias_and_the_limits_of_the_program() ->
         f"| significant | p times candidates tried below {100 * decision.FAMILY_ERROR:g} % |",
         f"| gain on data not fitted to | at least {100 * decision.LEAST_GAIN:g} % ",
         f"| helps in | at least {100 * decision.LEAST_VOTES:g} % ",
-        f"At most {search.MOST_EFFECTS} effects",
+        f"At most {MOST_EFFECTS} effects",
         f"at least {100 * confounding.LEAST_SHARE:g} % of what it removes",
     ):
         assert said in " ".join(page.split()), said

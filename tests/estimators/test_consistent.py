@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -22,6 +23,8 @@ from scara_ident.model import TorqueModel, build_model
 from scara_ident.motion import Motion
 from scara_ident.recording import read_recording
 from scara_ident.robot import Robot, load_robot
+from scara_ident.terms import Column
+from scara_ident.threads import one_blas_thread
 from tests.arms import motion, sines
 from tests.consistency.arms import heavier, panda, parameters, ur5
 from tests.evidence import evidence
@@ -53,6 +56,7 @@ def stroke(robot: Robot, speed: float = 0.65) -> Motion:
     return motion(q, v, a, rate=400.0)
 
 
+@one_blas_thread()
 def observed(model: TorqueModel, item: Motion, value: Array, noise: float, seed: int = 0) -> Evidence:
     w = model.regressor(item).transpose(0, 2, 1)
     u = np.einsum("jnp,p->jn", w, value)
@@ -300,6 +304,38 @@ def test_a_slow_stroke_predicts_fast_motion():
     assert np.max(shaped) < 0.12
 
 
+@dataclass(frozen=True, eq=False)
+class Spring:
+    """A further term that declares no more than that its parameter cannot be negative."""
+
+    robot: Robot
+    name: str = "spring"
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        return (Column("stiffness", self.robot.joints[0], "N m/rad", "spring", nonnegative=True),)
+
+    @property
+    def pattern(self) -> NDArray[np.bool_]:
+        return np.array([[True], [False]])
+
+    def regressor(self, item: Motion) -> Array:
+        return np.stack([item.q[:1], 0.0 * item.q[:1]])
+
+
+def test_a_further_term_keeps_the_signs_that_it_declares():
+    plain = scara("basic")
+    model = replace(plain, name="with spring", terms=(*plain.terms, Spring(plain.robot)))
+    for stiffness in (0.05, -0.05):
+        value = np.append(truth(plain), stiffness)
+        item = observed(model, moving(model.robot), value, 0.02)
+        found = consistent(model, [item])
+        assert found.was_possible == (stiffness > 0.0)
+        assert found.value[-1] == pytest.approx(max(stiffness, 0.0), abs=3.0 * ols(model, [item]).std[-1] + 1e-6)
+        assert ("stiffness" in found.active) == (stiffness < 0.0)
+    assert "stiffness = spring = -0.0" in possibility(ols(model, [item])).reasons[0]
+
+
 def test_free_friction_is_left_alone():
     model = scara()
     item = observed(model, stroke(model.robot), truth(model), 0.05, seed=3)
@@ -317,6 +353,7 @@ def test_a_velocity_limit_can_be_given():
     assert not any("friction" in text for text in found.active)
 
 
+@one_blas_thread()
 @pytest.mark.parametrize("arm", [ur5, panda], ids=["ur5", "panda"])
 def test_larger_arms_stay_possible_however_poor_the_data(arm):
     model = build_model(arm(), "basic")
@@ -352,6 +389,7 @@ def test_slow_stroke_of_the_cases_predicts_the_paper_trajectory():
     assert error(consistent(model, [seen], options=ConsistentOptions(friction="lubricated"))) < 0.12
 
 
+@one_blas_thread()
 def test_ur10e_measured_is_possible_and_predicts_as_well():
     robot = load_robot(shared_path("data", "ur10e", "robot.yaml"))
     model = build_model(robot, "basic")
