@@ -329,6 +329,7 @@ def report(
             "sigma": [item.sigma.tolist() for item in found["complete ols"].trajectories if item.sigma is not None],
             "distance": {k: float(v) for k, v in distances(columns[key], paper).items()},
         }
+        print(f"sigma {np.round(content['campaigns'][key]['sigma'], 3).tolist()}")
         print("distance", {k: round(v, 3) for k, v in content["campaigns"][key]["distance"].items()})
     return content
 

@@ -105,6 +105,6 @@ def test_a_tiny_campaign_runs_and_a_strong_effect_changes_the_tables(campaign: M
     without, delayed = (np.array(run["complete"]) for run in content["campaigns"].values())
     # L2's parameters from a torque 12 ms early predict L1 worse.
     assert delayed[1, 0, 0] > 2.0 * without[1, 0, 0]
-    # On their own trajectory OLS parameters leave Table 1's noise and hardly more.
-    own = np.diagonal(without).T
-    assert own == pytest.approx(campaign.sigma_of(names), rel=0.15)
+    # On their own trajectory OLS parameters leave Table 1's noise and the little that encoder steps stir up in the loop.
+    share = np.diagonal(without).T / campaign.sigma_of(names)
+    assert np.all((share > 0.97) & (share < 1.15))
