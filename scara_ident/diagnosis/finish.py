@@ -59,9 +59,11 @@ def physical_parameters(
         own = _shifted(places[i], base)
         parameters = dict(candidate.effect.parameters(scene, candidate.member, value[own], covariance[own, own]))
         for position, (owner, k) in enumerate(steps):
+            if owner != i:
+                continue
             knob = candidate.effect.knobs[k]
             # An underscore marks a parameter that only serves the shape of the columns.
-            if owner == i and not knob.name.startswith("_"):
+            if not knob.name.startswith("_"):
                 variance = covariance[len(linear) + position, len(linear) + position]
                 parameters[knob.name] = Parameter(
                     candidate.member.knobs[k], float(np.sqrt(max(variance, 0.0))), knob.unit
