@@ -124,7 +124,9 @@ def pick_effects(kind: str, arm, rng: np.random.Generator):
             value = factor * getattr(effect, key)
             effect = replace(effect, **{key: min(value, 0.9) if key in ("share", "loss_coefficient") else value})
         else:
-            effect = replace(effect, **{k: factor * getattr(effect, k) for k in ("amplitude", "viscous") if hasattr(effect, k)})
+            effect = replace(
+                effect, **{k: factor * getattr(effect, k) for k in ("amplitude", "viscous") if hasattr(effect, k)}
+            )
         if name == "payload_change":
             effect = replace(effect, time=float(rng.uniform(3.0, 7.0)))
         if name == "torque_ripple":
@@ -143,7 +145,12 @@ def one_set(task: tuple[str, int]) -> dict:
     effects, factors = pick_effects(kind, arm, rng)
     ojd = sampled("OJD", robot, OJD.motion, 14.0)
     ojk = sampled("OJK", robot, OJK.motion, 10.0)
-    training_motions = [ojd, ojk, multisine("F1", robot, seed + 10_000, 8.0), multisine("F2", robot, seed + 20_000, 12.0)]
+    training_motions = [
+        ojd,
+        ojk,
+        multisine("F1", robot, seed + 10_000, 8.0),
+        multisine("F2", robot, seed + 20_000, 12.0),
+    ]
     test_motion = multisine("F3", robot, seed + 30_000, 10.0)
     training = [
         simulate(arm, motion, effects=effects, seed=seed, repetition=k).recording
@@ -255,9 +262,15 @@ def report(results: list[dict]) -> None:
     if unlisted:
         honest = np.mean([item["verdict"] == "unexplained" and not item["found"] for item in unlisted])
         print(f"effects outside the catalogue called unexplained: {honest:.1%} of {len(unlisted)}")
-    ratios = [max(a / b for a, b in zip(i["after"], i["true_model"], strict=True)) for i in above if right(i) and i["true_model"]]
+    ratios = [
+        max(a / b for a, b in zip(i["after"], i["true_model"], strict=True))
+        for i in above
+        if right(i) and i["true_model"]
+    ]
     if ratios:
-        print(f"held-out error after, to that of the true model: median {np.median(ratios):.3f}, 95 % {np.quantile(ratios, 0.95):.3f}")
+        print(
+            f"held-out error after, to that of the true model: median {np.median(ratios):.3f}, 95 % {np.quantile(ratios, 0.95):.3f}"
+        )
 
 
 def detection_limit(items: list[dict]) -> float:
@@ -286,7 +299,10 @@ def main() -> None:
             found = ", ".join(f"{f['effect']}/{f['joint']}" for f in item["found"])
             true = ", ".join(f"{t['effect']}/{t['joint']}" for t in item["true"])
             factors = np.round(item["factors"], 2)
-            print(f"{k + 1:4d} {true or '-'} {factors} -> {item['verdict']} {found or '-'} {item['seconds']:.1f} s", flush=True)
+            print(
+                f"{k + 1:4d} {true or '-'} {factors} -> {item['verdict']} {found or '-'} {item['seconds']:.1f} s",
+                flush=True,
+            )
     report(results)
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     arguments.output.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.bands import choose_bands
-from scara_ident.errors import UsageError
 from scara_ident.consistency.feasibility import Possibility
 from scara_ident.consistency.options import ConsistentOptions
+from scara_ident.errors import UsageError
 from scara_ident.estimators import Estimate, History, JointError, ols, rls, wls
 from scara_ident.estimators.consistent import ConsistentEstimate, consistent, possibility
 from scara_ident.estimators.estimate import paper_criteria, pooled_information

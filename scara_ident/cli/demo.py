@@ -17,7 +17,7 @@ def demo(
     output: Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")] = Path(
         "demo-output"
     ),
-    seed: Annotated[int, typer.Option(help="Of noise and random starts.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of noise and random starts.")] = 1,
 ) -> None:
     """Run the whole story on the embedded arm: design, record, identify, compare, diagnose, report."""
     from scara_ident.cli.base import base

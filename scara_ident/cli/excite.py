@@ -18,16 +18,16 @@ def excite(
     criterion: Annotated[
         Literal["logdet", "cond"], typer.Option(help="ln det or the condition of the stacked regressor.")
     ] = "logdet",
-    duration: Annotated[float, typer.Option(min=1.0, help="Of each trajectory, s.")] = 25.0,
-    harmonics: Annotated[int | None, typer.Option(min=2, help="Per joint; default: by the duration.")] = None,
+    duration: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Of each trajectory, s.")] = 25.0,
+    harmonics: Annotated[int | None, typer.Option(min=3, help="Per joint; default: by the duration.")] = None,
     trajectories: Annotated[int, typer.Option(min=1, help="How many are designed together.")] = 1,
     known: Annotated[
         list[str] | None,
         typer.Option("--known", metavar="RECORDING", help="Recordings at hand: the design fills what they lack."),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random starts.")] = 0,
     starts: Annotated[int, typer.Option(min=1, help="Random starts; more take longer and may find better.")] = 8,
-    rate: Annotated[float, typer.Option(min=1.0, help="Samples per second of trajectory.csv.")] = 1000.0,
+    rate: Annotated[float, typer.Option(min=1.0, max=1e5, help="Samples per second of trajectory.csv.")] = 1000.0,
     output: Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")] = Path("."),
     json: JsonOption = False,
 ) -> None:

@@ -172,7 +172,9 @@ class Programme:
         problem = self.problem
         self._root.value = root[np.triu_indices(root.shape[0])]
         self._centre.value = centre
-        data = problem.get_problem_data(cp.CLARABEL)[0]
+        # Quick for parameters by the hundred; releases of cvxpy without it choose for themselves.
+        backend = getattr(cp.settings, "COO_CANON_BACKEND", None)
+        data = problem.get_problem_data(cp.CLARABEL, canon_backend=backend)[0]
         result = self._attempt(data, _FAST)
         if not self._is_good(result, strict=True):
             result = self._attempt(data, _CAREFUL)

@@ -25,7 +25,7 @@ LEAST_TIMES = 60
 # Times of the verification per time of the winner's limits, and at least per second.
 FINER, LEAST_RATE = 10, 1000.0
 # Bounds of the search and of the winner, as shares, and what a bound is tightened by besides its excess.
-BOUND, EXACT, MARGIN = 0.999, 1.0 - 1e-6, 2e-4
+BOUND, EXACT, MARGIN = 0.999, 1.0 - 1e-6, 5e-4
 # Size of changes of a good motion, as shares of it.
 CHANGES = (0.1, 0.2, 0.3)
 ELITE = 3

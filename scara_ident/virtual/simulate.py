@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -139,7 +140,8 @@ def simulate(
     resolved, draft = _prepare(arm, effects)
     wanted = _at_rate(arm, motion, rate)
     back = np.argsort(arm.robot.order)
-    random = np.random.default_rng([seed, repetition])
+    # The name takes part, so that no two trajectories share their noise.
+    random = np.random.default_rng([seed, repetition, zlib.crc32(motion.name.encode())])
     draft.sensors["shift"] = random.uniform(size=arm.robot.n)[back]
     start = _torque_at_start(arm, wanted)
     feed = np.zeros((len(wanted.time), arm.robot.n))

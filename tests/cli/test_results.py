@@ -243,11 +243,18 @@ def test_results_are_written_though_nobody_reads_the_output(tmp_path: Path, form
 
 @pytest.mark.parametrize(
     "words",
-    [["identify", "{runs}", "--verbose"], ["compare", "{runs}", "--verbose"], ["base"], ["paper"]],
+    [
+        ["identify", "{runs}", "--verbose"],
+        ["diagnose", "{short}", "--verbose"],
+        ["compare", "{runs}", "--verbose"],
+        ["base"],
+        ["paper"],
+    ],
     ids=lambda words: words[0],
 )
-def test_tables_fit_80_columns(command, folder: Path, words: list[str]):
-    result = command(*(word.replace("{runs}", str(folder)) for word in words))
+def test_tables_fit_80_columns(command, folder: Path, tmp_path: Path, words: list[str]):
+    short = save(tmp_path / "short_1.parquet", columns(1500))
+    result = command(*(word.replace("{runs}", str(folder)).replace("{short}", str(short)) for word in words))
     assert result.status == 0
     assert max(len(line) for line in result.out.splitlines()) <= 80
 

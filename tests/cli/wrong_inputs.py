@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -78,6 +79,8 @@ def _robots(place: Path) -> None:
     (place / "syntax.urdf").write_text(text.replace("</robot>", ""))
     (place / "root.urdf").write_text("<sdf version='1.6'></sdf>\n")
     (place / "rigid.urdf").write_text("<robot name='post'><link name='base'/></robot>\n")
+    endless = re.sub(r'lower="[^"]*" upper="[^"]*" ', "", text.replace('type="revolute"', 'type="continuous"'))
+    (place / "endless.urdf").write_text(endless)
     (place / "samename.urdf").write_text(text.replace('joint name="joint2"', 'joint name="joint1"'))
 
 

@@ -103,6 +103,7 @@ def test_weighted_least_squares_is_the_estimate_where_it_is_possible_and_asked_f
         consistent(model, [item], options=ConsistentOptions(weighting="noise", noise=np.ones(3)))
 
 
+@one_blas_thread()
 def test_an_impossible_estimate_becomes_possible_at_little_cost():
     model = build_model(ur5(), "basic")
     value = parameters(model, model.robot.standard_parameters(), (3.0, 2.0))

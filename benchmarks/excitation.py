@@ -1,0 +1,167 @@
+"""Design excitation: log det and condition reached, seconds, and every limit on a finer grid.
+
+Run ``python benchmarks/excitation.py [--study] [--output FILE.json]``. With ``--study`` also the effect of the number of
+harmonics, of splines, and of a longer search.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.metadata import distribution
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.description import JointDescription, RobotDescription
+from scara_ident.excitation import (
+    Condition,
+    Criterion,
+    Design,
+    Effort,
+    Progress,
+    design_excitation,
+    excitation_dict,
+)
+from scara_ident.indri2002 import OJD, criteria, regressor, tool_acceleration
+from scara_ident.model import TorqueModel, build_model
+from scara_ident.robot import Robot, build_robot, load_robot
+from scara_ident.terms.rigid_body import rigid_body
+
+Array = NDArray[np.float64]
+
+REPETITIONS = 500
+NOISE = 0.03
+
+
+def example(name: str) -> Path:
+    found = [file for file in distribution("example-robot-data").files or [] if str(file).endswith(f"/{name}")]
+    return Path(str(found[0].locate()))
+
+
+def arms() -> dict[str, Robot]:
+    panda = example("panda.urdf")
+    arm = {f"panda_joint{k}": JointDescription() for k in range(1, 8)}
+    return {
+        "UR5": load_robot(example("ur5_joint_limited_robot.urdf")),
+        "Panda": build_robot(RobotDescription(urdf=panda, joints=arm), panda),
+    }
+
+
+def told(design: Design) -> dict[str, Any]:
+    content = excitation_dict(design)
+    wanted = ("log_det", "condition_of_regressor", "condition_of_scaled_regressor", "limits", "active_limits", "search")
+    return {key: content[key] for key in wanted} | {"seconds": design.seconds, "verified": design.verified}
+
+
+def scara() -> tuple[Design, dict[str, Any]]:
+    design = design_excitation(build_model(load_robot()))
+    trajectory = design.trajectories[0]
+    log_det, condition = criteria(regressor(*trajectory.at(np.linspace(0.0, 25.0, 2500))))
+    ojd, _ = criteria(regressor(*OJD.motion(OJD.times())))
+    fine = np.linspace(0.0, 25.0, 10 * design.verified)
+    q, v, a = trajectory.at(fine)
+    print("\nSCARA03, 25 s, complete model, paper's definition (2500 samples, R_v = identity)")
+    print(f"  J_d {log_det:.2f} in {design.seconds:.1f} s (OJD {ojd:.2f}; wanted 92 in 60 s), J_k {condition:.3g}")
+    print(f"  local searches: {', '.join(f'{-cost:.2f}' for cost in design.costs)}")
+    print_limits(design)
+    push = tool_acceleration(q, v, a).max()
+    print(
+        f"  by the paper's formulas on {len(fine)} samples: velocities {np.abs(v).max(axis=1).round(5).tolist()} rad/s,"
+    )
+    print(f"  tool acceleration {push:.5f} m/s^2 (OJD {tool_acceleration(*OJD.motion(fine)).max():.2f})")
+    return design, {"J_d": log_det, "J_k": condition, "OJD": ojd, **told(design)}
+
+
+def repetitions(design: Design) -> dict[str, float]:
+    """Estimate from exact regressors with white noise, again and again, on OJD and on the design."""
+    random = np.random.default_rng(0)
+    trajectory = design.trajectories[0]
+    spread, log_det, predicted = [], [], []
+    for q, v, a in (OJD.motion(OJD.times()), trajectory.at(np.linspace(0.0, 25.0, 2500))):
+        motion = replace(trajectory.motion(2500), q=q, v=v, a=a)
+        h = design.model.regressor(motion).transpose(2, 0, 1).reshape(-1, len(design.model.names))
+        estimates = np.linalg.lstsq(h, NOISE * random.standard_normal((len(h), REPETITIONS)), rcond=None)[0]
+        spread.append(estimates.std(axis=1))
+        predicted.append(NOISE * np.sqrt(np.diag(np.linalg.inv(h.T @ h))))
+        log_det.append((np.linalg.slogdet(h.T @ h)[1], -np.linalg.slogdet(np.cov(estimates) / NOISE**2)[1]))
+    p = len(design.model.names)
+    promised = float(np.exp((log_det[0][0] - log_det[1][0]) / (2 * p)))
+    seen = float(np.exp((log_det[0][1] - log_det[1][1]) / (2 * p)))
+    worst = float(np.max(np.abs(np.array(spread) / np.array(predicted) - 1.0)))
+    print(f"\nstd of {REPETITIONS} repetitions, design over OJD, geometric mean of the principal axes")
+    print(f"  promised by the log dets {promised:.3f}, seen {seen:.3f} ({100 * (seen / promised - 1):+.1f} %)")
+    print(f"  every parameter's std by itself: within {100 * worst:.0f} % of what is foreseen")
+    ratio = spread[1] / spread[0]
+    print("  " + ", ".join(f"{name} {x:.2f}" for name, x in zip(design.model.names, ratio, strict=True)))
+    return {"promised": promised, "seen": seen, "worst": worst}
+
+
+def condition_of(robot: Robot, criterion: Criterion) -> dict[str, Any]:
+    model = TorqueModel("rigid", robot, (rigid_body(robot),))
+    design = design_excitation(model, duration=20.0, criterion=criterion)
+    content = told(design)
+    print(
+        f"  {robot.name:6} {criterion.name:12} cond(H) {content['condition_of_regressor']:7.2f}, columns of unit length "
+        f"{content['condition_of_scaled_regressor']:6.2f}; ln det {design.log_det:7.1f}; {design.seconds:5.1f} s; "
+        f"{len(model.names)} base parameters; limits {'kept' if all(r.kept for r in design.reached) else 'BROKEN'} "
+        f"(largest share {max(r.share for r in design.reached):.5f})",
+        flush=True,
+    )
+    return content
+
+
+def print_limits(design: Design) -> None:
+    print(f"  limits at {design.verified} samples, ten times the design's grid or more, and between them:")
+    for each in design.reached:
+        mark = "" if each.kept else "  BROKEN"
+        active = "  active" if each.active else ""
+        print(f"    {each.name:24} {each.reached:9.5f} of {each.bound:9.5f} {each.unit:6} {active}{mark}")
+
+
+def study() -> list[dict[str, Any]]:
+    model = build_model(load_robot())
+    print("\nwhat limits J_d of the SCARA03 in 25 s")
+    found = []
+    cases: list[tuple[str, Callable[[], Design]]] = [
+        (f"{k} harmonics", lambda k=k: design_excitation(model, harmonics=k)) for k in (5, 10, 20, 40, 60, 80, 120)
+    ]
+    cases += [
+        ("splines, 80 intervals", lambda: design_excitation(model, harmonics=40, family="spline")),
+        ("40, long search", lambda: design_excitation(model, effort=Effort(starts=16, rounds=8, seed=1), progress=dot)),
+    ]
+    for name, make in cases:
+        design = make()
+        found.append({"name": name, **told(design)})
+        active = ", ".join(each.name for each in design.reached if each.active)
+        print(f"  {name:22} {design.log_det:6.2f} in {design.seconds:6.1f} s; active: {active}", flush=True)
+    return found
+
+
+def dot(progress: Progress) -> None:
+    if progress.done % 16 == 0:
+        print(f"    {progress.done} of {progress.total}: {-progress.cost:.2f}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--study", action="store_true")
+    parser.add_argument("--output", type=Path)
+    arguments = parser.parse_args()
+    design, results = scara()
+    content: dict[str, Any] = {"scara03": results, "repetitions": repetitions(design)}
+    print("\nbase regressor of rigid bodies and rotors, 20 s (wanted: at most 100 in 300 s)")
+    for name, robot in arms().items():
+        content[name] = {c.name: condition_of(robot, c) for c in (Condition(), Condition(scaled=True))}
+    if arguments.study:
+        content["study"] = study()
+    if arguments.output:
+        arguments.output.write_text(json.dumps(content, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

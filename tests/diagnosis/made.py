@@ -1,0 +1,132 @@
+"""Recordings and tables for the tests of the diagnosis: short runs of the virtual SCARA03, and rows made by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.diagnosis.search import weighted_fit
+from scara_ident.diagnosis.table import Table
+from scara_ident.effects import Scene
+from scara_ident.evidence import gather_all
+from scara_ident.indri2002 import table5_parameters
+from scara_ident.model import TorqueModel, build_model
+from scara_ident.motion import motion_of, stretches
+from scara_ident.recording import Recording
+from scara_ident.robot import load_robot
+from scara_ident.virtual import ReferenceMotion, parse_effect, sampled, simulate, virtual_arm
+from tests.arms import noisy, recorded_torque, recording
+
+Array = NDArray[np.float64]
+
+BANDS = (11.0, 11.0)
+NOISE = (0.02, 0.008)
+RATE = 250.0
+
+
+def multisine(name: str, seed: int, duration: float, size: float = 1.9) -> ReferenceMotion:
+    """Five harmonics per joint within ``size`` rad about the middle and 2.5 rad/s."""
+    robot = load_robot()
+    rng = np.random.default_rng(seed)
+    omega = 2.0 * np.pi * np.arange(1, 6) / duration
+    amplitude = rng.normal(0.0, 1.0, (2, 5)) / np.arange(1, 6)
+    phase = rng.uniform(0.0, 2.0 * np.pi, (2, 5, 1))
+
+    def wave(t: Array, order: int) -> Array:
+        turn = omega[:, None] * t + phase + 0.5 * np.pi * order
+        return np.einsum("jk,jkt->jt", amplitude * omega**order, np.cos(turn))
+
+    t = np.linspace(0.0, duration, 400)
+    reach = np.minimum(size / np.abs(wave(t, 0)).max(axis=1), 2.5 / np.abs(wave(t, 1)).max(axis=1))
+    amplitude *= reach[:, None]
+    centre = np.array([[1.57], [0.0]])
+    return sampled(name, robot, lambda t: (centre + wave(t, 0), wave(t, 1), wave(t, 2)), duration)
+
+
+@lru_cache(maxsize=16)
+def virtual_runs(*effects: str, seed: int = 1, size: float = 1.9) -> tuple[Recording, ...]:
+    """Two trajectories of 6 and 7 s, twice each, of an arm with undeclared effects."""
+    arm = replace(virtual_arm(), torque_noise=np.array(NOISE))
+    motions = (multisine("F1", 1, 6.0, size), multisine("F2", 2, 7.0, size))
+    return tuple(
+        simulate(arm, motion, effects=[parse_effect(text) for text in effects], seed=seed, repetition=k).recording
+        for motion in motions
+        for k in (1, 2)
+    )
+
+
+@lru_cache(maxsize=1)
+def held_out_run(effect: str) -> Recording:
+    """A run of a third trajectory."""
+    arm = replace(virtual_arm(), torque_noise=np.array(NOISE))
+    return simulate(arm, multisine("F3", 3, 6.0), effects=[parse_effect(effect)], seed=7).recording
+
+
+@lru_cache(maxsize=4)
+def exact_runs(trajectories: int = 2, repetitions: int = 2, seconds: float = 12.0) -> tuple[Recording, ...]:
+    """Runs of formulas: torque of the complete model and white noise, and nothing else."""
+    robot = load_robot()
+    truth = table5_parameters("OJD")
+    friction = [(*truth[5 + 4 * j : 9 + 4 * j], 0.0) for j in range(2)]
+    made = []
+    for k in range(trajectories):
+        motion = multisine("ABC"[k], 3 + k, seconds).at(np.arange(round(seconds * RATE)) / RATE)
+        torque = recorded_torque(robot, motion.position, motion.velocity, motion.acceleration, friction)
+        for r in range(1, repetitions + 1):
+            clean = recording(robot, f"{motion.name}_{r}", motion.time, motion.position, torque)
+            made.append(noisy(clean, np.random.default_rng([k, r]), NOISE))
+    return tuple(made)
+
+
+def with_torque(recordings: Sequence[Recording], joint: int, added) -> list[Recording]:
+    """Add ``added(motion)`` to the effort of a joint."""
+    made = []
+    for item in recordings:
+        (part,) = stretches(item)
+        effort = item.effort.copy()
+        effort[joint] += added(motion_of(part, (None, None)))
+        made.append(replace(item, effort=effort))
+    return made
+
+
+def complete() -> TorqueModel:
+    return build_model(load_robot(), "complete")
+
+
+def fitted(model: TorqueModel, recordings: Sequence[Recording], bands=BANDS):
+    """Return the weighted estimate of a model."""
+    return weighted_fit(model, gather_all(model, recordings, bands))
+
+
+def scene_of(model: TorqueModel, recordings: Sequence[Recording], bands=BANDS) -> Scene:
+    """Return the scene with the estimate of the recordings."""
+    return Scene(
+        model=model,
+        value=fitted(model, recordings, bands).value,
+        duration=max(float(np.ptp(item.time)) for item in recordings),
+        rate=RATE,
+        band=max(bands),
+        travel=np.ptp(recordings[0].position, axis=1),
+        speed=np.full(model.robot.n, 2.0),
+        start={item.name: float(item.time[0]) for item in recordings},
+    )
+
+
+def table_of(columns: Array, torque: Array, recordings: int = 4, block: int = 40) -> Table:
+    """One joint's rows, cut into recordings of equal length, each its own fold."""
+    count = len(torque)
+    starts = np.arange(0, count, block)
+    owner = starts * recordings // count
+    return Table(
+        columns,
+        torque,
+        np.zeros(count, dtype=np.intp),
+        starts,
+        owner,
+        tuple(f"T{k}" for k in range(recordings)),
+        owner,
+    )

@@ -1,0 +1,45 @@
+"""Lines of the residual's spectra as candidates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis.lines import line_candidates
+from scara_ident.effects.periodic import TorqueRipple, Vibration
+from scara_ident.effects.position import Spring
+from tests.diagnosis.made import complete, exact_runs, scene_of, with_torque
+
+MODEL = complete()
+WIDE = (40.0, 40.0)
+PERIODIC = (TorqueRipple(), Vibration(), Spring())
+
+
+def candidates(runs, catalogue=PERIODIC):
+    scene = scene_of(MODEL, exact_runs(), WIDE)
+    return line_candidates(scene, MODEL, scene.value, runs, WIDE, catalogue)
+
+
+def test_noise_has_no_line():
+    assert candidates(exact_runs()) == []
+
+
+def test_a_line_in_motor_angle_becomes_a_ripple_of_its_order():
+    runs = with_torque(exact_runs(), 1, lambda motion: 0.01 * np.sin(1.37 * 100.0 * motion.q[1] + 0.5))
+    ripples = [item for item in candidates(runs) if isinstance(item.effect, TorqueRipple)]
+    assert [item.member.joint for item in ripples] == [1]
+    assert ripples[0].member.knobs[0] == pytest.approx(1.37, abs=0.01)
+
+
+def test_a_line_in_time_becomes_a_vibration_of_its_frequency():
+    runs = with_torque(exact_runs(), 0, lambda motion: 0.02 * np.sin(2.0 * np.pi * 17.3 * motion.time))
+    found = [item for item in candidates(runs) if isinstance(item.effect, Vibration)]
+    assert found
+    assert all(item.member.joint == 0 for item in found)
+    assert all(item.member.knobs[0] == pytest.approx(17.3, abs=0.05) for item in found)
+
+
+def test_only_families_of_the_catalogue_are_offered():
+    runs = with_torque(exact_runs(), 1, lambda motion: 0.01 * np.sin(137.0 * motion.q[1]))
+    assert candidates(runs, (Spring(),)) == []
+    assert not [item for item in candidates(runs, (Vibration(),)) if isinstance(item.effect, TorqueRipple)]
