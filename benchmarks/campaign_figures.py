@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+RIVALS = ("none", "wider_filter")
 INK, GREY, BLUE, ORANGE = "#222222", "#9a9a9a", "#1f5fa8", "#d9822b"
 
 
@@ -31,7 +32,7 @@ def draw_scan(content: dict[str, Any], path: Path) -> None:
     figure, axes = plt.subplots(figsize=(7.0, 5.2), layout="constrained")
     for row, item in enumerate(items):
         one, mean = item["one_run"], item["mean_of_six"]
-        colour = ORANGE if item["name"] == "none" else BLUE
+        colour = ORANGE if item["name"] in RIVALS else BLUE
         axes.plot(one["range"], [row, row], color=colour, lw=2)
         axes.plot(one["distance"]["both"], row, "o", color=colour, ms=5)
         axes.plot(mean["distance"]["both"], row, "o", mfc="none", color=GREY, ms=5)
@@ -40,6 +41,7 @@ def draw_scan(content: dict[str, Any], path: Path) -> None:
     )
     axes.plot([], [], "o-", color=BLUE, label="noise of one run: median and 5 to 95 % of draws")
     axes.plot([], [], "o", mfc="none", color=GREY, label="noise of the mean of six runs")
+    axes.plot([], [], "o-", color=ORANGE, label="the same without an effect")
     axes.legend(loc="upper right", fontsize=8, frameon=False)
     axes.set_xlabel("rms of log10(virtual / printed), cells of Tables 2 and 4")
     axes.set_xlim(left=0.0)

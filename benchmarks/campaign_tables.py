@@ -49,6 +49,11 @@ class Tables:
         return {name: np.asarray(getattr(self, name)).tolist() for name in self.__dataclass_fields__}
 
 
+def as_tables(values: dict[str, Any]) -> Tables:
+    """Return the inverse of `Tables.as_dict`."""
+    return Tables(**{key: np.array(value) for key, value in values.items()})
+
+
 def printed(names: Sequence[str] = TRAJECTORIES) -> Tables:
     """Return the printed tables for some of the trajectories."""
     t = [TRAJECTORIES.index(name) for name in names]
@@ -233,11 +238,9 @@ def in_scan(scenes: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[str,
     nearest: dict[str, dict[str, Any]] = {}
     for item in scenes:
         nearest.setdefault(item["name"], item)
-    nearest.pop("none")
     counts: dict[str, int] = {}
     for item in nearest.values():
-        tables = Tables(**{key: np.array(value) for key, value in item["one_run"]["tables"].items()})
-        for found in conclusions(tables, names):
+        for found in conclusions(as_tables(item["one_run"]["tables"]), names):
             counts[found.name] = counts.get(found.name, 0) + found.holds
     return {"scenes": list(nearest), "counts": counts}
 

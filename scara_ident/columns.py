@@ -129,6 +129,9 @@ def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> Non
             partial.unlink(missing_ok=True)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
+    except pl.exceptions.PolarsError as error:
+        # The Parquet writer wraps what the disk says.
+        raise RecordingError(f"{path}: cannot be written: {str(error).splitlines()[0]}") from error
 
 
 def check_suffix(path: Path) -> None:

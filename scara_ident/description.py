@@ -172,7 +172,9 @@ def read_description(path: Path) -> RobotDescription:
     import yaml
 
     try:
-        content: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        _refuse_twice(yaml.compose(text, Loader=yaml.SafeLoader), path)
+        content: Any = yaml.safe_load(text)
     except FileNotFoundError:
         raise RobotError(f"{path}: no such robot description") from None
     except IsADirectoryError:
@@ -188,6 +190,24 @@ def read_description(path: Path) -> RobotDescription:
         raise RobotError(f"{path}{where}: not YAML: {reason}") from None
     description = check_description(content, path)
     return description.model_copy(update={"urdf": (path.parent / description.urdf).resolve()})
+
+
+def _refuse_twice(node: Any, path: Path, above: str = "") -> None:
+    """Refuse a key that stands twice in a mapping: YAML's reader would take the last without a word."""
+    if not isinstance(getattr(node, "value", None), list):
+        return
+    seen: set[str] = set()
+    for item in node.value:
+        if not isinstance(item, tuple):
+            _refuse_twice(item, path, above)
+            continue
+        key, value = item
+        name = f"{above}{key.value}"
+        if name in seen:
+            line = key.start_mark.line + 1
+            raise RobotError(f"{path}, line {line}: {name}: stands here twice; keep one of them")
+        seen.add(name)
+        _refuse_twice(value, path, f"{name}.")
 
 
 def check_description(content: Any, path: Path) -> RobotDescription:

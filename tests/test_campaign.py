@@ -87,8 +87,10 @@ def test_drawn_noise_spreads_parameters_as_least_squares_on_2500_samples(campaig
 
 
 def test_sizes_cover_every_effect_of_the_catalogue_and_its_joints(campaign: ModuleType) -> None:
+    import campaign_effects
+
     arm = campaign.virtual_arm()
-    assert set(campaign.SIZE) == {kind.name for kind in CATALOGUE}
+    assert set(campaign_effects.SIZE) == {kind.name for kind in CATALOGUE}
     for kind in CATALOGUE:
         one, three = (campaign.sized(arm, kind, factor) for factor in (1.0, 3.0))
         assert one == tuple(kind(joint=effect.joint).resolve(arm) for effect in one)
@@ -98,7 +100,7 @@ def test_sizes_cover_every_effect_of_the_catalogue_and_its_joints(campaign: Modu
 def test_a_tiny_campaign_runs_and_a_strong_effect_changes_the_tables(campaign: ModuleType) -> None:
     kinds = [kind for kind in CATALOGUE if kind.name == "time_delay"]
     names = ("L2", "L1")
-    content = campaign.run(kinds, names, count=1, sizes=1, refined=0)
+    content = campaign.run(kinds, names, count=1, sizes=1, refined=0, filters=())
     assert content["chosen"] == "time_delay x -3"
     scenes = {item["name"]: item["one_run"] for item in content["scan"]}
     assert scenes["time_delay"]["distance"]["both"] != scenes["none"]["distance"]["both"]

@@ -99,12 +99,7 @@ def test_a_disk_that_fills_up_keeps_the_earlier_results(command, disk: Path, fol
     "words",
     [
         ["identify", "{runs}/OJD_1.parquet", "--band", "15"],
-        pytest.param(
-            ["simulate", "OJK"],
-            marks=pytest.mark.xfail(
-                strict=True, reason="columns.write_columns does not catch what polars raises for a Parquet file"
-            ),
-        ),
+        ["simulate", "OJK"],
     ],
     ids=["identify", "simulate"],
 )

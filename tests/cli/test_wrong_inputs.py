@@ -222,7 +222,6 @@ def test_the_files_beside_the_wrong_ones_are_right(command, wrong: Path, monkeyp
         assert command(*words.split()).status == 0
 
 
-@pytest.mark.xfail(strict=True, reason="description.read_description takes the last of two equal keys without a word")
 def test_a_joint_that_is_described_twice_is_refused(command, wrong: Path):
     result = command("base", "--robot", wrong / "again.yaml")
     assert result.status == 1

@@ -48,10 +48,10 @@ def multisine(name: str, seed: int, duration: float, size: float = 1.9) -> Refer
 
 
 @lru_cache(maxsize=16)
-def virtual_runs(*effects: str, seed: int = 1, size: float = 1.9) -> tuple[Recording, ...]:
-    """Two trajectories of 6 and 7 s, twice each, of an arm with undeclared effects."""
+def virtual_runs(*effects: str, seed: int = 1, seconds: tuple[float, float] = (7.0, 8.0)) -> tuple[Recording, ...]:
+    """Two trajectories, twice each, of an arm with undeclared effects."""
     arm = replace(virtual_arm(), torque_noise=np.array(NOISE))
-    motions = (multisine("F1", 1, 6.0, size), multisine("F2", 2, 7.0, size))
+    motions = (multisine("F1", 1, seconds[0]), multisine("F2", 2, seconds[1]))
     return tuple(
         simulate(arm, motion, effects=[parse_effect(text) for text in effects], seed=seed, repetition=k).recording
         for motion in motions
@@ -67,14 +67,14 @@ def held_out_run(effect: str) -> Recording:
 
 
 @lru_cache(maxsize=4)
-def exact_runs(trajectories: int = 2, repetitions: int = 2, seconds: float = 12.0) -> tuple[Recording, ...]:
+def exact_runs(trajectories: int = 2, repetitions: int = 2, size: float = 1.9) -> tuple[Recording, ...]:
     """Runs of formulas: torque of the complete model and white noise, and nothing else."""
     robot = load_robot()
     truth = table5_parameters("OJD")
     friction = [(*truth[5 + 4 * j : 9 + 4 * j], 0.0) for j in range(2)]
     made = []
     for k in range(trajectories):
-        motion = multisine("ABC"[k], 3 + k, seconds).at(np.arange(round(seconds * RATE)) / RATE)
+        motion = multisine("ABC"[k], 3 + k, 12.0, size).at(np.arange(round(12.0 * RATE)) / RATE)
         torque = recorded_torque(robot, motion.position, motion.velocity, motion.acceleration, friction)
         for r in range(1, repetitions + 1):
             clean = recording(robot, f"{motion.name}_{r}", motion.time, motion.position, torque)

@@ -2,40 +2,80 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import numpy as np
+
 from scara_ident.diagnosis.confounding import rivals
 from scara_ident.diagnosis.search import search
+from scara_ident.effects import Member
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.position import Spring
-from scara_ident.effects.tilt import BaseTilt, NominalBaseTilt
-from scara_ident.recording import Recording
-from tests.diagnosis.made import BANDS, complete, virtual_runs
+from scara_ident.terms import Column
+from tests.diagnosis.made import BANDS, complete, exact_runs, with_torque
 
-CATALOGUE = (Spring(), BaseTilt(), NominalBaseTilt(), AsymmetricFriction())
+MIDDLE = 1.57
+STIFFNESS = 0.3
 
 
-def groups(recordings: tuple[Recording, ...]) -> dict[str, set[str]]:
-    """Each effect found with its rivals."""
-    result = search(complete(), recordings, BANDS, catalogue=CATALOGUE)
-    last = result.steps[-1].estimate
-    found = rivals(result, last.weights)
-    for item, others in zip(result.chosen, found, strict=True):
-        assert all(rival.gain > 0.5 * rival.found_gain for rival in others)
-        assert item.label(result.scene) not in {rival.label for rival in others}
+@dataclass(frozen=True)
+class Pendulum:
+    """What gravity does to a joint of a base that stands on edge: the sine of the angle where a spring has the angle."""
+
+    name = "pendulum"
+    knobs = ()
+
+    def members(self, scene):
+        return (Member(0),)
+
+    def columns(self, scene, member):
+        return (Column("moment", "joint1", "N m", "moment of gravity", True),)
+
+    def regressor(self, signals, member):
+        return signals.row(0, [np.sin(signals.motion.q[0] - MIDDLE)])
+
+    def inadmissible(self, scene, member, value, std):
+        return None
+
+    def parameters(self, scene, member, value, covariance):
+        return {}
+
+    def description(self, scene, member):
+        return "pendulum"
+
+
+def groups(size: float, added) -> dict[str, dict[str, float]]:
+    """Each effect found with its rivals and their gain as a share of its own."""
+    runs = with_torque(exact_runs(size=size), 0, added)
+    result = search(complete(), runs, BANDS, catalogue=(Spring(), Pendulum(), AsymmetricFriction()))
+    found = rivals(result, result.steps[-1].estimate.weights)
     return {
-        item.effect.name: {rival.effect for rival in others} for item, others in zip(result.chosen, found, strict=True)
+        item.label(result.scene): {rival.label: rival.gain / rival.found_gain for rival in others}
+        for item, others in zip(result.chosen, found, strict=True)
     }
 
 
-def test_a_spring_and_a_tilt_are_one_on_a_small_range():
-    found = groups(virtual_runs("spring:joint1:stiffness=0.4,rest_position=0.8", size=0.2))
-    (name,) = found
-    assert {name, *found[name]} == {"spring", "base_tilt"}
+def spring(motion):
+    return STIFFNESS * (motion.q[0] - MIDDLE)
 
 
-def test_on_a_large_range_the_spring_stands_alone():
-    assert groups(virtual_runs("spring:joint1")) == {"spring": set()}
+def test_a_spring_and_a_pendulum_are_one_on_a_small_range():
+    for added in (spring, lambda motion: STIFFNESS * np.sin(motion.q[0] - MIDDLE)):
+        ((name, others),) = groups(0.3, added).items()
+        assert {name, *others} == {"spring of joint1", "pendulum of joint1"}
+        assert all(abs(share - 1.0) < 0.05 for share in others.values())
+
+
+def test_on_a_large_range_each_stands_alone():
+    assert groups(1.9, spring) == {"spring of joint1": {}}
+    pendulum = groups(1.9, lambda motion: STIFFNESS * np.sin(motion.q[0] - MIDDLE))
+    assert pendulum == {"pendulum of joint1": {}}
 
 
 def test_an_effect_of_another_kind_is_no_rival():
-    found = groups(virtual_runs("asymmetric_friction:joint2"))
-    assert found == {"asymmetric_friction": set()}
+    assert groups(1.9, lambda motion: 0.03 * np.abs(motion.v[0])) == {"asymmetric_friction of joint1": {}}
+
+
+def test_two_effects_at_once_are_not_rivals_of_each_other():
+    both = groups(1.9, lambda motion: spring(motion) + 0.03 * np.abs(motion.v[0]))
+    assert both == {"spring of joint1": {}, "asymmetric_friction of joint1": {}}

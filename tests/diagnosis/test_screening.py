@@ -60,5 +60,13 @@ def test_what_repeats_in_one_trajectory_only_is_not_called_a_dependence():
 
 
 def test_one_trajectory_is_judged_by_its_parts():
-    runs = with_torque(exact_runs()[:2], 1, lambda motion: 0.02 * np.sin(6.0 * motion.q[1]))
-    assert "position of joint2" in screened(runs)[0].signals
+    runs = exact_runs(1, 4)
+    planted = with_torque(runs, 1, lambda motion: 0.02 * np.sin(6.0 * motion.q[1]))
+    found = screen(MODEL, fitted(MODEL, runs).value, planted, BANDS)
+    assert "position of joint2" in found[0].signals
+    assert found[0].explained > 0.5
+
+
+def test_too_few_samples_for_the_bins_say_nothing():
+    runs = with_torque(exact_runs()[:1], 1, lambda motion: 0.02 * np.sin(6.0 * motion.q[1]))
+    assert screened(runs) == ()

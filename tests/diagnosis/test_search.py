@@ -50,8 +50,9 @@ def test_the_error_falls_with_every_step_to_that_of_the_clean_recordings():
     result = search(MODEL, runs, BANDS, catalogue=SMALL)
     errors = [residual_noise(step.estimate, step.evidence) for step in result.steps]
     start = residual_noise(result.start, result.start_evidence)
-    assert np.all(errors[0] <= start * (1.0 + 1e-6))
-    assert np.all(errors[1] <= errors[0] * (1.0 + 1e-3))
+    # The sum over joints in equal weight falls; a joint that fits worse only because it weighs less may grow a little.
+    sizes = [np.sum((error / errors[-1]) ** 2) for error in (start, *errors)]
+    assert sizes[0] > 2.0 * sizes[1] > 2.0 * sizes[2]
     clean = search(MODEL, exact_runs(), BANDS, catalogue=SMALL)
     assert errors[1] == pytest.approx(residual_noise(clean.start, clean.start_evidence), rel=0.02)
 

@@ -1,0 +1,43 @@
+"""``scara-ident diagnose``: what it writes and refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from scara_ident.recording import write_recording
+from tests.diagnosis.made import held_out_run, virtual_runs
+
+EFFECT = "spring:joint1"
+
+
+def test_it_writes_what_the_contract_says(command, tmp_path: Path):
+    train, out = tmp_path / "train", tmp_path / "out"
+    train.mkdir()
+    for run in virtual_runs(EFFECT):
+        write_recording(run, train / f"{run.name}.parquet")
+    test = tmp_path / "test_1.parquet"
+    write_recording(held_out_run(EFFECT), test)
+    result = command("diagnose", train, "--validate", test, "--output", out)
+    assert result.status == 0
+    content = json.loads((out / "diagnosis.json").read_text())
+    assert {
+        "verdict", "noise_floor", "effects", "training", "validation", "not_identifiable", "candidates", "unexplained",
+    } <= set(content)  # fmt: skip
+    assert content["verdict"] in ("complete", "explained", "unexplained")
+    effect = content["effects"][0]
+    assert (effect["effect"], effect["joint"]) == ("spring", "joint1")
+    assert set(content["recordings"]["validation"]) == {"test_1"}
+    assert set(content["recordings"]["training"]) == {"F1_1", "F1_2", "F2_1", "F2_2"}
+    assert content["validation"]["after"]["joint1"] < content["validation"]["before"]["joint1"]
+    assert {path.name for path in out.iterdir()} == {"diagnosis.json", "diagnosis.md", "report.html"}
+    assert "Found spring on joint1" in result.out
+    assert (out / "diagnosis.md").read_text().startswith("# Diagnosis of scara03")
+
+
+def test_what_cannot_be_read_or_used_is_said_in_a_line(command, folder: Path):
+    run = folder / "OJD_1.parquet"
+    assert command("diagnose", "nowhere.csv").status == 2
+    assert command("diagnose").status == 2
+    assert command("diagnose", run, "--model", "full").status == 2
+    assert "held out" in command("diagnose", run, "--validate", run).err

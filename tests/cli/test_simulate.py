@@ -1,0 +1,57 @@
+"""``scara-ident simulate``: recordings, what was behind them, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from scara_ident.robot import load_robot
+from tests.diagnosis.made import multisine
+
+
+@pytest.fixture
+def trajectory(tmp_path: Path) -> Path:
+    motion = multisine("short", 3, 3.0)
+    columns = {"time": motion.time}
+    for j, joint in enumerate(load_robot().joints):
+        for what in ("position", "velocity", "acceleration"):
+            columns[f"{joint}.{what}"] = getattr(motion, what)[j]
+    pl.DataFrame(columns).write_csv(tmp_path / "short.csv")
+    return tmp_path / "short.csv"
+
+
+def test_every_run_is_recorded_with_its_truth(command, trajectory: Path, tmp_path: Path):
+    out = tmp_path / "out"
+    words = ("simulate", trajectory, "--effect", "spring:joint1:stiffness=0.07", "--repetitions", "2", "--seed", "4")
+    result = command(*words, "--output", out)
+    assert result.status == 0
+    assert {path.name for path in out.iterdir()} == {
+        f"short_{k}.{ending}" for k in (1, 2) for ending in ("parquet", "truth.json")
+    }
+    one, two = (pl.read_parquet(out / f"short_{k}.parquet") for k in (1, 2))
+    assert {"time", "joint1.position", "joint1.effort", "joint2.position", "joint2.effort"} <= set(one.columns)
+    assert not np.array_equal(one["joint1.effort"], two["joint1.effort"])
+    truth = json.loads((out / "short_1.truth.json").read_text())
+    assert (truth["seed"], truth["repetition"]) == (4, 1)
+    assert "0.07" in json.dumps(truth["effects"])
+    assert str(out / "short_2.parquet") in result.out
+    again = tmp_path / "again"
+    assert command(*words, "--output", again).status == 0
+    assert pl.read_parquet(again / "short_1.parquet").equals(one)
+
+
+def test_bad_usage_is_status_2_and_writes_nothing(command, trajectory: Path, tmp_path: Path):
+    out = tmp_path / "out"
+    for words in (
+        ["nowhere.csv"],
+        [trajectory, "--effect", "magic"],
+        [trajectory, "--effect", "spring:joint9"],
+        [trajectory, "--seed", "-1"],
+    ):
+        result = command("simulate", *words, "--output", out)
+        assert result.status == 2
+        assert not out.exists()
