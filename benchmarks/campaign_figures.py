@@ -39,10 +39,10 @@ def draw_scan(content: dict[str, Any], path: Path) -> None:
     axes.set_yticks(
         range(len(items)), [f"{i['name']} × {i['factor']:g}" if i["name"] != "none" else "none" for i in items]
     )
-    axes.plot([], [], "o-", color=BLUE, label="noise of one run: median and 5 to 95 % of draws")
-    axes.plot([], [], "o", mfc="none", color=GREY, label="noise of the mean of six runs")
+    axes.plot([], [], "o-", color=BLUE, label="noise of one run: median,\n5 to 95 % of draws")
+    axes.plot([], [], "o", mfc="none", color=GREY, label="noise of the mean of six")
     axes.plot([], [], "o-", color=ORANGE, label="the same without an effect")
-    axes.legend(loc="upper right", fontsize=8, frameon=False)
+    axes.legend(loc="lower left", fontsize=7, frameon=False)
     axes.set_xlabel("rms of log10(virtual / printed), cells of Tables 2 and 4")
     axes.set_xlim(left=0.0)
     axes.grid(axis="x", color="#e5e5e5")

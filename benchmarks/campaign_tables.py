@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import Any
 
@@ -47,11 +47,6 @@ class Tables:
     def as_dict(self) -> dict[str, Any]:
         """Return all fields as lists."""
         return {name: np.asarray(getattr(self, name)).tolist() for name in self.__dataclass_fields__}
-
-
-def as_tables(values: dict[str, Any]) -> Tables:
-    """Return the inverse of `Tables.as_dict`."""
-    return Tables(**{key: np.array(value) for key, value in values.items()})
 
 
 def printed(names: Sequence[str] = TRAJECTORIES) -> Tables:
@@ -233,24 +228,24 @@ def conclusions(tables: Tables, names: Sequence[str]) -> list[Conclusion]:
     return found
 
 
-def in_scan(scenes: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[str, Any]:
-    """Count in how many effects, each at the size nearest to the printed tables, the conclusions hold."""
-    nearest: dict[str, dict[str, Any]] = {}
-    for item in scenes:
-        nearest.setdefault(item["name"], item)
-    counts: dict[str, int] = {}
-    for item in nearest.values():
-        for found in conclusions(as_tables(item["one_run"]["tables"]), names):
-            counts[found.name] = counts.get(found.name, 0) + found.holds
-    return {"scenes": list(nearest), "counts": counts}
+def shares(tables: Tables, names: Sequence[str]) -> dict[str, float]:
+    """Return in what share of the draws each conclusion holds."""
+    found: dict[str, float] = {}
+    count = len(tables.complete)
+    for k in range(count):
+        drawn = replace(tables, complete=tables.complete[k], reduced=tables.reduced[k], parameters=tables.parameters[k])
+        for item in conclusions(drawn, names):
+            found[item.name] = found.get(item.name, 0.0) + item.holds / count
+    return found
 
 
 def rank_correlation(x: Array, y: Array, expected: float) -> tuple[float, float]:
     """Return Spearman's coefficient and the share of all orders that are at least as extreme in the expected sense."""
-    a, b = (np.argsort(np.argsort(values)).astype(float) for values in (x, y))
-    rho = float(np.corrcoef(a, b)[0, 1])
-    orders = [float(np.corrcoef(a, np.array(order))[0, 1]) for order in permutations(b)]
-    return rho, float(np.mean([expected * order >= expected * rho - 1e-9 for order in orders]))
+    a, b = (np.argsort(np.argsort(values)) - 0.5 * (len(values) - 1) for values in (x, y))
+    size = float(a @ a)
+    orders = np.array(list(permutations(a))) @ a / size
+    rho = float(a @ b) / size
+    return rho, float(np.mean(expected * orders >= expected * rho - 1e-9))
 
 
 def campaign_tables(found: dict[str, Any]) -> Tables:

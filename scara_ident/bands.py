@@ -29,6 +29,7 @@ FIRST_POWER = 0.95
 FIRST_PERIODS = 10.0
 # The fit and the choice of its band are repeated until they agree, at the most so often.
 MOST_ROUNDS = 3
+MOST_HALVINGS = 4
 # Share of the torque's power that the motion must explain at the band's edge.
 EXPLAINED = 0.5
 # Highest band as a share of the sample rate, and of the position filter that shows where the noise begins.
@@ -79,11 +80,31 @@ def choose_bands(model: TorqueModel, recordings: Sequence[Recording]) -> BandCho
     edges = _edges(parts)
     highest = HIGHEST_BAND * min(part.rate for part in parts)
     start = _first_bands(parts, edges, model.robot.n)
-    choice = BandChoice((max(start),) * model.robot.n, (0.0,) * model.robot.n, ())
+    choice = _refined(model, chosen, parts, edges, start, highest)
+    # Where the first band holds so much noise that nothing is explained, a narrower one may show what is.
+    for _ in range(MOST_HALVINGS):
+        if any(share > 0.0 for share in choice.explained):
+            break
+        start = [0.5 * band for band in start]
+        choice = _refined(model, chosen, parts, edges, start, highest)
+    return choice
+
+
+def _refined(
+    model: TorqueModel,
+    chosen: Sequence[Recording],
+    parts: Sequence[Stretch],
+    edges: Array,
+    start: Sequence[float],
+    highest: float,
+) -> BandChoice:
+    """Repeat fit and choice of bands from a first band on until they agree."""
+    n = model.robot.n
+    choice = BandChoice((max(start),) * n, (0.0,) * n, ())
     for _ in range(MOST_ROUNDS):
         before = choice.bands
         evidence = gather_all(model, chosen, before)
-        value = merge(item.joint(j) for item in evidence for j in range(model.robot.n)).solve().value
+        value = merge(item.joint(j) for item in evidence for j in range(n)).solve().value
         choice = _explained_bands(model, parts, edges, value, start, highest)
         if choice.bands == before:
             break

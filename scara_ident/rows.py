@@ -28,7 +28,7 @@ ROUNDING = 1e-9
 # velocity's noise, for longer than this many periods of the band: friction is then anything up to Coulomb's.
 REST_SHARE = 3e-3
 REST_NOISE = 5.0
-REST_PERIODS = 0.05
+REST_PERIODS = 0.0
 # What happens at rest reaches so many periods of the band beyond it, through the low-pass; left in, it looks like a delay
 # of minus 0.7 ms on a virtual arm that has none.
 REST_WIDEN = 0.5

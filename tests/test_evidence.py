@@ -178,7 +178,8 @@ def test_the_noise_of_an_encoder_is_not_taken_for_motion(model: TorqueModel):
     item = gather(model, replace(one, position=noisy), [10.0, 10.0])
     assert item.left_out_rest[1] == 1.0
     assert item.joint(1).rows == item.unfiltered[1].rows == 0
-    assert item.left_out_rest[0] < 0.05
+    # Of the moving joint only the turning points.
+    assert item.left_out_rest[0] < 0.1
 
 
 def test_little_is_left_out_at_turning_points(model: TorqueModel, one: Recording):

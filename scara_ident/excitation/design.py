@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scara_ident.errors import UsageError
 from scara_ident.excitation.criteria import Criterion, LogDet
 from scara_ident.excitation.curves import ExcitationTrajectory, Family, make_basis
-from scara_ident.excitation.limits import Limits, limits_of, nominal_parameters, resting_posture
+from scara_ident.excitation.limits import Limits, limits_of, nominal_parameters, resting_posture, without_coulomb
 from scara_ident.excitation.problem import NARROWEST, Task
 from scara_ident.excitation.search import Effort, Progress, search
 from scara_ident.excitation.sensitivity import SmoothModel
@@ -198,26 +198,28 @@ def design_excitation(
             "gather it with the same model"
         )
     effort = Effort() if effort is None else effort
+    if effort.starts < 1 or effort.rounds < 0:
+        raise UsageError(f"starts {effort.starts}, rounds {effort.rounds}: expected at least 1 and 0")
     criterion = LogDet() if criterion is None else criterion
     limits = limits_of(robot) if limits is None else limits
     weights = _weights(torque_std, robot.n)
     nominal = nominal_parameters(model, known)
+    smooth, left = without_coulomb(model, limits, nominal)
     if harmonics is None:
         harmonics = default_harmonics(duration, robot.n, trajectories)
     task = Task(
         smooth=SmoothModel(model, NARROWEST * limits.velocity),
-        limits=limits,
-        nominal=nominal,
+        limits=left,
+        nominal=smooth,
         criterion=criterion,
         basis=make_basis(duration, harmonics, family, fixed_start=start is not None),
-        posture=resting_posture(model, limits, nominal, start=start, seed=effort.seed),
+        posture=resting_posture(model, left, smooth, start=start, seed=effort.seed),
         trajectories=trajectories,
         samples=samples,
         weights=weights,
         prior=np.zeros((count, count)) if prior is None else prior.regressor_factor.T @ prior.regressor_factor,
     )
     found = search(task, effort, progress)
-    units = tuple(robot.torque_unit(j) for j in range(robot.n))
     suffixes = [""] if trajectories == 1 else [f"-{chr(ord('a') + k)}" for k in range(trajectories)]
     designed = tuple(
         ExcitationTrajectory(name + suffix, robot.joints, task.basis, task.posture, x)
@@ -229,7 +231,7 @@ def design_excitation(
         trajectories=designed,
         limits=limits,
         nominal=nominal,
-        reached=reached(task, robot.joints, units, found.x, found.times),
+        reached=reached(task, limits.torque, found.x, found.times),
         verified=found.times,
         information=merge([information_of(model, each, samples, weights) for each in designed]),
         prior=prior,

@@ -14,6 +14,7 @@ from scara_ident.excitation.tool import Tool, tool_motion, tool_of
 from scara_ident.model import TorqueModel
 from scara_ident.motion import Motion
 from scara_ident.robot import Robot
+from scara_ident.terms import Friction
 
 Array = NDArray[np.float64]
 Value = TypeVar("Value")
@@ -184,6 +185,47 @@ def nominal_parameters(model: TorqueModel, known: Mapping[str, float] | None = N
             raise UsageError(f"parameter {name!r}: the model {model.name} has none of that name: {model.names}")
         value[model.names.index(name)] = given
     return value
+
+
+def without_coulomb(model: TorqueModel, limits: Limits, nominal: Array) -> tuple[Array, Limits]:
+    """Take Coulomb friction off the torque limits instead of adding it to the torque.
+
+    It jumps where a joint turns back, which is where the torque of acceleration is largest: there both signs count,
+    and so they are counted everywhere.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    limits : Limits
+    nominal : ndarray, shape (p,)
+
+    Returns
+    -------
+    nominal : ndarray, shape (p,)
+        Without Coulomb friction.
+    limits : Limits
+        With what it leaves of the torques.
+
+    Raises
+    ------
+    InfeasibleLimits
+        If it leaves nothing.
+    """
+    smooth, torque = nominal.copy(), limits.torque.copy()
+    for term in model.terms:
+        if isinstance(term, Friction) and 0 in term.powers:
+            step, place = len(term.powers), model.place(term).start + term.powers.index(0)
+            columns = place + step * np.arange(model.robot.n)
+            torque -= np.abs(nominal[columns])
+            smooth[columns] = 0.0
+    for joint, name in enumerate(model.robot.joints):
+        if not torque[joint] > 0.0:
+            unit = model.robot.torque_unit(joint)
+            raise InfeasibleLimits(
+                f"{name}: a torque of {limits.torque[joint]:.4g} {unit} does not overcome its friction of "
+                f"{limits.torque[joint] - torque[joint]:.4g} {unit}; allow more torque, or correct the friction"
+            )
+    return smooth, replace(limits, torque=torque)
 
 
 def resting_posture(

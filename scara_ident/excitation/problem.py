@@ -29,8 +29,9 @@ class Task:
     smooth : SmoothModel
         The torque model.
     limits : Limits
+        Torques are what Coulomb friction leaves of them; see `without_coulomb`.
     nominal : ndarray, shape (p,)
-        Parameters of which torques are foreseen.
+        Parameters of which torques are foreseen, without Coulomb friction.
     criterion : Criterion
     basis : Basis
     posture : ndarray, shape (n,)
@@ -139,22 +140,19 @@ class Problem:
         Every stride-th of them counts in the criterion.
     bounds : ndarray, shape (R,)
         Bound of each row of limits, 1 or a little less to make up for what happens between the times.
-    width : float
-        Share of the velocity limit within which Coulomb friction turns.
     """
 
     task: Task
     rows: Array
     stride: int
     bounds: Array
-    width: float = NARROWEST
 
     def sharpened(self, share: float) -> Problem:
         """Return the problem as it is to be solved first (share 0) or last (share 1)."""
         task = self.task
         width = WIDEST * (NARROWEST / WIDEST) ** share
         smooth = replace(task.smooth, width=width * task.limits.velocity)
-        return replace(self, width=width, task=replace(task, smooth=smooth, criterion=task.criterion.sharpened(share)))
+        return replace(self, task=replace(task, smooth=smooth, criterion=task.criterion.sharpened(share)))
 
     @property
     def two_sided(self) -> NDArray[np.bool_]:

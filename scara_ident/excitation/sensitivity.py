@@ -110,16 +110,20 @@ def _friction(term: Friction, motion: Motion, width: Array) -> tuple[Array, Arra
         v = motion.v[i]
         turn = np.tanh(v / width[i])
         turning = (1.0 - turn**2) / width[i]
+        side = np.sign(v)
         powers = [np.ones_like(v)]
         while len(powers) <= max(term.powers):
             powers.append(powers[-1] * v)
         for place, power in enumerate(term.powers):
             j = i * k + place
-            below = power * powers[power - 1] if power else np.zeros_like(v)
-            if power % 2:
+            below = power * powers[max(0, power - 1)]
+            # Only Coulomb friction jumps; sign(v) v^2 has a slope everywhere.
+            if power == 0:
+                columns[i, j], slopes[i, j] = turn, turning
+            elif power % 2:
                 columns[i, j], slopes[i, j] = powers[power], below
             else:
-                columns[i, j], slopes[i, j] = turn * powers[power], turning * powers[power] + turn * below
+                columns[i, j], slopes[i, j] = side * powers[power], side * below
         columns[i] *= term.robot.drive_sign[i]
         slopes[i] *= term.robot.drive_sign[i]
     return columns, slopes

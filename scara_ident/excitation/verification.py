@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,6 @@ from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.problem import Problem, Task, row_names
 
 Array = NDArray[np.float64]
-
-# Speeds below this share of the limit count as standing when the sign of friction is taken.
-STANDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -79,9 +76,7 @@ def extremes(task: Task, x: Array, times: int) -> tuple[Array, Array]:
     """
     time: Array = np.asarray(np.linspace(0.0, task.basis.duration, times), dtype=np.float64)
     rows = np.array([task.basis.rows(time, order) for order in range(3)])
-    smooth = replace(task.smooth, width=STANDING * task.limits.velocity)
-    problem = Problem(replace(task, smooth=smooth), rows, 1, np.ones(0))
-    values = problem.limited(x).reshape(-1, task.trajectories, times)
+    values = Problem(task, rows, 1, np.ones(0)).limited(x).reshape(-1, task.trajectories, times)
     second = np.abs(np.diff(values, n=2, axis=2))
     around = np.zeros_like(values)
     around[..., 1:-1] = second
@@ -89,27 +84,26 @@ def extremes(task: Task, x: Array, times: int) -> tuple[Array, Array]:
     return (values + beyond).max(axis=(1, 2)), (values - beyond).min(axis=(1, 2))
 
 
-def reached(task: Task, joints: tuple[str, ...], units: tuple[str, ...], x: Array, times: int) -> tuple[Reached, ...]:
+def reached(task: Task, torque: Array, x: Array, times: int) -> tuple[Reached, ...]:
     """Say for every limit how much of it a motion uses.
 
     Parameters
     ----------
     task : Task
-    joints, units : tuple of str
-        Names of the joints, and units of their torques.
+    torque : ndarray, shape (n,)
+        Torque limits before Coulomb friction was taken off.
     x : ndarray, shape (k, n, m)
     times : int
         Samples per trajectory.
     """
-    limits = task.limits
+    limits, robot = task.limits, task.smooth.model.robot
     largest, smallest = extremes(task, x, times)
     found = []
-    robot = task.smooth.model.robot
-    for (kind, joint), high, low in zip(row_names(limits, len(joints)), largest, smallest, strict=True):
+    for (kind, joint), high, low in zip(row_names(limits, robot.n), largest, smallest, strict=True):
         if joint is None:
             found.append(_of_tool(limits, kind, float(high)))
             continue
-        name, length = joints[joint], "m" if robot.prismatic[joint] else "rad"
+        name, length = robot.joints[joint], "m" if robot.prismatic[joint] else "rad"
         both = float(max(high, -low))
         if kind == "position":
             centre, half = limits.centre[joint], 0.5 * (limits.upper[joint] - limits.lower[joint])
@@ -120,8 +114,9 @@ def reached(task: Task, joints: tuple[str, ...], units: tuple[str, ...], x: Arra
             bound = float(limits.velocity[joint])
             found.append(Reached(f"{name}.velocity", bound, both * bound, f"{length}/s", both))
         else:
-            bound = float(limits.torque[joint])
-            found.append(Reached(f"{name}.torque", bound, both * bound, units[joint], both))
+            bound, left = float(torque[joint]), float(limits.torque[joint])
+            value = bound - left + both * left
+            found.append(Reached(f"{name}.torque", bound, value, robot.torque_unit(joint), value / bound))
     return tuple(found)
 
 

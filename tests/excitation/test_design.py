@@ -224,6 +224,18 @@ def test_limits_that_cannot_hold_the_arm_are_said(tmp_path):
         design_excitation(COMPLETE, limits=limits_of(SCARA, floor=2.0))
 
 
+def test_friction_counts_in_the_torque_also_where_a_joint_turns_back():
+    limits = limits_of(SCARA, torques={"joint1": 1.0})
+    known = {"a01": 0.3, "a11": 0.05, "a21": -0.01, "a02": 0.1}
+    made = design_excitation(COMPLETE, **SHORT, limits=limits, known=known, effort=QUICK)
+    torque = np.abs(made.motion(rate=20_000.0).torque[0])
+    told = {each.name: each for each in made.reached}["joint1.torque"]
+    assert torque.max() <= told.reached <= 1.0
+    assert told.active and torque.max() > 0.9
+    with pytest.raises(InfeasibleLimits, match=r"joint1: a torque of 1 N m does not overcome its friction of 1\.5 N m"):
+        design_excitation(COMPLETE, limits=limits, known={"a01": -1.5})
+
+
 def test_a_joint_without_limits_is_said(tmp_path):
     urdf = write_urdf(tmp_path / "arm.urdf", [Link(kind="continuous"), Link(xyz=(0.3, 0.0, 0.0))])
     with pytest.raises(RobotError, match=r"joint 'j1' has no position limits.*range for j1"):
