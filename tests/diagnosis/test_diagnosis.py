@@ -62,9 +62,6 @@ def test_a_clean_formula_is_complete():
     assert (result.verdict, result.effects, result.unexplained) == ("complete", (), None)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="reversals of joint 2 shorter than REST_PERIODS stay in the rows and look like ripple"
-)
 def test_reversals_of_a_clean_arm_are_not_taken_for_ripple():
     runs = virtual_runs(seconds=(6.0, 7.0))
     assert diagnose(ROBOT, "complete", runs, bands=BANDS, catalogue=(TorqueRipple(),)).verdict == "complete"
