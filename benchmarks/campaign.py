@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from campaign_effects import FACTORS, SIGNED, SIGNED_FACTORS, sized
+from campaign_effects import FACTORS, SIGNED, SIGNED_FACTORS, can_be, sized
 from campaign_tables import (
     PAPER_SAMPLES,
     campaign_tables,
@@ -136,11 +136,13 @@ def scan(
         tasks += [(kind.name, factor) for factor in (SIGNED_FACTORS if kind.name in SIGNED else FACTORS)[:sizes]]
     results = _each(each, tasks, processes)
     results.sort(key=_distance)
+    arm, named = virtual_arm(), {kind.name: kind for kind in kinds}
     best = list(dict.fromkeys(item["name"] for item in results if item["name"] not in RIVALS))[:refined]
     finer = []
     for name in best:
         first = next(item for item in results if item["name"] == name)
-        finer += [(name, first["factor"] * step) for step in FINER]
+        steps = [first["factor"] * step for step in FINER]
+        finer += [(name, factor) for factor in steps if can_be(arm, named[name], factor)]
     results += _each(each, finer, processes)
     results.sort(key=_distance)
     none = next(item for item in results if item["name"] == "none")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from scara_ident.errors import UsageError
 from scara_ident.virtual import Effect, VirtualArm
 
 # How often each default size; a negative factor where the effect's sign matters.
@@ -45,7 +46,13 @@ SIZE: dict[str, tuple[str, ...]] = {
 
 
 def sized(arm: VirtualArm, kind: type[Effect], factor: float) -> tuple[Effect, ...]:
-    """Return an effect at a multiple of its default size, on every joint that can have it."""
+    """Return an effect at a multiple of its default size, on every joint that can have it.
+
+    Raises
+    ------
+    UsageError
+        If that is out of the effect's bounds.
+    """
     joints: Sequence[str | None] = arm.robot.joints
     if kind.whole_arm != "never":
         joints = (None,)
@@ -61,7 +68,14 @@ def sized(arm: VirtualArm, kind: type[Effect], factor: float) -> tuple[Effect, .
             values = {key: 1.0 + factor * (value - 1.0) for key, value in values.items()}
         else:
             values = {key: factor * value for key, value in values.items()}
-            if kind.name == "position_dependent_friction":
-                values["share"] = min(values["share"], kind.bounds["share"][1])
-        effects.append(replace(effect, **values))
+        effects.append(replace(effect, **values).resolve(arm))
     return tuple(effects)
+
+
+def can_be(arm: VirtualArm, kind: type[Effect], factor: float) -> bool:
+    """Return whether the effect has that size within its bounds."""
+    try:
+        sized(arm, kind, factor)
+    except UsageError:
+        return False
+    return True

@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 FIRST_POWER = 0.95
 # It is not narrower than this many periods in the longest recording.
 FIRST_PERIODS = 10.0
+# Nor than this, Hz: in a narrower one too much about turning points would be left out to fit the rest.
+FIRST_BAND = 2.0
 # The fit and the choice of its band are repeated until they agree, at the most so often.
 MOST_ROUNDS = 3
 MOST_HALVINGS = 4
@@ -171,7 +173,8 @@ def _first_bands(parts: Sequence[Stretch], edges: Array, n: int) -> list[float]:
     for part in parts:
         power += binned_power(torque_of(part), part.rate, edges)
     longest = max(len(part.time) / part.rate for part in parts)
-    slowest, fastest = FIRST_PERIODS / longest, HIGHEST_BAND * min(part.rate for part in parts)
+    slowest = max(FIRST_BAND, FIRST_PERIODS / longest)
+    fastest = max(slowest, HIGHEST_BAND * min(part.rate for part in parts))
     share = np.cumsum(power, axis=1) / np.maximum(np.sum(power, axis=1, keepdims=True), np.finfo(float).tiny)
     first = [float(edges[int(np.argmax(row >= FIRST_POWER)) + 1]) for row in share]
     return [float(np.clip(band, slowest, fastest)) for band in first]

@@ -32,6 +32,8 @@ REST_PERIODS = 0.0
 # What happens at rest reaches so many periods of the band beyond it, through the low-pass; left in, it looks like a delay
 # of minus 0.7 ms on a virtual arm that has none.
 REST_WIDEN = 0.5
+# But no longer than this, s: in a narrow band too little would be left between turning points.
+REST_WIDEN_SECONDS = 0.1
 # Blocks are long against the band's memory, so that scores of different blocks are nearly independent.
 BLOCK_PERIODS = 4.0
 BLOCK_SECONDS = 0.5
@@ -153,7 +155,7 @@ def standstill(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) 
         v = motion.v[j]
         threshold = max(REST_SHARE * float(np.max(np.abs(v))), REST_NOISE * _velocity_noise(stretch, motion, j, band))
         span = 1 if band is None else max(1, int(REST_PERIODS * stretch.rate / band))
-        widen = 1 if band is None else max(1, int(REST_WIDEN * stretch.rate / band))
+        widen = 1 if band is None else max(1, int(stretch.rate * min(REST_WIDEN / band, REST_WIDEN_SECONDS)))
         result[j] = _runs_longer_than(np.abs(v) <= threshold, span, widen=widen)
     return result
 

@@ -94,7 +94,9 @@ def test_sizes_cover_every_effect_of_the_catalogue_and_its_joints(campaign: Modu
     for kind in CATALOGUE:
         one, three = (campaign.sized(arm, kind, factor) for factor in (1.0, 3.0))
         assert one == tuple(kind(joint=effect.joint).resolve(arm) for effect in one)
-        assert all(a.resolve(arm) != b for a, b in zip(three, one, strict=True))
+        assert all(a != b for a, b in zip(three, one, strict=True))
+    warm_up = next(kind for kind in CATALOGUE if kind.name == "warm_up")
+    assert not campaign_effects.can_be(arm, warm_up, -5.0)
 
 
 def test_a_tiny_campaign_runs_and_a_strong_effect_changes_the_tables(campaign: ModuleType) -> None:
