@@ -24,9 +24,10 @@ import numpy as np
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.bank import Candidate
 from scara_ident.diagnosis.diagnosis import joint_errors
-from scara_ident.diagnosis.search import model_with, weighted_fit
+from scara_ident.diagnosis.search import model_with
 from scara_ident.effects import CATALOGUE, Member
 from scara_ident.effects.measurement import shifted
+from scara_ident.estimators.least_squares import weighted_fit
 from scara_ident.evidence import gather_all
 from scara_ident.indri2002 import OJD, OJK
 from scara_ident.robot import load_robot

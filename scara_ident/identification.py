@@ -18,6 +18,7 @@ from scara_ident.estimators.consistent import ConsistentEstimate, consistent, po
 from scara_ident.estimators.estimate import paper_criteria, pooled_information
 from scara_ident.evidence import Evidence, gather_all
 from scara_ident.information import Information, merge
+from scara_ident.mapping import mapping_faults
 from scara_ident.model import ModelName, TorqueModel, build_model
 from scara_ident.motion import stretches
 from scara_ident.recording import Recording
@@ -136,6 +137,7 @@ def identify(
     progress("absorbing the recordings")
     training = gather_all(equation, recordings, bands)
     held_out = gather_all(equation, validation, bands)
+    notes += [str(fault) for fault in mapping_faults(equation, recordings, bands)]
     progress("estimating")
     noise = repeatability(recordings)
     estimate, history = estimate_by(method, equation, training, _joint_noise(noise), options)

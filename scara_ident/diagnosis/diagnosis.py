@@ -14,15 +14,18 @@ from scara_ident.diagnosis.confounding import Rival, rivals
 from scara_ident.diagnosis.finish import physical_parameters
 from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
 from scara_ident.diagnosis.screening import Dependence, screen
-from scara_ident.diagnosis.search import Search, is_delay, model_with, search, weighted_fit
+from scara_ident.diagnosis.search import Search, is_delay, model_with, search
 from scara_ident.effects import CATALOGUE, Effect, Parameter
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.measurement import shifted, within_sampling
+from scara_ident.errors import RecordingError
 from scara_ident.estimators import Estimate, JointError
 from scara_ident.estimators.estimate import joint_error
+from scara_ident.estimators.least_squares import weighted_fit
 from scara_ident.evidence import Evidence, gather_all
 from scara_ident.identification import check_held_out, data_notes
 from scara_ident.information import merge
+from scara_ident.mapping import mapping_faults
 from scara_ident.model import ModelName, TorqueModel, build_model
 from scara_ident.recording import Recording
 from scara_ident.robot import Robot
@@ -172,7 +175,7 @@ def diagnose(
     UsageError
         If a recording is both fitted and held out.
     RecordingError
-        If a recording cannot be used.
+        If a recording cannot be used, or its channels are not what the mapping says (see `mapping_faults`).
     """
     check_held_out(recordings, validation)
     base = build_model(robot, model) if isinstance(model, str) else model
@@ -183,6 +186,9 @@ def diagnose(
         # A joint whose model lacks something seems to have less band than it has.
         bands = (max(choice.bands),) * robot.n
         notes += choice.notes
+    faults = mapping_faults(base, recordings, bands)
+    if faults:
+        raise RecordingError("; ".join(str(fault) for fault in faults))
     found = search(base, recordings, bands, catalogue=catalogue, progress=progress)
     progress("testing what is left")
     delay = found.delay[0] if found.delay else 0.0

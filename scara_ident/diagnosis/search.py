@@ -17,12 +17,11 @@ from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
 from scara_ident.effects import CATALOGUE, Effect, Resolved, Scene
 from scara_ident.effects.measurement import shifted
 from scara_ident.estimators import Estimate
-from scara_ident.estimators.least_squares import least_squares, residual_noise
+from scara_ident.estimators.least_squares import weighted_fit
 from scara_ident.evidence import Evidence, gather_all
 from scara_ident.model import TorqueModel
 from scara_ident.motion import motion_of, stretches
 from scara_ident.recording import Recording
-from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
@@ -36,7 +35,6 @@ TOLD = 2.5
 # Points on the line between neighbouring scan points, and rounds of narrowing.
 LINE_POINTS = 7
 LINE_ROUNDS = 4
-WEIGHTING_ROUNDS = 3
 # Effects that act on predicted loads are fitted again until no base parameter moves by this many std.
 SETTLING_ROUNDS = 4
 SETTLED = 0.1
@@ -236,15 +234,6 @@ class Beside:
 def is_delay(candidate: Candidate) -> bool:
     """Whether a candidate is the delay of all joints, which is corrected in the data."""
     return candidate.effect.name == DELAY and candidate.member.joint is None
-
-
-def weighted_fit(model: TorqueModel, evidence: Sequence[Evidence]) -> Estimate:
-    """Fit with each joint weighted by its residual, in rounds: a bad joint first spoils the good one's residual."""
-    with one_blas_thread():
-        fit = least_squares(model, evidence, np.ones(model.robot.n), "wls")
-        for _ in range(WEIGHTING_ROUNDS):
-            fit = least_squares(model, evidence, 1.0 / residual_noise(fit, evidence), "wls")
-    return fit
 
 
 def _settle(

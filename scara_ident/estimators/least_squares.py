@@ -13,8 +13,11 @@ from scara_ident.estimators.estimate import Estimate, pooled_information, weight
 from scara_ident.evidence import Evidence
 from scara_ident.information import Information, merge
 from scara_ident.model import TorqueModel
+from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
+
+WEIGHTING_ROUNDS = 3
 
 
 def ols(model: TorqueModel, evidence: Sequence[Evidence]) -> Estimate:
@@ -95,3 +98,12 @@ def least_squares(
         covariance += inverse @ precision @ inverse
     covariance[np.diag_indices_from(covariance)] = np.where(solution.undetermined, np.inf, np.diag(covariance))
     return Estimate(model, method, solution.value, covariance, solution.undetermined, information, weights, spread.kind)
+
+
+def weighted_fit(model: TorqueModel, evidence: Sequence[Evidence]) -> Estimate:
+    """Fit with each joint weighted by its residual, in rounds: a bad joint first spoils the good one's residual."""
+    with one_blas_thread():
+        fit = least_squares(model, evidence, np.ones(model.robot.n), "wls")
+        for _ in range(WEIGHTING_ROUNDS):
+            fit = least_squares(model, evidence, 1.0 / residual_noise(fit, evidence), "wls")
+    return fit

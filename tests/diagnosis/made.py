@@ -9,9 +9,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.search import weighted_fit
 from scara_ident.diagnosis.table import Table
 from scara_ident.effects import Scene
+from scara_ident.estimators.least_squares import weighted_fit
 from scara_ident.evidence import gather_all
 from scara_ident.indri2002 import table5_parameters
 from scara_ident.model import TorqueModel, build_model
