@@ -11,13 +11,18 @@ from numpy.typing import NDArray
 from scara_ident.effects.effect import Knob, Member, Parameter
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.terms import Column
+from scara_ident.terms.friction import Offset
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Spring:
-    """A cable or hose that pulls a joint to a rest position: ``u = k (q - q0)``; the offset carries ``-k q0``."""
+    """A cable or hose that pulls a joint to a rest position: ``u = k (q - q0)``.
+
+    A model with a torque offset has the constant ``-k q0`` already. Then the rest position is that of a joint without
+    an offset, and no recording can tell how far that is from the truth: its standard deviation is infinite.
+    """
 
     @property
     def name(self) -> str:
@@ -34,20 +39,21 @@ class Spring:
         return tuple(Member(j) for j in range(scene.robot.n))
 
     def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
-        """Two columns, of the deflection and of the constant."""
+        """One column of the deflection, and one of the constant where the model has no offset."""
         j = member.joint or 0
         joint, torque = scene.robot.joints[j], scene.robot.torque_unit(j)
         angle = "m" if scene.robot.prismatic[j] else "rad"
-        return (
-            Column("stiffness", joint, f"{torque}/{angle}", f"stiffness of a spring on {joint}", True),
-            Column("preload", joint, torque, f"torque of the spring on {joint} at position zero"),
-        )
+        stiffness = Column("stiffness", joint, f"{torque}/{angle}", f"stiffness of a spring on {joint}", True)
+        if _offset(scene, j) is not None:
+            return (stiffness,)
+        return stiffness, Column("preload", joint, torque, f"torque of the spring on {joint} at position zero")
 
     def regressor(self, signals: Signals, member: Member) -> Array:
-        """Return position and one, shape (n, 2, N); the drive works against the spring in its own direction."""
+        """Return position and, without an offset in the model, one; the drive works in its own direction."""
         j = member.joint or 0
         q = signals.scene.robot.drive_sign[j] * signals.motion.q[j]
-        return signals.row(j, [q, np.ones_like(q)])
+        alone = _offset(signals.scene, j) is not None
+        return signals.row(j, [q] if alone else [q, np.ones_like(q)])
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """A spring pulls back."""
@@ -58,14 +64,31 @@ class Spring:
         j = member.joint or 0
         unit = scene.robot.torque_unit(j)
         angle = "m" if scene.robot.prismatic[j] else "rad"
-        stiffness, preload = float(value[0]), float(scene.robot.drive_sign[j] * value[1])
+        stiffness, sign = float(value[0]), float(scene.robot.drive_sign[j])
+        offset = _offset(scene, j)
+        preload = sign * float(value[1] if offset is None else scene.value[offset])
         rest = -preload / stiffness if stiffness else np.nan
-        gradient = np.array([-rest, -scene.robot.drive_sign[j]]) / stiffness if stiffness else np.zeros(2)
+        spread = np.inf
+        if offset is None and stiffness:
+            gradient = np.array([-rest, -sign]) / stiffness
+            spread = float(np.sqrt(gradient @ covariance @ gradient))
         return {
             "stiffness": Parameter(stiffness, float(np.sqrt(covariance[0, 0])), f"{unit}/{angle}"),
-            "rest_position": Parameter(rest, float(np.sqrt(gradient @ covariance @ gradient)), angle),
+            "rest_position": Parameter(rest, spread, angle),
         }
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say what it is."""
-        return "a spring, such as a cable or hose"
+        offset = _offset(scene, member.joint or 0)
+        told = "" if offset is None else ", whose rest position holds if the joint has no torque offset"
+        return f"a spring, such as a cable or hose{told}"
+
+
+def _offset(scene: Scene, joint: int) -> int | None:
+    """Return the place of the joint's torque offset among the model's columns, None without one."""
+    start = 0
+    for term in scene.model.terms:
+        if isinstance(term, Offset):
+            return start + joint
+        start += len(term.columns)
+    return None

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scara_ident.diagnosis.decision import Decision
 from scara_ident.diagnosis.diagnosis import Diagnosis, joint_errors
+from scara_ident.effects import Parameter
 from scara_ident.evidence import Evidence
 
 Array = NDArray[np.float64]
@@ -176,6 +177,14 @@ def moved(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return sorted(found, key=lambda item: -abs(item["in_std"]))
 
 
+def quantity(name: str, parameter: Parameter) -> str:
+    """Return a parameter in words, with its standard deviation or that nothing determines it."""
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    if not np.isfinite(parameter.std):
+        return f"{name} about {parameter.value:.3g}{unit} (not told by recordings)"
+    return f"{name} {parameter.value:.3g} ± {parameter.std:.1g}{unit}"
+
+
 def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Return the result in words."""
     found = []
@@ -184,8 +193,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     for effect in diagnosis.effects:
         where = f" on {effect.joint}" if effect.joint else ""
         values = ", ".join(
-            f"{name} {parameter.value:.3g} ± {parameter.std:.1g}{'' if parameter.unit == '1' else ' ' + parameter.unit}"
-            for name, parameter in effect.parameters.items()
+            quantity(name, parameter) for name, parameter in effect.parameters.items()
         )
         found.append(f"Found {effect.effect}{where}: {effect.description}; {values}.")
         if effect.confounded_with:

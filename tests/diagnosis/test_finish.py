@@ -69,6 +69,8 @@ def test_several_effects_get_their_own_parameters():
     assert set(stribeck) == {"amplitude", "velocity"}
     assert abs(stribeck["amplitude"].value - AMPLITUDE) < 4.0 * stribeck["amplitude"].std
     assert 0.0 < spring["stiffness"].std < 0.1 * STIFFNESS
+    # The model has an offset: nothing tells it from the spring's rest position.
+    assert spring["rest_position"].std == np.inf
 
 
 def test_a_parameter_that_only_serves_the_columns_is_not_reported():
