@@ -12,7 +12,6 @@ import argparse
 import json
 import os
 import time
-from collections import defaultdict
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +19,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from attribution_tables import report
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.bank import Candidate
@@ -183,6 +183,8 @@ def one_set(task: tuple[str, int]) -> dict:
         "unexplained": None if result.unexplained is None else result.unexplained.joint,
         "before": before,
         "after": after,
+        "noise": {fit.joint: fit.noise for fit in result.fit_after},
+        "missing": {fit.joint: fit.missing for fit in result.fit_after},
         "true_model": true_model_error(result, training, held_out, effects),
         "seconds": seconds,
     }
@@ -217,72 +219,6 @@ def true_model_error(result, training, held_out, effects) -> list[float] | None:
     return [error.rms for error in joint_errors(fit.value, tested)]
 
 
-def right(item: dict) -> bool:
-    """Whether what was found is what was there, a group that holds the truth included."""
-    found = {(f["effect"], f["joint"]) for f in item["found"]}
-    for true in item["true"]:
-        hit = any(
-            (f["effect"] == true["effect"] and f["joint"] == true["joint"]) or true["effect"] in f["group"]
-            for f in item["found"]
-        )
-        if not hit:
-            return False
-    return len(found) == len(item["true"])
-
-
-def report(results: list[dict]) -> None:
-    """Print the tables."""
-    by_kind = defaultdict(list)
-    for item in results:
-        by_kind[item["kind"]].append(item)
-    print(f"{'effect':30s} sets right missed wrong  limit  after/true  seconds")
-    for kind, items in by_kind.items():
-        ok = [right(item) for item in items]
-        missed = [not item["found"] for item in items]
-        wrong = [bool(item["found"]) and not good for item, good in zip(items, ok, strict=True)]
-        limit = detection_limit(items) if kind in SIZE else float("nan")
-        ratios = [
-            max(a / b for a, b in zip(item["after"], item["true_model"], strict=True))
-            for item, good in zip(items, ok, strict=True)
-            if good and item["true_model"]
-        ]
-        print(
-            f"{kind:30s} {len(items):4d} {sum(ok):5d} {sum(missed):6d} {sum(wrong):5d}  {limit:5.2f}  "
-            f"{np.median(ratios) if ratios else float('nan'):10.3f}  {np.median([i['seconds'] for i in items]):7.1f}"
-        )
-    single = [item for item in results if item["kind"] in SIZE]
-    above = [item for item in single if item["factors"][0] > detection_limit(by_kind[item["kind"]])]
-    share = np.mean([right(item) for item in above]) if above else float("nan")
-    wrong = np.mean([bool(item["found"]) and not right(item) for item in single]) if single else float("nan")
-    none = by_kind.get("none", [])
-    alarms = np.mean([item["verdict"] != "complete" for item in none]) if none else float("nan")
-    print(f"right above the detection limit: {share:.1%} of {len(above)}")
-    print(f"a wrong effect named: {wrong:.1%} of {len(single)}")
-    print(f"false alarms on sets with nothing missing: {alarms:.1%} of {len(none)}")
-    unlisted = by_kind.get("unlisted", [])
-    if unlisted:
-        honest = np.mean([item["verdict"] == "unexplained" and not item["found"] for item in unlisted])
-        print(f"effects outside the catalogue called unexplained: {honest:.1%} of {len(unlisted)}")
-    ratios = [
-        max(a / b for a, b in zip(i["after"], i["true_model"], strict=True))
-        for i in above
-        if right(i) and i["true_model"]
-    ]
-    if ratios:
-        print(
-            f"held-out error after, to that of the true model: median {np.median(ratios):.3f}, 95 % {np.quantile(ratios, 0.95):.3f}"
-        )
-
-
-def detection_limit(items: list[dict]) -> float:
-    """Size, as a factor of the default, at which half are found: the split that misjudges fewest."""
-    sizes = np.array([item["factors"][0] for item in items])
-    found = np.array([bool(item["found"]) for item in items])
-    cuts = np.concatenate([[0.0], np.sort(sizes)])
-    errors = [np.sum(found[sizes <= cut]) + np.sum(~found[sizes > cut]) for cut in cuts]
-    return float(cuts[int(np.argmin(errors))])
-
-
 def main() -> None:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -290,7 +226,11 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", default=None, help="kinds to run")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--output", type=Path, default=Path("benchmarks/results/attribution.json"))
+    parser.add_argument("--tables", type=Path, help="print the tables of an earlier run's JSON and stop")
     arguments = parser.parse_args()
+    if arguments.tables:
+        report(json.loads(arguments.tables.read_text(encoding="utf-8")))
+        return
     kinds = arguments.only or [*SIZE, "none", "none", "none", "unlisted", "unlisted", "pair", "pair"]
     tasks = [(kinds[k % len(kinds)], arguments.seed * 100_000 + k) for k in range(arguments.sets)]
     with ProcessPoolExecutor(max_workers=2) as pool:

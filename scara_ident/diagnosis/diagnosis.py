@@ -37,6 +37,9 @@ Verdict = Literal["complete", "explained", "unexplained"]
 REMAINDER = 0.08
 # A repeatable remainder larger than the noise, within the band, is one whatever it depends on.
 REMAINDER_TO_NOISE = 1.0
+# With what was found the search is repeated where the band becomes this many times as wide, so often at the most.
+WIDER = 1.3
+MOST_WIDENINGS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +183,7 @@ def diagnose(
     check_held_out(recordings, validation)
     base = build_model(robot, model) if isinstance(model, str) else model
     notes = list(data_notes((*recordings, *validation)))
+    given = bands is not None
     if bands is None:
         progress("choosing the band")
         choice = choose_bands(base, recordings)
@@ -190,6 +194,13 @@ def diagnose(
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))
     found = search(base, recordings, bands, catalogue=catalogue, progress=progress)
+    for _ in range(0 if given else MOST_WIDENINGS):
+        wider = max(choose_bands(found.model, found.recordings).bands) if found.chosen else 0.0
+        if wider < WIDER * max(band or np.inf for band in bands):
+            break
+        # What was missing had hidden how far up the motion explains the torque, and other effects with it.
+        bands = (wider,) * robot.n
+        found = search(base, recordings, bands, catalogue=catalogue, progress=progress)
     progress("testing what is left")
     delay = found.delay[0] if found.delay else 0.0
     held_out = tuple(shifted(recording, delay) for recording in validation) if delay else tuple(validation)

@@ -175,6 +175,7 @@ def search(
         if done:
             left = [k for k, item in enumerate(candidates) if item.label(scene) != winner.label]
             candidates, places = [candidates[k] for k in left], tuple(places[k] for k in left)
+        scene = _settle(scene, data, bands, chosen)
         fitted = model_with(scene, chosen)
         evidence = gather_all(fitted, data, bands)
         estimate = weighted_fit(fitted, evidence)

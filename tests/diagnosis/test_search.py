@@ -40,7 +40,7 @@ def test_two_planted_effects_come_in_and_nothing_else():
     result = search(MODEL, runs, BANDS, catalogue=SMALL)
     assert {item.label(result.scene) for item in result.chosen} == {"spring of joint2", "asymmetric_friction of joint1"}
     assert [step.decision.candidate for step in result.steps] == list(result.chosen)
-    assert len(result.model.columns) == len(MODEL.columns) + 3
+    assert len(result.model.columns) == len(MODEL.columns) + 2
     clean = fitted(MODEL, exact_runs())
     assert np.max(np.abs(result.scene.value - clean.value)[:5] / clean.std[:5]) < 4.0
 
