@@ -105,7 +105,7 @@ def _pooled(root: Array, value: Array, sequences: Sequence[Sequence[Block]]) -> 
             for block in blocks:
                 half = block[j].regressor_factor @ root
                 score = half.T @ (block[j].projected_torque - block[j].regressor_factor @ value)
-                leverage = np.linalg.svd(half, compute_uv=False) ** 2
+                leverage = np.linalg.eigvalsh(half.T @ half)
                 power += float(score @ score)
                 expected += float(np.sum(leverage * np.clip(1.0 - leverage, 0.0, None)))
                 product += half.T @ half
@@ -123,11 +123,12 @@ def _reduced_score(block: Information, root: Array, value: Array) -> Array | Non
     """Score of a block in the directions of ``root``, with residuals freed of the bias of fitting."""
     residual = block.projected_torque - block.regressor_factor @ value
     half = block.regressor_factor @ root
-    left, singular, right = np.linalg.svd(half, full_matrices=False)
-    leverage = singular**2
-    if np.any(leverage > FULL_LEVERAGE):
+    # With H = half half', half' (1 - H)^-1/2 = (1 - half' half)^-1/2 half': the smaller of two symmetric problems.
+    leverage, directions = np.linalg.eigh(half.T @ half)
+    if leverage[-1] > FULL_LEVERAGE:
         return None
-    return np.asarray(right.T @ (singular / np.sqrt(1.0 - leverage) * (left.T @ residual)))
+    score = directions.T @ (half.T @ residual)
+    return np.asarray(directions @ (score / np.sqrt(1.0 - leverage)))
 
 
 def _square_root(matrix: Array) -> Array:

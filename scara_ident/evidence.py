@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -53,9 +54,14 @@ class Evidence:
     left_out_ends: float
     left_out_rest: tuple[float, ...]
 
+    @cached_property
+    def joints(self) -> tuple[Information, ...]:
+        """All rows of each joint within the band."""
+        return tuple(merge(block[j] for block in self.blocks) for j in range(len(self.unfiltered)))
+
     def joint(self, joint: int) -> Information:
         """Return all rows of one joint within the band."""
-        return merge(block[joint] for block in self.blocks)
+        return self.joints[joint]
 
 
 def gather(model: TorqueModel, recording: Recording, bands: Sequence[float | None]) -> Evidence:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.estimators import Estimate
-from scara_ident.estimators.least_squares import weighted_fit
+from scara_ident.estimators.least_squares import weighted_fit, weighted_value
 from scara_ident.evidence import Evidence, gather_all
 from scara_ident.information import merge
 from scara_ident.model import TorqueModel
@@ -24,8 +24,10 @@ Signal = Literal["effort", "position", "effort and position"]
 
 # Another mapping must leave at most this share of the error, geometric mean over the joints.
 MENDED = 0.5
-# Joints whose error is above this share of their torque may be exchanged, or have their axis turned round.
+# Joints whose error is above this share of their torque may be exchanged with another.
 POOR = 0.05
+# An axis turned round leaves more than this of some joint's torque.
+TURNED = 0.08
 # Exchanging one signal alone makes nonsense of both joints.
 BAD = 0.3
 # Friction that feeds in this share of a joint's power, and this many standard deviations, points to a sign.
@@ -100,22 +102,24 @@ def mapping_faults(
     joints = model.robot.joints
     faults: list[MappingFault] = []
     for _ in range(2 * len(joints)):
-        fitted, evidence = _fit(model, data, bands)
-        errors, score = _relative(fitted, evidence), _score(fitted, evidence)
+        evidence = gather_all(model, data, bands)
+        fitted = weighted_fit(model, evidence)
+        errors, score = _relative(fitted.value, evidence), _score(fitted.value, evidence)
         pushing = _pushing(fitted, data, bands)
         best: tuple[MappingFault, tuple[Recording, ...]] | None = None
         for signal, chosen, exchanged in _suspects(errors, pushing):
             other = tuple(_read_as(item, signal, chosen, exchanged) for item in data)
-            found, held = _fit(model, other, bands)
+            held = gather_all(model, other, bands)
+            mended = _score(weighted_value(model, held), held)
+            if mended >= (MENDED * score if best is None else best[0].mended):
+                continue
             # A turned sign must take the push away; signs that an exchange brings to light are the next round's.
             allowed = np.count_nonzero(pushing) - (signal != "effort and position")
-            if not exchanged and np.count_nonzero(_pushing(found, other, bands)) > allowed:
+            if not exchanged and np.count_nonzero(_pushing(weighted_fit(model, held), other, bands)) > allowed:
                 continue
-            mended = _score(found, held)
             names = tuple(joints[j] for j in chosen)
-            if best is None or mended < best[0].mended:
-                best = MappingFault(signal, names, exchanged, score, mended), other
-        if best is not None and best[0].mended < MENDED * score:
+            best = MappingFault(signal, names, exchanged, score, mended), other
+        if best is not None:
             faults.append(best[0])
             data = best[1]
             continue
@@ -132,7 +136,7 @@ def _suspects(errors: Array, pushing: NDArray[np.bool_]) -> list[tuple[Signal, t
     poor = [int(j) for j in np.flatnonzero(errors > POOR)]
     found: list[tuple[Signal, tuple[int, ...], bool]] = []
     found += [(signal, (int(j),), False) for j in np.flatnonzero(pushing) for signal in one]
-    if poor and not np.any(pushing):
+    if np.any(errors > TURNED) and not np.any(pushing):
         found += [(both, (j,), False) for j in range(len(errors))]
     for pair in combinations(poor, 2):
         found.append((both, pair, True))
@@ -164,20 +168,13 @@ def _net_power(data: Sequence[Recording]) -> float:
     return float(sum(np.sum(item.effort[:, 1:] * np.diff(item.position)) for item in data if item.effort is not None))
 
 
-def _fit(
-    model: TorqueModel, data: Sequence[Recording], bands: Sequence[float | None]
-) -> tuple[Estimate, tuple[Evidence, ...]]:
-    evidence = gather_all(model, data, bands)
-    return weighted_fit(model, evidence), evidence
+def _relative(value: Array, evidence: Sequence[Evidence]) -> Array:
+    joints = [merge(item.joint(j) for item in evidence) for j in range(len(evidence[0].unfiltered))]
+    return np.array([part.rms(value) / max(part.torque_rms, np.finfo(float).tiny) for part in joints])
 
 
-def _relative(estimate: Estimate, evidence: Sequence[Evidence]) -> Array:
-    joints = [merge(item.joint(j) for item in evidence) for j in range(estimate.model.robot.n)]
-    return np.array([part.rms(estimate.value) / max(part.torque_rms, np.finfo(float).tiny) for part in joints])
-
-
-def _score(estimate: Estimate, evidence: Sequence[Evidence]) -> float:
-    return float(np.exp(np.mean(np.log(np.maximum(_relative(estimate, evidence), 1e-12)))))
+def _score(value: Array, evidence: Sequence[Evidence]) -> float:
+    return float(np.exp(np.mean(np.log(np.maximum(_relative(value, evidence), 1e-12)))))
 
 
 def _pushing(estimate: Estimate, data: Sequence[Recording], bands: Sequence[float | None]) -> NDArray[np.bool_]:

@@ -82,11 +82,14 @@ def examine(table: Table, model: Sequence[int], groups: Sequence[Sequence[int]])
     place = {k: i for i, k in enumerate(columns)}
     wanted = [*columns, table.rows.shape[1] - 1]
     sums = _sums(table.whole, model, wanted)
-    residual = table.rows[:, wanted] - table.rows[:, model] @ sums
+    # Column by column in memory: every candidate takes a few columns of all rows.
+    residual = np.asfortranarray(table.rows[:, wanted] - table.rows[:, model] @ sums)
     sizes = np.sum(table.rows[:, wanted] ** 2, axis=0)
     # What is left of a column that the model spans is rounding, and must not be scaled up.
-    residual[:, np.sum(residual**2, axis=0) < ABSORBED * sizes] = 0.0
+    absorbed = np.sum(residual**2, axis=0) < ABSORBED * sizes
     folds = [factor[:, wanted] - factor[:, model] @ sums for factor in table.fold_factors]
+    for part in (residual, *folds):
+        part[:, absorbed] = 0.0
     return [_examine_one(table, residual, sizes, folds, sums, [place[k] for k in group]) for group in groups]
 
 
@@ -96,12 +99,6 @@ def _sums(factor: Array, model: Sequence[int], wanted: Sequence[int]) -> Array:
     size = np.linalg.norm(basis, axis=0)
     size[size == 0.0] = 1.0
     return np.asarray(np.linalg.lstsq(basis / size, factor[:, wanted], rcond=1e-10)[0] / size[:, None])
-
-
-def _solve(columns: Array, target: Array) -> Array:
-    size = np.linalg.norm(columns, axis=0)
-    size[size == 0.0] = 1.0
-    return np.asarray(np.linalg.lstsq(columns / size, target, rcond=1e-9)[0] / size)
 
 
 def _examine_one(
@@ -117,12 +114,12 @@ def _examine_one(
         return Examination(
             nothing, np.full((k, k), np.inf), 1.0, outside, 0.0, 0.0, (None,) * len(folds), 0.0, sums[:, -1]
         )
-    value = _solve(columns, error)
+    products = [fold[:, group].T @ fold[:, group] for fold in folds]
+    aims = [fold[:, group].T @ fold[:, -1] for fold in folds]
+    value = _normal(np.sum(products, axis=0), np.sum(aims, axis=0))
     added = columns @ value
     after = error - added
     p_value, covariance = _block_test(table, columns, after, value, len(sums))
-    products = [fold[:, group].T @ fold[:, group] for fold in folds]
-    aims = [fold[:, group].T @ fold[:, -1] for fold in folds]
     mean = np.mean([np.trace(product) for product in products])
     gains: list[float | None] = []
     saved = 0.0
@@ -131,7 +128,7 @@ def _examine_one(
         if np.trace(product) < ABSTAIN * mean or base == 0.0:
             gains.append(None)
             continue
-        guess = _normal(sum(products) - product, sum(aims) - aims[k_fold])
+        guess = _normal(np.sum(products, axis=0) - product, np.sum(aims, axis=0) - aims[k_fold])
         with_it = fold[:, -1] - fold[:, group] @ guess
         saving = base - float(with_it @ with_it)
         gains.append(saving / base)

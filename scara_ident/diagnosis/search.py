@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scara_ident.diagnosis.bank import Candidate
 from scara_ident.diagnosis.decision import Decision, decide
 from scara_ident.diagnosis.examination import examine
-from scara_ident.diagnosis.finish import physical_parameters
+from scara_ident.diagnosis.finish import parameters_beside
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
 from scara_ident.effects import CATALOGUE, Effect, Resolved, Scene
@@ -163,7 +163,7 @@ def search(
         decisions += beside.judge_new([item for item in seeds if item.label(scene) not in taken])
         if len(steps) >= MOST_EFFECTS:
             break
-        winner = _choose(beside, decisions, chosen)
+        winner = _choose(beside, decisions)
         if winner is None:
             break
         if is_delay(winner.candidate):
@@ -278,7 +278,7 @@ def best_of_each(decisions: Sequence[Decision]) -> dict[str, Decision]:
     return best
 
 
-def _choose(beside: Beside, decisions: Sequence[Decision], chosen: Sequence[Candidate]) -> Decision | None:
+def _choose(beside: Beside, decisions: Sequence[Decision]) -> Decision | None:
     """Refine the best families and return the best acceptable member of them that is told from zero."""
     accepted = [item for item in best_of_each(decisions).values() if item.accepted]
     accepted.sort(key=lambda item: -item.examination.held_out)
@@ -289,15 +289,15 @@ def _choose(beside: Beside, decisions: Sequence[Decision], chosen: Sequence[Cand
     sound = sorted(
         (item for item in refine(beside, leaders) if item.accepted), key=lambda item: -item.examination.held_out
     )
-    return next((item for item in sound if _told_from_zero(beside, chosen, item.candidate)), None)
+    return next((item for item in sound if _told_from_zero(beside, item.candidate)), None)
 
 
-def _told_from_zero(beside: Beside, chosen: Sequence[Candidate], candidate: Candidate) -> bool:
+def _told_from_zero(beside: Beside, candidate: Candidate) -> bool:
     """Whether an effect has a size beyond its uncertainty, that of its nonlinear parameters included."""
     if not candidate.effect.knobs:
         return True
     knobs = {knob.name for knob in candidate.effect.knobs}
-    found = physical_parameters(beside.scene, beside.recordings, beside.bands, beside.weights, [*chosen, candidate])[-1]
+    found = parameters_beside(beside.scene, beside.recordings, beside.bands, beside.table, beside.weights, candidate)
     sizes = [parameter for name, parameter in found.items() if name not in knobs and name != "phase"]
     return any(abs(parameter.value) > TOLD * parameter.std for parameter in sizes)
 

@@ -72,13 +72,7 @@ def wls(model: TorqueModel, evidence: Sequence[Evidence], noise: Array | None = 
 def residual_noise(estimate: Estimate, evidence: Sequence[Evidence]) -> Array:
     """Return the rms residual of each joint within the band, shape (n,); 1 for a joint without rows."""
     n = estimate.model.robot.n
-    rms = np.ones(n)
-    for j in range(n):
-        rows = merge(item.joint(j) for item in evidence)
-        if rows.rows:
-            # An exact fit would give an infinite weight; rounding is the floor.
-            rms[j] = max(rows.rms(estimate.value), 1e-12 * max(rows.torque_rms, np.finfo(float).tiny))
-    return rms
+    return _rms(estimate.value, [merge(item.joint(j) for item in evidence) for j in range(n)])
 
 
 def least_squares(
@@ -101,9 +95,44 @@ def least_squares(
 
 
 def weighted_fit(model: TorqueModel, evidence: Sequence[Evidence]) -> Estimate:
-    """Fit with each joint weighted by its residual, in rounds: a bad joint first spoils the good one's residual."""
+    """Fit with each joint weighted by its residual, in rounds: a bad joint first spoils the good one's residual.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    evidence : sequence of Evidence
+
+    Returns
+    -------
+    Estimate
+    """
     with one_blas_thread():
-        fit = least_squares(model, evidence, np.ones(model.robot.n), "wls")
-        for _ in range(WEIGHTING_ROUNDS):
-            fit = least_squares(model, evidence, 1.0 / residual_noise(fit, evidence), "wls")
-    return fit
+        return least_squares(model, evidence, _settled_weights(model, evidence)[1], "wls")
+
+
+def weighted_value(model: TorqueModel, evidence: Sequence[Evidence]) -> Array:
+    """Return the parameters of `weighted_fit` alone, shape (p,), without the work of their covariance."""
+    with one_blas_thread():
+        return _settled_weights(model, evidence)[0]
+
+
+def _settled_weights(model: TorqueModel, evidence: Sequence[Evidence]) -> tuple[Array, Array]:
+    joints = [merge(item.joint(j) for item in evidence) for j in range(model.robot.n)]
+    weights = np.ones(model.robot.n)
+    for _ in range(WEIGHTING_ROUNDS):
+        weights = 1.0 / _rms(_weighted_value(joints, weights), joints)
+    return _weighted_value(joints, weights), weights
+
+
+def _weighted_value(joints: Sequence[Information], weights: Array) -> Array:
+    return merge(part.scaled(float(weight)) for part, weight in zip(joints, weights, strict=True)).solve().value
+
+
+def _rms(value: Array, joints: Sequence[Information]) -> Array:
+    # An exact fit would give an infinite weight; rounding is the floor.
+    return np.array(
+        [
+            max(part.rms(value), 1e-12 * max(part.torque_rms, np.finfo(float).tiny)) if part.rows else 1.0
+            for part in joints
+        ]
+    )
