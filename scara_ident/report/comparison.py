@@ -20,6 +20,14 @@ def comparison_dict(comparison: Comparison) -> dict[str, Any]:
         "method": comparison.method,
         "trajectories": names,
         "joints": list(joints),
+        "units": {
+            joint: {
+                "torque": comparison.model.robot.torque_unit(j),
+                "velocity": f"{'m' if comparison.model.robot.prismatic[j] else 'rad'}/s",
+                "acceleration": f"{'m' if comparison.model.robot.prismatic[j] else 'rad'}/s^2",
+            }
+            for j, joint in enumerate(joints)
+        },
         "band_hz": dict(zip(joints, comparison.bands, strict=True)),
         "characteristics": {
             summary.name: {

@@ -192,9 +192,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         found.append("The model lacks nothing that these recordings can show.")
     for effect in diagnosis.effects:
         where = f" on {effect.joint}" if effect.joint else ""
-        values = ", ".join(
-            quantity(name, parameter) for name, parameter in effect.parameters.items()
-        )
+        values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())
         found.append(f"Found {effect.effect}{where}: {effect.description}; {values}.")
         if effect.confounded_with:
             others = ", ".join(rival.label for rival in effect.confounded_with)
@@ -231,8 +229,15 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     return tuple(found)
 
 
-def diagnosis_markdown(diagnosis: Diagnosis) -> str:
-    """Return the story as Markdown."""
+def diagnosis_markdown(diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]] = ()) -> str:
+    """Return the story as Markdown.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    pictures : sequence of (str, str), optional
+        Title and file name of figures that stand beside it; see `scara_ident.report.pictures`.
+    """
     content = diagnosis_dict(diagnosis)
     lines = [f"# Diagnosis of {diagnosis.robot.name}: {diagnosis.verdict}", ""]
     lines += [f"{sentence}  " for sentence in content["summary"]]
@@ -250,6 +255,10 @@ def diagnosis_markdown(diagnosis: Diagnosis) -> str:
         for joint in diagnosis.robot.joints:
             cells = [part[key][joint] for key in ("before", "after", "before_relative", "after_relative")]
             lines.append(f"| {joint} | " + " | ".join(_cell(x, k > 1) for k, x in enumerate(cells)) + " |")
+    if pictures:
+        lines += ["", "## Residual before and after"]
+        for title, name in pictures:
+            lines += ["", f"### {title[:1].upper()}{title[1:]}", "", f"![{title}]({name})"]
     if content["moved"]:
         lines += ["", "## Parameters that moved when the effects came in", "", "| name | before | after | in std |"]
         lines += ["|---|---|---|---|"]

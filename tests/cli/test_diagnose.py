@@ -30,7 +30,8 @@ def test_it_writes_what_the_contract_says(command, tmp_path: Path):
     assert set(content["recordings"]["validation"]) == {"test_1"}
     assert set(content["recordings"]["training"]) == {"F1_1", "F1_2", "F2_1", "F2_2"}
     assert content["validation"]["after"]["joint1"] < content["validation"]["before"]["joint1"]
-    assert {path.name for path in out.iterdir()} == {"diagnosis.json", "diagnosis.md", "report.html"}
+    pictures = {f"effect_{k + 1}.png" for k in range(len(content["effects"]))}
+    assert {path.name for path in out.iterdir()} == {"diagnosis.json", "diagnosis.md", "report.html", *pictures}
     assert "Found spring on joint1" in result.out
     assert (out / "diagnosis.md").read_text().startswith("# Diagnosis of scara03")
 

@@ -14,19 +14,27 @@ from scara_ident.report.html.page import (
     Group,
     Page,
     Section,
+    colour_scale,
     escape,
     heading,
     listing,
+    number,
     paragraph,
     superscripts,
     table,
 )
+from scara_ident.report.html.parameters import digits
 from scara_ident.report.html.plot import Figure, Layer, Line, Panel, Plot, single
 
 COLORS = ("blue", "vermillion", "green", "orange", "purple", "black")
 DASHES = ("", "7 3", "2 3")
 # Ratio to the own error at which a cell has its full colour.
 FULL_RATIO = 10.0
+# Ratio to what the covariance promises from which an error is marked as bias.
+BIASED = 2.0
+
+# By joint and kind of quantity.
+Units = Mapping[str, Mapping[str, str]]
 
 
 def comparison_report(path: Path, content: Mapping[str, Any]) -> None:
@@ -50,16 +58,17 @@ def comparison_page(content: Mapping[str, Any]) -> Page:
     """Assemble the report of a comparison."""
     names: Sequence[str] = content["trajectories"]
     joints: Sequence[str] = content["joints"]
+    units: Units = content.get("units") or {}
     sections = [
-        Section("errors", "Every trajectory from every other", _error_blocks(content, names, joints)),
+        Section("errors", "Every trajectory from every other", _error_blocks(content, names, joints, units)),
         Section("parameters", "Parameters", _parameter_blocks(content, names)),
     ]
     if content.get("characteristics"):
-        sections.insert(0, Section("trajectories", "Trajectories", _characteristics(content, names, joints)))
+        sections.insert(0, Section("trajectories", "Trajectories", _characteristics(content, names, joints, units)))
     if content.get("friction"):
-        words = "Friction as every trajectory sees it: dotted where it goes beyond the trajectory's own speeds, which is extrapolation."
+        words = "Friction as every trajectory sees it: a full line over the speeds that it covers, dotted beyond them, which is extrapolation."
         sections.append(
-            Section("friction", "Friction", (paragraph(words), _friction_group(content["friction"], names)))
+            Section("friction", "Friction", (paragraph(words), _friction_group(content["friction"], names, units)))
         )
     if content.get("notes"):
         sections.append(Section("notes", "Notes on the data", (listing(content["notes"]),)))
@@ -72,48 +81,56 @@ def comparison_page(content: Mapping[str, Any]) -> Page:
     )
 
 
-def _characteristics(content: Mapping[str, Any], names: Sequence[str], joints: Sequence[str]) -> list[Block]:
+def _characteristics(
+    content: Mapping[str, Any], names: Sequence[str], joints: Sequence[str], units: Units
+) -> list[Block]:
     rows: list[list[Cell | str]] = []
     for name in names:
         what = content["characteristics"][name]
         row: list[Cell | str] = [
             Cell(escape(name), "name"),
-            _number(what.get("log_det"), 4),
-            _number(what.get("condition")),
+            number(what.get("log_det"), 4),
+            number(what.get("condition")),
         ]
         for key in ("sigma", "peak_velocity", "peak_acceleration"):
             values = what.get(key) or {}
-            row += [_number(values.get(joint)) for joint in joints]
+            row += [number(values.get(joint)) for joint in joints]
         rows.append([*row, str(len(what.get("recordings", ())))])
     head = ["trajectory", "J_d", "J_k"]
-    for words in ("repeatability", "peak velocity", "peak acceleration"):
-        head += [f"{words}, {joint}" for joint in joints]
+    for words, kind in (("scatter of runs", "torque"), ("peak velocity", "velocity"), ("peak acc.", "acceleration")):
+        head += [f"{words}, {joint}{_unit(units, joint, kind)}" for joint in joints]
     head.append("runs")
-    return [table(head, rows, numeric=range(1, len(head)))]
+    words = "J_d: what the motion tells of all parameters together (ln det); J_k: condition, small where no parameter is hidden behind others."
+    return [paragraph(words), table(head, rows, numeric=range(1, len(head)))]
 
 
-def _error_blocks(content: Mapping[str, Any], names: Sequence[str], joints: Sequence[str]) -> list[Block]:
+def _error_blocks(content: Mapping[str, Any], names: Sequence[str], joints: Sequence[str], units: Units) -> list[Block]:
     blocks: list[Block] = [
         paragraph(
             "Rms error on the trajectory of the row with parameters from that of the column. The colour is the ratio to the row's own error, "
-            f"white at 1 and full at {FULL_RATIO:g}; in brackets what the covariance of the parameters promises: where the error is far above it, bias is at work and not noise."
-        )
+            f"none at 1 and full at {FULL_RATIO:g}; in brackets what the covariance of the parameters promises. Where the error is over twice that (▲), bias is at work and not noise."
+        ),
+        colour_scale("own error", f"{FULL_RATIO:g} times the own error"),
     ]
     for joint in joints:
         rows: list[list[Cell | str]] = []
         for predicted in names:
             own = content["errors"][predicted][predicted][joint]
-            row: list[Cell | str] = [Cell(escape(predicted), "name"), _number(content["torque_rms"][predicted][joint])]
+            row: list[Cell | str] = [Cell(escape(predicted), "name"), number(content["torque_rms"][predicted][joint])]
             for estimated in names:
                 error = content["errors"][predicted][estimated][joint]
                 promised = content.get("predicted_by_covariance", {}).get(predicted, {}).get(estimated, {}).get(joint)
-                bracket = "" if promised is None else f" ({_number(promised, 2)})"
-                row.append(Cell(escape(_number(error) + bracket), "num", _ratio_strength(error, own)))
-            rows.append([*row, _number(_mean(content["errors"][predicted][other][joint] for other in names))])
+                bracket = "" if promised is None else f" <small>({number(promised, 2)})</small>"
+                biased = "▲ " if promised and error and error > BIASED * promised else ""
+                row.append(Cell(f"{biased}{number(error)}{bracket}", "num", _ratio_strength(error, own)))
+            rows.append([*row, number(_mean(content["errors"][predicted][other][joint] for other in names))])
         average: list[Cell | str] = [Cell("average", "name"), ""]
-        average += [_number(_mean(content["errors"][other][name][joint] for other in names)) for name in names]
-        head = ["predicted \\ from", "torque", *names, "average"]
-        blocks += [heading(joint), table(head, [*rows, [*average, ""]], numeric=range(1, len(head)))]
+        average += [number(_mean(content["errors"][other][name][joint] for other in names)) for name in names]
+        head = ["predicted \\ from", "rms torque", *names, "average"]
+        blocks += [
+            heading(f"{joint}{_unit(units, joint, 'torque')}"),
+            table(head, [*rows, [*average, ""]], numeric=range(1, len(head))),
+        ]
     return blocks
 
 
@@ -142,13 +159,14 @@ def _parameter_blocks(content: Mapping[str, Any], names: Sequence[str]) -> list[
                 row.append("undetermined")
                 continue
             strength = float(np.clip((value - middle) / (6.0 * std), -1.0, 1.0)) if std else 0.0
-            row.append(Cell(f"{value:.4g} ± {std:.1g}", "num", strength))
-        rows.append([*row, superscripts(entries[0].get("unit", ""))])
+            row.append(Cell(f"{digits(value, std)} <small>± {std:.1g}</small>", "num", strength))
+        rows.append([*row, Cell(escape(superscripts(entries[0].get("unit", ""))), "unit")])
     words = "Colour: how many of its own standard deviations a value lies above (blue) or below (vermillion) the median of the trajectories, full at six. Strong colours are disagreement that noise does not explain."
-    return [paragraph(words), table(("name", *names, "unit"), rows, numeric=range(1, len(names) + 1))]
+    scale = colour_scale("6 std below the median", "6 std above", two_sided=True)
+    return [paragraph(words), scale, table(("name", *names, "unit"), rows, numeric=range(1, len(names) + 1))]
 
 
-def _friction_group(friction: Mapping[str, Any], names: Sequence[str]) -> Group:
+def _friction_group(friction: Mapping[str, Any], names: Sequence[str], units: Units) -> Group:
     figures: list[Figure] = []
     for joint, curves in friction.items():
         speed = np.asarray(curves["speed"], dtype=float)
@@ -161,11 +179,18 @@ def _friction_group(friction: Mapping[str, Any], names: Sequence[str]) -> Group:
             layers.append(Line(speed, np.where(own, np.nan, torque), color, "", 1.2, "2 4"))
         figures.append(
             single(
-                f"friction-{len(figures)}", f"Friction of {joint}", "", Plot("speed", (Panel("friction", layers, 230),))
+                f"friction-{len(figures)}",
+                f"Friction of {joint}",
+                "",
+                Plot(
+                    f"speed{_unit(units, joint, 'velocity')}",
+                    (Panel(f"friction{_unit(units, joint, 'torque')}", layers, 230),),
+                ),
             )
         )
     return Group("friction-group", figures, (), "two")
 
 
-def _number(value: float | None, digits: int = 3) -> str:
-    return "–" if value is None or not np.isfinite(value) else f"{value:.{digits}g}"
+def _unit(units: Units, joint: str, kind: str) -> str:
+    unit = (units.get(joint) or {}).get(kind)
+    return f" [{superscripts(unit)}]" if unit else ""

@@ -7,37 +7,41 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from scara_ident.diagnosis.diagnosis import Diagnosis, FoundEffect
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
-from scara_ident.diagnosis.search import DELAY
 from scara_ident.effects.measurement import shifted
-from scara_ident.estimators import Estimate
 from scara_ident.recording import Recording
 from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.html.candidates import candidate_blocks
+from scara_ident.report.html.chapters import chapters
 from scara_ident.report.html.experiments import next_experiments
 from scara_ident.report.html.page import (
     Block,
     Cell,
     Page,
     Section,
-    bar,
+    chance,
+    count,
     escape,
     folded,
     heading,
     listing,
+    number,
     paragraph,
     superscripts,
     table,
     tag,
+    track,
 )
+from scara_ident.report.html.parameters import digits
+from scara_ident.report.html.remainder import remainder_group
 from scara_ident.report.html.residual import residual_blocks
-from scara_ident.report.html.story import Chapter, chapter_group, moment_group
+from scara_ident.report.html.story import chapter_group, moment_group
 from scara_ident.report.html.torque import torque_group
 from scara_ident.report.html.traces import Trace, traces
 from scara_ident.threads import one_blas_thread
-
-# Candidates shown at once, the best first; the others unfold.
-SHOWN_CANDIDATES = 10
 
 
 def diagnosis_report(
@@ -95,25 +99,42 @@ def diagnosis_page(diagnosis: Diagnosis, recordings: Sequence[Recording], valida
         Section(
             "left",
             "What is left",
-            (*_left_blocks(diagnosis), *residual_blocks(robot, sets, bands)),
+            (*_left_blocks(diagnosis), *_remainder(diagnosis, sets["training"]), *residual_blocks(robot, sets, bands)),
         ),
         Section(
             "torque-section",
             "Torque",
             (paragraph("Predicted by the model with the effects found."), torque_group(robot, parts, bands)),
         ),
-        Section("candidates", "Candidates", _candidate_blocks(content)),
+        Section("candidates", "Candidates", candidate_blocks(content)),
         Section("limits", "What cannot be known", _limit_blocks(diagnosis, content)),
     ]
     if diagnosis.notes:
         sections.append(Section("notes", "Notes on the data", (listing(diagnosis.notes),)))
     subtitle = (
-        f"{diagnosis.before.model.name} model; {len(recordings)} recordings, {len(validation)} held out; "
+        f"{diagnosis.before.model.name} model; {count(len(recordings), 'recording')}, {len(validation)} held out; "
         f"{diagnosis.search.tried} candidates and scan points tried; verdict: {diagnosis.verdict}"
     )
     return Page(
-        f"Diagnosis of {robot.name}", subtitle, content["summary"], sections, diagnosis.verdict == "unexplained"
+        f"Diagnosis of {robot.name}",
+        subtitle,
+        _verdict(diagnosis, content["summary"]),
+        sections,
+        diagnosis.verdict == "unexplained",
     )
+
+
+def _verdict(diagnosis: Diagnosis, summary: Sequence[str]) -> tuple[str, ...]:
+    """The verdict in a sentence, then what it rests on."""
+    found = " and ".join(_title(effect).replace("_", " ") for effect in diagnosis.effects)
+    if diagnosis.verdict == "complete":
+        # The first of the sentences says so already.
+        return tuple(summary)
+    if diagnosis.verdict == "explained":
+        return (f"Explained: the model lacked {found}; what is left is noise, or smaller than it.", *summary)
+    lacks = f"the model lacked {found}, and something" if found else "something"
+    where = f" on {diagnosis.unexplained.joint}" if diagnosis.unexplained else ""
+    return (f"Not all explained: {lacks}{where} repeats that no known effect accounts for.", *summary)
 
 
 def _gain_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
@@ -128,12 +149,12 @@ def _gain_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
                 [
                     words,
                     Cell(escape(joint), "name"),
-                    _number(before),
-                    _number(after),
+                    number(before),
+                    number(after),
                     _change(before, after),
                     _share(part["before_relative"][joint]),
                     _share(part["after_relative"][joint]),
-                    _number(floor),
+                    number(floor),
                     robot.torque_unit(j),
                 ]
             )
@@ -142,7 +163,7 @@ def _gain_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
         "joint",
         "before",
         "after",
-        "",
+        "what is left",
         "before, of torque",
         "after, of torque",
         "noise floor",
@@ -157,13 +178,21 @@ def _gain_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
     detail: list[list[Cell | str]] = [
         [
             Cell(escape(name), "name"),
-            kind,
-            *(x for joint in robot.joints for x in (_number(row["before"][joint]), _number(row["after"][joint]))),
+            words,
+            *(x for joint in robot.joints for x in (number(row["before"][joint]), number(row["after"][joint]))),
         ]
-        for kind in ("validation", "training")
+        for kind, words in (("validation", "held out"), ("training", "training"))
         for name, row in content["recordings"][kind].items()
     ]
-    columns = ["recording", "", *(f"{joint} {when}" for joint in robot.joints for when in ("before", "after"))]
+    columns = [
+        "recording",
+        "",
+        *(
+            f"{joint} {when} [{robot.torque_unit(j)}]"
+            for j, joint in enumerate(robot.joints)
+            for when in ("before", "after")
+        ),
+    ]
     return [*blocks, folded("every recording", table(columns, detail, numeric=range(2, len(columns))))]
 
 
@@ -171,7 +200,7 @@ def _change(before: float | None, after: float | None) -> Cell:
     if not before or after is None:
         return Cell("")
     change = round(100.0 * (after / before - 1.0))
-    return Cell(f"{bar(after / before)} {f'{change:+d}' if change else '0'} %", "unit")
+    return Cell(f"{track(after / before)}{f'{change:+d}' if change else '0'} %", "unit")
 
 
 def _story_blocks(diagnosis: Diagnosis, content: dict[str, Any], recordings: Sequence[Recording]) -> list[Block]:
@@ -181,72 +210,55 @@ def _story_blocks(diagnosis: Diagnosis, content: dict[str, Any], recordings: Seq
                 f"{diagnosis.search.tried} candidates were tried and none was let in; their reasons stand under Candidates."
             )
         ]
-    search = diagnosis.search
-    bands = search.bands
     blocks: list[Block] = []
-    corrected: Sequence[Recording] = recordings
-    estimate: Estimate = search.start
-    before = _all_traces(estimate, corrected, bands)
-    told = 0
-    for step in search.steps:
-        candidate = step.decision.candidate
-        name, joint = candidate.effect.name, candidate.joint(search.scene)
-        if name == DELAY and joint is None:
-            corrected = search.recordings
-        estimate = step.estimate
-        after = _all_traces(estimate, corrected, bands)
-        effect = diagnosis.effects[told] if told < len(diagnosis.effects) else None
-        if effect is None or (effect.effect, effect.joint) != (name, joint):
-            # A correction too small to be called an effect.
-            before = after
-            continue
-        told += 1
-        number = told
-        chapter = Chapter(number, effect.effect, _shown_joint(effect, diagnosis), before, after, bands)
-        blocks += [heading(f"{number}. {_title(effect)}"), *_effect_words(effect)]
+    for effect, chapter in chapters(diagnosis, recordings):
+        blocks += [heading(f"{chapter.number}. {_title(effect)}"), *_effect_words(effect, diagnosis)]
         blocks += [chapter_group(diagnosis.robot, chapter), moment_group(diagnosis.robot, chapter)]
-        before = after
     if content["moved"]:
+        columns = {column.name: column for column in diagnosis.before.model.columns}
         rows: list[list[Cell | str]] = [
-            [Cell(escape(m["name"]), "name"), f"{m['before']:.4g}", f"{m['after']:.4g}", f"{m['in_std']:+.1f}"]
+            [
+                Cell(escape(m["name"]), "name"),
+                number(m["before"], 4),
+                number(m["after"], 4),
+                f"{m['in_std']:+.3g}",
+                superscripts(columns[m["name"]].unit),
+                Cell(escape(superscripts(columns[m["name"]].meaning)), "words"),
+            ]
             for m in content["moved"]
         ]
         blocks += [
             heading("Parameters that the missing effects had bent"),
-            table(("name", "before", "after", "change / std"), rows, numeric=(1, 2, 3)),
+            paragraph("They had stood for what the model lacked; by over three standard deviations."),
+            table(("name", "before", "after", "change / std", "unit", "meaning"), rows, numeric=(1, 2, 3)),
         ]
     return blocks
-
-
-def _all_traces(estimate: Estimate, recordings: Sequence[Recording], bands: Sequence[float | None]) -> list[Trace]:
-    return [part for recording in recordings for part in traces(estimate.model, estimate.value, recording, bands)]
-
-
-def _shown_joint(effect: FoundEffect, diagnosis: Diagnosis) -> int:
-    """Return the effect's joint, or the one where it removes the largest share."""
-    joints = diagnosis.robot.joints
-    if effect.joint is not None:
-        return joints.index(effect.joint)
-    ratios = [(effect.after[joint] or 0.0) / (effect.before[joint] or 1.0) for joint in joints]
-    return ratios.index(min(ratios))
 
 
 def _title(effect: FoundEffect) -> str:
     return effect.effect if effect.joint is None else f"{effect.effect} on {effect.joint}"
 
 
-def _effect_words(effect: FoundEffect) -> list[Block]:
+def _effect_words(effect: FoundEffect, diagnosis: Diagnosis) -> list[Block]:
     helps, voting = effect.votes
+    robot = diagnosis.robot
     gains = ", ".join(
-        f"{joint} {_number(effect.before[joint])} to {_number(effect.after[joint])}" for joint in effect.before
+        f"{joint} {number(effect.before[joint])} to {number(effect.after[joint])} {robot.torque_unit(j)}"
+        for j, joint in enumerate(robot.joints)
+        if joint in effect.before
     )
     words = (
-        f"{effect.description[:1].upper()}{effect.description[1:]}. It removes {effect.gain:.0%} of the squared residual on data that it was not "
-        f"fitted to, helps in {helps} of {voting} trajectories that excite it, and would come about by chance with p = {effect.p_value:.1e}. "
+        f"{effect.description[:1].upper()}{effect.description[1:]}. It removes {min(1.0, effect.gain):.0%} of the squared residual on data that it was not "
+        f"fitted to, helps in {helps} of {voting} trajectories that excite it, and would come about by chance with p {_equals(effect.p_value)}. "
         f"Rms on the training recordings: {gains}."
     )
     rows: list[list[Cell | str]] = [
-        [Cell(escape(name), "name"), f"{parameter.value:.4g}", f"{parameter.std:.2g}", superscripts(parameter.unit)]
+        [
+            Cell(escape(name), "name"),
+            digits(parameter.value, parameter.std),
+            number(parameter.std, 2) if np.isfinite(parameter.std) else "not told",
+            "" if parameter.unit == "1" else superscripts(parameter.unit),
+        ]
         for name, parameter in effect.parameters.items()
     ]
     blocks: list[Block] = [paragraph(words), table(("parameter", "value", "std", "unit"), rows, numeric=(1, 2))]
@@ -268,19 +280,20 @@ def _left_blocks(diagnosis: Diagnosis) -> list[Block]:
             repeats.append(
                 [
                     Cell(escape(fit.joint), "name"),
-                    _number(before.missing if before else None),
-                    _number(fit.missing),
-                    _number(fit.noise),
-                    f"{fit.p_value:.1e}",
+                    number(before.missing if before else None),
+                    number(fit.missing),
+                    number(fit.noise),
+                    diagnosis.robot.torque_unit(diagnosis.robot.joints.index(fit.joint)),
+                    chance(fit.p_value),
                     Cell(_repeats(fit)),
                 ]
             )
-        head = ("joint", "repeats, before", "repeats, after", "does not repeat", "p", "")
+        head = ("joint", "repeats, before", "repeats, after", "does not repeat", "unit", "p", "")
         blocks += [
             paragraph(
                 "From repetitions: what of the residual repeats from run to run, which a model could explain, against what does not (rms)."
             ),
-            table(head, repeats, numeric=(1, 2, 3, 4)),
+            table(head, repeats, numeric=(1, 2, 3, 5)),
         ]
     telling = [item for item in diagnosis.dependences if item.explained > 0.0][:6]
     if diagnosis.dependences and not telling:
@@ -295,7 +308,7 @@ def _left_blocks(diagnosis: Diagnosis) -> list[Block]:
                 Cell(escape(item.joint), "name"),
                 " and ".join(item.signals),
                 Cell(f"{item.explained:.1%}", "num", max(0.0, min(1.0, item.explained))),
-                f"{item.rms:.3g}",
+                f"{number(item.rms)} {diagnosis.robot.torque_unit(diagnosis.robot.joints.index(item.joint))}",
             ]
             for item in telling
         ]
@@ -308,39 +321,22 @@ def _left_blocks(diagnosis: Diagnosis) -> list[Block]:
     return blocks
 
 
+def _remainder(diagnosis: Diagnosis, fitted: Sequence[Trace]) -> list[Block]:
+    if diagnosis.unexplained is None:
+        return []
+    group = remainder_group(diagnosis.robot, diagnosis.unexplained, fitted)
+    return [] if group is None else [heading("What no effect accounts for"), group]
+
+
 def _repeats(fit: LackOfFit) -> str:
     if fit.p_value > 0.01:
         return tag("nothing repeats", "good")
     return tag("repeats, below the noise") if fit.missing <= fit.noise else tag("repeats, above the noise", "bad")
 
 
-def _candidate_blocks(content: dict[str, Any]) -> list[Block]:
-    rows: list[list[Cell | str]] = []
-    most = max((abs(row["gain"]) for row in content["candidates"]), default=0.0) or 1.0
-    for row in content["candidates"]:
-        good = row["decision"] == "accepted"
-        helps, voting = row["helps_in"]
-        rows.append(
-            [
-                Cell(f"<b>{escape(row['label'])}</b>", "words"),
-                Cell(f"{bar(row['gain'] / most)} {row['gain']:.2%}", "unit"),
-                f"{row['p_value']:.1e}",
-                f"{helps} of {voting}",
-                Cell(tag(row["decision"], "good" if good else "plain")),
-                Cell(escape(row["why"]), "words"),
-            ]
-        )
-    head = ("candidate", "gain", "p", "helps in", "decision", "why")
-    blocks: list[Block] = [
-        paragraph(
-            "What else was tried beside the effects found, best member of every family: share of the squared residual removed on data not fitted to, p corrected for all that was tried."
-        ),
-        table(head, rows[:SHOWN_CANDIDATES], numeric=(2,)),
-    ]
-    if len(rows) > SHOWN_CANDIDATES:
-        rest = table(head, rows[SHOWN_CANDIDATES:], numeric=(2,))
-        blocks.append(folded(f"{len(rows) - SHOWN_CANDIDATES} more candidates", rest))
-    return blocks
+def _equals(p_value: float) -> str:
+    words = chance(p_value)
+    return words if words.startswith("<") else f"= {words}"
 
 
 def _limit_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
@@ -370,10 +366,6 @@ def _limit_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
             table(("effect", "absorbed by", "what would show it"), rows),
         ]
     return blocks
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.3g}"
 
 
 def _share(value: float | None) -> str:

@@ -12,19 +12,23 @@ from numpy.typing import NDArray
 from scara_ident.motion import Motion
 from scara_ident.report.html.page import (
     Arm,
+    Beside,
     Block,
     Cell,
     Group,
     Page,
     Section,
-    bar,
+    count,
     escape,
     listing,
+    number,
     paragraph,
+    superscripts,
     table,
     tag,
+    track,
 )
-from scara_ident.report.html.plot import Dots, Figure, Grid, Layer, Level, Line, Panel, Plot, single
+from scara_ident.report.html.plot import Figure, Grid, Layer, Level, Line, Mark, Panel, Plot, single
 from scara_ident.robot import Robot
 
 Array = NDArray[np.float64]
@@ -63,12 +67,15 @@ def excitation_page(content: Mapping[str, Any], robot: Robot, motions: Sequence[
     verdict = list(content.get("summary") or ())
     if not verdict:
         verdict = [
-            f"J_d {_number(content.get('log_det'), 4)}, J_k {_number(content.get('condition'))} in {_number(content.get('duration'))} s."
+            f"J_d {number(content.get('log_det'), 4)}, J_k {number(content.get('condition'))} in {number(content.get('duration'))} s."
         ]
         verdict.append(f"Broken limits: {', '.join(broken)}." if broken else "All limits hold.")
+    bounds = {name: float(limit["bound"]) for name, limit in limits if limit.get("bound") is not None}
     sections = [
         Section(
-            f"motion-{k}", "Motion" if len(motions) == 1 else f"Motion {motion.name}", _motion_blocks(robot, motion, k)
+            f"motion-{k}",
+            "Motion" if len(motions) == 1 else f"Motion {motion.name}",
+            _motion_blocks(robot, motion, k, bounds),
         )
         for k, motion in enumerate(motions)
     ]
@@ -76,54 +83,83 @@ def excitation_page(content: Mapping[str, Any], robot: Robot, motions: Sequence[
         sections.append(Section("limits", "Limits", _limit_blocks(limits)))
     if content.get("notes"):
         sections.append(Section("notes", "Notes", (listing(content["notes"]),)))
-    subtitle = (
-        f"{len(motions)} trajectories of {_number(content.get('duration'))} s"
-        if len(motions) > 1
-        else f"{_number(content.get('duration'))} s"
-    )
+    trajectories = count(len(motions), "trajectory").replace("trajectorys", "trajectories")
+    subtitle = f"{trajectories} of {content.get('duration') or 0.0:g} s for {count(robot.n, 'joint')}"
+    if content.get("harmonics"):
+        subtitle += f"; {count(content['harmonics'], 'harmonic')}"
+    if content.get("model"):
+        subtitle += f"; parameters of the {content['model']} model"
+    if content.get("log_det") is not None:
+        subtitle += (
+            f"; J_d (information) {number(content['log_det'], 4)}, J_k (condition) {number(content.get('condition'))}"
+        )
     return Page(f"Excitation of {robot.name}", subtitle, verdict, sections, bool(broken))
 
 
-def _motion_blocks(robot: Robot, motion: Motion, number: int) -> list[Block]:
-    figures = [_joint_figure(robot, motion, j, number) for j in range(robot.n)]
+def _motion_blocks(robot: Robot, motion: Motion, place: int, bounds: Mapping[str, float]) -> list[Block]:
+    figures = [_joint_figure(robot, motion, j, place, bounds) for j in range(robot.n)]
+    covers = [_cover_figure(robot, motion, j, place, bounds) for j in range(robot.n)]
+    torque = "" if motion.torque is None else " The torque is what the design foresees."
     return [
-        arm_in_plane(robot, motion, f"arm-{number}"),
-        Group(f"motion-group-{number}", figures, (), "two"),
-        paragraph("Where the joints go: what the data will cover."),
-        Group(f"cover-group-{number}", [_cover_figure(robot, motion, j, number) for j in range(robot.n)], (), "three"),
+        Beside(
+            (
+                arm_in_plane(robot, motion, f"arm-{place}"),
+                Group(f"cover-group-{place}", covers, (), "two" if robot.n > 2 else ""),
+            )
+        ),
+        paragraph(f"Over time; dashed: the limits.{torque}"),
+        Group(f"motion-group-{place}", figures, (), "two"),
     ]
 
 
-def _joint_figure(robot: Robot, motion: Motion, j: int, number: int) -> Figure:
+def _joint_figure(robot: Robot, motion: Motion, j: int, place: int, bounds: Mapping[str, float]) -> Figure:
     every = max(1, motion.samples // MOST_POINTS)
     grid = Grid(float(motion.time[0]), every / motion.rate, -(-motion.samples // every))
     length = "m" if robot.prismatic[j] else "rad"
-    speed = float(robot.velocity_limit[j])
+    lower, upper, speed, torque = _joint_limits(robot, j, bounds)
     panels = []
-    for label, signal, bounds in (
-        (f"position [{length}]", motion.q[j], (float(robot.lower[j]), float(robot.upper[j]))),
+    for label, signal, ends in (
+        (f"position [{length}]", motion.q[j], (lower, upper)),
         (f"velocity [{length}/s]", motion.v[j], (-speed, speed)),
-        (f"accel. [{length}/s²]", motion.a[j], ()),
-        (f"torque [{robot.torque_unit(j)}]", None if motion.torque is None else motion.torque[j], (-float(robot.torque_limit[j]), float(robot.torque_limit[j]))),
+        (f"acc. [{length}/s²]", motion.a[j], ()),
+        (f"torque [{robot.torque_unit(j)}]", None if motion.torque is None else motion.torque[j], (-torque, torque)),
     ):  # fmt: skip
         if signal is None:
             continue
         layers: list[Layer] = [Line(grid, signal[::every], "blue", label.split(" [")[0], 1.5)]
-        layers += [Level(bound, "vermillion", "limit") for bound in bounds if np.isfinite(bound)]
+        layers += [Level(bound, "vermillion", "limit") for bound in ends if np.isfinite(bound)]
         panels.append(Panel(label, layers, 110))
-    return single(f"motion-{number}-{j}", robot.joints[j], "", Plot("time [s]", panels))
+    return single(f"motion-{place}-{j}", robot.joints[j], "", Plot("time [s]", panels), quiet=True)
 
 
-def _cover_figure(robot: Robot, motion: Motion, j: int, number: int) -> Figure:
+def _cover_figure(robot: Robot, motion: Motion, j: int, place: int, bounds: Mapping[str, float]) -> Figure:
     length = "m" if robot.prismatic[j] else "rad"
     every = max(1, motion.samples // MOST_POINTS)
-    turn = int(np.argmax(motion.v[j]))
-    line = Line(motion.q[j, ::every], motion.v[j, ::every], "blue", path=True)
-    fastest = Dots([float(motion.q[j, turn])], [float(motion.v[j, turn])], "vermillion")
-    panel = Panel(f"velocity [{length}/s]", (line, fastest), 170)
-    return single(
-        f"cover-{number}-{j}", robot.joints[j], "", Plot(f"position [{length}]", (panel,), small=True), quiet=True
+    layers: list[Layer] = [Line(motion.q[j, ::every], motion.v[j, ::every], "blue", path=True)]
+    lower, upper, speed, _ = _joint_limits(robot, j, bounds)
+    ends = [end for end in (lower, upper) if np.isfinite(end)]
+    layers += [Mark(end, "vermillion") for end in ends]
+    layers += [Level(end, "vermillion") for end in (-speed, speed) if np.isfinite(end)]
+    reach = [*ends, float(np.min(motion.q[j])), float(np.max(motion.q[j]))]
+    # A limit far beyond the motion, such as that of an endless joint, is not worth the room.
+    span = float(np.ptp(motion.q[j])) or 1.0
+    low, high = max(min(reach), reach[-2] - span), min(max(reach), reach[-1] + span)
+    limits = (low - 0.03 * (high - low), high + 0.03 * (high - low))
+    plot = Plot(f"position [{length}]", (Panel(f"velocity [{length}/s]", layers, 170),), limits, small=True)
+    title = f"{robot.joints[j]}: what the data will cover"
+    return single(f"cover-{place}-{j}", title, "", plot, quiet=True)
+
+
+def _joint_limits(robot: Robot, j: int, bounds: Mapping[str, float]) -> tuple[float, float, float, float]:
+    """Lower and upper position, velocity and torque that the design kept to; the URDF's where it does not say."""
+    kinds = (
+        ("position.lower", robot.lower),
+        ("position.upper", robot.upper),
+        ("velocity", robot.velocity_limit),
+        ("torque", robot.torque_limit),
     )
+    lower, upper, speed, torque = (bounds.get(f"{robot.joints[j]}.{kind}", float(own[j])) for kind, own in kinds)
+    return lower, upper, speed, torque
 
 
 def arm_in_plane(robot: Robot, motion: Motion, name: str) -> Arm:
@@ -142,7 +178,7 @@ def arm_in_plane(robot: Robot, motion: Motion, name: str) -> Arm:
     spread = np.ptp(points.reshape(-1, 3), axis=0)
     plane = sorted(np.argsort(-spread, kind="stable")[:2].tolist())
     period = float(motion.time[-1] - motion.time[0]) / (count - 1)
-    return Arm(name, points[:, :, plane], period)
+    return Arm(name, points[:, :, plane], period, ("xyz"[plane[0]], "xyz"[plane[1]]))
 
 
 def joint_points(robot: Robot, q: Array) -> Array:
@@ -190,15 +226,15 @@ def _limit_blocks(limits: Sequence[tuple[str, Mapping[str, Any]]]) -> list[Block
     rows: list[list[Cell | str]] = []
     for name, limit in limits:
         share = limit.get("share")
-        words = "" if share is None else f"{bar(share, weak=share > 1.0)} {share:.0%}"
+        words = "" if share is None else f"{track(share)}{share:.0%}"
         if share is not None and share > 1.0:
             words += " " + tag("broken", "bad")
         rows.append(
             [
                 Cell(escape(name), "name"),
-                _number(limit.get("reached")),
-                _number(limit.get("bound")),
-                str(limit.get("unit", "")),
+                number(limit.get("reached")),
+                number(limit.get("bound")),
+                superscripts(str(limit.get("unit", ""))),
                 Cell(words),
             ]
         )
@@ -206,7 +242,3 @@ def _limit_blocks(limits: Sequence[tuple[str, Mapping[str, Any]]]) -> list[Block
         paragraph("What the motion reaches of each limit, between its samples too."),
         table(("limit", "reached", "bound", "unit", "used"), rows, numeric=(1, 2)),
     ]
-
-
-def _number(value: Any, digits: int = 3) -> str:
-    return "–" if value is None else f"{value:.{digits}g}"

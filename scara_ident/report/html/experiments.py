@@ -7,6 +7,8 @@ import numpy as np
 from scara_ident.diagnosis.decision import FAMILY_ERROR, Decision
 from scara_ident.diagnosis.diagnosis import Diagnosis
 from scara_ident.diagnosis.examination import WEAK
+from scara_ident.diagnosis.search import DELAY
+from scara_ident.effects.measurement import within_sampling
 from scara_ident.report.diagnosis import best_by_label
 
 # What brings each effect out against the others.
@@ -33,6 +35,7 @@ EXPERIMENTS = {
 }  # fmt: skip
 # Candidates of which more could be said with other recordings, at the most.
 MOST = 4
+MOST_LABELS = 3
 
 
 def next_experiments(diagnosis: Diagnosis) -> list[str]:
@@ -66,18 +69,33 @@ def next_experiments(diagnosis: Diagnosis) -> list[str]:
             hidden.append(decision)
         elif decision.gain > 0.0 and _significant(decision, diagnosis) and _possible(decision, diagnosis):
             faint.append(decision)
-    found += [
-        f"To judge {decision.label}, significant but not accepted ({decision.why}): {_experiment(decision.candidate.effect.name)}."
-        for decision in faint[:MOST]
-    ]
-    found += [
-        f"To see {decision.label} at all, which these recordings cannot show: {_experiment(decision.candidate.effect.name)}."
-        for decision in hidden[:MOST]
-    ]
+    told = {effect.effect for effect in diagnosis.effects if effect.confounded_with}
+    confirm: dict[str, list[str]] = {}
+    for effect in diagnosis.effects:
+        if effect.effect not in told:
+            confirm.setdefault(effect.effect, []).append(_label(effect.effect, effect.joint))
+    found += [f"To confirm {' and '.join(labels)}: {_experiment(name)}." for name, labels in confirm.items()]
+    for words, decisions in (
+        ("To judge {}, significant but not accepted ({})", faint),
+        ("To see {} at all, which these recordings cannot show", hidden),
+    ):
+        # One experiment serves all joints.
+        by_effect: dict[str, list[Decision]] = {}
+        for decision in decisions:
+            by_effect.setdefault(decision.candidate.effect.name, []).append(decision)
+        for name, members in list(by_effect.items())[:MOST]:
+            labels = " and ".join(member.label for member in members[:MOST_LABELS])
+            labels += f" and {len(members) - MOST_LABELS} more" if len(members) > MOST_LABELS else ""
+            found.append(f"{words.format(labels, members[0].why)}: {_experiment(name)}.")
     return found
 
 
 def _significant(decision: Decision, diagnosis: Diagnosis) -> bool:
+    # What lies within a sample's period is how the recordings were made; no motion of the arm tells more of it.
+    name, joint = decision.candidate.effect.name, decision.candidate.member.joint
+    scene = diagnosis.search.scene
+    if name == DELAY and joint is not None and within_sampling(float(decision.examination.value[0]), scene.rate):
+        return False
     return decision.examination.p_value * diagnosis.search.tried < FAMILY_ERROR
 
 

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 BEYOND = 1.3
 POINTS = 160
 COVERAGE_BINS = 48
+# Means per direction of motion.
+MEAN_BINS = 20
 
 
 def friction_group(estimate: Estimate, traces: Sequence[Trace]) -> Group | None:
@@ -68,13 +70,7 @@ def _figures(estimate: Estimate, term: Friction, traces: Sequence[Trace], j: int
     inside = (grid >= low) & (grid <= high)
     layers: list[Layer] = [*_coverage(v, most)]
     layers.append(Band(grid, value - 2.0 * std, value + 2.0 * std, "blue", "± 2 std", fit=False))
-    means = binned_means(v, partial, (low, high), 40)
-    filled = np.isfinite(means.y)
-    layers.append(
-        Dots(
-            means.x[filled], means.y[filled], "vermillion", "measured, rest subtracted", 2.0 * means.error[filled], 2.0
-        )
-    )
+    layers += _means(v, partial, low, high)
     layers.append(Line(grid, np.where(inside, value, np.nan), "blue", "friction", 2.0))
     layers.append(Line(grid, np.where(inside, np.nan, value), "blue", "beyond the data", 1.6, "3 4"))
     unit = robot.torque_unit(j)
@@ -87,6 +83,19 @@ def _figures(estimate: Estimate, term: Friction, traces: Sequence[Trace], j: int
             Plot(f"velocity [{length}/s]", (Panel(f"friction [{unit}]", layers, 230),), (-most, most)),
         )
     ]
+
+
+def _means(v: Array, partial: Array, low: float, high: float) -> list[Layer]:
+    """Means over velocity, each direction for itself: a bin over standstill would mix the two."""
+    found: list[Layer] = []
+    for side, limits in ((v < 0.0, (low, min(high, 0.0))), (v > 0.0, (max(low, 0.0), high))):
+        if limits[1] <= limits[0] or np.count_nonzero(side) < MEAN_BINS:
+            continue
+        means = binned_means(v[side], partial[side], limits, MEAN_BINS)
+        filled = np.isfinite(means.y)
+        bars = 2.0 * means.error[filled]
+        found.append(Dots(means.x[filled], means.y[filled], "vermillion", "measured less the rest", bars, 2.0))
+    return found
 
 
 def _coverage(v: Array, most: float) -> list[Layer]:

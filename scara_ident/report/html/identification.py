@@ -6,14 +6,17 @@ from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
 
+from scara_ident.diagnosis.diagnosis import joint_errors
+from scara_ident.estimators.consistent import ConsistentEstimate
 from scara_ident.identification import Identification, undetermined
 from scara_ident.recording import Recording
 from scara_ident.report.html.friction import friction_group
-from scara_ident.report.html.page import Block, Page, Section, heading, listing, paragraph
+from scara_ident.report.html.page import Block, Page, Section, count, heading, listing, paragraph
 from scara_ident.report.html.parameters import (
     cheap_history,
     convergence_group,
     correlation_group,
+    link_table,
     parameter_table,
     strongest_pairs,
 )
@@ -23,6 +26,12 @@ from scara_ident.report.html.traces import traces
 from scara_ident.report.identification import sentences
 from scara_ident.threads import one_blas_thread
 
+# Joints whose errors the first sentence lists; of more it gives the range.
+MOST_SHARES = 3
+SYMBOLS = (
+    "In the meanings m is a mass, mx, my, mz (or m s) are first moments, I is an inertia about the joint's frame, Jm that of "
+    "a rotor, l a length and tau 1 / reduction, numbered by link or joint."
+)
 STD_WORDS = {
     "block": "the scatter of blocks of time, which holds when residuals are correlated",
     "pooled block": "the scatter of few blocks of time, pooled over parameters",
@@ -79,7 +88,7 @@ def identification_page(
             "Prediction",
             (
                 paragraph(
-                    f"Rms residual within the band ({band_words}), and as a share of the rms torque. A click on a number shows it below."
+                    f"Rms residual within the band ({band_words}), and as a share of the rms torque: the darker, the larger. A click on a number shows it below."
                 ),
                 error_table(robot, [name for name, _ in parts], errors),
                 torque_group(robot, parts, bands),
@@ -93,7 +102,9 @@ def identification_page(
         words = "Where the strip below is dark the data hold many samples; beyond it the curve is an extrapolation. The dots are the measured torque less everything but friction, over velocity, ± 2 standard errors."
         sections.insert(2, Section("friction", "Friction", (paragraph(words), friction)))
     history = identification.history or cheap_history(estimate, identification.training)
-    words = "The recursive estimate as samples come in, with two standard deviations for white residuals; dashed the final value, dotted where a recording ends."
+    words = "The recursive estimate as samples come in, with two standard deviations for white residuals, which are too small where residuals are correlated; dashed: the final value, dotted: where a recording ends."
+    if estimate.method not in ("ols", "rls"):
+        words += f" The recursion is least squares; the method {estimate.method} ends elsewhere."
     sections.append(
         Section(
             "convergence",
@@ -106,29 +117,56 @@ def identification_page(
     samples = sum(item.samples for item in identification.training)
     subtitle = (
         f"{identification.model.name} model, {len(estimate.model.columns)} parameters, {estimate.method}; "
-        f"{len(recordings)} recordings, {samples} samples fitted, {len(validation)} recordings held out; "
-        f"J_d {identification.log_det:.2f}, J_k {identification.condition:.3g}"
+        f"{count(len(recordings), 'recording')}, {samples} samples fitted, {count(len(validation), 'recording')} held out; "
+        f"J_d (information) {identification.log_det:.2f}, J_k (condition) {identification.condition:.3g}"
     )
     return Page(
         f"Identification of {robot.name}",
         subtitle,
-        sentences(identification),
+        (_headline(identification), *sentences(identification)),
         sections,
         bool(undetermined(identification)),
     )
 
 
+def _headline(identification: Identification) -> str:
+    """How well the parameters predict, over all recordings held out, or else over those fitted."""
+    held_out = identification.validation
+    errors = joint_errors(identification.estimate.value, held_out or identification.training)
+    robot = identification.model.robot
+    shares = [
+        (error.relative, joint) for joint, error in zip(robot.joints, errors, strict=True) if error and error.relative
+    ]
+    what = "Predicts held-out recordings" if held_out else "Fits its own recordings"
+    if not shares:
+        return f"{identification.model.name} model of {robot.name}."
+    if len(shares) > MOST_SHARES:
+        (least, best), (most, worst) = min(shares), max(shares)
+        return f"{what} to within {least:.1%} ({best}) to {most:.1%} ({worst}) of the torque, rms."
+    return f"{what} to within {' and '.join(f'{share:.1%} of the torque of {joint}' for share, joint in shares)}, rms."
+
+
 def _parameter_blocks(identification: Identification) -> list[Block]:
     estimate = identification.estimate
     blocks: list[Block] = [
-        paragraph(f"Standard deviations from {STD_WORDS.get(estimate.std_kind, estimate.std_kind)}."),
+        paragraph(f"Standard deviations from {STD_WORDS.get(estimate.std_kind, estimate.std_kind)}. {SYMBOLS}"),
         parameter_table(estimate),
         heading("Correlation"),
     ]
     pairs = strongest_pairs(estimate)
     if pairs:
         blocks.append(paragraph(f"Strongest: {', '.join(pairs)}."))
-    return [*blocks, correlation_group(estimate)]
+    blocks.append(correlation_group(estimate))
+    if isinstance(estimate, ConsistentEstimate):
+        blocks += [
+            heading("Links of an arm with these parameters"),
+            paragraph(
+                "Mass, centre of mass and inertia about it, in the axes of the link. Torque tells their combinations in the table above, "
+                "not each number: the rest is as near to the URDF as the data allow."
+            ),
+            link_table(estimate),
+        ]
+    return blocks
 
 
 __all__ = ["identification_page", "identification_report"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -74,10 +75,42 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Cell | str]], numeric: Se
         )
 
     top = "".join(
-        f'<th{_class("num" if k in numeric else "")} scope="col">{escape(word)}</th>' for k, word in enumerate(head)
+        # Long names of joints may break after an underscore.
+        f'<th{_class("num" if k in numeric else "")} scope="col">{escape(word).replace("_", "_<wbr>")}</th>'
+        for k, word in enumerate(head)
     )
     body = "".join("<tr>" + "".join(cell(k, value) for k, value in enumerate(row)) + "</tr>" for row in rows)
     return Text(f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>')
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a value with so many significant digits, zeros at the end included; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{value:#.{digits}g}".rstrip(".")
+
+
+def chance(probability: float) -> str:
+    """Return a probability in few digits."""
+    if probability < 1e-99:
+        return "< 1e-99"
+    return f"{probability:.2g}" if probability >= 1e-3 else f"{probability:.0e}"
+
+
+def count(size: int, noun: str) -> str:
+    """Return how many of something there are, such as ``1 recording``."""
+    return f"{size} {noun}" if size == 1 else f"{size} {noun}s"
+
+
+def colour_scale(low: str, high: str, *, two_sided: bool = False) -> Text:
+    """Return the scale of colours of a table that is a heat map, between words for its two ends."""
+    middle = "var(--bg) 50%, " if two_sided else ""
+    start = "color-mix(in srgb, var(--c-below) 70%, transparent)" if two_sided else "var(--bg)"
+    stop = "color-mix(in srgb, var(--c-above) 70%, transparent)"
+    return Text(
+        f'<div class="scale">{escape(low)}<i style="background:linear-gradient(to right, {start}, {middle}{stop})"></i>'
+        f"{escape(high)}</div>"
+    )
 
 
 def superscripts(unit: str) -> str:
@@ -91,8 +124,14 @@ def tag(text: str, kind: str = "plain") -> str:
 
 
 def bar(share: float, *, weak: bool = False) -> str:
-    """Return a bar of a share of 90 pixels as HTML."""
-    return f'<span class="bar{" weak" if weak else ""}" style="width:{90 * min(1.0, max(0.0, share)):.0f}px"></span>'
+    """Return a bar whose length is a share of what the style sheet gives to the whole as HTML."""
+    length = f"calc(var(--whole) * {min(1.0, max(0.0, share)):.3f})"
+    return f'<span class="bar{" weak" if weak else ""}" style="width:{length}"></span>'
+
+
+def track(share: float) -> str:
+    """Return a bar on the whole that it is a share of as HTML; vermillion where it is more than the whole."""
+    return f'<span class="track">{bar(share, weak=share > 1.005)}</span>'
 
 
 @dataclass(frozen=True)
@@ -125,14 +164,34 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """The moving arm: positions of its joints in a plane, shape (frames, points, 2), every ``period`` seconds."""
+    """The moving arm: positions of its joints in a plane, shape (frames, points, 2), every ``period`` seconds.
+
+    Attributes
+    ----------
+    name : str
+        Unique on the page.
+    frames : ndarray
+        m.
+    period : float
+        s.
+    axes : tuple of str
+        Names of the plane's axes.
+    """
 
     name: str
     frames: Any
     period: float
+    axes: tuple[str, str] = ("x", "y")
 
 
-Block = Text | Group | Arm
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Two blocks side by side on a wide screen."""
+
+    blocks: tuple[Block, Block]
+
+
+Block = Text | Group | Arm | Beside
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +255,11 @@ class Page:
         write_whole(path, lambda temporary: _write(temporary, text))
 
     def _blocks(self, kind: type[Any]) -> list[Any]:
-        return [block for section in self.sections for block in section.blocks if isinstance(block, kind)]
+        return [block for section in self.sections for block in _flat(section.blocks) if isinstance(block, kind)]
+
+
+def _flat(blocks: Sequence[Block]) -> list[Block]:
+    return [inner for block in blocks for inner in (_flat(block.blocks) if isinstance(block, Beside) else (block,))]
 
 
 def _write(path: Path, text: str) -> None:
@@ -222,9 +285,12 @@ def _section(section: Section) -> str:
 def _block(block: Block) -> str:
     if isinstance(block, Text):
         return block.html
+    if isinstance(block, Beside):
+        return f'<div class="beside">{"".join(f"<div>{_block(inner)}</div>" for inner in block.blocks)}</div>'
     if isinstance(block, Arm):
         return (
-            f'<figure class="moving" data-arm="{block.name}"><figcaption><b>The arm in its plane</b></figcaption>'
+            f'<figure class="moving" data-arm="{block.name}"><figcaption><b>The arm in its plane</b>'
+            "<p>Square: the base. Grey: where the arm's end goes; orange: its last second.</p></figcaption>"
             '<div class="plot"></div><div class="controls"><button type="button">▶ move</button>'
             '<input type="range" min="0" max="1" value="0" aria-label="time"><output>0 s</output></div></figure>'
         )
@@ -272,4 +338,4 @@ def _figure(figure: Figure) -> str:
 def _arm_spec(arm: Arm) -> dict[str, Any]:
     low, high = arm.frames.min(axis=(0, 1)), arm.frames.max(axis=(0, 1))
     frames = [[[round(float(x), 4) for x in point] for point in frame] for frame in arm.frames]
-    return {"frames": frames, "period": arm.period, "low": low.tolist(), "high": high.tolist()}
+    return {"frames": frames, "period": arm.period, "low": low.tolist(), "high": high.tolist(), "axes": arm.axes}

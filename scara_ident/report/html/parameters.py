@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.estimators import Estimate, History, rls
+from scara_ident.estimators.consistent import ConsistentEstimate, links
 from scara_ident.evidence import Evidence
 from scara_ident.information import merge
-from scara_ident.report.html.page import Cell, Group, Text, bar, escape, superscripts, table, tag
-from scara_ident.report.html.plot import Band, Layer, Level, Line, Mark, Matrix, Panel, Plot, single
+from scara_ident.report.html.page import Cell, Group, Selector, Text, bar, escape, number, superscripts, table, tag
+from scara_ident.report.html.plot import Band, Drawing, Figure, Layer, Level, Line, Mark, Matrix, Panel, Plot, single
 from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -21,6 +22,11 @@ Array = NDArray[np.float64]
 MOST_STEPS = 48
 # Recordings whose limits are marked in the pictures of the recursion.
 MOST_MARKS = 12
+# Figures of the recursion shown together; more are shown in pages of so many.
+MOST_FIGURES = 18
+# Share of a body's largest moment below which one of its products is rounding.
+NO_INERTIA = 1e-9
+PER_PAGE = 12
 
 
 def parameter_table(estimate: Estimate) -> Text:
@@ -33,15 +39,17 @@ def parameter_table(estimate: Estimate) -> Text:
         else:
             relative = std / abs(value) if value else np.inf
             weak = relative > 0.5
-            interval = Cell(f"{_digits(value - 1.96 * std, std)} … {_digits(value + 1.96 * std, std)}", "num")
-            words = f"{100.0 * relative:.2g} %" if relative < 10.0 else "over 1000 %"
+            interval = Cell(f"{digits(value - 1.96 * std, std)} … {digits(value + 1.96 * std, std)}", "num")
+            percent = 100.0 * relative
+            words = "over 1000 %" if relative >= 10.0 else f"{percent:.0f} %" if percent >= 10.0 else f"{percent:.2g} %"
             share = Cell(
-                f"{bar(relative, weak=weak)} {escape(words)}{' ' + tag('not told from 0', 'bad') if weak else ''}"
+                f"{bar(relative, weak=weak)} {escape(words)}{' ' + tag('not told from 0', 'bad') if weak else ''}",
+                "unit",
             )
         rows.append(
             [
                 Cell(escape(column.name), "name"),
-                Cell(_digits(value, std), "num"),
+                Cell(digits(value, std), "num"),
                 interval,
                 Cell(escape(superscripts(column.unit)), "unit"),
                 share,
@@ -51,12 +59,35 @@ def parameter_table(estimate: Estimate) -> Text:
     return table(("name", "value", "95 % interval", "unit", "std / value", "meaning"), rows, numeric=(1, 2))
 
 
-def _digits(value: float, std: float) -> str:
+def digits(value: float, std: float) -> str:
     """Return a value to the second digit of its standard deviation."""
     if not np.isfinite(std) or std <= 0.0:
         return f"{value:.4g}"
     places = max(0, int(np.ceil(1.0 - np.log10(std))))
-    return f"{value:.{places}f}" if places <= 7 else f"{value:.4g}"
+    text = f"{value:.{places}f}" if places <= 6 else f"{value:.4g}"
+    return _unsigned_zero(text)
+
+
+def _unsigned_zero(text: str) -> str:
+    return text.lstrip("-") if float(text) == 0.0 else text
+
+
+def link_table(estimate: ConsistentEstimate) -> Text:
+    """Return mass, centre of mass and inertia of every identified link."""
+    rows: list[list[Cell | str]] = []
+    for link in links(estimate):
+        largest = max(abs(x) for x in link.inertia)
+        rows.append(
+            [
+                Cell(escape(link.name), "name"),
+                number(link.mass),
+                *(_unsigned_zero(f"{x:.3f}") for x in link.com),
+                *("0" if abs(x) < NO_INERTIA * largest else number(x) for x in link.inertia),
+            ]
+        )
+    head = ["link", "mass [kg]", *(f"{axis} [m]" for axis in "xyz")]
+    head += [f"I{axes} [kg m²]" for axes in ("xx", "xy", "xz", "yy", "yz", "zz")]
+    return table(head, rows, numeric=range(1, len(head)))
 
 
 def correlation_group(estimate: Estimate) -> Group:
@@ -110,7 +141,7 @@ def convergence_group(estimate: Estimate, history: History, evidence: Sequence[E
     """Return for every parameter how the recursive estimate settled."""
     ends = np.cumsum([sum(merge(block).rows for block in item.blocks) for item in evidence]) / estimate.model.robot.n
     marks: list[Layer] = [Mark(float(end), "grey") for end in ends[:-1]] if len(ends) <= MOST_MARKS else []
-    figures = []
+    plots: dict[str, Plot] = {}
     for k, column in enumerate(estimate.model.columns):
         value, std = history.value[:, k], history.std[:, k]
         final = float(estimate.value[k])
@@ -129,6 +160,26 @@ def convergence_group(estimate: Estimate, history: History, evidence: Sequence[E
             Line(history.samples, value, "blue", "estimate", 1.6),
             Level(final, "vermillion", "final"),
         )
-        panel = Panel(superscripts(column.unit), layers, 120, (low - pad, high + pad))
-        figures.append(single(f"converge-{k}", column.name, "", Plot("samples", (panel,), small=True), quiet=True))
-    return Group("convergence-group", figures, (), "three")
+        label = f"{column.name} [{superscripts(column.unit)}]"
+        panel = Panel(label, layers, 120, (low - pad, high + pad))
+        plots[column.name] = Plot("samples", (panel,), small=True)
+    return _pages(plots, [column.name for column in estimate.model.columns])
+
+
+def _pages(plots: Mapping[str, Plot], names: Sequence[str]) -> Group:
+    """Return all figures, or pages of them to choose from where they are many."""
+    if len(plots) <= MOST_FIGURES:
+        figures = [
+            single(f"converge-{k}", name, "", plots[name], quiet=True) for k, name in enumerate(names) if name in plots
+        ]
+        return Group("convergence-group", figures, (), "three")
+    shown = [name for name in names if name in plots]
+    pages = [shown[start : start + PER_PAGE] for start in range(0, len(shown), PER_PAGE)]
+    figures = []
+    for slot in range(PER_PAGE):
+        variants: dict[tuple[int, ...], Drawing] = {
+            (k,): plots[page[slot]] for k, page in enumerate(pages) if slot < len(page)
+        }
+        figures.append(Figure(f"converge-{slot}", "", "", variants, (0,), quiet=True))
+    options = tuple(f"{page[0]} … {page[-1]}" if len(page) > 1 else page[0] for page in pages)
+    return Group("convergence-group", figures, (Selector("parameters", options),), "three")

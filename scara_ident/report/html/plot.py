@@ -262,16 +262,20 @@ class Matrix:
     columns: Sequence[str]
     values: Array
     most: float = 1.0
+    row_label: str = ""
+    column_label: str = ""
 
     def spec(self) -> dict[str, Any]:
         """Return what the page draws."""
-        values = [[None if not np.isfinite(x) else round(float(x), 4) for x in row] for row in self.values]
+        values = [[None if not np.isfinite(x) else rounded(float(x)) for x in row] for row in self.values]
         return {
             "kind": "matrix",
             "rows": list(self.rows),
             "columns": list(self.columns),
             "z": values,
             "most": self.most,
+            "rowLabel": self.row_label,
+            "columnLabel": self.column_label,
         }
 
 

@@ -8,10 +8,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.report.html.bins import binned_means, density, middle_range
+from scara_ident.report.html.bins import MEAN_BINS, binned_means, density, middle_range
 from scara_ident.report.html.page import Block, Group, Selector, heading, paragraph
-from scara_ident.report.html.plot import Band, Density, Drawing, Figure, Layer, Level, Line, Mark, Panel, Plot
-from scara_ident.report.html.spectra import autocorrelation, orders, spectrum
+from scara_ident.report.html.plot import Band, Density, Drawing, Figure, Layer, Level, Line, Mark, Panel, Plot, Region
+from scara_ident.report.html.spectra import ORDER_WORDS, autocorrelation, orders, spectrum
 from scara_ident.report.html.traces import Trace, kept
 from scara_ident.robot import Robot
 
@@ -34,15 +34,29 @@ def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None], pre
         Keeps the names of figures apart where there are several on a page.
     """
     sets = {name: traces for name, traces in sets.items() if traces}
+    still = [joint for j, joint in enumerate(robot.joints) if not any(_turns(robot, s, j) for s in sets.values())]
+    which = "any joint" if len(still) == robot.n else ", ".join(still)
+    motor = (
+        f" No figure over the motor's angle of {which}: by the reductions given, it turns less than once."
+        if still
+        else ""
+    )
     return [
         heading("Against signals"),
         paragraph(
-            "Blue: how many samples lie where. Vermillion: their mean over the signal, with two standard errors."
+            "Blue: how many samples lie where. Vermillion: their mean over the signal, with two standard errors; where it leaves zero, "
+            f"the model lacks something that depends on the signal.{motor}"
         ),
         _signals_group(robot, sets, prefix),
         heading("By frequency, motor angle and lag"),
         _spectra_group(robot, sets, bands, prefix),
     ]
+
+
+def _turns(robot: Robot, traces: Sequence[Trace], j: int) -> bool:
+    """Whether a joint's motor makes a full turn, so that its angle is another signal than the joint's position."""
+    span = 2.0 * np.pi / abs(robot.reduction[j])
+    return any(float(np.ptp(trace.motion.q[j])) >= span for trace in traces)
 
 
 def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None], prefix: str) -> Group:
@@ -63,21 +77,21 @@ def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None], pref
         Figure(
             f"{prefix}frequency",
             "Spectrum over frequency",
-            "Amplitude density of recorded torque and of what is left of it, nothing filtered; the area reaches to the highest line of each bin. Beyond the band the prediction carries the noise of the position.",
+            "Amplitude density of recorded torque and of what is left of it, nothing filtered; the area reaches to the highest line of each bin. In the shade, beyond the band, the prediction carries the noise of the position.",
             by_time,
             (0, 1),
         ),
         Figure(
             f"{prefix}order",
             "Spectrum over the motor's angle",
-            "What repeats with the motor's turn; noise alone crosses the dashed bound anywhere in 1 of 100 cases.",
+            f"What repeats with the motor's turn; noise alone crosses the dashed bound anywhere in 1 of 100 cases. {ORDER_WORDS}",
             by_order,
             (0, 1),
         ),
         Figure(
             f"{prefix}lag",
             "Autocorrelation",
-            "Within the band; white residuals stay between the dashed bounds at 95 % of the lags.",
+            "Within the band, from the first lag on (at lag 0 it is 1); white residuals stay between the dashed bounds at 95 % of the lags.",
             by_lag,
             (0, 1),
         ),
@@ -101,12 +115,13 @@ def _frequency_plot(traces: Sequence[Trace], j: int, band: float | None, unit: s
         Line(left.frequency, left.mean, "green", "residual"),
     ]
     if band is not None:
+        layers.insert(0, Region((band, float(recorded.frequency[-1])), "grey", "", 0.15))
         layers.append(Mark(band, "black", f"band {band:.3g} Hz"))
     return Plot("frequency [Hz]", (Panel(f"density [{unit}/√Hz]", layers, 220, log=True),), log=True)
 
 
 def _order_plot(robot: Robot, traces: Sequence[Trace], j: int, unit: str) -> Plot | None:
-    found = orders(robot, traces, j, [trace.raw_residual[j] for trace in traces])
+    found = orders(robot, traces, j, [trace.residual[j] for trace in traces])
     if found is None:
         return None
     layers = (
@@ -121,7 +136,7 @@ def _lag_plot(traces: Sequence[Trace], j: int) -> Plot | None:
     if found is None:
         return None
     layers: list[Layer] = [
-        Line(found.lag, found.value, "green", "autocorrelation", 1.6),
+        Line(found.lag[1:], found.value[1:], "green", "autocorrelation", 1.6),
         Level(found.bound, "black", "bounds of white noise"),
         Level(-found.bound, "black", "bounds of white noise"),
     ]
@@ -144,24 +159,41 @@ def _signals_group(robot: Robot, sets: Sets, prefix: str) -> Group:
             y = kept(traces, [trace.residual[j] for trace in traces], j)
             # Time is the same for all joints.
             for i in range(1 if name == "time" else robot.n) if len(y) else ():
+                if name == "motor" and not _turns(robot, traces, i):
+                    continue
                 x = kept(traces, [signal(trace, i) for trace in traces], j)
-                variants[(j, s) if name == "time" else (j, s, i)] = _scatter(x, y, label(i), robot.torque_unit(j))
+                variants[(j, s) if name == "time" else (j, s, i)] = scatter(x, y, label(i), robot.torque_unit(j))
         by = (0, 1) if name == "time" else (0, 1, 2)
         figures.append(Figure(f"{prefix}against-{name}", title, "", variants, by, quiet=True))
     selectors = (*_selectors(robot, sets), Selector("signals of", robot.joints))
     return Group(f"{prefix}signals-group", figures, selectors, "three")
 
 
-def _scatter(x: Array, y: Array, label: str, unit: str) -> Plot:
+def scatter(x: Array, y: Array, label: str, unit: str, height: int = 170, bins: int = MEAN_BINS) -> Plot:
+    """Return how samples of a residual lie over a signal, and their means.
+
+    Parameters
+    ----------
+    x, y : ndarray, shape (N,)
+        Signal and residual, in the order of time.
+    label : str
+        Of the signal, with its unit.
+    unit : str
+        Of the residual.
+    height : int, optional
+        Pixels.
+    bins : int, optional
+        Of the means.
+    """
     limits = middle_range(x)
     reach = 1.25 * float(np.quantile(np.abs(y), 0.995)) or 1.0
-    means = binned_means(x, y, limits)
+    means = binned_means(x, y, limits, bins)
     layers = (
         Density(density(x, y, limits, (-reach, reach)), limits, (-reach, reach), "blue", "samples"),
         Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, "vermillion"),
         Line(means.x, means.y, "vermillion", "mean ± 2 s.e.", 1.8),
     )
-    return Plot(label, (Panel(f"residual [{unit}]", layers, 170, (-reach, reach)),), limits, small=True)
+    return Plot(label, (Panel(f"residual [{unit}]", layers, height, (-reach, reach)),), limits, small=True)
 
 
 def _length(robot: Robot, joint: int) -> str:

@@ -13,6 +13,7 @@ from scara_ident.robot import Robot
 
 Array = NDArray[np.float64]
 
+ORDER_WORDS = "Within the band: a ripple that passes faster than the band is not in it."
 SEGMENT_SECONDS = 4.0
 LOG_BINS = 260
 # Samples per motor turn onto which residuals are gathered, and the highest order shown.

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.search import DELAY
-from scara_ident.report.html.bins import binned_means, middle_range
+from scara_ident.report.html.bins import binned_means, middle_range, tail_means
+from scara_ident.report.html.chapters import Chapter
 from scara_ident.report.html.page import Group
 from scara_ident.report.html.plot import Band, Figure, Layer, Line, Panel, Plot, single
-from scara_ident.report.html.spectra import orders, spectrum
-from scara_ident.report.html.torque import banded
+from scara_ident.report.html.spectra import ORDER_WORDS, orders, spectrum
+from scara_ident.report.html.torque import banded, unused_regions
 from scara_ident.report.html.traces import Trace, kept
 from scara_ident.robot import Robot
 
@@ -27,7 +27,6 @@ class View:
     label: str
     signal: Callable[[Robot, Trace, int], Array]
     along: bool = False
-    share: float = 0.995
 
 
 def _since_reversal(robot: Robot, trace: Trace, j: int) -> Array:
@@ -42,7 +41,7 @@ POSITION = View("position", lambda robot, trace, j: trace.motion.q[j])
 VELOCITY = View("velocity", lambda robot, trace, j: trace.motion.v[j])
 TIME = View("time since the start [s]", lambda robot, trace, j: trace.time)
 TORQUE = View("predicted torque", lambda robot, trace, j: trace.predicted[j])
-REVERSAL = View("travel since the last reversal", _since_reversal, along=True, share=0.4)
+REVERSAL = View("travel since the last reversal", _since_reversal, along=True)
 VIEWS = {
     "spring": POSITION,
     "base_tilt": POSITION,
@@ -63,48 +62,20 @@ VIEWS = {
     ),
 }
 ADDED = "what it adds to the prediction"
+LEFT = "measured less the rest of the model"
+LAW = "the effect as found"
+# How far after a reversal an effect is shown, in the distances over which it acts.
+SHOWN_DISTANCES = 8.0
+# Samples after reversals that the figure holds at least, where the distance is short.
+LEAST_NEAR = 1000
 BY_ORDER = ("torque_ripple", "encoder_eccentricity")
 BY_FREQUENCY = ("vibration",)
 
 
-@dataclass(frozen=True, eq=False)
-class Chapter:
-    """One effect with the residual before and after it.
-
-    Attributes
-    ----------
-    number : int
-    effect : str
-    joint : int
-        The joint whose residual is shown.
-    before, after : sequence of Trace
-        Of the same recordings in the same order.
-    bands : sequence of float or None
-    """
-
-    number: int
-    effect: str
-    joint: int
-    before: Sequence[Trace]
-    after: Sequence[Trace]
-    bands: Sequence[float | None]
-
-    @property
-    def added(self) -> list[Array] | None:
-        """What the effect adds to the prediction, net of what the other parameters give back, (N,) per part.
-
-        None for an effect that was corrected in the data, which changes no prediction.
-        """
-        if self.effect == DELAY:
-            return None
-        return [
-            after.predicted[self.joint] - before.predicted[self.joint]
-            for before, after in zip(self.before, self.after, strict=True)
-        ]
-
-
 def chapter_group(robot: Robot, chapter: Chapter) -> Group:
     """Return the figures that show an effect before and after."""
+    if not any(np.any(trace.used[chapter.joint]) for trace in (*chapter.before, *chapter.after)):
+        return Group(f"effect-{chapter.number}", (), (), "two")
     figures = [figure for figure in (_telling(robot, chapter), _own(robot, chapter)) if figure]
     return Group(f"effect-{chapter.number}", figures, (), "two")
 
@@ -115,7 +86,7 @@ def moment_group(robot: Robot, chapter: Chapter) -> Group:
     gains = [_squares(a, j) - _squares(b, j) for a, b in zip(chapter.before, chapter.after, strict=True)]
     k = int(np.argmax(gains))
     before, after = chapter.before[k], chapter.after[k]
-    layers: list[Layer] = []
+    layers: list[Layer] = [*unused_regions(after, j)]
     for trace, signal, color, name, dash in (
         (before, before.residual[j], "vermillion", "residual before", ""),
         (after, after.residual[j], "blue", "residual after", ""),
@@ -131,7 +102,7 @@ def moment_group(robot: Robot, chapter: Chapter) -> Group:
 
 
 def _squares(trace: Trace, j: int) -> float:
-    return float(np.sum(trace.residual[j][trace.used[j]] ** 2)) / max(1, trace.motion.samples)
+    return float(np.sum(trace.residual[j][trace.used[j]] ** 2)) / max(1, int(np.count_nonzero(trace.used[j])))
 
 
 def _telling(robot: Robot, chapter: Chapter) -> Figure | None:
@@ -146,29 +117,53 @@ def _telling(robot: Robot, chapter: Chapter) -> Figure | None:
     j = chapter.joint
     plots = [[view.signal(robot, trace, j) for trace in traces] for traces in (chapter.before, chapter.after)]
     plot = _means_plot(robot, chapter, plots[0], plots[1], _with_unit(robot, view, j), view)
-    words = (
-        "Means with two standard errors; residual in the direction of motion."
-        if view.along
-        else "Means with two standard errors."
-    )
-    return single(name, f"{robot.joints[j]}: residual over {view.label.split(' [')[0]}", words, plot)
+    words = "Means with two standard errors"
+    if view.along:
+        words += ", in the direction of motion"
+    words += "."
+    if chapter.own is not None:
+        words += " Above: torque that the rest of the model leaves to the effect. Below: the residual; before the effect came in, other parameters had bent to stand for it."
+    return single(name, f"{robot.joints[j]} over {view.label.split(' [')[0]}", words, plot)
 
 
 def _own(robot: Robot, chapter: Chapter) -> Figure | None:
     added = chapter.added
     if added is None:
         return None
-    label = f"added to the prediction [{robot.torque_unit(chapter.joint)}]"
-    plot = _means_plot(robot, chapter, added, added, label, View(label, TORQUE.signal))
+    j, unit = chapter.joint, robot.torque_unit(chapter.joint)
+    layers: list[Layer] = []
+    for traces, color, name in (
+        (chapter.before, "vermillion", "residual before"),
+        (chapter.after, "blue", "residual after"),
+    ):
+        y = kept(traces, [trace.residual[j] for trace in traces], j)
+        means = tail_means(kept(traces, added, j), y, 30)
+        layers.append(Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, color))
+        layers.append(Line(means.x, means.y, color, name, 1.8))
+    x = kept(chapter.after, added, j)
+    ends = [float(np.min(x)), float(np.max(x))]
+    layers.append(Line(ends, ends, "black", ADDED, 1.2, "4 3"))
+    plot = Plot(f"added to the prediction [{unit}]", (Panel(f"residual [{unit}]", layers, 220),))
     words = "If the effect is real, the residual before follows the dashed line, and nothing of it is left after."
     return single(f"effect-{chapter.number}-own", "Residual over what the effect adds", words, plot)
 
 
 def _means_plot(
-    robot: Robot, chapter: Chapter, x_before: Sequence[Array], x_after: Sequence[Array], label: str, view: View
+    robot: Robot,
+    chapter: Chapter,
+    x_before: Sequence[Array],
+    x_after: Sequence[Array],
+    label: str,
+    view: View,
 ) -> Plot:
     j = chapter.joint
-    limits = middle_range(kept(chapter.after, x_after, j), view.share)
+    after = kept(chapter.after, x_after, j)
+    limits = middle_range(after)
+    if view is REVERSAL:
+        # Most of the way to the next reversal has nothing to tell.
+        far = SHOWN_DISTANCES * chapter.distance if chapter.distance else 0.0
+        enough = float(np.quantile(after, min(1.0, LEAST_NEAR / max(1, len(after)))))
+        limits = (0.0, min(limits[1], max(far, enough)) or limits[1])
     layers: list[Layer] = []
     for traces, signals, color, name in (
         (chapter.before, x_before, "vermillion", "residual before"),
@@ -179,11 +174,33 @@ def _means_plot(
         layers.append(Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, color))
         layers.append(Line(means.x, means.y, color, name, 1.8))
     added = chapter.added
+    law = _law(chapter, after, limits, view)
     if added is not None:
         turned = [part * _direction(trace, j, view.along) for part, trace in zip(added, chapter.after, strict=True)]
-        means = binned_means(kept(chapter.after, x_after, j), kept(chapter.after, turned, j), limits, 30)
+        means = binned_means(after, kept(chapter.after, turned, j), limits, 30)
         layers.append(Line(means.x, means.y, "black", ADDED, 1.2, "4 3"))
-    return Plot(label, (Panel(f"residual [{robot.torque_unit(j)}]", layers, 220),), limits)
+    panels = [Panel(f"residual [{robot.torque_unit(j)}]", layers, 150 if law else 220)]
+    if law:
+        panels.insert(0, Panel(f"torque [{robot.torque_unit(j)}]", law, 150))
+    return Plot(label, panels, limits)
+
+
+def _law(chapter: Chapter, x: Array, limits: tuple[float, float], view: View) -> list[Layer]:
+    """The effect's torque over its signal, and what measured torque leaves to it."""
+    j, own = chapter.joint, chapter.own
+    if own is None:
+        return []
+    layers: list[Layer] = []
+    for signals, color, name, dash in (
+        ([part + trace.residual[j] for part, trace in zip(own, chapter.after, strict=True)], "green", LEFT, ""),
+        (own, "black", LAW, "2 3"),
+    ):
+        turned = [part * _direction(trace, j, view.along) for part, trace in zip(signals, chapter.after, strict=True)]
+        means = binned_means(x, kept(chapter.after, turned, j), limits, 30)
+        if not dash:
+            layers.append(Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, color))
+        layers.append(Line(means.x, means.y, color, name, 1.8 if not dash else 1.2, dash))
+    return layers
 
 
 def _direction(trace: Trace, j: int, along: bool) -> Array | float:
@@ -208,12 +225,12 @@ def _with_unit(robot: Robot, view: View, j: int) -> str:
 def _by_order(robot: Robot, chapter: Chapter, name: str, unit: str) -> Figure | None:
     layers: list[Layer] = []
     for traces, color, words in ((chapter.before, "vermillion", "before"), (chapter.after, "blue", "after")):
-        found = orders(robot, traces, chapter.joint, [trace.raw_residual[chapter.joint] for trace in traces])
+        found = orders(robot, traces, chapter.joint, [trace.residual[chapter.joint] for trace in traces])
         if found is None:
             return None
         layers.append(Line(found.order, found.amplitude, color, f"residual {words}"))
     plot = Plot("order [1 / motor turn]", (Panel(f"amplitude [{unit}]", layers, 220),))
-    return single(name, f"{robot.joints[chapter.joint]}: what repeats with the motor's turn", "", plot)
+    return single(name, f"{robot.joints[chapter.joint]}: what repeats with the motor's turn", ORDER_WORDS, plot)
 
 
 def _by_frequency(chapter: Chapter, name: str, unit: str) -> Figure | None:
@@ -224,4 +241,4 @@ def _by_frequency(chapter: Chapter, name: str, unit: str) -> Figure | None:
             return None
         layers.append(Line(found.frequency, found.highest, color, f"residual {words}"))
     plot = Plot("frequency [Hz]", (Panel(f"density [{unit}/√Hz]", layers, 220, log=True),), log=True)
-    return single(name, "Spectrum over frequency", "", plot)
+    return single(name, "Spectrum over frequency", "Highest line of each bin, nothing filtered.", plot)

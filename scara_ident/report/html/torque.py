@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.estimators import JointError
-from scara_ident.report.html.page import Cell, Group, Selector, Text, escape, table
+from scara_ident.report.html.page import Cell, Group, Selector, Text, escape, number, table
 from scara_ident.report.html.plot import Drawing, Figure, Grid, Layer, Line, Panel, Plot, Region
 from scara_ident.report.html.traces import Trace
 from scara_ident.robot import Robot
@@ -65,10 +66,19 @@ def _plot(robot: Robot, traces: Sequence[Trace], j: int, band: float | None, buc
         _, predicted = banded(trace, trace.predicted[j], band)
         above.append(_line(grid, measured, bucket, "blue", "measured", 1.6))
         above.append(_line(grid, predicted, bucket, "vermillion", "predicted", 1.4, "5 3"))
-        below.append(_line(grid, measured - predicted, bucket, "green", "residual", 1.2))
-        below += [Region(limits, "grey", "not used: ends, standstill", 0.25) for limits in _unused(trace, j)]
+        residual, used = measured - predicted, trace.used[j, :: _every(trace, band)]
+        below += unused_regions(trace, j)
+        # What the estimate does not use may be far larger, and must not set the scale.
+        idle = _line(grid, np.where(used, np.nan, residual), bucket, "grey", "residual, not used", 1.0)
+        below.append(replace(idle, fit=not np.any(used)))
+        below.append(_line(grid, np.where(used, residual, np.nan), bucket, "green", "residual", 1.2))
     unit = robot.torque_unit(j)
     return Plot("time [s]", (Panel(f"torque [{unit}]", above, 260), Panel(f"residual [{unit}]", below, 130)))
+
+
+def unused_regions(trace: Trace, j: int) -> list[Layer]:
+    """Return strips over the times that the estimate of a joint leaves out."""
+    return [Region(limits, "grey", "not used: ends, standstill", 0.25) for limits in _unused(trace, j)]
 
 
 def _unused(trace: Trace, j: int) -> list[tuple[float, float]]:
@@ -143,20 +153,18 @@ def error_table(robot: Robot, names: Sequence[str], errors: Sequence[Sequence[Jo
     for place, (name, found) in enumerate(zip(names, errors, strict=True)):
         cells: list[Cell | str] = [Cell(escape(name), "name")]
         for j, error in enumerate(found):
-            cells += _error_cells(error, place, j, most)
+            cells.append(_error_cell(error, place, j, most))
         rows.append(cells)
-    head = ["recording"]
-    for j, joint in enumerate(robot.joints):
-        head += [f"{joint} [{robot.torque_unit(j)}]", "of torque"]
+    head = ["recording", *(f"{joint} [{robot.torque_unit(j)}]" for j, joint in enumerate(robot.joints))]
     return table(head, rows, numeric=range(1, len(head)))
 
 
-def _error_cells(error: JointError | None, recording: int, j: int, most: float) -> list[Cell | str]:
+def _error_cell(error: JointError | None, recording: int, j: int, most: float) -> Cell | str:
     if error is None:
-        return ["–", "–"]
+        return "at rest"
     button = (
-        f'<button type="button" data-choose="torque-group" data-values="[{recording},{j}]">{error.rms:.3g}</button>'
+        f'<button type="button" data-choose="torque-group" data-values="[{recording},{j}]">{number(error.rms)}</button>'
     )
     if error.relative is None:
-        return [Cell(button, "num"), "–"]
-    return [Cell(button, "num"), Cell(f"{error.relative:.1%}", "num", error.relative / most)]
+        return Cell(button, "num")
+    return Cell(f"{button} <small>{error.relative:.1%}</small>", "num", error.relative / most)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.effects.effect import EffectTerm
 from scara_ident.model import TorqueModel
 from scara_ident.motion import Motion, Stretch, low_pass, motion_of, stretches, torque_of
 from scara_ident.recording import Recording
@@ -42,6 +43,9 @@ class Trace:
         Per joint, samples that the band makes dependent on each other.
     trim : int
         Samples at either end where the filter's continuation is a guess.
+    effects : tuple of (str, str or None, ndarray)
+        Name, joint and predicted torque within the band of every effect in the model, in the order in which they came
+        in.
     """
 
     recording: str
@@ -55,6 +59,7 @@ class Trace:
     used: NDArray[np.bool_]
     step: tuple[int, ...]
     trim: int
+    effects: tuple[tuple[str, str | None, Array], ...] = field(default=())
 
     @property
     def time(self) -> Array:
@@ -114,6 +119,7 @@ def _trace(model: TorqueModel, value: Array, part: Stretch, bands: Sequence[floa
     torque = torque_of(part)
     motion = motion_of(part, position_cuts(part.rate, bands))
     total, load, friction = (np.zeros_like(motion.q) for _ in range(3))
+    own: list[tuple[str, str | None, Array]] = []
     for term in model.terms:
         share = np.einsum("jpn,p->jn", term.regressor(motion), value[model.place(term)])
         total += share
@@ -121,12 +127,16 @@ def _trace(model: TorqueModel, value: Array, part: Stretch, bands: Sequence[floa
             load += share
         elif isinstance(term, Friction):
             friction += share
-    measured, predicted = (
-        np.array([low_pass(row, part.rate, band) for row, band in zip(rows, bands, strict=True)])
-        for rows in (torque, total)
-    )
+        elif isinstance(term, EffectTerm):
+            own.append((term.name, term.joint, share))
+
+    def banded(rows: Array) -> Array:
+        return np.array([low_pass(row, part.rate, band) for row, band in zip(rows, bands, strict=True)])
+
+    measured, predicted = banded(torque), banded(total)
+    effects = tuple((name, joint, banded(share)) for name, joint, share in own)
     used = ~standstill(part, motion, bands)
     trim = trim_of(part, bands)
     used[:, :trim] = used[:, -trim:] = False
     steps = tuple(row_step(part.rate, band) for band in bands)
-    return Trace(part.name, start, motion, measured, predicted, total, load, friction, used, steps, trim)
+    return Trace(part.name, start, motion, measured, predicted, total, load, friction, used, steps, trim, effects)

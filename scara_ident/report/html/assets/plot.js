@@ -37,18 +37,29 @@ const Plot = (() => {
 
   function linearTicks(low, high, most) {
     const rough = (high - low) / Math.max(1, most), power = 10 ** Math.floor(Math.log10(rough));
-    const step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= rough * 0.999);
-    const ticks = [];
-    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) ticks.push([k * step, true]);
-    return ticks;
+    const steps = [0.5, 1, 2, 5, 10].map((k) => k * power), wide = steps.findIndex((k) => k >= rough * 0.999);
+    const along = (step) => {
+      const ticks = [];
+      for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) ticks.push([k * step, true]);
+      return ticks;
+    };
+    const ticks = along(steps[wide]);
+    // One or two ticks tell no scale.
+    return ticks.length < 3 && wide > 0 ? along(steps[wide - 1]) : ticks;
   }
 
-  // Digits that tell neighbouring ticks apart.
-  const tickDigits = (ticks) => {
-    if (ticks.length < 2) return 4;
+  // Words of linear ticks: all of an axis with as many decimals as tell neighbours apart.
+  function tickWords(ticks) {
+    if (ticks.length < 2) return (v) => number(v);
+    const step = ticks[1][0] - ticks[0][0];
     const most = Math.max(Math.abs(ticks[0][0]), Math.abs(ticks[ticks.length - 1][0]));
-    return Math.max(3, Math.min(12, Math.ceil(Math.log10(most / (ticks[1][0] - ticks[0][0]))) + 1));
-  };
+    if (most < 1e-3 || most >= 1e6) {
+      const digits = Math.max(1, Math.min(12, Math.ceil(Math.log10(most / step)) + 1));
+      return (v) => (Math.abs(v) < 1e-6 * step ? "0" : number(v, digits));
+    }
+    const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
+    return (v) => (Math.abs(v) < 1e-6 * step ? "0" : v.toFixed(decimals).replace("-", "−"));
+  }
 
   function logTicks(low, high, most) {
     const first = Math.floor(low), last = Math.ceil(high), every = Math.max(1, Math.ceil((last - first) / most));
@@ -70,6 +81,7 @@ const Plot = (() => {
     for (const key of ["y", "lo", "hi"]) if (layer[key] && typeof layer[key] === "object") out[key] = warp(unpack(layer[key]), logY);
     if (layer.t === "dots" && layer.e) out.e = unpack(layer.e);
     if (layer.t === "v" && logX) out.x = Math.log10(layer.x);
+    if (layer.t === "region" && logX) [out.x0, out.x1] = [Math.log10(layer.x0), Math.log10(layer.x1)];
     if (layer.t === "h" && logY) out.y = Math.log10(layer.y);
     if (layer.t === "density") out.z = bytes(layer.z);
     return out;
@@ -190,8 +202,8 @@ const Plot = (() => {
     return canvas.toDataURL();
   }
 
-  function draw(host, spec, state) {
-    const width = Math.max(240, Math.round(host.clientWidth || 640));
+  function draw(host, spec, state, wanted) {
+    const width = Math.max(200, Math.round(wanted || host.clientWidth || 640));
     if (spec.kind === "matrix") return drawMatrix(host, spec, width);
     const small = Boolean(spec.small), left = small ? 60 : LEFT, bottom = small ? 34 : BOTTOM;
     const inner = width - left - RIGHT;
@@ -230,18 +242,19 @@ const Plot = (() => {
       const sy = (v) => top + height - ((v - y0) / (y1 - y0)) * height;
       const clip = `clip${++clips}`;
       const ticks = panel.log ? logTicks(y0, y1, height / 26) : linearTicks(y0, y1, height / 26);
-      const digits = panel.log ? 3 : tickDigits(ticks);
+      const words = panel.log ? (v) => number(10 ** v, 3) : tickWords(ticks);
       for (const [v, label] of ticks) {
         const py = sy(v).toFixed(1);
         body += `<line class="grid" x1="${left}" x2="${left + inner}" y1="${py}" y2="${py}"/>`;
-        if (label) body += `<text class="tick" x="${left - 6}" y="${py}" dy=".32em" text-anchor="end">${number(panel.log ? 10 ** v : v, digits)}</text>`;
+        if (label) body += `<text class="tick" x="${left - 6}" y="${py}" dy=".32em" text-anchor="end">${words(v)}</text>`;
       }
       const xTicks = (logX ? logTicks : linearTicks)(x0, x1, inner / (small ? 48 : 72)).filter(([v]) => v >= x0 && v <= x1);
+      const xWords = logX ? (v) => number(10 ** v, 3) : tickWords(xTicks);
       const lowest = panel === spec.panels[spec.panels.length - 1];
       for (const [v, label] of xTicks) {
         const px = sx(v).toFixed(1);
         body += `<line class="grid" x1="${px}" x2="${px}" y1="${top}" y2="${top + height}"/>`;
-        if (lowest && label) body += `<text class="tick" x="${px}" y="${top + height + 15}" text-anchor="middle">${number(logX ? 10 ** v : v, logX ? 3 : tickDigits(xTicks))}</text>`;
+        if (lowest && label) body += `<text class="tick" x="${px}" y="${top + height + 15}" text-anchor="middle">${xWords(v)}</text>`;
       }
       if (y0 < 0 && y1 > 0 && !panel.log) body += `<line class="zero" x1="${left}" x2="${left + inner}" y1="${sy(0).toFixed(1)}" y2="${sy(0).toFixed(1)}"/>`;
       body += `<clipPath id="${clip}"><rect x="${left}" y="${top}" width="${inner}" height="${height}"/></clipPath><g clip-path="url(#${clip})">`;
@@ -295,7 +308,7 @@ const Plot = (() => {
     if (layer.t === "region") {
       const a = Math.max(g.left, g.sx(layer.x0)), b = Math.min(g.left + g.inner, g.sx(layer.x1));
       const top = layer.share ? g.top + g.height * (1 - layer.share) : g.top;
-      return b > a ? `<rect class="region" ${colour} x="${a.toFixed(1)}" width="${(b - a).toFixed(1)}" y="${top}" height="${g.top + g.height - top}" fill-opacity="${layer.o || 0.1}"/>` : "";
+      return b > a ? `<rect class="region" ${colour} x="${a.toFixed(1)}" width="${(b - a + 0.3).toFixed(1)}" y="${top}" height="${g.top + g.height - top}" fill-opacity="${layer.o || 0.1}"/>` : "";
     }
     if (layer.t === "h") return `<path class="line" ${colour} d="M${g.left} ${g.sy(layer.y).toFixed(1)}H${g.left + g.inner}" stroke-width="1" stroke-dasharray="5 4"/>`;
     if (layer.t === "v") return layer.x < g.x0 || layer.x > g.x1 ? "" : `<path class="line" ${colour} d="M${g.sx(layer.x).toFixed(1)} ${g.top}V${g.top + g.height}" stroke-width="1" stroke-dasharray="3 3"/>`;
@@ -304,8 +317,8 @@ const Plot = (() => {
 
   function drawMatrix(host, spec, width) {
     const rows = spec.rows.length, columns = spec.columns.length;
-    const label = Math.min(130, 14 + 6.6 * Math.max(...spec.rows.map((r) => r.length)));
-    const under = Math.min(120, 12 + 6.2 * Math.max(...spec.columns.map((r) => r.length)));
+    const label = Math.min(130, 14 + 6.6 * Math.max(...spec.rows.map((r) => r.length))) + (spec.rowLabel ? 16 : 0);
+    const under = Math.min(120, 12 + 6.2 * Math.max(...spec.columns.map((r) => r.length))) + (spec.columnLabel ? 18 : 0);
     const cell = Math.min(46, (width - label - 8) / columns);
     let body = "";
     const every = Math.ceil(11 / cell);
@@ -318,7 +331,7 @@ const Plot = (() => {
         if (v === null) { body += `<rect class="cell none" ${at}>${tip}</rect>`; continue; }
         const strength = Math.min(1, Math.abs(v) / spec.most);
         body += `<rect class="cell" ${at} style="--c:var(--c-${v < 0 ? "below" : "above"})" fill-opacity="${(0.85 * strength).toFixed(3)}">${tip}</rect>`;
-        if (cell >= 30) body += `<text class="in" x="${(label + (k + 0.5) * cell).toFixed(1)}" y="${(TOP + (i + 0.5) * cell).toFixed(1)}" dy=".32em" text-anchor="middle">${v.toFixed(2).replace("0.", ".").replace("-", "−")}</text>`;
+        if (cell >= 30) body += `<text class="in" x="${(label + (k + 0.5) * cell).toFixed(1)}" y="${(TOP + (i + 0.5) * cell).toFixed(1)}" dy=".32em" text-anchor="middle">${spec.most === 1 ? (Math.abs(v) < 0.005 ? 0 : v).toFixed(2).replace("0.", ".").replace("-", "−") : number(v, 2)}</text>`;
       }
     });
     const foot = TOP + rows * cell;
@@ -327,10 +340,12 @@ const Plot = (() => {
       const px = label + (k + 0.5) * cell;
       body += `<text class="tick" transform="translate(${px.toFixed(1)} ${(foot + 8).toFixed(1)}) rotate(-60)" text-anchor="end" dy=".32em">${escape(name)}</text>`;
     });
+    if (spec.columnLabel) body += `<text class="axis" x="${label + columns * cell / 2}" y="${foot + under - 5}" text-anchor="middle">${escape(spec.columnLabel)}</text>`;
+    if (spec.rowLabel) body += `<text class="axis" transform="translate(12 ${TOP + rows * cell / 2}) rotate(-90)" text-anchor="middle">${escape(spec.rowLabel)}</text>`;
     body += `<rect class="frame" x="${label}" y="${TOP}" width="${columns * cell}" height="${rows * cell}"/>`;
     host.innerHTML = `<svg viewBox="0 0 ${width} ${Math.round(foot + under)}" role="img" aria-label="${escape(spec.label || "")}">${body}</svg>`;
     return null;
   }
 
-  return {draw, number, escape, lowerBound};
+  return {draw, number, escape, lowerBound, linearTicks, tickWords};
 })();

@@ -5,6 +5,9 @@
   const content = JSON.parse(document.getElementById("report-data").textContent);
   const figures = new Map();
   const groups = new Map();
+  // CSS pixels between the margins of A4.
+  const PAPER = 688;
+  let printing = false;
 
   class Figure {
     constructor(element) {
@@ -26,9 +29,15 @@
       this.element.hidden = !spec;
       this.element.dataset.drawn = "true";
       if (!spec) return;
-      this.plot = Plot.draw(this.host, spec, this.state);
+      this.plot = Plot.draw(this.host, spec, this.state, printing ? this.paperWidth : 0);
       this.drawLegend(spec);
       if (this.plot) [this.element.dataset.x0, this.element.dataset.x1] = this.plot.view;
+    }
+
+    // On paper a figure is drawn for its width there, so that its words keep their size.
+    get paperWidth() {
+      const columns = this.element.closest(".three") ? 3 : this.element.closest(".two") ? 2 : 1;
+      return (PAPER - 18 * (columns - 1)) / columns / (this.element.closest(".beside") ? 2 : 1);
     }
 
     drawLegend(spec) {
@@ -203,22 +212,45 @@
     };
   }
 
-  // The arm in its plane: a slider of time, and a button that moves it.
+  // The arm in its plane, both axes of one scale: a slider of time, and a button that moves it.
   function arm(element) {
     const data = content.arms[element.dataset.arm], host = element.querySelector(".plot");
     const slider = element.querySelector("input"), button = element.querySelector("button"), clock = element.querySelector("output");
-    const {frames, period, low, high} = data;
-    const size = 400, scale = size / Math.max(high[0] - low[0], high[1] - low[1]);
-    const point = ([x, y]) => `${((x - low[0]) * scale).toFixed(1)},${((high[1] - y) * scale).toFixed(1)}`;
-    const box = [(high[0] - low[0]) * scale, (high[1] - low[1]) * scale].map((v) => Math.max(60, v));
-    const path = "M" + frames.map((f) => point(f[f.length - 1])).join("L");
-    host.innerHTML = `<svg viewBox="-12 -12 ${box[0] + 24} ${box[1] + 24}" role="img" aria-label="the arm in its plane"><path class="line" style="--c:var(--c-grey)" stroke-width="1" d="${path}"/><polyline class="arm"/><g class="joints"></g></svg>`;
-    const line = host.querySelector("polyline"), joints = host.querySelector(".joints");
+    const {frames, period, axes} = data;
+    const reach = Math.max(data.high[0] - data.low[0], data.high[1] - data.low[1], 1e-3), pad = 0.06 * reach;
+    // Neither side shorter than a third of the other: a motion along a line still is a picture.
+    const half = [0, 1].map((k) => Math.max(0.5 * (data.high[k] - data.low[k]) + pad, reach / 6));
+    const low = [0, 1].map((k) => 0.5 * (data.low[k] + data.high[k]) - half[k]), high = low.map((v, k) => v + 2 * half[k]);
+    const left = 54, top = 8, bottom = 36, room = Math.max(220, Math.min(450, (host.clientWidth || 516) - left - 12));
+    const scale = Math.min(room / (high[0] - low[0]), 400 / (high[1] - low[1]));
+    const inner = scale * (high[0] - low[0]), height = scale * (high[1] - low[1]);
+    const at = ([x, y]) => [left + (x - low[0]) * scale, top + (high[1] - y) * scale];
+    const point = (p) => at(p).map((v) => v.toFixed(1)).join(",");
+    const ends = frames.map((f) => point(f[f.length - 1]));
+    let grid = "";
+    const xTicks = Plot.linearTicks(low[0], high[0], inner / 70), yTicks = Plot.linearTicks(low[1], high[1], height / 45);
+    const xWords = Plot.tickWords(xTicks), yWords = Plot.tickWords(yTicks);
+    for (const [v] of xTicks) {
+      const px = at([v, 0])[0].toFixed(1);
+      grid += `<line class="grid" x1="${px}" x2="${px}" y1="${top}" y2="${top + height}"/><text class="tick" x="${px}" y="${top + height + 15}" text-anchor="middle">${xWords(v)}</text>`;
+    }
+    for (const [v] of yTicks) {
+      const py = at([0, v])[1].toFixed(1);
+      grid += `<line class="grid" x1="${left}" x2="${left + inner}" y1="${py}" y2="${py}"/><text class="tick" x="${left - 6}" y="${py}" dy=".32em" text-anchor="end">${yWords(v)}</text>`;
+    }
+    const words = `<text class="axis" x="${left + inner / 2}" y="${top + height + bottom - 5}" text-anchor="middle">${axes[0]} [m]</text><text class="axis" transform="translate(13 ${top + height / 2}) rotate(-90)" text-anchor="middle">${axes[1]} [m]</text>`;
+    host.innerHTML = `<svg viewBox="0 0 ${(left + inner + 12).toFixed(0)} ${(top + height + bottom).toFixed(0)}" role="img" aria-label="the arm in its plane">${grid}<rect class="frame" x="${left}" y="${top}" width="${inner}" height="${height}"/>${words}<path class="line" style="--c:var(--c-grey)" stroke-width="1" d="M${ends.join("L")}"/><polyline class="trail"/><polyline class="arm"/><g class="joints"></g></svg>`;
+    const line = host.querySelector(".arm"), trail = host.querySelector(".trail"), joints = host.querySelector(".joints");
+    const second = Math.max(1, Math.round(1 / period));
     const show = (k) => {
       const points = frames[k].map(point);
       line.setAttribute("points", points.join(" "));
-      joints.innerHTML = points.map((p) => `<circle class="pin" r="5" cx="${p.split(",")[0]}" cy="${p.split(",")[1]}"/>`).join("");
-      clock.textContent = `${Plot.number(k * period, 3)} s`;
+      trail.setAttribute("points", ends.slice(Math.max(0, k - second), k + 1).join(" "));
+      joints.innerHTML = points.map((p, i) => {
+        const [x, y] = p.split(",");
+        return i ? `<circle class="pin" r="5" cx="${x}" cy="${y}"/>` : `<rect class="pin" x="${x - 7}" y="${y - 7}" width="14" height="14"/>`;
+      }).join("");
+      clock.textContent = `${(k * period).toFixed(1)} s`;
       slider.value = k;
     };
     let began = null;
@@ -255,7 +287,12 @@
     all();
   };
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", all);
-  window.addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
+  window.addEventListener("beforeprint", () => {
+    document.querySelectorAll("details").forEach((d) => { d.open = true; });
+    printing = true;
+    all();
+  });
+  window.addEventListener("afterprint", () => { printing = false; all(); });
   let wide = window.innerWidth, timer = 0;
   window.addEventListener("resize", () => {
     clearTimeout(timer);
