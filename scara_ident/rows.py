@@ -25,15 +25,14 @@ END_SAMPLES = 20
 # A rate is known to rounding only; what is a whole number but for that is one.
 ROUNDING = 1e-9
 # A joint stands still where its speed stays below this share of its peak, or below this many standard deviations of its
-# velocity's noise, for longer than this many periods of the band: friction is then anything up to Coulomb's.
+# velocity's noise: friction is then anything up to Coulomb's. The position's low-pass widens it by this many of its periods.
 REST_SHARE = 3e-3
 REST_NOISE = 5.0
-REST_PERIODS = 0.0
-# What happens at rest reaches so many periods of the band beyond it, through the low-pass; left in, it looks like a delay
-# of minus 0.7 ms on a virtual arm that has none.
 REST_WIDEN = 0.5
-# But no longer than this, s: in a narrow band too little would be left between turning points.
-REST_WIDEN_SECONDS = 0.1
+# Both sides of the equation fade out towards rest over this many periods of the position's low-pass.
+FADE_PERIODS = 1.0
+# Neither is longer than this, s: in a narrow band too little would be left between turning points.
+LONGEST_WIDENING = 0.05
 # Blocks are long against the band's memory, so that scores of different blocks are nearly independent.
 BLOCK_PERIODS = 4.0
 BLOCK_SECONDS = 0.5
@@ -41,9 +40,21 @@ BLOCK_SECONDS = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows of a stretch: ``[columns; torque]`` per joint, shape (p + 1, N), before and after the low-pass."""
+    """Rows of a stretch: ``[columns; torque]`` per joint, shape (p + 1, N).
+
+    Attributes
+    ----------
+    motion : Motion
+    rest : ndarray of bool, shape (n, N)
+        Where each joint stands still, see `standstill`.
+    raw : tuple of ndarray
+        Before the low-pass.
+    banded : tuple of ndarray
+        Faded out towards rest, then low-passed: what happens at rest does not reach beyond it.
+    """
 
     motion: Motion
+    rest: NDArray[np.bool_]
     raw: tuple[Array, ...]
     banded: tuple[Array, ...]
 
@@ -63,12 +74,13 @@ def rows_of(model: TorqueModel, stretch: Stretch, bands: Sequence[float | None])
     Rows
     """
     motion, raw = raw_rows(model, stretch, bands)
+    rest = standstill(stretch, motion, bands)
     banded = []
-    for rows, active, band in zip(raw, active_rows(model), bands, strict=True):
+    for rows, active, fade, band in zip(raw, active_rows(model), fading(rest, stretch.rate, bands), bands, strict=True):
         smooth = np.zeros_like(rows)
-        smooth[active] = low_pass(rows[active], stretch.rate, band)
+        smooth[active] = low_pass(fade * rows[active], stretch.rate, band)
         banded.append(smooth)
-    return Rows(motion, raw, tuple(banded))
+    return Rows(motion, rest, raw, tuple(banded))
 
 
 def raw_rows(model: TorqueModel, stretch: Stretch, bands: Sequence[float | None]) -> tuple[Motion, tuple[Array, ...]]:
@@ -116,9 +128,10 @@ def band_blocks(
     length = _block_length(stretch.rate, bands)
     bounds = np.linspace(trim, count - trim, max(1, round((count - 2 * trim) / length)) + 1).astype(int)
     per_joint = []
+    fades = fading(rest, stretch.rate, bands)
     for j, (rows, active, band) in enumerate(zip(raw, active_rows(model), bands, strict=True)):
         step = row_step(stretch.rate, band)
-        kept = low_pass_every(rows[active], stretch.rate, band, step)
+        kept = low_pass_every(fades[j] * rows[active], stretch.rate, band, step)
         table = np.zeros((kept.shape[1], rows.shape[0]))
         table[:, active] = np.sqrt(step) * kept.T
         places = step * np.arange(kept.shape[1])
@@ -149,15 +162,45 @@ def _block_length(rate: float, bands: Sequence[float | None]) -> int:
 
 
 def standstill(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) -> NDArray[np.bool_]:
-    """Return where each joint stands still, shape (n, N), widened by the filter's memory."""
+    """Return where each joint stands still, shape (n, N), widened by the memory of the position's filter."""
     result = np.zeros(motion.q.shape, dtype=bool)
     for j, band in enumerate(bands):
         v = motion.v[j]
         threshold = max(REST_SHARE * float(np.max(np.abs(v))), REST_NOISE * _velocity_noise(stretch, motion, j, band))
-        span = 1 if band is None else max(1, int(REST_PERIODS * stretch.rate / band))
-        widen = 1 if band is None else max(1, int(stretch.rate * min(REST_WIDEN / band, REST_WIDEN_SECONDS)))
-        result[j] = _runs_longer_than(np.abs(v) <= threshold, span, widen=widen)
+        result[j] = _runs_longer_than(np.abs(v) <= threshold, 1, widen=_widening(REST_WIDEN, stretch.rate, band))
     return result
+
+
+def fading(rest: NDArray[np.bool_], rate: float, bands: Sequence[float | None]) -> Array:
+    """Return the weight of every sample, shape (n, N): 0 at rest, 1 away from it, and between them without a step.
+
+    An equation that holds at every sample holds for both sides times any weight. With the weight zero where friction
+    is unknown, the low-pass carries nothing of it to the samples that are used.
+
+    Parameters
+    ----------
+    rest : ndarray of bool, shape (n, N)
+    rate : float
+        Samples per second.
+    bands : sequence of float or None, one per joint
+    """
+    result = np.ones(rest.shape)
+    for j, band in enumerate(bands):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], rest[j].astype(np.int8), [0]])))
+        ramp = _widening(FADE_PERIODS, rate, band)
+        rise = np.sin(0.5 * np.pi * np.arange(1, ramp + 1) / (ramp + 1)) ** 2
+        for start, stop in edges.reshape(-1, 2):
+            before, after = result[j, max(0, start - ramp) : start], result[j, stop : stop + ramp]
+            before *= rise[: len(before)][::-1]
+            after *= rise[: len(after)]
+            result[j, start:stop] = 0.0
+    return result
+
+
+def _widening(periods: float, rate: float, band: float | None) -> int:
+    if band is None:
+        return 1
+    return max(1, int(rate * min(periods / (POSITION_BAND * band), LONGEST_WIDENING)))
 
 
 def _velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | None) -> float:

@@ -17,7 +17,7 @@ from scara_ident.model import TorqueModel, build_model
 from scara_ident.motion import low_pass, motion_of, stretches
 from scara_ident.recording import Recording
 from scara_ident.robot import load_robot
-from scara_ident.rows import position_cuts, row_step, rows_of, standstill
+from scara_ident.rows import fading, position_cuts, row_step, rows_of, standstill
 from tests.arms import PLANAR_2R, recorded_torque, recording, sines, write_urdf
 
 RATE = 500.0
@@ -100,8 +100,9 @@ def test_both_sides_pass_the_same_filter(model: TorqueModel, one: Recording):
     regressor = model.regressor(motion)
     assert one.effort is not None
     for j, band in enumerate((6.0, 12.0)):
-        assert_allclose(rows.banded[j][-1], low_pass(one.effort[j], part.rate, band), atol=1e-12)
-        assert_allclose(rows.banded[j][:-1], low_pass(regressor[j], part.rate, band), atol=1e-11)
+        weight = fading(rows.rest, part.rate, [6.0, 12.0])[j]
+        assert_allclose(rows.banded[j][-1], low_pass(weight * one.effort[j], part.rate, band), atol=1e-12)
+        assert_allclose(rows.banded[j][:-1], low_pass(weight * regressor[j], part.rate, band), atol=1e-11)
         assert_allclose(rows.raw[j], np.vstack([regressor[j], one.effort[j]]), atol=1e-12)
 
 

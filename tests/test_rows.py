@@ -15,6 +15,7 @@ from scara_ident.rows import (
     BLOCK_SECONDS,
     active_rows,
     band_blocks,
+    fading,
     position_cuts,
     raw_rows,
     row_step,
@@ -64,7 +65,8 @@ def test_banded_rows_are_the_low_pass_of_raw_ones(stretch):
     motion, raw = raw_rows(MODEL, stretch, BANDS)
     for j, active in enumerate(active_rows(MODEL)):
         assert_array_equal(rows.raw[j], raw[j])
-        assert_allclose(rows.banded[j][active], low_pass(raw[j][active], RATE, BANDS[j]), atol=1e-12)
+        faded = fading(rows.rest, RATE, BANDS)[j] * raw[j][active]
+        assert_allclose(rows.banded[j][active], low_pass(faded, RATE, BANDS[j]), atol=1e-12)
         idle = np.setdiff1d(np.arange(len(raw[j])), active)
         assert not np.any(raw[j][idle])
         assert not np.any(rows.banded[j][idle])
@@ -111,6 +113,31 @@ def test_a_joint_that_stops_is_left_out_there_and_no_more():
     assert rest[1, 1050:1450].all()
     assert rest[1].mean() < 0.35
     assert not rest[0, 1050:1450].all()
+
+
+def test_the_weight_is_zero_at_rest_one_away_from_it_and_has_no_step():
+    rest = np.zeros((2, 2000), dtype=bool)
+    rest[0, 700:800] = rest[0, 1000:1001] = rest[0, :5] = True
+    weight = fading(rest, RATE, (10.0, None))
+    assert np.all(weight[0][rest[0]] == 0.0)
+    assert np.all((weight[0][~rest[0]] > 0.0) & (weight[0][~rest[0]] <= 1.0))
+    ramp = RATE / (3.0 * 10.0)
+    assert weight[0][int(800 + ramp) + 1] == 1.0
+    assert np.max(np.abs(np.diff(weight[0]))) < 2.0 / ramp
+    assert np.all(weight[1] == 1.0)
+
+
+def test_what_happens_at_rest_does_not_reach_the_rows():
+    """A torque that friction takes up at rest, whatever it is, leaves the equation where the joint moves as it was."""
+    run = exact_runs()[0]
+    (part,) = stretches(run)
+    clean = rows_of(MODEL, part, BANDS)
+    assert run.effort is not None
+    shaken = run.effort + np.where(clean.rest, 5.0, 0.0)
+    (other,) = stretches(replace(run, effort=shaken))
+    assert np.any(clean.rest)
+    for before, after in zip(clean.banded, rows_of(MODEL, other, BANDS).banded, strict=True):
+        assert_array_equal(before, after)
 
 
 def test_positions_pass_a_wider_filter_than_rows_where_the_rate_allows():

@@ -12,7 +12,7 @@ from scara_ident.model import TorqueModel
 from scara_ident.motion import stretches
 from scara_ident.recording import Recording
 from scara_ident.repeatability import LARGEST_SHIFT, alignment
-from scara_ident.rows import rows_of, standstill, trim_of
+from scara_ident.rows import rows_of, trim_of
 
 Array = NDArray[np.float64]
 
@@ -134,7 +134,7 @@ def _aligned_residuals(
             shift = found
         rows = rows_of(model, part, bands)
         residual = np.array([banded[-1] - value @ banded[:-1] for banded in rows.banded])
-        used = ~standstill(part, rows.motion, bands)
+        used = ~rows.rest
         trim = trim_of(part, bands)
         used[:, :trim] = used[:, -trim:] = False
         aligned.append((np.roll(residual, shift, axis=1), _rolled(used, shift), part.rate))

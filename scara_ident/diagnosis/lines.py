@@ -23,7 +23,7 @@ from scara_ident.effects.spectra import (
 from scara_ident.model import TorqueModel
 from scara_ident.motion import stretches
 from scara_ident.recording import Recording
-from scara_ident.rows import rows_of, standstill, trim_of
+from scara_ident.rows import rows_of, trim_of
 
 Array = NDArray[np.float64]
 
@@ -99,7 +99,7 @@ def _residuals(
         if len(part.time) <= 4 * trim:
             continue
         rows = rows_of(model, part, bands)
-        rest = standstill(part, rows.motion, bands)
+        rest = rows.rest
         inside = slice(trim, len(part.time) - trim)
         residual = [
             np.where(rest[j], 0.0, banded[-1] - value @ banded[:-1])[inside] for j, banded in enumerate(rows.banded)

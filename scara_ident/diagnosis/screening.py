@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scara_ident.model import TorqueModel
 from scara_ident.motion import Motion, stretches
 from scara_ident.recording import Recording
-from scara_ident.rows import row_step, rows_of, standstill, trim_of
+from scara_ident.rows import row_step, rows_of, trim_of
 
 Array = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ def _samples(
         begin = float(recording.time[0])
         for part in stretches(recording):
             rows = rows_of(model, part, bands)
-            rest = standstill(part, rows.motion, bands)[j]
+            rest = rows.rest[j]
             trim = trim_of(part, bands)
             places = np.arange(trim, len(part.time) - trim, row_step(part.rate, bands[j]))
             places = places[~rest[places]]

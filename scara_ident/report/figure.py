@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from scara_ident.identification import Identification
-from scara_ident.motion import stretches
+from scara_ident.motion import low_pass, stretches
 from scara_ident.recording import Recording
 from scara_ident.rows import rows_of
 
@@ -42,8 +42,9 @@ def torque_figure(path: Path, identification: Identification, recordings: Sequen
         for part in stretches(recording):
             rows = rows_of(identification.model, part, identification.bands)
             for j in range(robot.n):
-                measured = rows.banded[j][-1]
-                predicted = identification.estimate.value @ rows.banded[j][:-1]
+                predicted = identification.estimate.value @ rows.raw[j][:-1]
+                both = low_pass(np.stack([rows.raw[j][-1], predicted]), part.rate, identification.bands[j])
+                measured, predicted = both
                 axis = axes[j, column]
                 axis.plot(
                     part.time,
