@@ -116,7 +116,7 @@ def identify(
     ------
     UsageError
         If there are no recordings, the method is unknown, a recording is both fitted and held out, or a band is no
-        frequency.
+        frequency that the slowest recording carries.
     RecordingError
         If a recording cannot be used.
     """
@@ -133,7 +133,7 @@ def identify(
         bands = choice.bands
         notes += choice.notes
     else:
-        _check_bands(robot, bands)
+        _check_bands(robot, bands, (*recordings, *validation))
     progress("absorbing the recordings")
     training = gather_all(equation, recordings, bands)
     held_out = gather_all(equation, validation, bands)
@@ -184,12 +184,18 @@ def known_information(model: TorqueModel, recordings: Sequence[Recording], rate:
     return merge(sampled)
 
 
-def _check_bands(robot: Robot, bands: Sequence[float | None]) -> None:
+def _check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequence[Recording]) -> None:
     if len(bands) != robot.n:
         raise UsageError(f"bands: {len(bands)} given; expected one for each of {', '.join(robot.joints)}")
     for joint, band in zip(robot.joints, bands, strict=True):
         if band is not None and not 0.0 < band < np.inf:
             raise UsageError(f"band of {joint} is {band:g} Hz; expected a frequency above 0, or none")
+        slowest = min(recordings, key=lambda recording: recording.rate)
+        if band is not None and band >= 0.5 * slowest.rate:
+            raise UsageError(
+                f"band of {joint} is {band:g} Hz; {slowest.name} has {slowest.rate:.4g} samples per second, which carry "
+                f"less than {0.5 * slowest.rate:.4g} Hz; give a lower band"
+            )
 
 
 def estimate_by(

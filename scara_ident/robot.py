@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scara_ident.channels import Channels, build_channels
 from scara_ident.description import JointDescription, RobotDescription, read_description
 from scara_ident.errors import RobotError
+from scara_ident.urdf_faults import urdf_fault
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -153,7 +154,7 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
     """Build a robot from a checked description; ``source`` is named in errors."""
     urdf = description.urdf
     tree = _parse_xml(urdf, source)
-    full = _pinocchio_model(urdf)
+    full = _pinocchio_model(urdf, tree)
     names = _identified_joints(description, full, tree, source)
     described = description.joints or {}
     joints = [described.get(name) or JointDescription() for name in names]
@@ -254,12 +255,12 @@ def _quiet_stderr() -> Iterator[None]:
         os.close(saved)
 
 
-def _pinocchio_model(urdf: Path) -> pin.Model:
+def _pinocchio_model(urdf: Path, tree: ElementTree.Element) -> pin.Model:
     try:
         with _quiet_stderr():
             return pin.buildModelFromUrdf(str(urdf))
     except (ValueError, RuntimeError) as error:
-        reason = " ".join(str(error).split()) or "Pinocchio refuses it"
+        reason = urdf_fault(tree) or " ".join(str(error).split()) or "Pinocchio refuses it"
         raise RobotError(f"{urdf}: not a usable URDF: {reason}") from None
 
 

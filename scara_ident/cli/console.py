@@ -20,7 +20,11 @@ if TYPE_CHECKING:
 PIPE_WIDTH = 80
 
 RecordingArguments = Annotated[
-    list[str], typer.Argument(metavar="RECORDING...", help="Recordings (.parquet, .csv), folders or globs of them.")
+    list[str],
+    typer.Argument(
+        metavar="RECORDING...",
+        help="Recordings (.parquet, .csv, .mat, .h5, .mcap, .db3, a rosbag2 folder), folders or globs of them.",
+    ),
 ]
 RobotOption = Annotated[
     Path | None, typer.Option("--robot", metavar="FILE", help="robot.yaml (or a URDF); default: the embedded SCARA03.")

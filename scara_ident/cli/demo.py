@@ -25,7 +25,7 @@ def demo(
     from scara_ident.cli.diagnose import diagnose
     from scara_ident.cli.excite import excite
     from scara_ident.cli.identify import identify
-    from scara_ident.cli.paper import paper
+    from scara_ident.cli.paper import paper_in_short
     from scara_ident.cli.simulate import simulate
     from scara_ident.report.files import check_output
 
@@ -39,7 +39,7 @@ def demo(
     chapter("What torque can tell of this arm")
     base(output=output / "base")
     chapter("The founding paper, printed against computed")
-    paper(output=output / "paper")
+    paper_in_short(output / "paper")
     chapter("A motion that tells more: 12 s within all limits")
     excite(duration=12.0, harmonics=10, starts=2, seed=seed, output=output / "excite")
     chapter("Recordings of the virtual arm, with an effect that nobody declares")

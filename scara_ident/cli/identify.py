@@ -84,25 +84,19 @@ def identify(
     for row, value, std in zip(content["parameters"], result.estimate.value, result.estimate.std, strict=True):
         parameters.add_row(row["name"], number(value, std), f"{std:.2g}", row["unit"], row["meaning"])
     console.print(parameters)
-    errors = table(
-        "rms error within the band",
-        "recording",
-        "joint",
-        "rms",
-        "of torque",
-        "unfiltered",
-        "",
-        right=("rms", "of torque", "unfiltered"),
-    )
-    for kind, found in (("", result.training_errors()), ("held out", result.validation_errors())):
+    for title, found in (("fitted", result.training_errors()), ("held out", result.validation_errors())):
+        if not found:
+            continue
+        columns = ("rms", "of torque", "unfiltered")
+        errors = table(f"rms error within the band, recordings {title}", "recording", "joint", *columns, right=columns)
         for name, joints in found.items():
             for joint, error in zip(arm.joints, joints, strict=True):
                 if error is None:
-                    errors.add_row(name, joint, "-", "-", "-", "at rest throughout")
+                    errors.add_row(name, joint, "-", "at rest", "-")
                     continue
                 share = "-" if error.relative is None else f"{error.relative:.1%}"
-                errors.add_row(name, joint, f"{error.rms:.3g}", share, f"{error.rms_unfiltered:.3g}", kind)
-    console.print(errors)
+                errors.add_row(name, joint, f"{error.rms:.3g}", share, f"{error.rms_unfiltered:.3g}")
+        console.print(errors)
     bands = ", ".join(
         f"{joint} {'none' if cut is None else f'{cut:.3g} Hz'}"
         for joint, cut in zip(arm.joints, result.bands, strict=True)

@@ -134,6 +134,8 @@ def _show(console: Console, found: Inspection, written: Path | None) -> None:
 def _meaning(column: Any) -> str:
     if column.quantity is None:
         return ""
-    text = column.quantity if column.joint is None else f"{column.quantity} of {column.joint}"
+    # A name that begins with the joint's need not say it again.
+    told = column.joint is None or column.name.startswith(f"{column.joint}.")
+    text = column.quantity if told else f"{column.quantity} of {column.joint}"
     text += f", {column.unit}" if column.unit else ""
     return text if column.channel else f"({text})"

@@ -51,9 +51,20 @@ def program(
     """Identify the dynamic model of a robot arm from measured motion, and find what the model lacks."""
 
 
-_COMMANDS: tuple[Callable[..., Any], ...] = (identify, diagnose, compare, excite, simulate, inspect, base, paper, demo)
-for _command in _COMMANDS:
-    app.command()(_command)
+# Each with a line for the list of commands that 80 columns do not cut.
+_COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
+    (identify, "Estimate the parameters from recordings, predict other torques."),
+    (diagnose, "Find what the model lacks, trace it to an effect, add that."),
+    (compare, "Set every trajectory's parameters against every trajectory."),
+    (excite, "Design a motion that tells much, within the arm's limits."),
+    (simulate, "Record the virtual arm in closed loop."),
+    (inspect, "Show what is in a file, audit it, write a first robot.yaml."),
+    (base, "Print the base parameters: what each is made of."),
+    (paper, "Set the tables of Indri et al. beside what is computed."),
+    (demo, "Run the whole story on the embedded arm."),
+)
+for _command, _line in _COMMANDS:
+    app.command(short_help=_line)(_command)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -64,7 +75,7 @@ def main(arguments: list[str] | None = None) -> None:
 def run(arguments: list[str]) -> int:
     """Run the program and return its exit status: 0 done, 1 cannot be given, 2 bad usage."""
     try:
-        result = app(args=arguments, standalone_mode=False)
+        result = app(args=arguments, prog_name="scara-ident", standalone_mode=False)
         status = int(result) if isinstance(result, int) else 0
         if status == INTERRUPTED:
             _complain("interrupted; no file is left half-written")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from scara_ident.cli.console import OutputOption, output_console, table
 
 # Printed line by line; of the others only the count and what differs.
@@ -9,7 +11,7 @@ _IN_FULL = ("Table 1", "Limits", "Torque rms from Table 5")
 
 
 def paper(output: OutputOption = None) -> None:
-    """Set the tables of Indri et al. (2002) beside what the program computes, and mark which agree."""
+    """Set the printed tables of the paper (Indri et al., 2002) beside what the program computes."""
     from scara_ident.indri2002 import check_paper
     from scara_ident.report.files import check_output, write_json
 
@@ -21,8 +23,12 @@ def paper(output: OutputOption = None) -> None:
         agreeing = sum(check.agrees is True for check in checks)
         judged = sum(check.agrees is not None for check in checks)
         shown = checks if section in _IN_FULL else [check for check in checks if check.agrees is False]
+        title = f"{section}: {agreeing} of {judged} agree"
+        if not shown:
+            console.print(title, style="italic")
+            continue
         rows = table(
-            f"{section}: {agreeing} of {judged} agree",
+            title,
             *("quantity", "trajectory", "joint", "printed", "computed", "", "comment"),
             right=("printed", "computed"),
         )
@@ -41,6 +47,24 @@ def paper(output: OutputOption = None) -> None:
     if output is not None:
         write_json(output / "paper.json", report.to_dict())
         console.print(f"written: {output / 'paper.json'}", markup=False, soft_wrap=True)
+
+
+def paper_in_short(output: Path) -> None:
+    """Count what agrees, section by section, and write ``paper.json``."""
+    from scara_ident.indri2002 import check_paper
+    from scara_ident.report.files import check_output, write_json
+
+    check_output(output)
+    report = check_paper()
+    rows = table("printed against computed", "of the paper", "agree", "judged", right=("agree", "judged"))
+    for section in report.sections:
+        judged = [check.agrees for check in report.section(section) if check.agrees is not None]
+        rows.add_row(section, str(sum(judged)), str(len(judged)))
+    console = output_console()
+    console.print(rows)
+    console.print("Every value, and why some differ: scara-ident paper", markup=False)
+    write_json(output / "paper.json", report.to_dict())
+    console.print(f"written: {output / 'paper.json'}", markup=False, soft_wrap=True)
 
 
 def _number(value: float | None) -> str:

@@ -148,6 +148,9 @@ def inspect_file(
         found.notes.append(f"topic: {topic} taken of {', '.join(topics)}")
     text = description_text(found, arm, described, _relative(arm.urdf, Path(folder)), path)
     recording, refusal = (None, None) if not found.complete else _audited(path, text, arm)
+    scale = None if recording is None else _scale(recording, arm, text)
+    if scale is not None:
+        found.notes.append(scale)
     return Inspection(
         path=path,
         topics=topics,
@@ -273,13 +276,25 @@ def _relative(urdf: Path, folder: Path) -> Path:
 
 def _audited(path: Path, text: str, arm: Robot) -> tuple[Recording | None, str | None]:
     """Read the file as the text describes it, so that what is written is what was tried."""
+    return _read(path, _described(text, arm))
+
+
+def _described(text: str, arm: Robot) -> Robot:
     import yaml
 
-    content = yaml.safe_load(text)
-    described = check_description(content, Path("robot.yaml"))
+    described = check_description(yaml.safe_load(text), Path("robot.yaml"))
     # The audit does not depend on the side, which is the user's to state.
     described = described.model_copy(update={"urdf": arm.urdf, "effort_side": described.effort_side or "joint"})
-    return _read(path, build_robot(described, Path("robot.yaml")))
+    return build_robot(described, Path("robot.yaml"))
+
+
+def _scale(recording: Recording, arm: Robot, text: str) -> str | None:
+    """Return what the URDF says of the scale of effort; None where a gear leaves the side open."""
+    if recording.effort is None or any(arm.reduction != 1.0):
+        return None
+    from scara_ident.inspection.scale import scale_note
+
+    return scale_note(recording, _described(text, arm))
 
 
 def _read(path: Path, robot: Robot) -> tuple[Recording | None, str | None]:

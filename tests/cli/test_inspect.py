@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from scara_ident.cli.main import run
-from scara_ident.robot import embedded_urdf
+from scara_ident.robot import embedded_urdf, load_robot
 from tests.importers.formats import recorded, write_plotjuggler
 from tests.made_recordings import save
 from tests.shared import shared_path
@@ -90,8 +90,16 @@ def test_wrong_words_and_files_end_in_a_line_and_nothing_written(
 def test_the_ur10e_goes_from_a_file_and_a_urdf_to_an_identification(tmp_path, capsys):
     urdf, file = shared_path("data", "ur10e", "ur10e.urdf"), shared_path("data", "ur10e", "ident_20s_5harm.parquet")
     assert answer(capsys, file, "--urdf", urdf, "--output", tmp_path)[0] == 0
+    # All that is to be stated is the scale of effort, which are currents of the motors.
+    text = (tmp_path / "robot.yaml").read_text()
+    assert [line for line in text.splitlines() if line.endswith("# STATE effort_gain, N m per recorded unit")]
+    for gain in (14.87, 13.26, 11.13, 10.62, 11.03, 11.47):
+        text = text.replace("effort_gain: 1.0", f"effort_gain: {gain}", 1)
+    (tmp_path / "robot.yaml").write_text(text)
     words = ["identify", str(file), "--robot", str(tmp_path / "robot.yaml"), "--model", "basic", "--band", "8"]
-    assert run([*words, "--output", str(tmp_path / "out")]) == 0
+    assert run([*words, "--method", "consistent", "--output", str(tmp_path / "out")]) == 0
+    assert {"report.html", "ur10e_identified.urdf"} <= {path.name for path in (tmp_path / "out").iterdir()}
+    assert load_robot(tmp_path / "out" / "ur10e_identified.urdf").joints == load_robot(urdf).joints
     content = json.loads((tmp_path / "out" / "identification.json").read_text())
     errors = content["errors"]["training"]["ident_20s_5harm"]
     assert set(errors) == {

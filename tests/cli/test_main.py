@@ -29,6 +29,8 @@ def test_the_program_lists_its_commands(command):
     assert result.status == 0
     assert {"identify", "base"} <= set(COMMANDS)
     assert all(name in result.out for name in COMMANDS)
+    # No line that is cut.
+    assert "..." not in result.out.partition("Commands:")[2]
 
 
 def test_the_version_is_the_packages(command):
@@ -113,6 +115,29 @@ def test_a_user_gets_one_line_when_it_cannot_be(tmp_path: Path):
     assert done.returncode == 2
     assert done.stdout == ""
     assert done.stderr == "scara-ident: nowhere.parquet: no such file or folder\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("scara-ident id", {"identify"}),
+        ("scara-ident identify --val", {"--validate"}),
+        ("scara-ident identify --method ", {"ols", "wls", "rls", "consistent"}),
+    ],
+)
+def test_the_shell_is_told_how_words_go_on(words: str, offered: set[str]):
+    asked = {"_SCARA_IDENT_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(words.count(" "))}
+    done = user(environment=asked)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert set(done.stdout.split()) == offered
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_is_installed_as_the_documentation_says(shell: str, tmp_path: Path):
+    done = user("--install-completion", shell, environment={"HOME": str(tmp_path)})
+    assert (done.returncode, done.stderr) == (0, "")
+    written = [path for path in tmp_path.rglob("*") if path.is_file() and "_SCARA_IDENT_COMPLETE" in path.read_text()]
+    assert len(written) == 1
 
 
 def test_a_terminal_that_knows_ascii_only_is_no_trouble():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -42,6 +44,7 @@ RECORDINGS = [
     ("milliseconds_1.parquet", 1, ("milliseconds_1.parquet: time", "looks like milliseconds", "divide by 1000")),
     ("nanoseconds_1.parquet", 1, ("nanoseconds_1.parquet: time", "looks like nanoseconds", "divide by 1e+09")),
     ("backwards_1.parquet", 1, ("backwards_1.parquet: time never advances", "must be in seconds and grow")),
+    ("leap_1.parquet", 1, ("leap_1.parquet: time runs backwards at row 601", "sort the rows by time")),
     ("frozen_1.parquet", 1, ("frozen_1.parquet: time never advances", "must be in seconds and grow")),
     ("day1 day2", 1, ("two recordings named 'run_1'", "day1", "day2", "rename one")),
 ]
@@ -61,7 +64,12 @@ ROBOTS = [
     ("syntax.urdf", 1, ("syntax.urdf: not well-formed XML", "line ")),
     ("root.urdf", 1, ("root.urdf: the root element is <sdf>", "a URDF has <robot>")),
     ("rigid.urdf", 1, ("rigid.urdf: joints: none to identify", "no movable joint")),
-    ("samename.urdf", 1, ("samename.urdf: not a usable URDF",)),
+    ("samename.urdf", 1, ("samename.urdf: not a usable URDF: two joints are named 'joint1'", "rename one")),
+    ("samelink.urdf", 1, ("samelink.urdf: not a usable URDF: two links are named 'link1'", "rename one")),
+    ("nolink.urdf", 1, ("nolink.urdf: not a usable URDF: joint 'joint2' names 'lnk2'", "correct it")),
+    ("nochild.urdf", 1, ("nochild.urdf: not a usable URDF: joint 'joint2' has no child link", "name it")),
+    ("loop.urdf", 1, ("loop.urdf: not a usable URDF: link 'link1' is the child of two joints", "cut one")),
+    ("roots.urdf", 1, ("roots.urdf: not a usable URDF: links 'base_link', 'lonely' hang on no joint",)),
 ]
 OTHERS = [
     # identify
@@ -72,6 +80,8 @@ OTHERS = [
     ("identify good_1.parquet --band=-3", 2, ("--band", "greater than", "see scara-ident identify --help")),
     ("identify good_1.parquet --band=nan", 2, ("--band", "greater than", "see scara-ident identify --help")),
     ("identify good_1.parquet --band=inf", 2, ("band of joint1 is inf Hz", "expected a frequency above 0")),
+    ("identify good_1.parquet --band 1e9", 2, ("1e+09 Hz", "good_1 has 1000 samples per second", "a lower band")),
+    ("identify good_1.parquet --band 500", 2, ("band of joint1 is 500 Hz", "less than 500 Hz", "a lower band")),
     ("identify good_1.parquet --friction dry", 2, ("--friction", "'dry' is not one of 'dissipative'")),
     ("identify good_1.parquet --band=wide", 2, ("--band", "number", "see scara-ident identify --help")),
     ("identify good_1.parquet --validate", 2, ("--validate", "requires an argument")),
@@ -220,6 +230,69 @@ def test_the_files_beside_the_wrong_ones_are_right(command, wrong: Path, monkeyp
     monkeypatch.chdir(wrong)
     for words in ("identify good_1.csv --band 15", "inspect good_1.csv", "base"):
         assert command(*words.split()).status == 0
+
+
+def test_a_joint_that_never_moves_is_said_and_its_parameters_are_left_open(command, wrong: Path, monkeypatch):
+    monkeypatch.chdir(wrong)
+    answer = command("identify", "stiff_1.parquet", "--band", "15")
+    assert answer.status == 0
+    said = " ".join(answer.out.split())
+    assert "stiff_1: joint2 does not move" in said
+    assert "joint2 - at rest -" in said
+    assert "The data leave P_d1, P_d2, P_d3, P_d4, P_d5, a02, a12, a22, a32, p_o2 undetermined" in said
+
+
+@pytest.fixture
+def forbidden(tmp_path: Path) -> Iterator[Callable[[], None]]:
+    """What takes the rights from the program: root, whom no mode of a file stops, works on as nobody."""
+    if os.name != "posix":
+        pytest.skip("needs the file modes of POSIX")
+    above = [folder for folder in tmp_path.parents if folder.owner() == tmp_path.owner() and folder.name]
+    modes = {folder: folder.stat().st_mode for folder in above}
+    root = os.geteuid() == 0
+
+    def drop() -> None:
+        if root:
+            # So that nobody gets as far as the folder of this test.
+            for folder, mode in modes.items():
+                folder.chmod(mode | 0o011)
+            os.seteuid(65534)
+
+    yield drop
+    if root:
+        os.seteuid(0)
+        for folder, mode in modes.items():
+            folder.chmod(mode)
+
+
+def test_a_folder_that_may_not_be_written_to_is_said_before_the_work(command, tmp_path: Path, forbidden):
+    place = tmp_path / "theirs"
+    place.mkdir(mode=0o555)
+    tmp_path.chmod(0o755)
+    # Loads what the command needs, which nobody may not read.
+    assert command("base", "--output", tmp_path / "mine").status == 0
+    forbidden()
+    for folder in (place, place / "new"):
+        answer = command("base", "--output", folder)
+        assert answer.status == 1
+        assert f"{folder}: results cannot be written here: Permission denied; give another folder" in answer.err
+    assert list(place.iterdir()) == []
+
+
+def test_files_that_may_not_be_read_are_said(command, wrong: Path, tmp_path: Path, forbidden):
+    for name in ("good_1.csv", "good_1.parquet", "key.yaml"):
+        (tmp_path / name).write_bytes((wrong / name).read_bytes())
+        (tmp_path / name).chmod(0)
+    tmp_path.chmod(0o755)
+    assert command("inspect", wrong / "good_1.csv").status == 0
+    assert command("inspect", wrong / "good_1.parquet").status == 0
+    assert command("identify", wrong / "cut_1.parquet").status == 1
+    forbidden()
+    for words in ("inspect good_1.csv", "identify good_1.parquet", "base --robot key.yaml"):
+        *before, name = words.split()
+        answer = command(*before, tmp_path / name)
+        assert answer.status == 1
+        assert f"{tmp_path / name}: cannot be read: permission denied" in answer.err.replace("Permission", "permission")
 
 
 def test_a_joint_that_is_described_twice_is_refused(command, wrong: Path):

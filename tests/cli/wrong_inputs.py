@@ -52,6 +52,8 @@ def _recordings(place: Path) -> None:
     save(place / "nanoseconds_1.parquet", good | {"time": 1.7e18 + 1e9 * time})
     save(place / "milliseconds_1.parquet", good | {"time": 1e3 * time})
     save(place / "backwards_1.parquet", good | {"time": time[::-1].copy()})
+    save(place / "leap_1.parquet", good | {"time": np.where(np.arange(LONG) == 600, time[500], time)})
+    save(place / "stiff_1.parquet", good | {"joint2.position": np.full(LONG, 0.3)})
     save(place / "frozen_1.parquet", good | {"time": np.zeros(LONG)})
     (place / "nothing").mkdir()
     for folder in ("day1", "day2"):
@@ -81,7 +83,16 @@ def _robots(place: Path) -> None:
     (place / "rigid.urdf").write_text("<robot name='post'><link name='base'/></robot>\n")
     endless = re.sub(r'lower="[^"]*" upper="[^"]*" ', "", text.replace('type="revolute"', 'type="continuous"'))
     (place / "endless.urdf").write_text(endless)
-    (place / "samename.urdf").write_text(text.replace('joint name="joint2"', 'joint name="joint1"'))
+    child = '<child link="link2"/>'
+    for name, old, new in (
+        ("samename", 'joint name="joint2"', 'joint name="joint1"'),
+        ("samelink", 'link name="link2"', 'link name="link1"'),
+        ("nolink", child, '<child link="lnk2"/>'),
+        ("nochild", child, ""),
+        ("loop", child, '<child link="link1"/>'),
+        ("roots", "</robot>", '<link name="lonely"/></robot>'),
+    ):
+        (place / f"{name}.urdf").write_text(text.replace(old, new))
 
 
 def _others(place: Path) -> None:

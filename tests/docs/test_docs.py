@@ -72,7 +72,7 @@ def test_what_a_page_says_to_type_runs(page: Path, reader: Path) -> None:
 
 def test_the_tutorial_finds_what_it_hid(reader: Path) -> None:
     names = run(TUTORIAL, reader)
-    diagnosis = json.loads((reader / "out" / "diagnosis.json").read_text())
+    diagnosis = json.loads((reader / "out" / "diagnose" / "diagnosis.json").read_text())
     (effect,) = diagnosis["effects"]
     assert (diagnosis["verdict"], effect["effect"], effect["joint"]) == ("explained", "transmission_loss", "joint1")
     assert effect["parameters"]["loss_coefficient"]["value"] == pytest.approx(0.25, rel=0.1)

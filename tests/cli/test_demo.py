@@ -1,0 +1,27 @@
+"""The demo: the whole story on the embedded arm, with no input."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+
+def test_the_demo_writes_every_result_and_finds_what_it_hid(command, tmp_path: Path):
+    answer = command("demo", "--output", tmp_path / "demo")
+    assert answer.status == 0
+    written = {str(path.relative_to(tmp_path / "demo")) for path in tmp_path.rglob("*") if path.is_file()}
+    assert written >= {
+        "base/base.json", "paper/paper.json",
+        "excite/trajectory.csv", "excite/excitation.json", "excite/report.html",
+        "train/trajectory_1.parquet", "train/OJD_2.parquet", "test/L1_1.parquet",
+        "identify/identification.json", "identify/report.html", "identify/scara03_identified.urdf",
+        "compare/comparison.json", "compare/report.html", "diagnose/diagnosis.json", "diagnose/report.html",
+    }  # fmt: skip
+    diagnosis = json.loads((tmp_path / "demo" / "diagnose" / "diagnosis.json").read_text())
+    (effect,) = diagnosis["effects"]
+    assert (diagnosis["verdict"], effect["effect"], effect["joint"]) == ("explained", "transmission_loss", "joint2")
+    # The story ends with the truth, and with what to look at.
+    story = answer.out.splitlines()
+    assert "transmission_loss:joint2:loss_coefficient=0.2" in story[-2]
+    assert story[-1] == f"Open {tmp_path / 'demo' / 'diagnose' / 'report.html'}"
+    assert max(map(len, (line for line in story if "/" not in line))) <= 80
