@@ -258,6 +258,7 @@ def _effects(found: Search, after: Estimate) -> list[FoundEffect]:
     parameters = (
         physical_parameters(scene, found.recordings, found.bands, after.weights, found.chosen) if found.chosen else []
     )
+    labels = [item.label(scene) for item in found.chosen]
     results = []
     before = joint_rms(found.start.value, found.start_evidence)
     for step in found.steps:
@@ -271,7 +272,8 @@ def _effects(found: Search, after: Estimate) -> list[FoundEffect]:
             values: Mapping[str, Parameter] = {"delay": Parameter(found.delay[0], found.delay[1], "s")}
             confounded: tuple[Rival, ...] = ()
         else:
-            place = found.chosen.index(candidate)
+            place = labels.index(decision.label)
+            candidate = found.chosen[place]
             values, confounded = parameters[place], groups[place]
         results.append(
             FoundEffect(

@@ -11,14 +11,12 @@ from scara_ident.covariance import block_covariance
 from scara_ident.diagnosis.bank import Candidate
 from scara_ident.diagnosis.examination import examine
 from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
+from scara_ident.diagnosis.tuning import DERIVATIVE_STEP, Linearised, linearise
 from scara_ident.effects import Parameter, Scene
 from scara_ident.information import Information, triangular
 from scara_ident.recording import Recording
 
 Array = NDArray[np.float64]
-
-# Step for the derivative by a nonlinear parameter, as a share of it.
-DERIVATIVE_STEP = 1e-3
 
 
 def physical_parameters(
@@ -30,45 +28,22 @@ def physical_parameters(
 ) -> list[dict[str, Parameter]]:
     """Return the physical parameters of each effect.
 
-    Nonlinear parameters join the fit by the derivative of the effect's columns (Gauss and Newton), so that the
+    Nonlinear parameters, armatures included, join the fit by the derivative of the effects' columns, so that the
     covariance is that of all parameters together.
     """
-    steps = [(i, k) for i, candidate in enumerate(chosen) for k in range(len(candidate.effect.knobs))]
-    variants: list[Candidate] = []
-    for i, k in steps:
-        for sign in (1.0, -1.0):
-            knobs = list(chosen[i].member.knobs)
-            knobs[k] += sign * _step(chosen[i], k)
-            variants.append(chosen[i].at(knobs))
-    model = tabulate(scene.model, recordings, bands)
-    extra, places = tabulate_candidates(scene, [*chosen, *variants], recordings, bands)
-    rows = model.beside(extra).weighted(weights)
-    base = len(scene.model.columns)
-    linear = list(range(base + places[len(chosen) - 1].stop))
-    value = _solve(rows.rows[:, linear], rows.rows[:, -1])
-    derivatives = []
-    for place, (i, k) in enumerate(steps):
-        coefficients = value[_shifted(places[i], base)]
-        up, down = (places[len(chosen) + 2 * place + side] for side in (0, 1))
-        change = rows.rows[:, _shifted(up, base)] - rows.rows[:, _shifted(down, base)]
-        derivatives.append(change @ coefficients / (2.0 * _step(chosen[i], k)))
-    columns = np.column_stack([rows.rows[:, linear], *derivatives])
-    full = np.concatenate([value, np.zeros(len(steps))])
-    covariance = _covariance(rows, columns, full)
+    state = linearise(scene, recordings, bands, tabulate(scene.model, recordings, bands), weights, chosen)
+    covariance = _covariance(state)
     found = []
-    for i, candidate in enumerate(chosen):
-        own = _shifted(places[i], base)
-        parameters = dict(candidate.effect.parameters(scene, candidate.member, value[own], covariance[own, own]))
-        for position, (owner, k) in enumerate(steps):
-            if owner != i:
+    for owner, (candidate, own) in enumerate(zip(chosen, state.places, strict=True)):
+        parameters = dict(candidate.effect.parameters(scene, candidate.member, state.value[own], covariance[own, own]))
+        for position, unknown in enumerate(state.unknowns):
+            if unknown.owner != owner:
                 continue
-            knob = candidate.effect.knobs[k]
+            knob = candidate.effect.knobs[unknown.place]
             # An underscore marks a parameter that only serves the shape of the columns.
             if not knob.name.startswith("_"):
-                variance = covariance[len(linear) + position, len(linear) + position]
-                parameters[knob.name] = Parameter(
-                    candidate.member.knobs[k], float(np.sqrt(max(variance, 0.0))), knob.unit
-                )
+                variance = covariance[len(state.value) + position, len(state.value) + position]
+                parameters[knob.name] = Parameter(unknown.value, float(np.sqrt(max(variance, 0.0))), knob.unit)
         found.append(parameters)
     return found
 
@@ -110,27 +85,24 @@ def _step(candidate: Candidate, k: int) -> float:
     return DERIVATIVE_STEP * (abs(value) if value else knob.upper - knob.lower)
 
 
-def _shifted(place: slice, by: int) -> slice:
-    return slice(place.start + by, place.stop + by)
-
-
-def _solve(columns: Array, target: Array) -> Array:
-    size = np.linalg.norm(columns, axis=0)
-    size[size == 0.0] = 1.0
-    return np.asarray(np.linalg.lstsq(columns / size, target, rcond=1e-10)[0] / size)
-
-
-def _covariance(rows: Table, columns: Array, value: Array) -> Array:
+def _covariance(state: Linearised) -> Array:
     """Block covariance of all parameters, columns scaled to unit size meanwhile."""
-    size = np.linalg.norm(columns, axis=0)
+    rows, aim = state.prior
+    columns = state.columns
+    size = np.linalg.norm(np.vstack([columns, rows]), axis=0)
     size[size == 0.0] = 1.0
-    bounds = [*rows.starts, len(columns)]
-    table = np.column_stack([columns / size, rows.rows[:, -1]])
+    table = np.column_stack([columns / size, state.table.torque])
+    prior = np.column_stack([rows / size, aim])
+    bounds = [*state.table.starts, len(columns)]
     sequences: dict[int, list[tuple[Information, ...]]] = {}
-    for block, recording in enumerate(rows.recording):
+    for block, recording in enumerate(state.table.recording):
         part = table[bounds[block] : bounds[block + 1]]
         factor = triangular(part)
         sequences.setdefault(int(recording), []).append((Information(factor, float(len(part))),))
-    whole = Information(triangular(table), float(len(table)))
-    spread = block_covariance(whole.inverse(), value * size, list(sequences.values()))
-    return np.asarray(spread.matrix / np.outer(size, size))
+    whole = Information(triangular(np.vstack([table, prior])), float(len(table)))
+    inverse = whole.inverse()
+    value = np.concatenate([state.value, np.zeros(len(state.unknowns))])
+    spread = block_covariance(inverse, value * size, list(sequences.values())).matrix
+    # What the priors leave open, which no residual shows.
+    spread = spread + state.variance * inverse @ (prior[:, :-1].T @ prior[:, :-1]) @ inverse
+    return np.asarray(spread / np.outer(size, size))

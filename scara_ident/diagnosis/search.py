@@ -14,6 +14,7 @@ from scara_ident.diagnosis.examination import examine
 from scara_ident.diagnosis.finish import parameters_beside
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
+from scara_ident.diagnosis.tuning import tune
 from scara_ident.effects import CATALOGUE, Effect, Resolved, Scene
 from scara_ident.effects.measurement import shifted
 from scara_ident.estimators import Estimate
@@ -35,9 +36,6 @@ TOLD = 2.5
 # Points on the line between neighbouring scan points, and rounds of narrowing.
 LINE_POINTS = 7
 LINE_ROUNDS = 4
-# Effects that act on predicted loads are fitted again until no base parameter moves by this many std.
-SETTLING_ROUNDS = 4
-SETTLED = 0.1
 # A delay is corrected in the data until a further correction is below this, s.
 DELAY_STEP = 2e-5
 DELAY = "time_delay"
@@ -175,7 +173,7 @@ def search(
         if done:
             left = [k for k, item in enumerate(candidates) if item.label(scene) != winner.label]
             candidates, places = [candidates[k] for k in left], tuple(places[k] for k in left)
-        scene = _settle(scene, data, bands, chosen)
+        scene, chosen = tune(scene, data, bands, base, weights, chosen)
         fitted = model_with(scene, chosen)
         evidence = gather_all(fitted, data, bands)
         estimate = weighted_fit(fitted, evidence)
@@ -184,8 +182,9 @@ def search(
         repeated = bool(steps) and steps[-1].decision.label == winner.label
         steps[len(steps) - repeated :] = [Step(winner, evidence, estimate)]
     kept = _backward(scene, data, bands, base, weights, chosen, tried)
-    scene = _settle(scene, data, bands, kept)
-    steps = [step for step in steps if step.decision.candidate in kept or is_delay(step.decision.candidate)]
+    scene, kept = tune(scene, data, bands, base, weights, kept)
+    labels = {item.label(scene) for item in kept}
+    steps = [step for step in steps if step.decision.label in labels or is_delay(step.decision.candidate)]
     return Search(
         model, scene, tuple(bands), start, start_evidence, tuple(steps), tuple(kept), delay,
         tuple(decisions), tried, data,
@@ -235,21 +234,6 @@ class Beside:
 def is_delay(candidate: Candidate) -> bool:
     """Whether a candidate is the delay of all joints, which is corrected in the data."""
     return candidate.effect.name == DELAY and candidate.member.joint is None
-
-
-def _settle(
-    scene: Scene, recordings: Sequence[Recording], bands: Sequence[float | None], chosen: Sequence[Candidate]
-) -> Scene:
-    """Repeat the fit until the loads that the effects are predicted from are those of the estimate."""
-    for _ in range(SETTLING_ROUNDS if chosen else 0):
-        model = model_with(scene, chosen)
-        estimate = weighted_fit(model, gather_all(model, recordings, bands))
-        value = estimate.value[: len(scene.model.columns)]
-        moved = np.max(np.abs(value - scene.value) / np.maximum(estimate.std[: len(value)], np.finfo(float).tiny))
-        scene = replace(scene, value=value)
-        if moved < SETTLED:
-            break
-    return scene
 
 
 def _scene(model: TorqueModel, value: Array, recordings: Sequence[Recording], bands: Sequence[float | None]) -> Scene:

@@ -124,6 +124,15 @@ class Resolved(Protocol):
         ...
 
 
+@runtime_checkable
+class Geared(Protocol):
+    """A family that depends on the torque behind a gear, and so on how much of an inertia is the rotor's."""
+
+    def geared_joint(self, member: Member) -> int:
+        """Return the place of the joint whose gear it is."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class EffectTerm:
     """A member of a family as a term of a torque model.

@@ -81,6 +81,10 @@ class JointElasticity:
         lag = swing(load, inertia, stiffness, 2.0 * DAMPING * np.sqrt(stiffness * usual), 1.0 / signals.motion.rate)
         return stiffness * lagging(signals, j, lag)[:, None]
 
+    def geared_joint(self, member: Member) -> int:
+        """Return the joint whose gear it is."""
+        return member.joint or 0
+
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """A spring pulls back, and swings at the frequency that its stiffness gives."""
         if value[0] < -2.0 * std[0]:
@@ -188,6 +192,10 @@ class Backlash:
         drift = load / np.maximum(inertia, 0.1 * usual)
         place = flank(drift, member.knobs[0], 1.0 / signals.motion.rate)
         return lagging(signals, j, _differentiated(signals, place, LAG_BAND))[:, None]
+
+    def geared_joint(self, member: Member) -> int:
+        """Return the joint whose gear it is."""
+        return member.joint or 0
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """A clearance is open, and small."""

@@ -54,6 +54,10 @@ class TransmissionLoss:
         load = signals.load(j)
         return signals.row(j, [np.abs(load) * signals.sign[j] + (np.sqrt(1.0 + share**2) - 1.0) / share * load])
 
+    def geared_joint(self, member: Member) -> int:
+        """Return the joint whose gear it is."""
+        return member.joint or 0
+
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """A gear takes energy out and passes some on."""
         if value[0] < -2.0 * std[0]:

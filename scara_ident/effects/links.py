@@ -124,12 +124,6 @@ def point_mass(point: Array) -> Array:
     return np.array([1.0, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y])
 
 
-def armature_of(scene: Scene, joint: int) -> float:
-    """Return the armature of a joint: what the data tell of it, else its nominal value."""
-    told = scene.armature(joint)
-    return float(scene.robot.reduction[joint] ** 2 * scene.robot.rotor_inertia[joint]) if told is None else told
-
-
 def rigid_torque(scene: Scene, motion: Motion, q: Array, v: Array, a: Array) -> Array:
     """Return what `Signals.rigid` gives, at other positions, velocities and accelerations, shape (n, N)."""
     term = scene.model.rigid_body
@@ -163,7 +157,7 @@ def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Ar
     for part, change in zip(moved, lag, strict=True):
         part[joint] -= step * change
     result = (rigid_torque(scene, motion, *moved) - signals.rigid) / step
-    result[joint] += scene.robot.row_scale[joint] * armature_of(scene, joint) * lag[2]
+    result[joint] += scene.robot.row_scale[joint] * scene.armature(joint) * lag[2]
     return np.asarray(result)
 
 
@@ -175,7 +169,7 @@ def link_inertia(signals: Signals, joint: int) -> Array:
         pushed = motion.a.copy()
         pushed[joint] += 1.0
         change = rigid_torque(scene, motion, motion.q, motion.v, pushed)[joint] - signals.rigid[joint]
-        return np.asarray(change / scene.robot.row_scale[joint] - armature_of(scene, joint))
+        return np.asarray(change / scene.robot.row_scale[joint] - scene.armature(joint))
 
     return shared(signals, ("link inertia", joint), make)
 
@@ -189,4 +183,4 @@ def usual_link_inertia(scene: Scene, joint: int) -> float:
     pushed[joint] = 1.0
     motion = Motion("poses", "poses", np.arange(40.0), q, rest, rest, None, 1.0)
     change = rigid_torque(scene, motion, q, rest, pushed) - rigid_torque(scene, motion, q, rest, rest)
-    return float(np.mean(change[joint]) / robot.row_scale[joint] - armature_of(scene, joint))
+    return float(np.mean(change[joint]) / robot.row_scale[joint] - scene.armature(joint))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -38,6 +38,8 @@ class Scene:
         Largest speed of each joint over all recordings.
     start : Mapping[str, float]
         Time of the first sample of every recording, s.
+    armatures : Mapping[int, float]
+        Armature N^2 Jm of joints (by place) where the data tell it by an effect only; nominal for the others.
     """
 
     model: TorqueModel
@@ -48,14 +50,24 @@ class Scene:
     travel: Array
     speed: Array
     start: dict[str, float]
+    armatures: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def robot(self) -> Robot:
         """The robot."""
         return self.model.robot
 
-    def armature(self, joint: int) -> float | None:
-        """Armature N^2 Jm of a joint where the data tell it apart from the links, else None."""
+    def armature(self, joint: int) -> float:
+        """Armature N^2 Jm of a joint: what the data tell of it, else its nominal value."""
+        told = self.told_armature(joint)
+        return self.armatures.get(joint, self.nominal_armature(joint)) if told is None else told
+
+    def nominal_armature(self, joint: int) -> float:
+        """Armature N^2 Jm of a joint as the robot's description has it."""
+        return float(self.robot.reduction[joint] ** 2 * self.robot.rotor_inertia[joint])
+
+    def told_armature(self, joint: int) -> float | None:
+        """Armature N^2 Jm of a joint where the base model tells it apart from the links, else None."""
         term = self.model.rigid_body
         wanted = 10 * self.robot.n + joint
         for place, k in enumerate(term.kept):
@@ -94,21 +106,10 @@ class Signals:
         term = model.rigid_body
         return np.asarray(np.einsum("jpn,p->jn", term.regressor(self.motion), self.scene.value[model.place(term)]))
 
-    def load(self, joint: int, armature: float | None = None) -> Array:
-        """Torque that the gear of a joint transmits, recorded side, shape (N,): rigid torque without the own rotor's.
-
-        Parameters
-        ----------
-        joint : int
-        armature : float, optional
-            N^2 Jm where the data do not tell it; by default what they tell, else its nominal value.
-        """
-        robot = self.scene.robot
-        if armature is None:
-            armature = self.scene.armature(joint)
-        if armature is None:
-            armature = float(robot.reduction[joint] ** 2 * robot.rotor_inertia[joint])
-        return np.asarray(self.rigid[joint] - robot.row_scale[joint] * armature * self.motion.a[joint])
+    def load(self, joint: int) -> Array:
+        """Torque that the gear of a joint transmits, recorded side, shape (N,): rigid torque without the own rotor's."""
+        own = self.scene.robot.row_scale[joint] * self.scene.armature(joint) * self.motion.a[joint]
+        return np.asarray(self.rigid[joint] - own)
 
     @cached_property
     def motor_turns(self) -> Array:
