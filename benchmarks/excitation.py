@@ -1,15 +1,19 @@
 """Design excitation: log det and condition reached, seconds, and every limit on a finer grid.
 
-Run ``python benchmarks/excitation.py [--study] [--output FILE.json]``. With ``--study`` also the effect of the number of
-harmonics, of splines, and of a longer search.
+Run ``python benchmarks/excitation.py [--only scara|arms|study]... [--case WORD] [--output FILE.json]``; without
+``--only`` the first two. The study tells the effect of the number of harmonics, of splines, of multisines, of a
+longer search and of wider limits; ``--case`` takes of these those that have a word in their name.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
+import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
@@ -23,20 +27,25 @@ from scara_ident.excitation import (
     Criterion,
     Design,
     Effort,
+    Limits,
     Progress,
     design_excitation,
     excitation_dict,
     limits_of,
     nominal_parameters,
 )
-from scara_ident.indri2002 import OJD, criteria, regressor, tool_acceleration
+from scara_ident.identification import identify
+from scara_ident.indri2002 import OJD, criteria, regressor, table5_parameters, tool_acceleration
 from scara_ident.model import TorqueModel, build_model
 from scara_ident.robot import Robot, build_robot, load_robot
 from scara_ident.terms.rigid_body import rigid_body
+from scara_ident.virtual import sampled, simulate, virtual_arm
 
 Array = NDArray[np.float64]
 
 REPETITIONS = 500
+# Of the virtual arm in closed loop, 25 s each.
+RUNS = 60
 NOISE = 0.03
 
 
@@ -47,7 +56,7 @@ def example(name: str) -> Path:
 
 def arms() -> dict[str, Robot]:
     panda = example("panda.urdf")
-    arm = {f"panda_joint{k}": JointDescription() for k in range(1, 8)}
+    arm: dict[str, JointDescription | None] = {f"panda_joint{k}": JointDescription() for k in range(1, 8)}
     return {
         "UR5": load_robot(example("ur5_joint_limited_robot.urdf")),
         "Panda": build_robot(RobotDescription(urdf=panda, joints=arm), panda),
@@ -60,15 +69,26 @@ def told(design: Design) -> dict[str, Any]:
     return {key: content[key] for key in wanted} | {"seconds": design.seconds, "verified": design.verified}
 
 
+def timed(make: Callable[[], Design]) -> tuple[Design, float, float]:
+    """Return a design with its seconds by the clock and of all processors."""
+    before, begun = os.times(), time.perf_counter()
+    design = make()
+    passed, after = time.perf_counter() - begun, os.times()
+    return design, passed, sum(after[:4]) - sum(before[:4])
+
+
 def scara() -> tuple[Design, dict[str, Any]]:
-    design = design_excitation(build_model(load_robot()))
+    design, wall, work = timed(lambda: design_excitation(build_model(load_robot())))
     trajectory = design.trajectories[0]
     log_det, condition = criteria(regressor(*trajectory.at(np.linspace(0.0, 25.0, 2500))))
     ojd, _ = criteria(regressor(*OJD.motion(OJD.times())))
     fine = np.linspace(0.0, 25.0, 10 * design.verified)
     q, v, a = trajectory.at(fine)
     print("\nSCARA03, 25 s, complete model, paper's definition (2500 samples, R_v = identity)")
-    print(f"  J_d {log_det:.2f} in {design.seconds:.1f} s (OJD {ojd:.2f}; wanted 92 in 60 s), J_k {condition:.3g}")
+    print(
+        f"  J_d {log_det:.2f} in {wall:.1f} s, {work:.1f} s of computing (OJD {ojd:.2f}; wanted 92 in 60 s), "
+        f"J_k {condition:.3g}"
+    )
     print(f"  local searches: {', '.join(f'{-cost:.2f}' for cost in design.costs)}")
     print_limits(design)
     push = tool_acceleration(q, v, a).max()
@@ -76,7 +96,11 @@ def scara() -> tuple[Design, dict[str, Any]]:
         f"  by the paper's formulas on {len(fine)} samples: velocities {np.abs(v).max(axis=1).round(5).tolist()} rad/s,"
     )
     print(f"  tool acceleration {push:.5f} m/s^2 (OJD {tool_acceleration(*OJD.motion(fine)).max():.2f})")
-    return design, {"J_d": log_det, "J_k": condition, "OJD": ojd, **told(design)}
+    torque = np.einsum("ipN,p->iN", regressor(q, v, a), table5_parameters("OJD"))
+    most = np.abs(torque).max(axis=1).round(4).tolist()
+    print(f"  motor torque with every parameter of Table 5 (OJD), friction included: {most} N m of 2")
+    result = {"J_d": log_det, "J_k": condition, "OJD": ojd, "wall": wall, "computing": work, "torque": most}
+    return design, {**result, **told(design)}
 
 
 def repetitions(design: Design) -> dict[str, float]:
@@ -103,14 +127,39 @@ def repetitions(design: Design) -> dict[str, float]:
     return {"promised": promised, "seen": seen, "worst": worst}
 
 
-def condition_of(robot: Robot, criterion: Criterion) -> dict[str, Any]:
-    model = TorqueModel("rigid", robot, (rigid_body(robot),))
-    design = design_excitation(model, duration=20.0, criterion=criterion)
-    content = told(design)
+def virtual_repetitions(design: Design) -> dict[str, float]:
+    """Estimate from recordings of the virtual arm in closed loop, with its own noise, on OJD and on the design."""
+    arm = virtual_arm()
+    found, promised = [], []
+    for name, motion in (("OJD", OJD.motion), ("design", design.trajectories[0].at)):
+        path = sampled(name, arm.robot, motion, 25.0)
+        values = []
+        for repetition in range(1, RUNS + 1):
+            recording = simulate(arm, path, seed=5, repetition=repetition).recording
+            result = identify(arm.robot, [recording])
+            values.append(result.estimate.value)
+            promised.append(result.log_det)
+        found.append(np.array(values).T)
+    p = len(design.model.names)
+    promise = float(np.exp((np.mean(promised[:RUNS]) - np.mean(promised[RUNS:])) / (2 * p)))
+    dets = [np.linalg.slogdet(np.cov(each))[1] for each in found]
+    seen = float(np.exp((dets[1] - dets[0]) / (2 * p)))
+    ratio = found[1].std(axis=1) / found[0].std(axis=1)
+    print(f"\nstd of {RUNS} recordings of the virtual arm, design over OJD, geometric mean of the principal axes")
+    print(f"  promised by the recordings' J_d {promise:.3f}, seen {seen:.3f} ({100 * (seen / promise - 1):+.1f} %)")
+    print("  " + ", ".join(f"{name} {x:.2f}" for name, x in zip(design.model.names, ratio, strict=True)))
+    return {"promised": promise, "seen": seen}
+
+
+def condition_of(model: TorqueModel, criterion: Criterion) -> dict[str, Any]:
+    robot = model.robot
+    design, wall, work = timed(lambda: design_excitation(model, duration=20.0, criterion=criterion))
+    content = {**told(design), "wall": wall, "computing": work}
     print(
-        f"  {robot.name:6} {criterion.name:12} cond(H) {content['condition_of_regressor']:7.2f}, columns of unit length "
-        f"{content['condition_of_scaled_regressor']:6.2f}; ln det {design.log_det:7.1f}; {design.seconds:5.1f} s; "
-        f"{len(model.names)} base parameters; limits {'kept' if all(r.kept for r in design.reached) else 'BROKEN'} "
+        f"  {robot.name:6} {model.name:9} {len(model.names):3} {criterion.name:12} plain "
+        f"{content['condition_of_regressor']:7.2f}, columns of unit length "
+        f"{content['condition_of_scaled_regressor']:6.2f}; ln det {design.log_det:7.1f}; {wall:5.1f} s, {work:5.1f} s of "
+        f"computing; limits {'kept' if all(r.kept for r in design.reached) else 'BROKEN'} "
         f"(largest share {max(r.share for r in design.reached):.5f})",
         flush=True,
     )
@@ -158,23 +207,48 @@ def bound_of_states(count: int = 100_000, rounds: int = 200) -> float:
     return bound
 
 
-def study() -> list[dict[str, Any]]:
+def wider_limits() -> dict[str, Limits]:
+    """Return the SCARA03's limits with one kind of them a tenth wider, by kind."""
+    limits = limits_of(load_robot())
+    half = 0.5 * (limits.upper - limits.lower)
+    return {
+        "ranges": replace(limits, lower=limits.centre - 1.1 * half, upper=limits.centre + 1.1 * half),
+        "velocities": replace(limits, velocity=1.1 * limits.velocity),
+        "torques": replace(limits, torque=1.1 * limits.torque),
+        "tool acceleration": replace(limits, tool_acceleration=1.1 * limits.tool_acceleration),
+    }
+
+
+def study(word: str = "") -> list[dict[str, Any]]:
     model = build_model(load_robot())
     print("\nwhat limits J_d of the SCARA03 in 25 s")
-    print(f"  no choice of states within the limits exceeds about {bound_of_states():.1f}, joined by a motion or not")
+    if not word:
+        print(
+            f"  no choice of states within the limits exceeds about {bound_of_states():.1f}, joined by a motion or not"
+        )
     found = []
     cases: list[tuple[str, Callable[[], Design]]] = [
-        (f"{k} harmonics", lambda k=k: design_excitation(model, harmonics=k)) for k in (5, 10, 20, 40, 60, 80, 120)
+        (f"{k} harmonics", partial(design_excitation, model, harmonics=k)) for k in (5, 10, 20, 40, 60, 80, 120)
     ]
+    odd = tuple(range(1, 80, 2))
+    spread = tuple(sorted({round(1.6 * 1.12**k) for k in range(36)}))
     cases += [
+        (f"{len(odd)} odd harmonics to 79", lambda: design_excitation(model, harmonics=odd)),
+        (f"{len(spread)} spread harmonics to {spread[-1]}", lambda: design_excitation(model, harmonics=spread)),
         ("splines, 80 intervals", lambda: design_excitation(model, harmonics=40, family="spline")),
-        ("40, long search", lambda: design_excitation(model, effort=Effort(starts=16, rounds=8, seed=1), progress=dot)),
+        ("splines, 160 intervals", lambda: design_excitation(model, harmonics=80, family="spline")),
+        ("40, long search", lambda: design_excitation(model, effort=Effort(starts=16, rounds=3, seed=1), progress=dot)),
     ]
+    for what, wider in wider_limits().items():
+        cases.append((f"{what} by 10 % wider", partial(design_excitation, model, limits=wider)))
     for name, make in cases:
-        design = make()
-        found.append({"name": name, **told(design)})
+        if word not in name:
+            continue
+        design, wall, work = timed(make)
+        found.append({"name": name, "wall": wall, "computing": work, **told(design)})
         active = ", ".join(each.name for each in design.reached if each.active)
-        print(f"  {name:22} {design.log_det:6.2f} in {design.seconds:6.1f} s; active: {active}", flush=True)
+        line = f"{name:28} {design.log_det:6.2f} in {wall:6.1f} s, {work:6.1f} s of computing; active: {active}"
+        print(f"  {line}", flush=True)
     return found
 
 
@@ -185,16 +259,27 @@ def dot(progress: Progress) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--study", action="store_true")
+    parser.add_argument("--only", action="append", choices=("scara", "arms", "study"))
+    parser.add_argument("--case", default="", metavar="WORD")
     parser.add_argument("--output", type=Path)
     arguments = parser.parse_args()
-    design, results = scara()
-    content: dict[str, Any] = {"scara03": results, "repetitions": repetitions(design)}
-    print("\nbase regressor of rigid bodies and rotors, 20 s (wanted: at most 100 in 300 s)")
-    for name, robot in arms().items():
-        content[name] = {c.name: condition_of(robot, c) for c in (Condition(), Condition(scaled=True))}
-    if arguments.study:
-        content["study"] = study()
+    parts = arguments.only or ["scara", "arms"]
+    content: dict[str, Any] = {}
+    if "scara" in parts:
+        design, content["scara03"] = scara()
+        content["repetitions"] = repetitions(design)
+        content["virtual_repetitions"] = virtual_repetitions(design)
+    if "arms" in parts:
+        print(
+            "\ncondition of the regressor H as it is (plain) and with columns of unit length, 20 s (wanted: 100 in 300 s)"
+        )
+        print("  rigid: base parameters of bodies and rotors; complete: friction and offset of every joint too")
+        for name, robot in arms().items():
+            rigid = TorqueModel("rigid", robot, (rigid_body(robot),))
+            content[name] = [condition_of(rigid, c) for c in (Condition(), Condition(scaled=True))]
+            content[name].append(condition_of(build_model(robot), Condition()))
+    if "study" in parts:
+        content["study"] = study(arguments.case)
     if arguments.output:
         arguments.output.write_text(json.dumps(content, indent=1), encoding="utf-8")
 

@@ -18,13 +18,42 @@ def excite(
     criterion: Annotated[
         Literal["logdet", "cond"], typer.Option(help="ln det or the condition of the stacked regressor.")
     ] = "logdet",
+    wanted: Annotated[
+        list[str] | None,
+        typer.Option("--for", metavar="NAME", help="Parameter or term to tell from all others; may be repeated."),
+    ] = None,
     duration: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Of each trajectory, s.")] = 25.0,
     harmonics: Annotated[int | None, typer.Option(min=3, help="Per joint; default: by the duration.")] = None,
+    family: Annotated[Literal["fourier", "spline"], typer.Option(help="Harmonics, or B-splines.")] = "fourier",
     trajectories: Annotated[int, typer.Option(min=1, help="How many are designed together.")] = 1,
     known: Annotated[
         list[str] | None,
         typer.Option("--known", metavar="RECORDING", help="Recordings at hand: the design fills what they lack."),
     ] = None,
+    parameters: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="identification.json to foresee torques with, friction included."),
+    ] = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="Q1,Q2,..", help="Positions of all joints to start at, rad or m.")
+    ] = None,
+    ranges: Annotated[
+        list[str] | None, typer.Option("--range", metavar="JOINT=LOWER..UPPER", help="Instead of the URDF's, rad or m.")
+    ] = None,
+    velocities: Annotated[
+        list[str] | None, typer.Option("--velocity", metavar="JOINT=V", help="Instead of the URDF's, rad/s or m/s.")
+    ] = None,
+    torques: Annotated[
+        list[str] | None,
+        typer.Option("--torque", metavar="JOINT=T", help="Instead of the URDF's, on the recorded side."),
+    ] = None,
+    share: Annotated[float, typer.Option(help="Share of ranges, velocities and torques to use.")] = 1.0,
+    tool: Annotated[str | None, typer.Option(metavar="LINK", help="Link whose origin is the tool.")] = None,
+    tool_acceleration: Annotated[
+        float | None, typer.Option(metavar="A", help="Most, m/s^2; default: 9 on the SCARA03, else no limit.")
+    ] = None,
+    tool_speed: Annotated[float | None, typer.Option(metavar="V", help="Most, m/s.")] = None,
+    floor: Annotated[float | None, typer.Option(metavar="Z", help="Height the tool stays above, m.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the random starts.")] = 0,
     starts: Annotated[int, typer.Option(min=1, help="Random starts; more take longer and may find better.")] = 8,
     rate: Annotated[float, typer.Option(min=1.0, max=1e5, help="Samples per second of trajectory.csv.")] = 1000.0,
@@ -32,19 +61,25 @@ def excite(
     json: JsonOption = False,
 ) -> None:
     """Design an excitation trajectory within the limits of the joints, the motors and the tool."""
+    import numpy as np
+
+    from scara_ident.cli.joint_values import joint_numbers, joint_ranges, numbers
     from scara_ident.estimators.estimate import PAPER_SAMPLES
     from scara_ident.excitation import (
-        Condition,
         Effort,
-        LogDet,
         Progress,
+        default_harmonics,
         design_excitation,
         excitation_dict,
+        limits_of,
         write_joint_trajectory,
         write_preview,
         write_trajectory,
     )
-    from scara_ident.excitation.output import file_names
+    from scara_ident.excitation.criteria import criterion_of
+    from scara_ident.excitation.design import SAMPLES, check_size
+    from scara_ident.excitation.known import read_parameters
+    from scara_ident.excitation.output import check_rate, file_names
     from scara_ident.identification import known_information
     from scara_ident.model import build_model
     from scara_ident.recording import read_recordings
@@ -55,19 +90,41 @@ def excite(
     check_output(output)
     arm = load_robot(robot)
     equation = build_model(arm, model)
+    goal = criterion_of(criterion, equation, wanted or ())
+    place = numbers(start, "--start")
+    limits = limits_of(
+        arm,
+        ranges=joint_ranges(ranges, "--range"),
+        velocities=joint_numbers(velocities, "--velocity"),
+        torques=joint_numbers(torques, "--torque"),
+        tool_acceleration=tool_acceleration,
+        tool_speed=np.inf if tool_speed is None else tool_speed,
+        floor=-np.inf if floor is None else floor,
+        tool=tool,
+        share=share,
+    )
+    count = default_harmonics(duration, arm.n, trajectories) if harmonics is None else harmonics
+    check_size(count, arm.n, trajectories, SAMPLES)
+    check_rate(rate, count / duration)
+    nominal = None if parameters is None else read_parameters(parameters, equation)
     prior = known_information(equation, read_recordings(known, arm), PAPER_SAMPLES / duration) if known else None
     with progress() as step:
 
         def told(state: Progress) -> None:
             step(f"search {state.done} of {state.total}, best so far {-state.cost:.2f}")
 
+        step("search 1")
         design = design_excitation(
             equation,
             duration=duration,
-            harmonics=harmonics,
-            criterion=LogDet() if criterion == "logdet" else Condition(),
+            harmonics=count,
+            criterion=goal,
+            limits=limits,
+            known=nominal,
             trajectories=trajectories,
             prior=prior,
+            start=None if place is None else np.array(place),
+            family=family,
             effort=Effort(starts=starts, seed=seed),
             progress=told,
         )
@@ -77,19 +134,28 @@ def excite(
     console = output_console(quiet=json)
     for sentence in content["summary"]:
         console.print(sentence, markup=False)
-    limits = table("limits", "limit", "bound", "reached", right=("bound", "reached"))
+    reached = table("limits", "limit", "bound", "reached", right=("bound", "reached"))
     for each in design.reached:
-        limits.add_row(each.name, f"{each.bound:.4g} {each.unit}", f"{each.reached:.4g} {each.unit}")
-    console.print(limits)
-    with written_together(output) as place:
+        reached.add_row(each.name, f"{each.bound:.4g} {each.unit}", f"{each.reached:.4g} {each.unit}")
+    console.print(reached)
+    for note in content["notes"]:
+        console.print(f"note: {note}", markup=False, style="dim")
+    with written_together(output) as folder:
         for trajectory, csv, yaml in zip(
             design.trajectories, file_names(design, ".csv"), file_names(design, ".yaml"), strict=True
         ):
-            write_trajectory(trajectory, place / csv, rate)
-            write_joint_trajectory(trajectory, place / yaml)
-        write_preview(design, place / "excitation.png")
-        excitation_report(place / "report.html", content, arm, [each.motion(2500) for each in design.trajectories])
-        write_json(place / "excitation.json", content)
-    names = (*file_names(design, ".csv"), "excitation.json", "report.html", "excitation.png")
+            write_trajectory(trajectory, folder / csv, rate)
+            write_joint_trajectory(trajectory, folder / yaml)
+        write_preview(design, folder / "excitation.png")
+        motions = [design.motion(k, PAPER_SAMPLES / duration) for k in range(trajectories)]
+        excitation_report(folder / "report.html", content, arm, motions)
+        write_json(folder / "excitation.json", content)
+    names = (
+        *file_names(design, ".csv"),
+        *file_names(design, ".yaml"),
+        "excitation.json",
+        "report.html",
+        "excitation.png",
+    )
     written = ", ".join(str(output / name) for name in names)
     console.print(f"written: {written}", markup=False, soft_wrap=True)

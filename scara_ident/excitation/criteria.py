@@ -150,6 +150,22 @@ class Condition:
         return replace(self, power=2.0 * (self.power / 2.0) ** share)
 
 
+def criterion_of(name: str, model: TorqueModel, wanted: Sequence[str] = ()) -> Criterion:
+    """Return ``logdet`` or ``cond`` over all parameters, or over some parameters or terms.
+
+    Raises
+    ------
+    UsageError
+        If the name or what is wanted is not known.
+    """
+    if name not in ("logdet", "cond"):
+        raise UsageError(f"criterion {name!r}: expected logdet or cond")
+    block = block_of(model, wanted) if wanted else None
+    if name == "cond":
+        return Condition(None if block is None else block.columns)
+    return LogDet() if block is None else block
+
+
 def block_of(model: TorqueModel, names: Sequence[str]) -> BlockLogDet:
     """Return the criterion that asks for some parameters of a model.
 

@@ -22,6 +22,8 @@ Family = Literal["fourier", "spline"]
 
 # Splines of this degree have a continuous third derivative of acceleration.
 DEGREE = 5
+# Times that are worked on at once, so that hours of motion fit into memory.
+CHUNK = 20_000
 # Conditions whose singular value is below this share of the largest are implied by the others.
 IMPLIED = 1e-12
 
@@ -166,7 +168,13 @@ class ExcitationTrajectory:
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
         """Return position, velocity and acceleration, each of shape (n, N), at times (N,) in s."""
-        q, v, a = (self.coefficients @ self.basis.rows(time, order).T for order in range(3))
+        time = np.asarray(time, dtype=float)
+        found = np.empty((3, len(self.joints), len(time)))
+        for first in range(0, len(time), CHUNK):
+            part = slice(first, first + CHUNK)
+            for order in range(3):
+                found[order, :, part] = self.coefficients @ self.basis.rows(time[part], order).T
+        q, v, a = found
         return q + self.posture[:, None], v, a
 
     def motion(self, samples: int) -> Motion:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,8 +27,12 @@ Array = NDArray[np.float64]
 SAMPLES = 2500
 # Highest frequency of a motion by default, Hz: controllers still follow it and arms do not yet swing.
 HIGHEST_FREQUENCY = 1.6
-# Coefficients that a search handles quickly.
-MANY_COEFFICIENTS = 160
+# Coefficients that a search handles quickly, and at all: its time grows with their cube.
+MANY_COEFFICIENTS, MOST_COEFFICIENTS = 160, 600
+# Samples per period of the highest harmonic that the criterion needs.
+LEAST_PER_PERIOD = 4
+# They are told apart by a letter.
+MOST_TRAJECTORIES = 26
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +124,7 @@ def design_excitation(
     model: TorqueModel,
     *,
     duration: float = 25.0,
-    harmonics: int | None = None,
+    harmonics: int | Sequence[int] | None = None,
     criterion: Criterion | None = None,
     limits: Limits | None = None,
     known: Mapping[str, float] | None = None,
@@ -142,8 +146,8 @@ def design_excitation(
         Its columns must depend on present position, velocity and acceleration alone.
     duration : float
         Of each trajectory, s.
-    harmonics : int, optional
-        See `default_harmonics`.
+    harmonics : int or sequence of int, optional
+        How many, or which: a multisine. See `default_harmonics`.
     criterion : Criterion, optional
         By default the log determinant.
     limits : Limits, optional
@@ -188,8 +192,8 @@ def design_excitation(
     """
     begun = time.perf_counter()
     robot, count = model.robot, len(model.names)
-    if trajectories < 1:
-        raise UsageError(f"trajectories {trajectories}: expected at least 1")
+    if not 1 <= trajectories <= MOST_TRAJECTORIES:
+        raise UsageError(f"trajectories {trajectories}: expected at least 1 and at most {MOST_TRAJECTORIES}")
     if samples < 2:
         raise UsageError(f"samples {samples}: expected at least 2")
     if prior is not None and prior.parameters != count:
@@ -207,6 +211,7 @@ def design_excitation(
     smooth, left = without_coulomb(model, limits, nominal)
     if harmonics is None:
         harmonics = default_harmonics(duration, robot.n, trajectories)
+    check_size(harmonics, robot.n, trajectories, samples)
     task = Task(
         smooth=SmoothModel(model, NARROWEST * limits.velocity),
         limits=left,
@@ -261,6 +266,34 @@ def information_of(
         regressor = regressor * weights[:, None, None]
     rows = regressor.transpose(2, 0, 1).reshape(-1, regressor.shape[1])
     return Information.empty(rows.shape[1]).absorb(rows, np.zeros(len(rows)))
+
+
+def check_size(chosen: int | Sequence[int], joints: int, trajectories: int, samples: int) -> None:
+    """Refuse a design that a search cannot handle, or whose samples cannot tell its harmonics.
+
+    Parameters
+    ----------
+    chosen : int or sequence of int
+        How many harmonics, or which.
+    joints, trajectories, samples : int
+
+    Raises
+    ------
+    UsageError
+        In one line.
+    """
+    most = max(5, MOST_COEFFICIENTS // (2 * joints * trajectories))
+    harmonics, highest = (chosen, chosen) if isinstance(chosen, int) else (len(chosen), max(chosen, default=0))
+    if harmonics > most:
+        few = "" if trajectories == 1 else ", or fewer trajectories"
+        raise UsageError(
+            f"harmonics {harmonics}: more than a search over {joints} joints can handle; use at most {most}{few}"
+        )
+    if LEAST_PER_PERIOD * highest > samples:
+        raise UsageError(
+            f"harmonic {highest}: {samples} samples cannot tell so fast a motion; use at most "
+            f"{samples // LEAST_PER_PERIOD}, or more samples"
+        )
 
 
 def _weights(torque_std: Array | None, joints: int) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from scara_ident.errors import RobotError, ScaraIdentError, UsageError
 from scara_ident.excitation.tool import Tool, tool_motion, tool_of
+from scara_ident.indri2002 import PARAMETERS, table5_parameters
 from scara_ident.model import TorqueModel
 from scara_ident.motion import Motion
 from scara_ident.robot import Robot
@@ -125,7 +126,7 @@ def limits_of(
         if not (np.isfinite(lower[joint]) and np.isfinite(upper[joint])):
             raise RobotError(
                 f"{robot.urdf}: joint {name!r} has no position limits; give <limit lower= upper=> in the URDF, or a "
-                f"range for {name} in {unit}"
+                f"range for {name} in {unit} (--range {name}=LOWER..UPPER)"
             )
         if not lower[joint] < upper[joint]:
             raise RobotError(
@@ -135,13 +136,15 @@ def limits_of(
         if not np.isfinite(velocity[joint]):
             raise RobotError(
                 f"{robot.urdf}: joint {name!r} has no velocity limit; give <limit velocity=> in the URDF, or a "
-                f"velocity for {name} in {unit}/s"
+                f"velocity for {name} in {unit}/s (--velocity {name}=V)"
             )
     if tool_acceleration is None:
         tool_acceleration = SCARA03_TOOL_ACCELERATION if robot.name == "scara03" else np.inf
     for value, kind in ((tool_acceleration, "tool acceleration"), (tool_speed, "tool speed")):
         if not value > 0.0:
             raise UsageError(f"{kind} {value:g}: allows no motion; give more than 0")
+    if not floor < np.inf:
+        raise UsageError(f"floor {floor:g}: expected a height in m")
     middle, half = 0.5 * (lower + upper), 0.5 * share * (upper - lower)
     limits = Limits(
         middle - half, middle + half, share * velocity, share * torque, tool_acceleration, tool_speed, floor
@@ -170,7 +173,8 @@ def nominal_parameters(model: TorqueModel, known: Mapping[str, float] | None = N
     Returns
     -------
     ndarray, shape (p,)
-        The URDF's bodies and rotors as base parameters, and zero for what it does not say (friction, offset).
+        The URDF's bodies and rotors as base parameters, and zero for what it does not say (friction, offset). If
+        nothing is known, the SCARA03 has the friction of the paper's Table 5, column OJD.
 
     Raises
     ------
@@ -180,11 +184,21 @@ def nominal_parameters(model: TorqueModel, known: Mapping[str, float] | None = N
     value = np.zeros(len(model.names))
     body = model.rigid_body
     value[model.place(body)] = (body.base.grouping @ model.robot.standard_parameters())[body.kept]
-    for name, given in (known or {}).items():
+    if known is None:
+        known = {name: given for name, given in scara03_friction(model.robot).items() if name in model.names}
+    for name, given in known.items():
         if name not in model.names:
             raise UsageError(f"parameter {name!r}: the model {model.name} has none of that name: {model.names}")
         value[model.names.index(name)] = given
     return value
+
+
+def scara03_friction(robot: Robot) -> dict[str, float]:
+    """Return the friction of the paper's Table 5 (OJD) by parameter, N m at the motor; none for any other robot."""
+    if robot.name != "scara03" or robot.effort_side != "motor" or robot.n != 2:
+        return {}
+    values = zip(PARAMETERS, table5_parameters("OJD").tolist(), strict=True)
+    return {parameter.name: value for parameter, value in values if parameter.name.startswith("a")}
 
 
 def without_coulomb(model: TorqueModel, limits: Limits, nominal: Array) -> tuple[Array, Limits]:

@@ -13,13 +13,20 @@ from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.excitation.criteria import BlockLogDet, Condition
 from scara_ident.excitation.curves import Basis, ExcitationTrajectory
 from scara_ident.excitation.design import Design, information_of
+from scara_ident.excitation.limits import scara03_friction
 from scara_ident.information import Information
 
 Array = NDArray[np.float64]
 
 RATE = 1000.0
-# Points of a JointTrajectory are splined by the controller that gets them.
+# Points of a JointTrajectory are splined by the controller that gets them: this many per second, and at least so
+# many per period of the highest harmonic.
 ROS_RATE = 100.0
+ROS_POINTS = 10.0
+# Samples per period of the highest harmonic below which a table no longer tells the motion.
+LEAST_SAMPLES = 4.0
+# Motion above this frequency makes most arms swing, Hz.
+SWINGING = 5.0
 
 
 def file_names(design: Design, suffix: str) -> tuple[str, ...]:
@@ -59,14 +66,33 @@ def write_trajectory(trajectory: ExcitationTrajectory, path: Path | str, rate: f
 
 def sample_times(trajectory: ExcitationTrajectory, rate: float) -> Array:
     """Return equally spaced times from 0 to the duration at about a rate, s."""
-    least = 4.0 * trajectory.basis.bandwidth
-    if not rate >= least:
-        raise UsageError(f"rate {rate:g} Hz: this motion reaches {0.25 * least:g} Hz and needs at least {least:g} Hz")
+    check_rate(rate, trajectory.basis.bandwidth)
     return np.linspace(0.0, trajectory.duration, round(trajectory.duration * rate) + 1)
 
 
-def joint_trajectory_yaml(trajectory: ExcitationTrajectory, rate: float = ROS_RATE) -> str:
-    """Return a ROS 2 ``trajectory_msgs/msg/JointTrajectory`` as YAML, as ``ros2 topic pub`` takes it."""
+def check_rate(rate: float, bandwidth: float) -> None:
+    """Refuse a rate that cannot tell a motion of this bandwidth; both in Hz.
+
+    Raises
+    ------
+    UsageError
+        In one line.
+    """
+    least = LEAST_SAMPLES * bandwidth
+    if not rate >= least:
+        raise UsageError(
+            f"rate {rate:g} Hz: this motion reaches {bandwidth:g} Hz and needs at least {least:g} Hz; "
+            "use fewer harmonics, or a higher rate"
+        )
+
+
+def joint_trajectory_yaml(trajectory: ExcitationTrajectory, rate: float | None = None) -> str:
+    """Return a ROS 2 ``trajectory_msgs/msg/JointTrajectory`` as YAML, as ``ros2 topic pub`` takes it.
+
+    Without a rate 100 points a second, more where the motion needs them.
+    """
+    if rate is None:
+        rate = max(ROS_RATE, ROS_POINTS * trajectory.basis.bandwidth)
     time = sample_times(trajectory, rate)
     q, v, a = trajectory.at(time)
     lines = [
@@ -88,7 +114,7 @@ def joint_trajectory_yaml(trajectory: ExcitationTrajectory, rate: float = ROS_RA
     return "\n".join(lines) + "\n"
 
 
-def write_joint_trajectory(trajectory: ExcitationTrajectory, path: Path | str, rate: float = ROS_RATE) -> None:
+def write_joint_trajectory(trajectory: ExcitationTrajectory, path: Path | str, rate: float | None = None) -> None:
     """Write a ROS 2 ``JointTrajectory``; see `joint_trajectory_yaml`."""
     path = Path(path)
     text = joint_trajectory_yaml(trajectory, rate)
@@ -190,14 +216,24 @@ def notes(design: Design) -> list[str]:
     """Say what the design rests on."""
     said = ["Collisions of the arm with itself or its surroundings were not looked for: rehearse it slowly."]
     if np.any(np.isfinite(design.limits.torque)):
-        frictionless = not np.any(np.delete(design.nominal, np.r_[design.model.place(design.model.rigid_body)]))
-        said.append(
-            "Torques were foreseen with the URDF's bodies and rotors"
-            + (", without friction." if frictionless else " and the friction that was given.")
-        )
+        said.append(_foreseen(design))
+    bandwidth = design.trajectories[0].basis.bandwidth
+    if bandwidth > SWINGING:
+        said.append(f"The motion reaches {bandwidth:g} Hz, where many arms swing: use fewer harmonics if yours does.")
     if not design.trajectories[0].basis.periodic:
         said.append("The motion does not end where it starts.")
     return said
+
+
+def _foreseen(design: Design) -> str:
+    model = design.model
+    told = "Torques were foreseen with the URDF's bodies and rotors"
+    if not np.any(np.delete(design.nominal, np.r_[model.place(model.rigid_body)])):
+        return f"{told}, without friction: identify once, and give what was found."
+    own = scara03_friction(model.robot)
+    if own and all(own[name] == value for name, value in zip(model.names, design.nominal, strict=True) if name in own):
+        return f"{told} and the friction of the paper's Table 5 (OJD)."
+    return f"{told}, or what was known better, and the friction that was given."
 
 
 def _harmonics(basis: Basis) -> int | list[int] | None:

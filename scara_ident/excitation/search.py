@@ -124,7 +124,7 @@ def search(task: Task, effort: Effort, progress: Callable[[Progress], None] | No
             if progress is not None:
                 progress(Progress(len(costs), total, min(costs)))
         if not elite:
-            raise InfeasibleLimits(_narrowest(problem, task))
+            raise InfeasibleLimits(_tightest(problem, effort.seed))
         elite = sorted(elite, key=lambda found: found.cost)[:ELITE]
     with one_blas_thread():
         x, times = _finish(task, elite[0].x)
@@ -197,13 +197,31 @@ def _excess(task: Task, x: Array, times: int) -> Array:
     return np.where(one_sided, largest, np.maximum(largest, -smallest))
 
 
-def _narrowest(problem: Problem, task: Task) -> str:
-    values = np.abs(problem.limited(np.zeros(task.shape))).max(axis=1)
-    kind, joint = row_names(task.limits, len(task.posture))[int(np.argmax(values))]
-    where = kind.replace("_", " ") + ("" if joint is None else f" of {task.smooth.model.robot.joints[joint]}")
+def _tightest(problem: Problem, seed: int) -> str:
+    """Say which limit a random motion of half the velocity limits breaks most."""
+    task = problem.task
+    limits, robot = task.limits, task.smooth.model.robot
+    values = np.abs(problem.limited(_random_motion(task, np.random.default_rng([seed, 0])))).max(axis=1)
+    names = row_names(limits, robot.n)
+    # Rows of the tool's acceleration and speed are squares.
+    squared = np.array([kind in ("tool_acceleration", "tool_speed") for kind, _ in names])
+    kind, joint = names[int(np.argmax(np.where(squared, np.sqrt(values), values)))]
+    if joint is None:
+        bound = {"tool_acceleration": limits.tool_acceleration, "tool_speed": limits.tool_speed}.get(kind, limits.floor)
+        unit = {"tool_acceleration": "m/s^2", "tool_speed": "m/s"}.get(kind, "m")
+        where = f"{kind.replace('_', ' ')} limit of {bound:.4g} {unit}"
+    else:
+        length = "m" if robot.prismatic[joint] else "rad"
+        bound, unit = {
+            "position": (limits.upper[joint] - limits.lower[joint], length),
+            "velocity": (limits.velocity[joint], f"{length}/s"),
+            "torque": (limits.torque[joint], robot.torque_unit(joint)),
+        }[kind]
+        what = "range" if kind == "position" else f"{kind} limit"
+        where = f"{what} of {robot.joints[joint]}, {bound:.4g} {unit}"
     return (
-        f"no motion within the limits shows all parameters; the narrowest, at rest, is the {where} "
-        f"({100 * values.max():.0f} % used); widen it, use more harmonics, or a model with fewer parameters"
+        f"no motion within the limits shows all parameters; the tightest is the {where}; "
+        "widen it, use more harmonics, or a model with fewer parameters"
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.excitation.curves import Basis
+from scara_ident.excitation.curves import CHUNK, Basis
 from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.problem import Problem, Task, row_names
 
@@ -75,13 +75,24 @@ def extremes(task: Task, x: Array, times: int) -> tuple[Array, Array]:
     largest, smallest : ndarray, shape (R,)
     """
     time: Array = np.asarray(np.linspace(0.0, task.basis.duration, times), dtype=np.float64)
+    found = []
+    for first in range(0, times, CHUNK):
+        # With two neighbours on either side, for second differences around every time.
+        begin, end = max(0, first - 2), min(times, first + CHUNK + 2)
+        high, low = _envelope(task, x, time[begin:end])
+        kept = slice(first - begin, min(first + CHUNK, times) - begin)
+        found.append((high[..., kept].max(axis=(1, 2)), low[..., kept].min(axis=(1, 2))))
+    return np.max([high for high, _ in found], axis=0), np.min([low for _, low in found], axis=0)
+
+
+def _envelope(task: Task, x: Array, time: Array) -> tuple[Array, Array]:
+    """Return what rows may reach around times, from above and from below, shape (R, k, M)."""
     rows = np.array([task.basis.rows(time, order) for order in range(3)])
-    values = Problem(task, rows, 1, np.ones(0)).limited(x).reshape(-1, task.trajectories, times)
-    second = np.abs(np.diff(values, n=2, axis=2))
+    values = Problem(task, rows, 1, np.ones(0)).limited(x).reshape(-1, task.trajectories, len(time))
     around = np.zeros_like(values)
-    around[..., 1:-1] = second
+    around[..., 1:-1] = np.abs(np.diff(values, n=2, axis=2))
     beyond = np.maximum(around, np.maximum(np.roll(around, 1, axis=2), np.roll(around, -1, axis=2))) / 8.0
-    return (values + beyond).max(axis=(1, 2)), (values - beyond).min(axis=(1, 2))
+    return values + beyond, values - beyond
 
 
 def reached(task: Task, torque: Array, x: Array, times: int) -> tuple[Reached, ...]:

@@ -34,6 +34,61 @@ def test_a_small_design_keeps_its_limits_and_writes_its_files(command, tmp_path:
     assert str(tmp_path / "trajectory.csv") in result.out
 
 
+QUICK = ("--duration", "4", "--harmonics", "4", "--starts", "1", "--model", "basic")
+
+
+def test_start_limits_block_and_known_torques_are_heeded(command, tmp_path: Path):
+    parameters = tmp_path / "identification.json"
+    parameters.write_text(json.dumps({"parameters": [{"name": "a01", "value": 0.3}, {"name": "a02", "value": 0.1}]}))
+    words = (
+        *QUICK, "--for", "rigid_body", "--start", "1,-0.5", "--range", "joint1=0..2", "--velocity", "joint1=1.5",
+        "--torque", "joint2=0.8", "--tool-acceleration", "6", "--tool-speed", "0.9", "--parameters", parameters,
+        "--trajectories", "2",
+    )  # fmt: skip
+    result = command("excite", *words, "--output", tmp_path / "a")
+    assert result.status == 0
+    content = json.loads((tmp_path / "a" / "excitation.json").read_text())
+    assert content["criterion"] == {"name": "block_logdet", "parameters": ["P_d1", "P_d2", "P_d3", "P_d4", "P_d5"]}
+    bounds = {name: limit["bound"] for name, limit in content["limits"].items()}
+    assert bounds["joint1.position.upper"] == 2.0 and bounds["joint1.velocity"] == 1.5
+    assert bounds["joint2.torque"] == 0.8 and bounds["tool.acceleration"] == 6.0 and bounds["tool.speed"] == 0.9
+    assert all(limit["share"] <= 1.0 for limit in content["limits"].values())
+    assert any("the friction that was given" in note for note in content["notes"])
+    for name in ("trajectory.csv", "trajectory-b.csv"):
+        table = pl.read_csv(tmp_path / "a" / name)
+        assert np.allclose(table[0, "joint1.position"], 1.0) and np.allclose(table[-1, "joint2.position"], -0.5)
+    # Once more: the same seed gives the same files.
+    assert command("excite", *words, "--output", tmp_path / "b").status == 0
+    for name in ("trajectory.csv", "trajectory-b.yaml", "excitation.png"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_recordings_at_hand_count(command, tmp_path: Path, folder: Path):
+    alone = command("excite", *QUICK, "--json", "--output", tmp_path)
+    filled = command("excite", *QUICK, "--json", "--known", folder / "OJD_1.parquet", "--output", tmp_path)
+    before, after = json.loads(alone.out), json.loads(filled.out)
+    assert before["log_det_with_prior"] is None
+    assert after["log_det_with_prior"] > max(after["log_det"], before["log_det"])
+    assert after["trajectories"] != before["trajectories"]
+
+
+def test_what_cannot_be_is_said_before_the_search(command, tmp_path: Path):
+    for words, status, said in (
+        (("--start", "0,2.5"), 1, "start: joint2 = 2.5 lies outside its range"),
+        (("--start", "0"), 2, "expected 2 positions"),
+        (("--duration", "2", "--harmonics", "4000"), 2, "use at most 150"),
+        (("--harmonics", "50", "--rate", "5"), 2, "use fewer harmonics, or a higher rate"),
+        (("--floor", "2"), 1, "lower the floor"),
+        (("--torque", "joint1=0.1"), 1, "joint1: a torque of 0.1 N m does not overcome its friction"),
+        (("--range", "joint9=0..1"), 2, "'joint9': the robot has no such joint"),
+        (("--for", "P_d9"), 2, "parameter 'P_d9'"),
+        (("--parameters", "none.json"), 1, "none.json: cannot be read"),
+    ):
+        outcome = command("excite", *words, "--output", tmp_path)
+        assert (outcome.status, said in outcome.err) == (status, True), outcome.err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_bad_usage_is_status_2(command, tmp_path: Path):
     for words in (["--duration", "0"], ["--harmonics", "1"], ["--starts", "0"], ["--criterion", "magic"]):
         assert command("excite", *words, "--output", tmp_path).status == 2

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scara_ident.errors import UsageError
-from scara_ident.excitation.criteria import BlockLogDet, Condition, LogDet, block_of
+from scara_ident.excitation.criteria import BlockLogDet, Condition, LogDet, block_of, criterion_of
 from scara_ident.information import Information
 from scara_ident.model import build_model
 from scara_ident.robot import load_robot
@@ -82,3 +82,13 @@ def test_blocks_are_named_by_parameters_or_terms():
         block_of(model, ["P_d9"])
     with pytest.raises(UsageError, match="no parameter"):
         block_of(model, [])
+
+
+def test_a_criterion_is_named_and_may_be_about_some_parameters():
+    model = build_model(load_robot())
+    assert criterion_of("logdet", model) == LogDet()
+    assert criterion_of("logdet", model, ["P_d2"]) == BlockLogDet((1,))
+    assert criterion_of("cond", model) == Condition()
+    assert criterion_of("cond", model, ["offset"]) == Condition((13, 14))
+    with pytest.raises(UsageError, match="'volume': expected logdet or cond"):
+        criterion_of("volume", model)

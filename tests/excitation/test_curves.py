@@ -4,6 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scara_ident.errors import UsageError
+from scara_ident.excitation import curves
 from scara_ident.excitation.curves import ExcitationTrajectory, make_basis
 
 
@@ -45,6 +46,15 @@ def test_the_series_in_plain_terms_gives_the_motion_back():
         phase = np.outer(2 * np.pi * np.arange(1, 9) / 7.0, time)
         q = series["offset"][0] + series["cosine"] @ np.cos(phase) + series["sine"] @ np.sin(phase)
         np.testing.assert_allclose(q, made.at(time)[0][joint], atol=1e-12)
+
+
+def test_long_motions_are_evaluated_piece_by_piece_alike(monkeypatch):
+    made = trajectory("fourier", 5)
+    time = np.linspace(0.0, 7.0, 101)
+    whole = made.at(time)
+    monkeypatch.setattr(curves, "CHUNK", 13)
+    for once, by_pieces in zip(whole, made.at(time), strict=True):
+        np.testing.assert_allclose(by_pieces, once, atol=1e-13)
 
 
 def test_the_paper_counts_both_ends_among_its_samples():

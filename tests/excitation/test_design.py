@@ -15,8 +15,9 @@ from scara_ident.excitation import (
     design_excitation,
     information_of,
     limits_of,
+    nominal_parameters,
 )
-from scara_ident.indri2002 import OJD, criteria, regressor, tool_acceleration
+from scara_ident.indri2002 import OJD, criteria, regressor, table5_parameters, tool_acceleration
 from scara_ident.information import Information
 from scara_ident.model import build_model
 from scara_ident.robot import Robot, load_robot
@@ -62,9 +63,11 @@ def test_25_s_of_the_scara_reach_a_log_det_of_92_within_all_limits(paper_length)
     assert max(found.values()) <= 1.0
     assert max(found.values()) > 0.99
     assert paper_length.verified > 10 * 48 * 40
-    fine = trajectory.at(np.linspace(0.0, 25.0, 50_001))
+    fine = trajectory.at(np.linspace(0.0, 25.0, 100_001))
     assert np.max(tool_acceleration(*fine)) <= 9.0
     assert np.max(np.abs(fine[1])) <= 3.77
+    # Motors turn the arm of Table 5 against its friction.
+    assert np.max(np.abs(np.einsum("ipN,p->iN", regressor(*fine), table5_parameters("OJD")))) <= 2.0
 
 
 def test_what_is_reported_as_reached_is_reached_between_samples_too(short):
@@ -261,6 +264,9 @@ def test_parameters_that_no_motion_tells_apart_are_said():
         ({"velocities": {"joint1": 0.0}}, "velocity limit of joint1"),
         ({"tool_acceleration": -1.0}, "tool acceleration -1"),
         ({"share": 1.5}, "share of the limits 1.5"),
+        ({"share": np.nan}, "share of the limits nan"),
+        ({"floor": np.nan}, "floor nan: expected a height"),
+        ({"tool_speed": 0.0}, "tool speed 0"),
     ],
 )
 def test_limits_that_make_no_sense_are_said(given, said):
@@ -281,6 +287,11 @@ def test_the_scara_has_the_papers_tool_acceleration_and_other_arms_none():
     ("given", "said"),
     [
         ({"trajectories": 0}, "trajectories 0"),
+        ({"trajectories": 27}, "trajectories 27: expected at least 1 and at most 26"),
+        ({"duration": 2.0, "harmonics": 4000}, "harmonics 4000: more than a search .* use at most 150"),
+        ({"harmonics": 151}, "harmonics 151"),
+        ({"harmonics": 80, "trajectories": 2}, "use at most 75, or fewer trajectories"),
+        ({"harmonics": (1, 2, 700)}, "harmonic 700: 2500 samples cannot tell so fast a motion; use at most 625"),
         ({"samples": 1}, "samples 1"),
         ({"duration": -3.0}, "duration -3"),
         ({"torque_std": np.array([1.0, 0.0])}, "torque noise: expected 2 positive"),
@@ -291,6 +302,41 @@ def test_the_scara_has_the_papers_tool_acceleration_and_other_arms_none():
 def test_arguments_that_do_not_fit_are_said(given, said):
     with pytest.raises(UsageError, match=said):
         design_excitation(COMPLETE, **given)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"tool_acceleration": 1e-4}, r"tightest is the tool acceleration limit of 0\.0001 m/s\^2"),
+        ({"ranges": {"joint1": (0.0, 1e-5)}}, r"tightest is the range of joint1, 1e-05 rad"),
+        ({"torques": {"joint1": 0.2101}}, r"tightest is the torque limit of joint1, 0\.0001 N m"),
+    ],
+)
+def test_limits_too_tight_for_any_motion_are_named(given, said):
+    with pytest.raises(InfeasibleLimits, match=f"no motion within the limits shows all parameters; the {said}"):
+        design_excitation(COMPLETE, **SHORT, limits=limits_of(SCARA, **given), effort=QUICK)
+
+
+def test_a_multisine_has_the_chosen_harmonics_alone():
+    made = design_excitation(COMPLETE, duration=4.0, samples=400, harmonics=(1, 2, 3, 5, 7), effort=QUICK)
+    (trajectory,) = made.trajectories
+    assert trajectory.basis.orders == (1, 2, 3, 5, 7)
+    # Over one period without its end, so that a harmonic falls on one line of the spectrum.
+    q = trajectory.at(np.linspace(0.0, 4.0, 65)[:-1])[0]
+    lines = np.abs(np.fft.rfft(q, axis=1))
+    others = np.setdiff1d(np.arange(33), (0, 1, 2, 3, 5, 7))
+    assert np.max(lines[:, others]) < 1e-10 * np.max(lines)
+
+
+def test_the_scara_is_foreseen_with_the_papers_friction_unless_told_better():
+    names = COMPLETE.names
+    value = nominal_parameters(COMPLETE)
+    np.testing.assert_array_equal(value[5:], table5_parameters("OJD")[5:])
+    assert nominal_parameters(COMPLETE, {"a01": 0.3})[5:].tolist() == [0.3] + [0.0] * 9
+    assert not np.any(nominal_parameters(COMPLETE, {})[5:])
+    assert dict(zip(names, value, strict=True))["a31"] == 0.0
+    joint_side = replace(SCARA, effort_side="joint")
+    assert not np.any(nominal_parameters(build_model(joint_side))[5:])
 
 
 def test_harmonics_are_fewer_for_more_joints():

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
@@ -15,6 +16,8 @@ from scara_ident.excitation import (
     write_preview,
     write_trajectory,
 )
+from scara_ident.excitation.curves import make_basis
+from scara_ident.excitation.output import joint_trajectory_yaml, notes
 from scara_ident.model import build_model
 from scara_ident.report.files import plain
 from scara_ident.robot import load_robot
@@ -47,10 +50,22 @@ def test_the_csv_is_what_the_contract_says(made, tmp_path):
 
 
 def test_a_rate_too_low_for_the_motion_is_said(made, tmp_path):
-    with pytest.raises(UsageError, match=r"rate 3 Hz: this motion reaches 1\.5 Hz"):
+    with pytest.raises(UsageError, match=r"rate 3 Hz: this motion reaches 1\.5 Hz and needs at least 6 Hz; use fewer"):
         write_trajectory(made.trajectories[0], tmp_path / "t.csv", rate=3.0)
     with pytest.raises(ScaraIdentError, match="suffix"):
         write_trajectory(made.trajectories[0], tmp_path / "t.txt")
+
+
+def test_ros_2_gets_points_enough_for_a_fast_motion(made):
+    fast = replace(made.trajectories[0], basis=make_basis(0.25, 6))
+    points = yaml.safe_load(joint_trajectory_yaml(fast))["points"]
+    assert len(points) == 0.25 * 240 + 1
+
+
+def test_a_fast_motion_is_noted(made):
+    assert not any("Hz" in line for line in notes(made))
+    fast = tuple(replace(each, basis=make_basis(1.0, 6)) for each in made.trajectories)
+    assert any("reaches 6 Hz, where many arms swing" in line for line in notes(replace(made, trajectories=fast)))
 
 
 def test_ros_2_reads_the_joint_trajectory(made, tmp_path):
@@ -86,7 +101,7 @@ def test_the_json_says_what_was_designed(made):
     q = series["offset"][0] + series["cosine"] @ np.cos(phase) + series["sine"] @ np.sin(phase)
     assert q == pytest.approx(made.trajectories[1].at(np.array([2.5]))[0][1, 0], abs=1e-12)
     assert any("All limits hold" in line for line in content["summary"])
-    assert any("without friction" in line for line in content["notes"])
+    assert any("the friction of the paper's Table 5 (OJD)" in line for line in content["notes"])
 
 
 def test_friction_that_is_known_counts_in_the_torque():

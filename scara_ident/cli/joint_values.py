@@ -1,0 +1,45 @@
+"""Options that give values of joints, such as ``--torque joint1=1.5``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from scara_ident.errors import UsageError
+
+Range = tuple[float, float]
+
+
+def joint_numbers(words: Sequence[str] | None, option: str) -> dict[str, float]:
+    """Read ``JOINT=NUMBER`` words of an option."""
+    return {name: _number(text, option, word) for word in words or () for name, text in [_parted(word, option)]}
+
+
+def joint_ranges(words: Sequence[str] | None, option: str) -> dict[str, Range]:
+    """Read ``JOINT=LOWER..UPPER`` words of an option."""
+    found: dict[str, Range] = {}
+    for word in words or ():
+        name, text = _parted(word, option)
+        lower, dots, upper = text.partition("..")
+        if not dots:
+            raise UsageError(f"{option} {word}: expected JOINT=LOWER..UPPER, such as joint1=-1.5..1.5")
+        found[name] = (_number(lower, option, word), _number(upper, option, word))
+    return found
+
+
+def numbers(word: str | None, option: str) -> list[float] | None:
+    """Read numbers parted by commas; None where nothing is given."""
+    return None if word is None else [_number(text, option, word) for text in word.split(",")]
+
+
+def _parted(word: str, option: str) -> tuple[str, str]:
+    name, sign, text = word.partition("=")
+    if not (name and sign and text):
+        raise UsageError(f"{option} {word}: expected JOINT=VALUE, such as joint1=1.5")
+    return name, text
+
+
+def _number(text: str, option: str, word: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise UsageError(f"{option} {word}: {text!r} is not a number") from None

@@ -1,0 +1,52 @@
+"""What an earlier identification found, to foresee torques with."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from scara_ident.errors import ScaraIdentError
+from scara_ident.model import TorqueModel
+
+
+def read_parameters(path: Path, model: TorqueModel) -> dict[str, float]:
+    """Read the parameters of an ``identification.json``.
+
+    Parameters
+    ----------
+    path : Path
+    model : TorqueModel
+        The model that the design is for.
+
+    Returns
+    -------
+    dict of str to float
+        Value by parameter; without those that the recordings did not determine.
+
+    Raises
+    ------
+    ScaraIdentError
+        If the file cannot be read, has no parameters, or is of another model or robot.
+    """
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))["parameters"]
+        found = {str(row["name"]): float(row["value"]) for row in rows if not _undetermined(row)}
+    except OSError as error:
+        raise ScaraIdentError(
+            f"{path}: cannot be read: {error.strerror or error}; give an identification.json"
+        ) from None
+    except (ValueError, KeyError, TypeError):
+        raise ScaraIdentError(
+            f"{path}: no parameters in it; give the identification.json that identify wrote"
+        ) from None
+    for name in found:
+        if name not in model.names:
+            raise ScaraIdentError(
+                f"{path}: parameter {name!r} is not of the model {model.name}, which has {', '.join(model.names)}; "
+                "identify and excite with one --robot and --model"
+            )
+    return found
+
+
+def _undetermined(row: dict[str, object]) -> bool:
+    return row["value"] is None or bool(row.get("undetermined"))
