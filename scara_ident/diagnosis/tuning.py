@@ -32,7 +32,7 @@ SETTLED = 0.1
 # A step moves a parameter by no more than this share of it.
 LONGEST_STEP = 0.5
 # A rise of the squared error by more than this share turns a step back; loads that settle may raise it by less.
-RISE = 1e-3
+RISE = 1e-5
 
 
 @dataclass(frozen=True)
