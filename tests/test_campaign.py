@@ -112,3 +112,18 @@ def test_a_tiny_campaign_runs_and_a_strong_effect_changes_the_tables(campaign: M
     # On their own trajectory OLS parameters leave Table 1's noise and the little that encoder steps stir up in the loop.
     share = np.diagonal(without).T / campaign.sigma_of(names)
     assert np.all((share > 0.97) & (share < 1.15))
+
+
+def test_encoder_steps_alone_make_the_inertia_of_l2_negative(campaign: ModuleType) -> None:
+    from dataclasses import replace
+
+    arm = campaign.virtual_arm()
+    model = build_model(arm.robot, "reduced")
+    found = {}
+    for steps in (0.0, 2000.0):
+        runs = campaign.repetitions(replace(arm, encoder_steps=np.full(2, steps)), ["L2"], (), 1, noisy=False)
+        (evidence,) = campaign.gather_all(model, runs, (13.7, 10.9))
+        found[steps] = campaign.merge(evidence.unfiltered).solve().value[model.names.index("P_d4")]
+    # Table 5, column OJD, is what the arm is made of.
+    assert found[0.0] == pytest.approx(0.758, rel=0.03)
+    assert found[2000.0] < -0.5
