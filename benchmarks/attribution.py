@@ -23,7 +23,7 @@ from attribution_tables import report
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.bank import Candidate
-from scara_ident.diagnosis.diagnosis import joint_errors
+from scara_ident.diagnosis.outcome import joint_errors
 from scara_ident.diagnosis.search import model_with
 from scara_ident.effects import CATALOGUE, Member
 from scara_ident.effects.measurement import shifted

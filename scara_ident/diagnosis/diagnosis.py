@@ -12,19 +12,17 @@ from numpy.typing import NDArray
 from scara_ident.bands import choose_bands
 from scara_ident.diagnosis.confounding import Rival, rivals
 from scara_ident.diagnosis.finish import physical_parameters
-from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
-from scara_ident.diagnosis.screening import Dependence, screen
-from scara_ident.diagnosis.search import Search, is_delay, model_with, search
+from scara_ident.diagnosis.lack_of_fit import LackOfFit
+from scara_ident.diagnosis.outcome import Task, Unexplained, joint_errors, joint_rms, outcome_of
+from scara_ident.diagnosis.screening import Dependence
+from scara_ident.diagnosis.search import Search, is_delay, model_with
 from scara_ident.effects import CATALOGUE, Effect, Parameter
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.measurement import shifted, within_sampling
 from scara_ident.errors import RecordingError
-from scara_ident.estimators import Estimate, JointError
-from scara_ident.estimators.estimate import joint_error
-from scara_ident.estimators.least_squares import weighted_fit
+from scara_ident.estimators import Estimate
 from scara_ident.evidence import Evidence, gather_all
 from scara_ident.identification import check_held_out, data_notes
-from scara_ident.information import merge
 from scara_ident.mapping import mapping_faults
 from scara_ident.model import ModelName, TorqueModel, build_model
 from scara_ident.recording import Recording
@@ -32,14 +30,6 @@ from scara_ident.robot import Robot
 
 Array = NDArray[np.float64]
 Verdict = Literal["complete", "explained", "unexplained"]
-
-# Share of the squared residual that signals must explain on held-out trajectories to be called a remainder.
-REMAINDER = 0.08
-# A repeatable remainder larger than the noise, within the band, is one whatever it depends on.
-REMAINDER_TO_NOISE = 1.0
-# With what was found the search is repeated where the band becomes this many times as wide, so often at the most.
-WIDER = 1.3
-MOST_WIDENINGS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,27 +64,6 @@ class FoundEffect:
     votes: tuple[int, int]
     before: Mapping[str, float | None]
     after: Mapping[str, float | None]
-
-
-@dataclass(frozen=True)
-class Unexplained:
-    """A repeatable remainder that no effect explains.
-
-    Attributes
-    ----------
-    joint : str
-    signals : tuple of str
-        What it depends on; empty where no signal or pair of signals shows it.
-    rms : float
-        Its size within the band, N m or N.
-    explained : float
-        Share of the squared residual that the signals explain on held-out trajectories.
-    """
-
-    joint: str
-    signals: tuple[str, ...]
-    rms: float
-    explained: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,63 +162,36 @@ def diagnose(
     faults = mapping_faults(base, recordings, bands)
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))
-    found = search(base, recordings, bands, catalogue=catalogue, progress=progress)
-    for _ in range(0 if given else MOST_WIDENINGS):
-        wider = max(choose_bands(found.model, found.recordings).bands) if found.chosen else 0.0
-        if wider < WIDER * max(band or np.inf for band in bands):
-            break
-        # What was missing had hidden how far up the motion explains the torque, and other effects with it.
-        bands = (wider,) * robot.n
-        found = search(base, recordings, bands, catalogue=catalogue, progress=progress)
-    progress("testing what is left")
+    task = Task(base, tuple(recordings), tuple(catalogue), progress)
+    outcome = outcome_of(task, bands, free=not given)
+    found, after = outcome.search, outcome.after
     delay = found.delay[0] if found.delay else 0.0
     held_out = tuple(shifted(recording, delay) for recording in validation) if delay else tuple(validation)
-    final = found.model
-    training_after = gather_all(final, found.recordings, bands)
-    after = weighted_fit(final, training_after)
-    fit_before = lack_of_fit(base, found.start.value, recordings, bands)
-    fit_after = lack_of_fit(final, after.value, found.recordings, bands)
-    dependences = screen(final, after.value, found.recordings, bands)
-    unexplained = _unexplained(fit_after, dependences)
     effects = _effects(found, after)
+    notes += outcome.demoted
     if found.delay is not None and not _is_effect(found):
         notes.append(
             f"effort and position are {found.delay[0] * 1e3:+.2g} ms apart, less than one sample, as when a sample is "
             "held to the next; corrected in the data, not counted as an effect"
         )
-    verdict: Verdict = "unexplained" if unexplained else ("explained" if effects else "complete")
+    verdict: Verdict = "unexplained" if outcome.unexplained else ("explained" if effects else "complete")
     return Diagnosis(
         verdict,
         found,
         found.start,
         after,
         found.start_evidence,
-        training_after,
-        gather_all(base, validation, bands),
-        gather_all(final, held_out, bands),
-        fit_before,
-        fit_after,
+        outcome.training,
+        gather_all(base, validation, found.bands),
+        gather_all(found.model, held_out, found.bands),
+        outcome.fit_before,
+        outcome.fit_after,
         tuple(effects),
         aliases(base),
-        unexplained,
-        dependences[:12],
+        outcome.unexplained,
+        outcome.dependences[:12],
         tuple(notes),
     )
-
-
-def _unexplained(fit: Sequence[LackOfFit], dependences: Sequence[Dependence]) -> Unexplained | None:
-    if dependences and dependences[0].explained > REMAINDER:
-        top = dependences[0]
-        # A pair must say clearly more than its better half.
-        for other in dependences[1:]:
-            if other.joint == top.joint and len(other.signals) == 1 and other.explained > 0.8 * top.explained:
-                top = other
-                break
-        return Unexplained(top.joint, top.signals, top.rms, top.explained)
-    for joint in fit:
-        if joint.missing > REMAINDER_TO_NOISE * joint.noise and joint.p_value < 0.01:
-            return Unexplained(joint.joint, (), joint.missing, 0.0)
-    return None
 
 
 def _effects(found: Search, after: Estimate) -> list[FoundEffect]:
@@ -296,22 +238,6 @@ def _effects(found: Search, after: Estimate) -> list[FoundEffect]:
 def _is_effect(found: Search) -> bool:
     """Whether a delay is more than the place of a sample within its period."""
     return found.delay is not None and not within_sampling(found.delay[0], found.scene.rate)
-
-
-def joint_rms(value: Array, evidence: Sequence[Evidence]) -> list[float | None]:
-    """Return the rms of each joint over recordings, within the band; None without rows."""
-    return [error.rms if error else None for error in joint_errors(value, evidence)]
-
-
-def joint_errors(value: Array, evidence: Sequence[Evidence]) -> list[JointError | None]:
-    """Return the error of each joint over all recordings together."""
-    if not evidence:
-        return []
-    joints = len(evidence[0].unfiltered)
-    return [
-        joint_error(merge(item.joint(j) for item in evidence), merge(item.unfiltered[j] for item in evidence), value)
-        for j in range(joints)
-    ]
 
 
 __all__ = ["Diagnosis", "FoundEffect", "Unexplained", "diagnose", "joint_errors", "joint_rms", "model_with"]

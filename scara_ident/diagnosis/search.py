@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,6 +118,7 @@ def search(
     bands: Sequence[float | None],
     *,
     catalogue: Sequence[Effect] = CATALOGUE,
+    without: Collection[str] = (),
     progress: Callable[[str], None] = lambda step: None,
 ) -> Search:
     """Find what the model lacks.
@@ -130,6 +131,8 @@ def search(
     bands : sequence of float or None, one per joint
     catalogue : sequence of Effect, optional
         Families to try.
+    without : collection of str, optional
+        Labels of candidates that are not to be tried.
     progress : callable, optional
         Called with the name of every step.
 
@@ -141,7 +144,8 @@ def search(
     start_evidence = gather_all(model, data, bands)
     start = weighted_fit(model, start_evidence)
     scene = _scene(model, start.value, data, bands)
-    candidates = [Candidate(effect, member) for effect in catalogue for member in effect.members(scene)]
+    everything = [Candidate(effect, member) for effect in catalogue for member in effect.members(scene)]
+    candidates = [item for item in everything if item.label(scene) not in without]
     tried = max(1, len(candidates))
     progress(f"making the columns of {len(candidates)} candidates")
     base = tabulate(model, data, bands)
@@ -157,7 +161,7 @@ def search(
         decisions = beside.judge(candidates, columns, places)
         fitted = model_with(scene, chosen)
         seeds = line_candidates(scene, fitted, estimate.value, data, bands, catalogue)
-        taken = {item.label(scene) for item in chosen}
+        taken = {*without, *(item.label(scene) for item in chosen)}
         decisions += beside.judge_new([item for item in seeds if item.label(scene) not in taken])
         if len(steps) >= MOST_EFFECTS:
             break

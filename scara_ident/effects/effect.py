@@ -133,6 +133,15 @@ class Geared(Protocol):
         ...
 
 
+@runtime_checkable
+class Resonant(Protocol):
+    """A family whose columns hold in a band that ends below a resonance."""
+
+    def resonance(self, member: Member) -> float:
+        """Return the frequency of the resonance, Hz."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class EffectTerm:
     """A member of a family as a term of a torque model.

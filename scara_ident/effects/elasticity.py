@@ -24,8 +24,9 @@ LAG_BAND = 1.5
 FREQUENCIES = (0.7, 1.2, 2.0, 4.0)
 LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 2.0, 200.0
 # Damping ratio of that swinging. Gears have 0.03 to 0.1, but then the phase after a few swings depends on inertia and
-# stiffness to the percent; with more, what the link does follows from the torque of the last swing.
-DAMPING = 0.3
+# stiffness to the percent; the search begins with more, so that what the link does follows from the torque of the last swing.
+DAMPING = 0.2
+LEAST_DAMPING, MOST_DAMPING = 0.02, 0.7
 # Clearances tried, rad or m at the joint.
 WIDTHS = (3e-4, 1e-3, 3e-3)
 LARGEST_WIDTH = 0.05
@@ -49,15 +50,18 @@ class JointElasticity:
 
     @property
     def knobs(self) -> tuple[Knob, ...]:
-        """The frequency at which the link swings while its motor is held."""
-        return (Knob("frequency", "Hz", LOWEST_FREQUENCY, HIGHEST_FREQUENCY),)
+        """The frequency at which the link swings while its motor is held, and the damping ratio of that, not reported."""
+        return (
+            Knob("frequency", "Hz", LOWEST_FREQUENCY, HIGHEST_FREQUENCY),
+            Knob("_damping_ratio", "1", LEAST_DAMPING, MOST_DAMPING),
+        )
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Frequencies from below the band to far above it, per joint."""
         frequencies = dict.fromkeys(
             float(np.clip(share * scene.band, LOWEST_FREQUENCY, HIGHEST_FREQUENCY)) for share in FREQUENCIES
         )
-        return tuple(Member(j, (f,)) for j in range(scene.robot.n) for f in frequencies)
+        return tuple(Member(j, (f, DAMPING)) for j in range(scene.robot.n) for f in frequencies)
 
     def rows(self, member: Member) -> slice:
         """Return that all joints feel it."""
@@ -78,12 +82,18 @@ class JointElasticity:
         load = _differentiated(signals, _load(signals, j), LOAD_BAND)[0]
         inertia = np.maximum(link_inertia(signals, j), 0.1 * usual)
         stiffness = (2.0 * np.pi * member.knobs[0]) ** 2 * usual
-        lag = swing(load, inertia, stiffness, 2.0 * DAMPING * np.sqrt(stiffness * usual), 1.0 / signals.motion.rate)
+        lag = swing(
+            load, inertia, stiffness, 2.0 * member.knobs[1] * np.sqrt(stiffness * usual), 1.0 / signals.motion.rate
+        )
         return stiffness * lagging(signals, j, lag)[:, None]
 
     def geared_joint(self, member: Member) -> int:
         """Return the joint whose gear it is."""
         return member.joint or 0
+
+    def resonance(self, member: Member) -> float:
+        """Return the frequency of the link against its held motor, Hz."""
+        return member.knobs[0]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """A spring pulls back, and swings at the frequency that its stiffness gives."""

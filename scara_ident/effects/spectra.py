@@ -126,7 +126,7 @@ def frequency_spectrum(residuals: Sequence[Array], rate: float, frequencies: Arr
 
 
 def whitened(
-    residuals: Sequence[Array], rate: float, *, smoothing: float = 0.5, highest: float | None = None
+    residuals: Sequence[Array], rate: float, *, smoothing: float = 1.0, highest: float | None = None
 ) -> list[Array]:
     """Divide residuals by the smooth part of their common amplitude spectrum, without phase.
 
@@ -139,7 +139,7 @@ def whitened(
     rate : float
         Samples per second.
     smoothing : float
-        Hz over which the spectrum is averaged.
+        Hz on either side over which the spectrum's median is taken, which a line does not move.
     highest : float, optional
         Hz above which nothing is kept: the residual's own low-pass.
 
@@ -149,13 +149,14 @@ def whitened(
         Shapes as given.
     """
     from scipy.fft import next_fast_len
-    from scipy.ndimage import uniform_filter1d
+    from scipy.ndimage import median_filter, uniform_filter1d
 
     length = next_fast_len(max(len(residual) for residual in residuals))
     spectra = [np.fft.rfft(np.asarray(residual) - np.mean(residual), length) for residual in residuals]
     power = np.sum([np.abs(spectrum) ** 2 for spectrum in spectra], axis=0) / sum(map(len, residuals))
     reach = max(1, round(smoothing * length / rate))
-    smooth = uniform_filter1d(power, 2 * reach + 1, mode="nearest")
+    middle = median_filter(power, 2 * reach + 1, mode="nearest") / np.log(2.0)
+    smooth = uniform_filter1d(middle, 2 * reach + 1, mode="nearest")
     gain = np.divide(1.0, np.sqrt(smooth), out=np.zeros_like(smooth), where=smooth > 0.0)
     if highest is not None:
         gain[np.fft.rfftfreq(length, 1.0 / rate) > highest] = 0.0

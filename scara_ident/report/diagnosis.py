@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.decision import Decision
-from scara_ident.diagnosis.diagnosis import Diagnosis, joint_errors
+from scara_ident.diagnosis.diagnosis import Diagnosis
+from scara_ident.diagnosis.outcome import joint_errors
 from scara_ident.effects import Parameter
 from scara_ident.evidence import Evidence
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.diagnosis import joint_rms
+from scara_ident.diagnosis.outcome import joint_rms
 from scara_ident.effects import CATALOGUE, Member, Parameter
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted

@@ -89,7 +89,7 @@ def test_far_below_its_frequency_the_column_is_minus_inertia_times_the_loads_sec
     scene = scene_of(load_robot(), band=60.0)
     item = moving(scene.robot, 3.0, rate=1000.0)
     signals = Signals(scene, item)
-    column = columns(JointElasticity(), scene, item, Member(1, (150.0,)))[:, 0]
+    column = columns(JointElasticity(), scene, item, Member(1, (150.0, 0.3)))[:, 0]
     load = signals.load(1) / 0.01
     lag = [load]
     for _ in range(2):
@@ -106,7 +106,7 @@ def test_the_stiffness_is_recovered(joint: str, stiffness: float):
     data = [simulate(arm, wandering(arm, f"t{k}", k), effects=[effect], seed=k).recording for k in (1, 2)]
     family, j = JointElasticity(), arm.robot.joints.index(joint)
     frequency = np.sqrt(stiffness / usual_link_inertia(scene_of(arm.robot), j)) / (2 * np.pi)
-    member = Member(j, (float(frequency),))
+    member = Member(j, (float(frequency), 0.2))
     scene, value, covariance = fit(build_model(arm.robot), data, family, member, rounds=2)
     found = family.parameters(scene, member, value, covariance)["stiffness"]
     assert found.value == pytest.approx(stiffness, rel=0.15)
@@ -126,8 +126,8 @@ def test_the_width_is_recovered():
 def test_what_no_gear_can_have_is_refused():
     scene = scene_of(load_robot())
     std = np.array([1e-7])
-    assert "negative" in str(JointElasticity().inadmissible(scene, Member(0, (30.0,)), np.array([-1e-5]), std))
-    assert "Hz" in str(JointElasticity().inadmissible(scene, Member(0, (30.0,)), np.array([1e-2]), std))
-    assert JointElasticity().inadmissible(scene, Member(0, (30.0,)), np.array([1.2e-5]), std) is None
+    assert "negative" in str(JointElasticity().inadmissible(scene, Member(0, (30.0, 0.3)), np.array([-1e-5]), std))
+    assert "Hz" in str(JointElasticity().inadmissible(scene, Member(0, (30.0, 0.3)), np.array([1e-2]), std))
+    assert JointElasticity().inadmissible(scene, Member(0, (30.0, 0.3)), np.array([1.2e-5]), std) is None
     assert "negative" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([-1e-4]), std))
     assert "rattle" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.2]), std))

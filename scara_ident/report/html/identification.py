@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
 
-from scara_ident.diagnosis.diagnosis import joint_errors
+from scara_ident.diagnosis.outcome import joint_errors
 from scara_ident.estimators.consistent import ConsistentEstimate
 from scara_ident.identification import Identification, undetermined
 from scara_ident.recording import Recording

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.diagnosis import Unexplained
+from scara_ident.diagnosis.outcome import Unexplained
 from scara_ident.report.html.bins import binned_means, middle_range
 from scara_ident.report.html.page import Group
 from scara_ident.report.html.plot import Figure, Matrix, rounded, single
