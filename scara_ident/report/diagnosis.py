@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from scara_ident.diagnosis.decision import Decision
 from scara_ident.diagnosis.diagnosis import Diagnosis
-from scara_ident.diagnosis.outcome import joint_errors
+from scara_ident.diagnosis.outcome import Unexplained, joint_errors
 from scara_ident.effects import Parameter
 from scara_ident.evidence import Evidence
+from scara_ident.terms.friction import Friction
 
 Array = NDArray[np.float64]
 
@@ -186,6 +187,15 @@ def quantity(name: str, parameter: Parameter) -> str:
     return f"{name} {parameter.value:.3g} ± {parameter.std:.1g}{unit}"
 
 
+def _curved(diagnosis: Diagnosis, remainder: Unexplained) -> str:
+    """Return the advice to try curved friction where that is what a straight law leaves, else nothing."""
+    laws = [term for term in diagnosis.before.model.terms if isinstance(term, Friction)]
+    straight = all(max(law.powers) < 2 for law in laws)
+    if straight and remainder.signals == (f"velocity of {remainder.joint}",):
+        return ", but the model's friction is straight in speed: try --model complete"
+    return ""
+
+
 def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Return the result in words."""
     found = []
@@ -225,7 +235,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         on = f"depends on {' and '.join(remainder.signals)}" if remainder.signals else "repeats from run to run"
         found.append(
             f"Unexplained: on {remainder.joint} a remainder of {remainder.rms:.3g} {unit} rms {on}; "
-            "no effect of the catalogue accounts for it."
+            f"no effect of the catalogue accounts for it{_curved(diagnosis, remainder)}."
         )
     return tuple(found)
 

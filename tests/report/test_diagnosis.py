@@ -128,3 +128,14 @@ def test_a_remainder_is_told_with_joint_signal_and_size():
     assert content["verdict"] == "unexplained"
     assert set(content["unexplained"]) == {"joint", "signals", "rms", "explained_share"}
     assert "depends on position of joint2" in content["summary"][-1]
+
+
+def test_a_straight_friction_law_that_leaves_a_curve_is_told_what_to_try():
+    runs = with_torque(exact_runs(), 0, lambda motion: 0.05 * motion.v[0] ** 3)
+    found = diagnose(load_robot(), "basic", runs, bands=BANDS, catalogue=())
+    words = " ".join(sentences(found))
+    assert found.unexplained is not None
+    assert found.unexplained.signals == (f"velocity of {found.unexplained.joint}",)
+    assert "straight in speed: try --model complete" in words
+    cubic = " ".join(sentences(diagnose(load_robot(), "complete", runs, bands=BANDS, catalogue=())))
+    assert "try --model" not in cubic
