@@ -68,13 +68,14 @@ def diagnose(
     console.print(rows)
     if output is not None:
         from scara_ident.report.html import diagnosis_report
-        from scara_ident.report.pictures import diagnosis_pictures
+        from scara_ident.report.pictures import diagnosis_pictures, remove_stale
 
         with written_together(output) as place:
             pictures = diagnosis_pictures(place, result, training)
             write_text(place / "diagnosis.md", diagnosis_markdown(result, pictures))
             diagnosis_report(place / "report.html", result, training, held_out)
             write_json(place / "diagnosis.json", content)
+        remove_stale(output, [name for _, name in pictures])
         names = ("diagnosis.json", "diagnosis.md", *(name for _, name in pictures), "report.html")
         written = ", ".join(str(output / name) for name in names)
         console.print(f"written: {written}", markup=False, soft_wrap=True)

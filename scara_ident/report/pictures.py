@@ -190,3 +190,17 @@ def _draw_matrix(part: Any, matrix: Matrix) -> None:
     axis.set_xlabel(matrix.column_label, fontsize=8)
     axis.set_ylabel(matrix.row_label, fontsize=8)
     part.colorbar(image, ax=axis).ax.tick_params(labelsize=7)
+
+
+def remove_stale(folder: Path, written: Sequence[str]) -> None:
+    """Remove pictures that an earlier diagnosis left in a folder, so that they are not taken for this one's.
+
+    Parameters
+    ----------
+    folder : Path
+    written : sequence of str
+        Names of this diagnosis' pictures.
+    """
+    for old in (*folder.glob("effect_*.png"), folder / "unexplained.png"):
+        if old.name not in written:
+            old.unlink(missing_ok=True)

@@ -17,7 +17,7 @@ from scara_ident.report.html.remainder import signal_of
 from scara_ident.report.html.story import chapter_group
 from scara_ident.report.html.torque import torque_group
 from scara_ident.report.html.traces import Trace
-from scara_ident.report.pictures import COLORS, diagnosis_pictures
+from scara_ident.report.pictures import COLORS, diagnosis_pictures, remove_stale
 from scara_ident.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, with_torque
 
@@ -101,3 +101,10 @@ def test_a_residual_that_is_not_used_does_not_set_the_scale():
     assert not layers["residual, not used"].fit
     assert np.nanmax(layers["residual"].y) == pytest.approx(0.01)
     assert np.nanmax(layers["residual, not used"].y) == pytest.approx(5.0)
+
+
+def test_pictures_of_an_earlier_diagnosis_do_not_stay(tmp_path: Path) -> None:
+    for name in ("effect_1.png", "effect_2.png", "unexplained.png", "mine.png"):
+        (tmp_path / name).write_bytes(b"png")
+    remove_stale(tmp_path, ["effect_1.png"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["effect_1.png", "mine.png"]
