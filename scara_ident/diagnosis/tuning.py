@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 ARMATURE_STD = 0.2
 # Step for the derivative by a nonlinear parameter, as a share of it.
 DERIVATIVE_STEP = 1e-3
+# A longer one for an armature: the flights of a backlash begin and end at samples, which a short step does not move.
+ARMATURE_STEP = 2e-2
 # Steps of Gauss and Newton, and by how many standard deviations the last one may still move something.
 ROUNDS = 6
 SETTLED = 0.1
@@ -62,7 +64,8 @@ class Unknown:
     @property
     def step(self) -> float:
         """For a derivative."""
-        return DERIVATIVE_STEP * (abs(self.value) if self.value else self.upper - self.lower)
+        share = ARMATURE_STEP if self.owner is None else DERIVATIVE_STEP
+        return share * (abs(self.value) if self.value else self.upper - self.lower)
 
 
 @dataclass(frozen=True, eq=False)
