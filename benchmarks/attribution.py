@@ -27,7 +27,7 @@ from scara_ident.diagnosis.outcome import joint_errors
 from scara_ident.diagnosis.search import model_with
 from scara_ident.effects import CATALOGUE, Member
 from scara_ident.effects.measurement import shifted
-from scara_ident.estimators.least_squares import weighted_fit
+from scara_ident.estimators.least_squares import wls
 from scara_ident.evidence import gather_all
 from scara_ident.indri2002 import OJD, OJK
 from scara_ident.robot import load_robot
@@ -214,7 +214,7 @@ def true_model_error(result, training, held_out, effects) -> list[float] | None:
             partner = 1 - joint
         chosen.append(Candidate(family, Member(joint, knobs, partner)))
     model = model_with(scene, chosen)
-    fit = weighted_fit(model, gather_all(model, [shifted(item, delay) for item in training], bands))
+    fit = wls(model, gather_all(model, [shifted(item, delay) for item in training], bands))
     tested = gather_all(model, [shifted(item, delay) for item in held_out], bands)
     return [error.rms for error in joint_errors(fit.value, tested)]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.estimators import Estimate
-from scara_ident.estimators.least_squares import weighted_fit, weighted_value
+from scara_ident.estimators.least_squares import weighted_value, wls
 from scara_ident.evidence import Evidence, gather_all
 from scara_ident.information import merge
 from scara_ident.model import TorqueModel
@@ -103,7 +103,7 @@ def mapping_faults(
     faults: list[MappingFault] = []
     for _ in range(2 * len(joints)):
         evidence = gather_all(model, data, bands)
-        fitted = weighted_fit(model, evidence)
+        fitted = wls(model, evidence)
         errors, score = _relative(fitted.value, evidence), _score(fitted.value, evidence)
         pushing = _pushing(fitted, data, bands)
         best: tuple[MappingFault, tuple[Recording, ...]] | None = None
@@ -115,7 +115,7 @@ def mapping_faults(
                 continue
             # A turned sign must take the push away; signs that an exchange brings to light are the next round's.
             allowed = np.count_nonzero(pushing) - (signal != "effort and position")
-            if not exchanged and np.count_nonzero(_pushing(weighted_fit(model, held), other, bands)) > allowed:
+            if not exchanged and np.count_nonzero(_pushing(wls(model, held), other, bands)) > allowed:
                 continue
             names = tuple(joints[j] for j in chosen)
             best = MappingFault(signal, names, exchanged, score, mended), other

@@ -21,13 +21,19 @@ from scara_ident.consistency.programme import MARGIN, Point, Programme
 from scara_ident.consistency.pull import prior_rows
 from scara_ident.consistency.unknowns import Unknowns
 from scara_ident.errors import EstimationError, UsageError
-from scara_ident.information import UNDETERMINED, Information, Solution, merge
+from scara_ident.information import (
+    LEAST_NOISE,
+    UNDETERMINED,
+    Information,
+    Solution,
+    joint_noise,
+    merge,
+    weighted,
+)
 from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
-# Data without noise are not weighted beyond this share of the torque.
-LEAST_NOISE = 1e-6
 # The solver keeps its constraints to so many digits, relative to the nominal bodies.
 DIGITS = 1e-6
 
@@ -121,7 +127,7 @@ def solve_joints(
 
 
 def _weighted(joints: Sequence[Information], weights: Array, prior: Information | None) -> Information:
-    information = merge(joint.scaled(float(w)) for joint, w in zip(joints, weights, strict=True))
+    information = weighted(joints, weights)
     if prior is None:
         return information
     return merge([information, prior.scaled(noise_of(information, information.solve()))])
@@ -133,9 +139,7 @@ def _joint_noise(joints: Sequence[Information], given: Array | None) -> Array:
         if noise.shape != (len(joints),) or not np.all(noise > 0.0):
             raise UsageError(f"noise: expected {len(joints)} numbers above 0, one per joint")
         return noise
-    value = merge(joints).solve().value
-    # An exact fit would give an infinite weight; rounding is the floor.
-    return np.array([max(j.rms(value), LEAST_NOISE * j.torque_rms) or 1.0 for j in joints])
+    return joint_noise(joints)
 
 
 @one_blas_thread()

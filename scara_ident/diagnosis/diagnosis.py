@@ -13,9 +13,9 @@ from scara_ident.bands import choose_bands
 from scara_ident.diagnosis.confounding import Rival, rivals
 from scara_ident.diagnosis.finish import physical_parameters
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
-from scara_ident.diagnosis.outcome import Task, Unexplained, joint_errors, joint_rms, outcome_of
+from scara_ident.diagnosis.outcome import Task, Unexplained, joint_rms, outcome_of
 from scara_ident.diagnosis.screening import Dependence
-from scara_ident.diagnosis.search import Search, is_delay, model_with
+from scara_ident.diagnosis.search import Search, is_delay
 from scara_ident.effects import CATALOGUE, Effect, Parameter
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.measurement import shifted, within_sampling
@@ -238,6 +238,3 @@ def _effects(found: Search, after: Estimate) -> list[FoundEffect]:
 def _is_effect(found: Search) -> bool:
     """Whether a delay is more than the place of a sample within its period."""
     return found.delay is not None and not within_sampling(found.delay[0], found.scene.rate)
-
-
-__all__ = ["Diagnosis", "FoundEffect", "Unexplained", "diagnose", "joint_errors", "joint_rms", "model_with"]

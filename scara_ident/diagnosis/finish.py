@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scara_ident.covariance import block_covariance
 from scara_ident.diagnosis.bank import Candidate
 from scara_ident.diagnosis.examination import examine
-from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
-from scara_ident.diagnosis.tuning import DERIVATIVE_STEP, Linearised, linearise
+from scara_ident.diagnosis.table import Table, tabulate
+from scara_ident.diagnosis.tuning import Linearised, linearise
 from scara_ident.effects import Parameter, Scene
 from scara_ident.information import Information, triangular
 from scara_ident.recording import Recording
@@ -58,31 +58,16 @@ def parameters_beside(
 ) -> dict[str, Parameter]:
     """Return the physical parameters of one effect beside a model, as `physical_parameters` at a fraction of the work.
 
-    The model's columns are projected out, and the covariance is that of the effect's block scores.
+    The model's columns are projected out, and the covariance is that of the effect's block scores. Armatures stay as
+    they are.
     """
-    variants = [
-        candidate.at([value + sign * _step(candidate, k) * (i == k) for i, value in enumerate(candidate.member.knobs)])
-        for k in range(len(candidate.effect.knobs))
-        for sign in (1.0, -1.0)
-    ]
-    columns, places = tabulate_candidates(scene, [candidate, *variants], recordings, bands)
-    count, own = table.columns.shape[1], columns[:, places[0]]
-    value = examine(table.beside(own).weighted(weights), range(count), [list(range(count, count + own.shape[1]))])[
-        0
-    ].value
-    changes = [
-        (columns[:, places[1 + 2 * k]] - columns[:, places[2 + 2 * k]]) @ value / (2.0 * _step(candidate, k))
-        for k in range(len(candidate.effect.knobs))
-    ]
-    wide = np.column_stack([own, *changes])
-    found = examine(table.beside(wide).weighted(weights), range(count), [list(range(count, count + wide.shape[1]))])[0]
-    size = own.shape[1]
-    return dict(candidate.effect.parameters(scene, candidate.member, value, found.covariance[:size, :size]))
-
-
-def _step(candidate: Candidate, k: int) -> float:
-    knob, value = candidate.effect.knobs[k], candidate.member.knobs[k]
-    return DERIVATIVE_STEP * (abs(value) if value else knob.upper - knob.lower)
+    state = linearise(scene, recordings, bands, table, weights, [candidate])
+    knobs = [k for k, unknown in enumerate(state.unknowns) if unknown.owner is not None]
+    first, own = table.columns.shape[1], state.places[0]
+    wide = state.table.beside(state.derivatives[:, knobs])
+    (found,) = examine(wide, range(first), [list(range(first, wide.columns.shape[1]))])
+    size = own.stop - own.start
+    return dict(candidate.effect.parameters(scene, candidate.member, state.value[own], found.covariance[:size, :size]))
 
 
 def _covariance(state: Linearised) -> Array:

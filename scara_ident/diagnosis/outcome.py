@@ -16,7 +16,7 @@ from scara_ident.effects import Effect
 from scara_ident.effects.effect import Resonant
 from scara_ident.estimators import Estimate, JointError
 from scara_ident.estimators.estimate import joint_error
-from scara_ident.estimators.least_squares import weighted_fit
+from scara_ident.estimators.least_squares import wls
 from scara_ident.evidence import Evidence, gather_all
 from scara_ident.information import merge
 from scara_ident.model import TorqueModel
@@ -139,7 +139,7 @@ def _searched(task: Task, bands: Sequence[float | None], without: Collection[str
     task.progress("testing what is left")
     final = found.model
     training = gather_all(final, found.recordings, bands)
-    after = weighted_fit(final, training)
+    after = wls(final, training)
     fit_before = lack_of_fit(task.model, found.start.value, task.recordings, bands)
     fit_after = lack_of_fit(final, after.value, found.recordings, bands)
     dependences = screen(final, after.value, found.recordings, bands)

@@ -18,7 +18,7 @@ from scara_ident.diagnosis.tuning import tune
 from scara_ident.effects import CATALOGUE, Effect, Resolved, Scene
 from scara_ident.effects.measurement import shifted
 from scara_ident.estimators import Estimate
-from scara_ident.estimators.least_squares import weighted_fit
+from scara_ident.estimators.least_squares import wls
 from scara_ident.evidence import Evidence, gather_all
 from scara_ident.model import TorqueModel
 from scara_ident.motion import motion_of, stretches
@@ -142,7 +142,7 @@ def search(
     """
     data = tuple(recordings)
     start_evidence = gather_all(model, data, bands)
-    start = weighted_fit(model, start_evidence)
+    start = wls(model, start_evidence)
     scene = _scene(model, start.value, data, bands)
     everything = [Candidate(effect, member) for effect in catalogue for member in effect.members(scene)]
     candidates = [item for item in everything if item.label(scene) not in without]
@@ -180,7 +180,7 @@ def search(
         scene, chosen = tune(scene, data, bands, base, weights, chosen)
         fitted = model_with(scene, chosen)
         evidence = gather_all(fitted, data, bands)
-        estimate = weighted_fit(fitted, evidence)
+        estimate = wls(fitted, evidence)
         weights = estimate.weights
         scene = replace(scene, value=estimate.value[: len(model.columns)])
         repeated = bool(steps) and steps[-1].decision.label == winner.label

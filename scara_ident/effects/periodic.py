@@ -1,4 +1,4 @@
-"""Torques and readings that are periodic in the motor's angle or in time, and the spectra that show them."""
+"""Torques and readings that are periodic in the motor's angle or in time."""
 
 from __future__ import annotations
 
@@ -12,31 +12,9 @@ from scara_ident.effects.effect import Knob, Member, Parameter
 from scara_ident.effects.friction import amplitude_and_phase, friction_slope, moving
 from scara_ident.effects.links import rigid_torque, shared
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.effects.spectra import (
-    Line,
-    frequency_spectrum,
-    frequency_width,
-    lines,
-    order_spectrum,
-    order_width,
-    whitened,
-)
 from scara_ident.terms import Column
 
 Array = NDArray[np.float64]
-
-__all__ = [
-    "EncoderEccentricity",
-    "Line",
-    "TorqueRipple",
-    "Vibration",
-    "frequency_spectrum",
-    "frequency_width",
-    "lines",
-    "order_spectrum",
-    "order_width",
-    "whitened",
-]
 
 # Orders that gears and motors have; others are found in the residual's spectrum.
 ORDERS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0)

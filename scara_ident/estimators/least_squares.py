@@ -11,13 +11,11 @@ from scara_ident.covariance import block_covariance
 from scara_ident.errors import EstimationError
 from scara_ident.estimators.estimate import Estimate, pooled_information, weighted_blocks
 from scara_ident.evidence import Evidence
-from scara_ident.information import Information, merge
+from scara_ident.information import Information, joint_noise, merge, weighted
 from scara_ident.model import TorqueModel
 from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
-
-WEIGHTING_ROUNDS = 3
 
 
 def ols(model: TorqueModel, evidence: Sequence[Evidence]) -> Estimate:
@@ -49,8 +47,8 @@ def wls(model: TorqueModel, evidence: Sequence[Evidence], noise: Array | None = 
     model : TorqueModel
     evidence : sequence of Evidence
     noise : ndarray, shape (n,), optional
-        Standard deviation of each joint's torque, from repetitions; by default the residual of `ols` within
-        the band.
+        Standard deviation of each joint's torque, from repetitions; by default each joint's residual within the band,
+        in rounds: at first a bad joint spoils the good one's.
 
     Returns
     -------
@@ -62,17 +60,12 @@ def wls(model: TorqueModel, evidence: Sequence[Evidence], noise: Array | None = 
         If there is no evidence, or a joint's noise is not a positive number.
     """
     if noise is None:
-        noise = residual_noise(ols(model, evidence), evidence)
+        with one_blas_thread():
+            return least_squares(model, evidence, 1.0 / joint_noise(_joints(model, evidence)), "wls")
     for joint, sigma in zip(model.robot.joints, noise, strict=True):
         if not 0.0 < sigma < np.inf:
             raise EstimationError(f"noise of joint {joint} is {sigma:g}; expected a positive number to weigh by")
     return least_squares(model, evidence, 1.0 / noise, "wls")
-
-
-def residual_noise(estimate: Estimate, evidence: Sequence[Evidence]) -> Array:
-    """Return the rms residual of each joint within the band, shape (n,); 1 for a joint without rows."""
-    n = estimate.model.robot.n
-    return _rms(estimate.value, [merge(item.joint(j) for item in evidence) for j in range(n)])
 
 
 def least_squares(
@@ -94,45 +87,15 @@ def least_squares(
     return Estimate(model, method, solution.value, covariance, solution.undetermined, information, weights, spread.kind)
 
 
-def weighted_fit(model: TorqueModel, evidence: Sequence[Evidence]) -> Estimate:
-    """Fit with each joint weighted by its residual, in rounds: a bad joint first spoils the good one's residual.
-
-    Parameters
-    ----------
-    model : TorqueModel
-    evidence : sequence of Evidence
-
-    Returns
-    -------
-    Estimate
-    """
-    with one_blas_thread():
-        return least_squares(model, evidence, _settled_weights(model, evidence)[1], "wls")
-
-
 def weighted_value(model: TorqueModel, evidence: Sequence[Evidence]) -> Array:
-    """Return the parameters of `weighted_fit` alone, shape (p,), without the work of their covariance."""
+    """Return the parameters of `wls` alone, shape (p,), without the work of their covariance."""
     with one_blas_thread():
-        return _settled_weights(model, evidence)[0]
+        joints = _joints(model, evidence)
+        return weighted(joints, 1.0 / joint_noise(joints)).solve().value
 
 
-def _settled_weights(model: TorqueModel, evidence: Sequence[Evidence]) -> tuple[Array, Array]:
-    joints = [merge(item.joint(j) for item in evidence) for j in range(model.robot.n)]
-    weights = np.ones(model.robot.n)
-    for _ in range(WEIGHTING_ROUNDS):
-        weights = 1.0 / _rms(_weighted_value(joints, weights), joints)
-    return _weighted_value(joints, weights), weights
-
-
-def _weighted_value(joints: Sequence[Information], weights: Array) -> Array:
-    return merge(part.scaled(float(weight)) for part, weight in zip(joints, weights, strict=True)).solve().value
-
-
-def _rms(value: Array, joints: Sequence[Information]) -> Array:
-    # An exact fit would give an infinite weight; rounding is the floor.
-    return np.array(
-        [
-            max(part.rms(value), 1e-12 * max(part.torque_rms, np.finfo(float).tiny)) if part.rows else 1.0
-            for part in joints
-        ]
-    )
+def _joints(model: TorqueModel, evidence: Sequence[Evidence]) -> list[Information]:
+    """All rows of each joint."""
+    if not evidence:
+        raise EstimationError("no recording to estimate from")
+    return [merge(item.joint(j) for item in evidence) for j in range(model.robot.n)]

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from scara_ident.diagnosis.table import Table
 from scara_ident.effects import Scene
-from scara_ident.estimators.least_squares import weighted_fit
-from scara_ident.evidence import gather_all
+from scara_ident.estimators import Estimate
+from scara_ident.estimators.least_squares import wls
+from scara_ident.evidence import Evidence, gather_all
 from scara_ident.indri2002 import table5_parameters
+from scara_ident.information import merge
 from scara_ident.model import TorqueModel, build_model
 from scara_ident.motion import motion_of, stretches
 from scara_ident.recording import Recording
@@ -99,7 +101,7 @@ def complete() -> TorqueModel:
 
 def fitted(model: TorqueModel, recordings: Sequence[Recording], bands=BANDS):
     """Return the weighted estimate of a model."""
-    return weighted_fit(model, gather_all(model, recordings, bands))
+    return wls(model, gather_all(model, recordings, bands))
 
 
 def scene_of(model: TorqueModel, recordings: Sequence[Recording], bands=BANDS) -> Scene:
@@ -130,3 +132,9 @@ def table_of(columns: Array, torque: Array, recordings: int = 4, block: int = 40
         tuple(f"T{k}" for k in range(recordings)),
         owner,
     )
+
+
+def residual_noise(estimate: Estimate, evidence: Sequence[Evidence]) -> Array:
+    """Rms residual of each joint within the band, shape (n,)."""
+    joints = range(estimate.model.robot.n)
+    return np.array([merge(item.joint(j) for item in evidence).rms(estimate.value) for j in joints])

@@ -12,8 +12,16 @@ from scara_ident.effects import Member
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
-from scara_ident.estimators.least_squares import residual_noise
-from tests.diagnosis.made import BANDS, complete, exact_runs, fitted, scene_of, virtual_runs, with_torque
+from tests.diagnosis.made import (
+    BANDS,
+    complete,
+    exact_runs,
+    fitted,
+    residual_noise,
+    scene_of,
+    virtual_runs,
+    with_torque,
+)
 
 MODEL = complete()
 SMALL = (Spring(), Stribeck(), AsymmetricFriction(), TimeDelay())

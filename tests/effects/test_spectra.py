@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scara_ident.effects.periodic import (
+from scara_ident.effects.spectra import (
+    NEIGHBOURS_IN_TIME,
     frequency_spectrum,
     frequency_width,
     lines,
@@ -14,7 +15,6 @@ from scara_ident.effects.periodic import (
     order_width,
     whitened,
 )
-from scara_ident.effects.spectra import NEIGHBOURS_IN_TIME
 
 Array = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose
 from scara_ident.errors import EstimationError
 from scara_ident.estimators import ols, wls
 from scara_ident.estimators.estimate import joint_error, paper_criteria, pooled_information
-from scara_ident.estimators.least_squares import residual_noise
 from scara_ident.information import Information
 from scara_ident.model import TorqueModel
+from tests.diagnosis.made import residual_noise
 from tests.evidence import evidence, rows, two_joint_model
 
 NOISE = np.array([0.5, 0.01])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
@@ -17,7 +18,7 @@ BY_ARM = math.nan
 
 
 @dataclass(frozen=True)
-class Effect:
+class Effect(ABC):
     """One physical effect that a rigid body with polynomial friction and offset lacks.
 
     Attributes
@@ -79,9 +80,9 @@ class Effect:
         """Return the row of its joint in Pinocchio's order."""
         return int(arm.robot.order[arm.joint_index(self.joint or arm.robot.joints[0])])
 
+    @abstractmethod
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Add the effect, which must be resolved, to the arm's arrays."""
-        raise NotImplementedError
 
     def as_dict(self) -> dict[str, Any]:
         """Return name, joint and parameters, ready for JSON."""
