@@ -22,16 +22,16 @@ import numpy as np
 from attribution_tables import report
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.bank import Candidate
-from scara_ident.diagnosis.outcome import joint_errors
+from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.model_selection import joint_errors
 from scara_ident.diagnosis.search import model_with
 from scara_ident.effects import CATALOGUE, Member
 from scara_ident.effects.measurement import shifted
-from scara_ident.estimators.least_squares import wls
-from scara_ident.evidence import gather_all
-from scara_ident.indri2002 import OJD, OJK
-from scara_ident.robot import load_robot
-from scara_ident.virtual import EFFECTS, ReferenceMotion, sampled, simulate, virtual_arm
+from scara_ident.estimation.least_squares import wls
+from scara_ident.estimation.observations import gather_all
+from scara_ident.paper import OJD, OJK
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import EFFECTS, ReferenceMotion, sampled, simulate, virtual_arm
 
 # Effects that are not told by one name: their size is this parameter, scaled by a random factor.
 SIZE = {
@@ -174,7 +174,7 @@ def one_set(task: tuple[str, int]) -> dict:
             {
                 "effect": e.effect,
                 "joint": e.joint,
-                "group": [rival.effect for rival in e.confounded_with],
+                "group": [confounder.effect for confounder in e.confounded_with],
                 "parameters": {k: [p.value, p.std] for k, p in e.parameters.items()},
                 "gain": e.gain,
             }
@@ -201,18 +201,23 @@ def true_model_error(result, training, held_out, effects) -> list[float] | None:
             continue
         # The family whose nonlinear parameters are those that the effect has.
         family = next(
-            (f for f in CATALOGUE if f.name == effect.name and all(knob.name in values for knob in f.knobs)), None
+            (
+                f
+                for f in CATALOGUE
+                if f.name == effect.name and all(parameter.name in values for parameter in f.nonlinear)
+            ),
+            None,
         )
         if family is None:
             return None
         joint = None if effect.joint is None else scene.robot.joints.index(effect.joint)
-        knobs = tuple(float(values[knob.name]) for knob in family.knobs if knob.name in values)
-        if len(knobs) != len(family.knobs):
+        nonlinear = tuple(float(values[parameter.name]) for parameter in family.nonlinear if parameter.name in values)
+        if len(nonlinear) != len(family.nonlinear):
             return None
         partner = None
         if effect.name == "friction_coupling":
             partner = 1 - joint
-        chosen.append(Candidate(family, Member(joint, knobs, partner)))
+        chosen.append(Candidate(family, Member(joint, nonlinear, partner)))
     model = model_with(scene, chosen)
     fit = wls(model, gather_all(model, [shifted(item, delay) for item in training], bands))
     tested = gather_all(model, [shifted(item, delay) for item in held_out], bands)

@@ -8,7 +8,7 @@ JSON are made by ``campaign_figures.py``.
    with noise of Table 1's size drawn on top: on the parameters, where white noise ends up by
    ``A^-1 sum_j sigma_j W_j' e_j``, and on the torque that is predicted. All scenes share the same draws. Their distance
    from the printed tables is the rms of log10(virtual / printed) over the error cells. Beside the effects stands a
-   rival: no effect, but a wider low-pass on the motion.
+   confounder: no effect, but a wider low-pass on the motion.
 2. Campaign: six noisy repetitions, without an effect and with the one that came nearest (or those given), through
    `compare` for OLS complete, OLS reduced and consistent. Errors are those of the unfiltered torque, as the paper's.
 """
@@ -39,14 +39,14 @@ from campaign_tables import (
 )
 from numpy.typing import NDArray
 
-from scara_ident.comparison import Comparison, compare
-from scara_ident.evidence import Evidence, gather_all
-from scara_ident.indri2002 import REDUCED, TRAJECTORIES
-from scara_ident.information import merge
-from scara_ident.model import build_model
-from scara_ident.recording import Recording
-from scara_ident.virtual import CATALOGUE, Effect, ReferenceMotion, VirtualArm, parse_effect, simulate, virtual_arm
-from scara_ident.virtual.named import named_motion
+from scara_ident.estimation.information import merge
+from scara_ident.estimation.observations import Evidence, gather_all
+from scara_ident.identification.compare import Comparison, compare
+from scara_ident.model.model import build_model
+from scara_ident.paper import REDUCED, TRAJECTORIES
+from scara_ident.recording.recording import Recording
+from scara_ident.simulation import CATALOGUE, Effect, ReferenceMotion, VirtualArm, parse_effect, simulate, virtual_arm
+from scara_ident.simulation.named import named_motion
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ METHODS = (("complete", "ols"), ("reduced", "ols"), ("complete", "consistent"))
 DRAWS = 200
 READINGS = {"one_run": 1.0, "mean_of_six": 1.0 / np.sqrt(6.0)}
 FINER = (0.6, 1.7)
-# No effect of the arm but a rival: motion filtered at that many times the chosen cut-off, so that accelerations are
+# No effect of the arm but a confounder: motion filtered at that many times the chosen cut-off, so that accelerations are
 # noisier, as the paper's may have been; it does not say how it found them.
 WIDER = "wider_filter"
 WIDER_FACTORS = (1.5, 2.0, 2.5)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from scara_ident.errors import UsageError
-from scara_ident.virtual import Effect, VirtualArm
+from scara_ident.simulation import Effect, VirtualArm
 
 # How often each default size; a negative factor where the effect's sign matters.
 FACTORS = (0.5, 1.0, 3.0)

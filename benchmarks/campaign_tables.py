@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.evidence import Evidence
-from scara_ident.indri2002 import REDUCED, TABLE_1, TABLE_2, TABLE_4, TABLE_5, TORQUE_RMS, TRAJECTORIES
-from scara_ident.information import merge
-from scara_ident.model import build_model
-from scara_ident.virtual import virtual_arm
+from scara_ident.estimation.information import merge
+from scara_ident.estimation.observations import Evidence
+from scara_ident.model.model import build_model
+from scara_ident.paper import REDUCED, TABLE_1, TABLE_2, TABLE_4, TABLE_5, TORQUE_RMS, TRAJECTORIES
+from scara_ident.simulation import virtual_arm
 
 Array = NDArray[np.float64]
 

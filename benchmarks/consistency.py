@@ -27,16 +27,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.consistency.bodies import pack, smallest_eigenvalue_share
-from scara_ident.consistency.friction_certificate import friction_faults
-from scara_ident.consistency.programme import Programme, constraints_on
-from scara_ident.consistency.pull import prior_rows
-from scara_ident.consistency.solution import fill, least_squares_arm, solve_consistent, solve_joints
-from scara_ident.description import JointDescription, RobotDescription
-from scara_ident.information import Information, merge
-from scara_ident.model import TorqueModel, build_model
-from scara_ident.motion import Motion
-from scara_ident.robot import Robot, build_robot, load_robot
+from scara_ident.estimation.consistent.bodies import pack, smallest_eigenvalue_share
+from scara_ident.estimation.consistent.friction_certificate import friction_faults
+from scara_ident.estimation.consistent.programme import Programme, constraints_on
+from scara_ident.estimation.consistent.pull import prior_rows
+from scara_ident.estimation.consistent.solution import fill, least_squares_arm, solve_consistent, solve_joints
+from scara_ident.estimation.information import Information, merge
+from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.description import JointDescription, RobotDescription
+from scara_ident.robot.robot import Robot, build_robot, load_robot
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.description import JointDescription, RobotDescription
 from scara_ident.excitation import (
     Condition,
     Criterion,
@@ -34,12 +33,13 @@ from scara_ident.excitation import (
     limits_of,
     nominal_parameters,
 )
-from scara_ident.identification import identify
-from scara_ident.indri2002 import OJD, criteria, regressor, table5_parameters, tool_acceleration
-from scara_ident.model import TorqueModel, build_model
-from scara_ident.robot import Robot, build_robot, load_robot
-from scara_ident.terms.rigid_body import rigid_body
-from scara_ident.virtual import sampled, simulate, virtual_arm
+from scara_ident.identification.identify import identify
+from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.model.terms.rigid_body import rigid_body
+from scara_ident.paper import OJD, criteria, regressor, table5_parameters, tool_acceleration
+from scara_ident.robot.description import JointDescription, RobotDescription
+from scara_ident.robot.robot import Robot, build_robot, load_robot
+from scara_ident.simulation import sampled, simulate, virtual_arm
 
 Array = NDArray[np.float64]
 

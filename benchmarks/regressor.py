@@ -26,7 +26,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from scara_ident.regressor import build_kernel
+from scara_ident.model.regressor.kernel import build_kernel
 
 Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[1]

@@ -17,14 +17,14 @@ from pathlib import Path
 
 import numpy as np
 
-from scara_ident.robot import Robot, load_robot
-from scara_ident.virtual import Effect, ReferenceMotion, parse_effect, sampled, simulate, virtual_arm
+from scara_ident.robot.robot import Robot, load_robot
+from scara_ident.simulation import Effect, ReferenceMotion, parse_effect, sampled, simulate, virtual_arm
 
 FIRST = """
 import time
 start = time.perf_counter()
-from scara_ident.indri2002 import OJD
-from scara_ident.virtual import sampled, simulate, virtual_arm
+from scara_ident.paper import OJD
+from scara_ident.simulation import sampled, simulate, virtual_arm
 arm = virtual_arm()
 simulate(arm, sampled("OJD", arm.robot, OJD.motion, 25.0))
 print(time.perf_counter() - start)
@@ -83,7 +83,7 @@ def best_of(robot: Robot, motion: ReferenceMotion, effects: tuple[Effect, ...], 
 
 
 def main() -> None:
-    from scara_ident.indri2002 import OJD
+    from scara_ident.paper import OJD
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, help="write the table as JSON")

@@ -14,49 +14,49 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scara_ident.base_parameters import BaseParameters, check_base_parameters, find_base_parameters
     from scara_ident.errors import ScaraIdentError
-    from scara_ident.estimators import Estimate, ols, rls, wls
-    from scara_ident.evidence import Evidence, gather, gather_all
-    from scara_ident.identification import Identification, identify
-    from scara_ident.information import Information, merge
-    from scara_ident.model import TorqueModel, build_model
-    from scara_ident.motion import Motion, motion_of, stretches
-    from scara_ident.recording import Recording, read_recording, read_recordings, write_recording
-    from scara_ident.regressor import RegressorKernel, build_kernel
-    from scara_ident.robot import Robot, load_robot
+    from scara_ident.estimation import Estimate, ols, rls, wls
+    from scara_ident.estimation.information import Information, merge
+    from scara_ident.estimation.observations import Evidence, gather, gather_all
+    from scara_ident.identification.identify import Identification, identify
+    from scara_ident.model.base_parameters import BaseParameters, check_base_parameters, find_base_parameters
+    from scara_ident.model.model import TorqueModel, build_model
+    from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
+    from scara_ident.motion.motion import Motion, motion_of, stretches
+    from scara_ident.recording.recording import Recording, read_recording, read_recordings, write_recording
+    from scara_ident.robot.robot import Robot, load_robot
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "BaseParameters": "base_parameters",
-    "find_base_parameters": "base_parameters",
-    "check_base_parameters": "base_parameters",
+    "BaseParameters": "model.base_parameters",
+    "find_base_parameters": "model.base_parameters",
+    "check_base_parameters": "model.base_parameters",
     "ScaraIdentError": "errors",
-    "Estimate": "estimators",
-    "ols": "estimators",
-    "rls": "estimators",
-    "wls": "estimators",
-    "Evidence": "evidence",
-    "gather": "evidence",
-    "gather_all": "evidence",
-    "Identification": "identification",
-    "identify": "identification",
-    "Information": "information",
-    "merge": "information",
-    "TorqueModel": "model",
-    "build_model": "model",
-    "Motion": "motion",
-    "motion_of": "motion",
-    "stretches": "motion",
-    "Recording": "recording",
-    "read_recording": "recording",
-    "read_recordings": "recording",
-    "write_recording": "recording",
-    "RegressorKernel": "regressor",
-    "build_kernel": "regressor",
-    "Robot": "robot",
-    "load_robot": "robot",
+    "Estimate": "estimation",
+    "ols": "estimation",
+    "rls": "estimation",
+    "wls": "estimation",
+    "Evidence": "estimation.observations",
+    "gather": "estimation.observations",
+    "gather_all": "estimation.observations",
+    "Identification": "identification.identify",
+    "identify": "identification.identify",
+    "Information": "estimation.information",
+    "merge": "estimation.information",
+    "TorqueModel": "model.model",
+    "build_model": "model.model",
+    "Motion": "motion.motion",
+    "motion_of": "motion.motion",
+    "stretches": "motion.motion",
+    "Recording": "recording.recording",
+    "read_recording": "recording.recording",
+    "read_recordings": "recording.recording",
+    "write_recording": "recording.recording",
+    "RegressorKernel": "model.regressor.kernel",
+    "build_kernel": "model.regressor.kernel",
+    "Robot": "robot.robot",
+    "load_robot": "robot.robot",
 }
 
 __all__ = [*sorted(_HOMES), "__version__"]

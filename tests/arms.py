@@ -11,9 +11,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from scara_ident.motion import Motion
-from scara_ident.recording import Recording, split_name
-from scara_ident.robot import Robot
+from scara_ident.motion.motion import Motion
+from scara_ident.recording.recording import Recording, split_name
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from scara_ident.evidence import Evidence
-from scara_ident.indri2002 import REDUCED, TRAJECTORIES
-from scara_ident.information import Information
-from scara_ident.model import build_model
-from scara_ident.robot import load_robot
-from scara_ident.virtual import CATALOGUE
+from scara_ident.estimation.information import Information
+from scara_ident.estimation.observations import Evidence
+from scara_ident.model.model import build_model
+from scara_ident.paper import REDUCED, TRAJECTORIES
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import CATALOGUE
 
 BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 

@@ -74,7 +74,7 @@ def test_the_wheel_says_what_it_needs_and_brings_the_command(wheel: Path):
 
 def test_outside_the_checkout_the_wheel_finds_its_arm_and_its_assets(installed: Path, tmp_path: Path):
     code = (
-        "import scara_ident, scara_ident.robot as r; from scara_ident.report.html import page; "
+        "import scara_ident, scara_ident.robot.robot as r; from scara_ident.report.html import page; "
         "print(scara_ident.__file__, r.embedded_urdf(), r.load_robot().name, len(page._asset('report.js')) > 1000)"
     )
     file, urdf, name, assets = outside(installed, tmp_path, "-c", code).split()

@@ -9,7 +9,7 @@ def base(robot: RobotOption = None, output: OutputOption = None, json: JsonOptio
     """Print the base parameters: what each is made of, what is not identifiable and why."""
     from scara_ident.report.base import base_dict
     from scara_ident.report.files import check_output, write_json
-    from scara_ident.robot import load_robot
+    from scara_ident.robot.robot import load_robot
 
     check_output(output)
     arm = load_robot(robot)

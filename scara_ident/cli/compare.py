@@ -32,11 +32,11 @@ def compare(
     verbose: VerboseOption = False,
 ) -> None:
     """Set every trajectory's parameters against every trajectory."""
-    from scara_ident.comparison import compare as run
-    from scara_ident.recording import read_recordings
+    from scara_ident.identification.compare import compare as run
+    from scara_ident.recording.recording import read_recordings
     from scara_ident.report.comparison import comparison_dict
     from scara_ident.report.files import check_output, write_json, written_together
-    from scara_ident.robot import load_robot
+    from scara_ident.robot.robot import load_robot
 
     check_output(output)
     arm = load_robot(robot)

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from scara_ident.recording import Recording
+    from scara_ident.recording.recording import Recording
 
 # Of a pipe or a file, which have no width of their own.
 PIPE_WIDTH = 80

@@ -64,7 +64,7 @@ def excite(
     import numpy as np
 
     from scara_ident.cli.joint_values import joint_numbers, joint_ranges, numbers
-    from scara_ident.estimators.estimate import PAPER_SAMPLES
+    from scara_ident.estimation.estimate import PAPER_SAMPLES
     from scara_ident.excitation import (
         Effort,
         Progress,
@@ -80,12 +80,12 @@ def excite(
     from scara_ident.excitation.design import SAMPLES, check_size
     from scara_ident.excitation.known import read_parameters
     from scara_ident.excitation.output import check_rate, file_names
-    from scara_ident.identification import known_information
-    from scara_ident.model import build_model
-    from scara_ident.recording import read_recordings
+    from scara_ident.identification.identify import known_information
+    from scara_ident.model.model import build_model
+    from scara_ident.recording.recording import read_recordings
     from scara_ident.report.files import check_output, write_json, written_together
     from scara_ident.report.html import excitation_report
-    from scara_ident.robot import load_robot
+    from scara_ident.robot.robot import load_robot
 
     check_output(output)
     arm = load_robot(robot)

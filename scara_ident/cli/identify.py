@@ -46,13 +46,13 @@ def identify(
     verbose: VerboseOption = False,
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
-    from scara_ident.consistency.options import ConsistentOptions
-    from scara_ident.identification import identified_arm
-    from scara_ident.identification import identify as run
-    from scara_ident.recording import read_recordings
+    from scara_ident.estimation.consistent.options import ConsistentOptions
+    from scara_ident.identification.identify import identified_arm
+    from scara_ident.identification.identify import identify as run
+    from scara_ident.recording.recording import read_recordings
     from scara_ident.report.files import check_output, write_json, write_whole, written_together
     from scara_ident.report.identification import identification_dict, sentences
-    from scara_ident.robot import load_robot
+    from scara_ident.robot.robot import load_robot
 
     check_output(output)
     arm = load_robot(robot)

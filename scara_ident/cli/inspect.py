@@ -12,7 +12,7 @@ from scara_ident.cli.console import OutputOption, output_console, print_json, pr
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from scara_ident.inspection import Inspection
+    from scara_ident.recording.inspect.inspection import Inspection
 
 # Of columns that are no channels so many are shown on a terminal; --json has them all.
 OTHERS_SHOWN = 20
@@ -38,7 +38,7 @@ def inspect(
 ) -> None:
     """Show what is in a file, guess which columns are the arm's, audit it and write a first robot.yaml."""
     from scara_ident.errors import ScaraIdentError, UsageError
-    from scara_ident.inspection import inspect_file
+    from scara_ident.recording.inspect.inspection import inspect_file
     from scara_ident.report.files import check_output, write_text
 
     target = None if output is None else output / "robot.yaml"
@@ -85,7 +85,7 @@ def inspection_dict(found: Inspection, written: Path | None) -> dict[str, Any]:
 
 
 def _show(console: Console, found: Inspection, written: Path | None) -> None:
-    from scara_ident.audit.samples import several
+    from scara_ident.recording.audit.samples import several
 
     rows = table(str(found.path), "column", "samples", "range", "taken for", right=("samples",))
     # Only the last column folds, so that names can be copied into robot.yaml.

@@ -26,10 +26,10 @@ def simulate(
 ) -> None:
     """Record the virtual arm in closed loop, with what it really was in a JSON beside."""
     from scara_ident.report.files import check_output, written_together
-    from scara_ident.robot import load_robot
-    from scara_ident.virtual import parse_effect, virtual_arm, write_simulation
-    from scara_ident.virtual import simulate as run
-    from scara_ident.virtual.named import named_motion
+    from scara_ident.robot.robot import load_robot
+    from scara_ident.simulation import parse_effect, virtual_arm, write_simulation
+    from scara_ident.simulation import simulate as run
+    from scara_ident.simulation.named import named_motion
 
     check_output(output)
     arm = virtual_arm(load_robot(robot))

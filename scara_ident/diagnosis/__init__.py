@@ -1,8 +1,8 @@
 """Close the loop: what the model lacks, traced to physics."""
 
-from scara_ident.diagnosis.diagnosis import Diagnosis, FoundEffect, diagnose
+from scara_ident.diagnosis.diagnose import Diagnosis, FoundEffect, diagnose
 from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
-from scara_ident.diagnosis.outcome import Unexplained
+from scara_ident.diagnosis.model_selection import Unexplained
 from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, search
 

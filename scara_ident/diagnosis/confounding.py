@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.bank import Candidate
-from scara_ident.diagnosis.examination import left_over
+from scara_ident.diagnosis.candidate_tests import left_over
+from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.search import Beside, Search, best_of_each, refine
 from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
 
@@ -22,7 +22,7 @@ LEAST_SHARE = 0.8
 
 
 @dataclass(frozen=True)
-class Rival:
+class Confounder:
     """An effect that would do nearly as well as one that was found.
 
     Attributes
@@ -42,7 +42,7 @@ class Rival:
     found_gain: float
 
 
-def rivals(result: Search, weights: Array) -> list[tuple[Rival, ...]]:
+def confounders(result: Search, weights: Array) -> list[tuple[Confounder, ...]]:
     """Return for each effect that stayed those that these recordings cannot tell from it.
 
     Parameters
@@ -52,16 +52,18 @@ def rivals(result: Search, weights: Array) -> list[tuple[Rival, ...]]:
 
     Returns
     -------
-    list of tuple of Rival
+    list of tuple of Confounder
     """
     table = tabulate(result.base, result.recordings, result.bands)
     pool = [decision.candidate for decision in result.decisions]
     columns, places = tabulate_candidates(result.scene, [*result.chosen, *pool], result.recordings, result.bands)
     count = len(result.chosen)
-    return [_rivals_of(result, weights, table, columns, places[:count], places[count:], k, pool) for k in range(count)]
+    return [
+        _confounders_of(result, weights, table, columns, places[:count], places[count:], k, pool) for k in range(count)
+    ]
 
 
-def _rivals_of(
+def _confounders_of(
     result: Search,
     weights: Array,
     table: Table,
@@ -70,7 +72,7 @@ def _rivals_of(
     others: Sequence[slice],
     found: int,
     pool: Sequence[Candidate],
-) -> tuple[Rival, ...]:
+) -> tuple[Confounder, ...]:
     scene = result.scene
     rest = [columns[:, place] for k, place in enumerate(chosen) if k != found]
     beside = Beside(
@@ -88,14 +90,14 @@ def _rivals_of(
     ]
     refined = refine(beside, near)
     rows = [_left_over(beside, item.candidate) for item in (own, *refined)]
-    found_rivals = []
+    found_confounders = []
     for decision, left in zip(refined, rows[1:], strict=True):
         worse = left - rows[0]
         error = float(np.sqrt(len(worse) * np.var(worse)))
         alike = decision.gain >= LEAST_SHARE * own.gain and abs(float(np.sum(worse))) < STANDARD_ERRORS * error
         if decision.accepted and (alike or decision.gain >= own.gain):
-            found_rivals.append(
-                Rival(
+            found_confounders.append(
+                Confounder(
                     decision.label,
                     decision.candidate.effect.name,
                     decision.candidate.joint(scene),
@@ -103,7 +105,7 @@ def _rivals_of(
                     own.gain,
                 )
             )
-    return tuple(sorted(found_rivals, key=lambda rival: -rival.gain))
+    return tuple(sorted(found_confounders, key=lambda confounder: -confounder.gain))
 
 
 def _left_over(beside: Beside, candidate: Candidate) -> Array:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.model import TorqueModel
-from scara_ident.motion import stretches
-from scara_ident.recording import Recording
-from scara_ident.repeatability import LARGEST_SHIFT, alignment
-from scara_ident.rows import rows_of, trim_of
+from scara_ident.model.model import TorqueModel
+from scara_ident.motion.motion import stretches
+from scara_ident.motion.prepared import rows_of, trim_of
+from scara_ident.motion.repeatability import LARGEST_SHIFT, alignment
+from scara_ident.recording.recording import Recording
 
 Array = NDArray[np.float64]
 

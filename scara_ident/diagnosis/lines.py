@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.bank import Candidate
+from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.effects import Effect, Member, Scene
 from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
 from scara_ident.effects.spectra import (
@@ -20,10 +20,10 @@ from scara_ident.effects.spectra import (
     order_width,
     whitened,
 )
-from scara_ident.model import TorqueModel
-from scara_ident.motion import stretches
-from scara_ident.recording import Recording
-from scara_ident.rows import rows_of, trim_of
+from scara_ident.model.model import TorqueModel
+from scara_ident.motion.motion import stretches
+from scara_ident.motion.prepared import rows_of, trim_of
+from scara_ident.recording.recording import Recording
 
 Array = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.model import TorqueModel
-from scara_ident.motion import Motion, stretches
-from scara_ident.recording import Recording
-from scara_ident.rows import row_step, rows_of, trim_of
+from scara_ident.model.model import TorqueModel
+from scara_ident.motion.motion import Motion, stretches
+from scara_ident.motion.prepared import row_step, rows_of, trim_of
+from scara_ident.recording.recording import Recording
 
 Array = NDArray[np.float64]
 

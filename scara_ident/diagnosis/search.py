@@ -8,21 +8,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.bank import Candidate
-from scara_ident.diagnosis.decision import Decision, decide
-from scara_ident.diagnosis.examination import examine
-from scara_ident.diagnosis.finish import parameters_beside
+from scara_ident.diagnosis.acceptance import Decision, decide
+from scara_ident.diagnosis.candidate_tests import examine
+from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.effect_parameters import parameters_beside
 from scara_ident.diagnosis.lines import line_candidates
+from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
-from scara_ident.diagnosis.tuning import tune
 from scara_ident.effects import CATALOGUE, Effect, Resolved, Scene
 from scara_ident.effects.measurement import shifted
-from scara_ident.estimators import Estimate
-from scara_ident.estimators.least_squares import wls
-from scara_ident.evidence import Evidence, gather_all
-from scara_ident.model import TorqueModel
-from scara_ident.motion import motion_of, stretches
-from scara_ident.recording import Recording
+from scara_ident.estimation import Estimate
+from scara_ident.estimation.least_squares import wls
+from scara_ident.estimation.observations import Evidence, gather_all
+from scara_ident.model.model import TorqueModel
+from scara_ident.motion.motion import motion_of, stretches
+from scara_ident.recording.recording import Recording
 
 Array = NDArray[np.float64]
 
@@ -282,11 +282,11 @@ def _choose(beside: Beside, decisions: Sequence[Decision]) -> Decision | None:
 
 def _told_from_zero(beside: Beside, candidate: Candidate) -> bool:
     """Whether an effect has a size beyond its uncertainty, that of its nonlinear parameters included."""
-    if not candidate.effect.knobs:
+    if not candidate.effect.nonlinear:
         return True
-    knobs = {knob.name for knob in candidate.effect.knobs}
+    nonlinear = {parameter.name for parameter in candidate.effect.nonlinear}
     found = parameters_beside(beside.scene, beside.recordings, beside.bands, beside.table, beside.weights, candidate)
-    sizes = [parameter for name, parameter in found.items() if name not in knobs and name != "phase"]
+    sizes = [parameter for name, parameter in found.items() if name not in nonlinear and name != "phase"]
     return any(abs(parameter.value) > TOLD * parameter.std for parameter in sizes)
 
 
@@ -308,16 +308,16 @@ def refine(beside: Beside, leaders: Sequence[Decision]) -> list[Decision]:
 def _line(scene: Scene, candidate: Candidate, round_: int) -> list[Candidate]:
     """Return variants of a candidate on a line for each nonlinear parameter, a third as long every round."""
     variants = []
-    for k, knob in enumerate(candidate.effect.knobs):
-        value = candidate.member.knobs[k]
+    for k, parameter in enumerate(candidate.effect.nonlinear):
+        value = candidate.member.nonlinear[k]
         reach = _spacing(scene, candidate, k) * (2.0 / (LINE_POINTS - 1)) ** round_
         offsets = np.linspace(-reach, reach, LINE_POINTS)
-        points = value * np.exp(offsets) if knob.logarithmic else value + offsets
+        points = value * np.exp(offsets) if parameter.logarithmic else value + offsets
         for point in points:
-            if abs(point - value) > 1e-12 * abs(value) and knob.lower <= point <= knob.upper:
-                knobs = list(candidate.member.knobs)
-                knobs[k] = float(point)
-                variants.append(candidate.at(knobs))
+            if abs(point - value) > 1e-12 * abs(value) and parameter.lower <= point <= parameter.upper:
+                nonlinear = list(candidate.member.nonlinear)
+                nonlinear[k] = float(point)
+                variants.append(candidate.at(nonlinear))
     return variants
 
 
@@ -326,14 +326,14 @@ def _spacing(scene: Scene, candidate: Candidate, k: int) -> float:
 
     A family that knows how far apart values must be to be told apart says so by ``resolution``.
     """
-    knob = candidate.effect.knobs[k]
+    parameter = candidate.effect.nonlinear[k]
     if isinstance(candidate.effect, Resolved):
         width = candidate.effect.resolution(scene, candidate.member)[k]
-        return width / candidate.member.knobs[k] if knob.logarithmic else width
-    grid = np.array(sorted({member.knobs[k] for member in candidate.effect.members(scene)}))
-    if knob.logarithmic:
+        return width / candidate.member.nonlinear[k] if parameter.logarithmic else width
+    grid = np.array(sorted({member.nonlinear[k] for member in candidate.effect.members(scene)}))
+    if parameter.logarithmic:
         return float(np.min(np.diff(np.log(grid)))) if len(grid) > 1 else float(np.log(2.0))
-    return float(np.min(np.diff(grid))) if len(grid) > 1 else 0.1 * (knob.upper - knob.lower)
+    return float(np.min(np.diff(grid))) if len(grid) > 1 else 0.1 * (parameter.upper - parameter.lower)
 
 
 def _correct_delay(

@@ -10,13 +10,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.bank import Bank, Candidate
+from scara_ident.diagnosis.candidates import Bank, Candidate
 from scara_ident.effects import Scene
-from scara_ident.information import triangular
-from scara_ident.model import TorqueModel
-from scara_ident.motion import stretches
-from scara_ident.recording import Recording
-from scara_ident.rows import band_blocks, raw_rows, standstill, trim_of
+from scara_ident.estimation.information import triangular
+from scara_ident.model.model import TorqueModel
+from scara_ident.motion.motion import stretches
+from scara_ident.motion.prepared import band_blocks, raw_rows, standstill, trim_of
+from scara_ident.recording.recording import Recording
 from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]

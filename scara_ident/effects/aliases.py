@@ -13,11 +13,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from scara_ident.base_parameters import standard_regressor
 from scara_ident.effects.links import point_mass, tool_of
-from scara_ident.model import TorqueModel
-from scara_ident.motion import Motion
-from scara_ident.robot import Robot
+from scara_ident.model.base_parameters import standard_regressor
+from scara_ident.model.model import TorqueModel
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 

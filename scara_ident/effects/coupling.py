@@ -9,10 +9,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion import Motion
-from scara_ident.terms import Column, RigidBody
+from scara_ident.model.terms import Column, RigidBody
+from scara_ident.motion.motion import Motion
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class InertiaCoupling:
         return "inertia_coupling"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 
@@ -84,7 +84,7 @@ class DriveCoupling:
         return "drive_coupling"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 

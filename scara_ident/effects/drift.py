@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
 from scara_ident.effects.friction import deviation, friction_of, friction_torque, moving
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.terms import Column, Offset
+from scara_ident.model.terms import Column, Offset
 
 Array = NDArray[np.float64]
 
@@ -38,9 +38,9 @@ class WarmUp:
         return "warm_up"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """The time constant."""
-        return (Knob("time_constant", "s", 0.05, 1e5),)
+        return (NonlinearParameter("time_constant", "s", 0.05, 1e5),)
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Every joint with friction, at shares of the longest run."""
@@ -59,7 +59,7 @@ class WarmUp:
     def regressor(self, signals: Signals, member: Member) -> Array:
         """Return the predicted friction times ``exp(-t/time_constant)``, shape (n, 1, N)."""
         j = member.joint or 0
-        return signals.row(j, [friction_torque(signals, j) * np.exp(-signals.time / member.knobs[0])])
+        return signals.row(j, [friction_torque(signals, j) * np.exp(-signals.time / member.nonlinear[0])])
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Friction falls as a gear warms up."""
@@ -67,7 +67,7 @@ class WarmUp:
             return "friction would be smaller when the run starts"
         if value[0] - 2.0 * std[0] > MOST_WARM_UP:
             return f"friction would fall to less than a {1.0 + MOST_WARM_UP:.0f}th in the run"
-        if member.knobs[0] > LONGEST_WARM_UP * scene.duration:
+        if member.nonlinear[0] > LONGEST_WARM_UP * scene.duration:
             return "the recordings are too short to see it end"
         return None
 
@@ -90,7 +90,7 @@ class OffsetDrift:
         return "offset_drift"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 

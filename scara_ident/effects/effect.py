@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion import Motion
-from scara_ident.terms import Column
+from scara_ident.model.terms import Column
+from scara_ident.motion.motion import Motion
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Knob:
+class NonlinearParameter:
     """A nonlinear parameter of an effect.
 
     Attributes
@@ -60,14 +60,14 @@ class Member:
     ----------
     joint : int or None
         Place of the joint in ``robot.joints``; None where the effect belongs to no one joint.
-    knobs : tuple of float
-        One value per knob of the family.
+    nonlinear : tuple of float
+        One value per parameter of the family.
     partner : int or None
         A second joint, for effects of one joint on another.
     """
 
     joint: int | None
-    knobs: tuple[float, ...] = ()
+    nonlinear: tuple[float, ...] = ()
     partner: int | None = None
 
 
@@ -80,7 +80,7 @@ class Effect(Protocol):
         ...
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """Nonlinear parameters."""
         ...
 
@@ -120,7 +120,7 @@ class Resolved(Protocol):
     """A family whose nonlinear parameters have narrow peaks, such as orders and frequencies."""
 
     def resolution(self, scene: Scene, member: Member) -> tuple[float, ...]:
-        """Return, for every knob, how far apart two values must be to be told apart."""
+        """Return, for every parameter, how far apart two values must be to be told apart."""
         ...
 
 

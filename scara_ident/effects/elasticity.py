@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
 from scara_ident.effects.links import lagging, link_inertia, shared, usual_link_inertia
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion import differentiate
-from scara_ident.terms import Column
+from scara_ident.model.terms import Column
+from scara_ident.motion.motion import differentiate
 
 Array = NDArray[np.float64]
 
@@ -49,11 +49,11 @@ class JointElasticity:
         return "joint_elasticity"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """The frequency at which the link swings while its motor is held, and the damping ratio of that, not reported."""
         return (
-            Knob("frequency", "Hz", LOWEST_FREQUENCY, HIGHEST_FREQUENCY),
-            Knob("_damping_ratio", "1", LEAST_DAMPING, MOST_DAMPING),
+            NonlinearParameter("frequency", "Hz", LOWEST_FREQUENCY, HIGHEST_FREQUENCY),
+            NonlinearParameter("_damping_ratio", "1", LEAST_DAMPING, MOST_DAMPING),
         )
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
@@ -81,9 +81,9 @@ class JointElasticity:
             return np.zeros((signals.scene.robot.n, 1, signals.motion.samples))
         load = _differentiated(signals, _load(signals, j), LOAD_BAND)[0]
         inertia = np.maximum(link_inertia(signals, j), 0.1 * usual)
-        stiffness = (2.0 * np.pi * member.knobs[0]) ** 2 * usual
+        stiffness = (2.0 * np.pi * member.nonlinear[0]) ** 2 * usual
         lag = swing(
-            load, inertia, stiffness, 2.0 * member.knobs[1] * np.sqrt(stiffness * usual), 1.0 / signals.motion.rate
+            load, inertia, stiffness, 2.0 * member.nonlinear[1] * np.sqrt(stiffness * usual), 1.0 / signals.motion.rate
         )
         return stiffness * lagging(signals, j, lag)[:, None]
 
@@ -93,7 +93,7 @@ class JointElasticity:
 
     def resonance(self, member: Member) -> float:
         """Return the frequency of the link against its held motor, Hz."""
-        return member.knobs[0]
+        return member.nonlinear[0]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """A spring pulls back, and swings at the frequency that its stiffness gives."""
@@ -103,7 +103,7 @@ class JointElasticity:
         least = value[0] - 2.0 * std[0]
         if usual > 0.0 and least > 0.0:
             frequency = float(1.0 / np.sqrt(least * usual) / (2.0 * np.pi))
-            if 2.0 * frequency < min(member.knobs[0], scene.band):
+            if 2.0 * frequency < min(member.nonlinear[0], scene.band):
                 return f"so soft a gear would let the link swing at {frequency:.2g} Hz, which is not seen"
         return None
 
@@ -174,9 +174,9 @@ class Backlash:
         return "backlash"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """The width that times the crossing."""
-        return (Knob("crossing_width", "rad", 1e-5, LARGEST_WIDTH),)
+        return (NonlinearParameter("crossing_width", "rad", 1e-5, LARGEST_WIDTH),)
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Three widths per joint."""
@@ -200,7 +200,7 @@ class Backlash:
         if not usual > 0.0:
             return np.zeros((signals.scene.robot.n, 1, signals.motion.samples))
         drift = load / np.maximum(inertia, 0.1 * usual)
-        place = flank(drift, member.knobs[0], 1.0 / signals.motion.rate)
+        place = flank(drift, member.nonlinear[0], 1.0 / signals.motion.rate)
         return lagging(signals, j, _differentiated(signals, place, LAG_BAND))[:, None]
 
     def geared_joint(self, member: Member) -> int:

@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.terms import Column, Friction
-from scara_ident.terms.term import per_speed
+from scara_ident.model.terms import Column, Friction
+from scara_ident.model.terms.term import per_speed
 
 Array = NDArray[np.float64]
 
@@ -78,9 +78,9 @@ class Stribeck:
         return "stribeck"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """The speed at which it has fallen to 1/e."""
-        return (Knob("velocity", "rad/s", 1e-4, 5.0),)
+        return (NonlinearParameter("velocity", "rad/s", 1e-4, 5.0),)
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Every joint, at shares of its largest speed."""
@@ -95,7 +95,7 @@ class Stribeck:
     def regressor(self, signals: Signals, member: Member) -> Array:
         """Return ``sign(v) exp(-(v/velocity)^2)``, shape (n, 1, N)."""
         j = member.joint or 0
-        ratio = signals.motion.v[j] / member.knobs[0]
+        ratio = signals.motion.v[j] / member.nonlinear[0]
         return signals.row(j, [signals.sign[j] * np.exp(-np.minimum(ratio * ratio, 700.0))])
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
@@ -103,7 +103,7 @@ class Stribeck:
         j = member.joint or 0
         if value[0] < -2.0 * std[0]:
             return "friction would fall towards rest"
-        if member.knobs[0] > WIDEST_STRIBECK * scene.speed[j]:
+        if member.nonlinear[0] > WIDEST_STRIBECK * scene.speed[j]:
             return "the joint is never fast against this speed"
         coulomb = friction_of(scene, j).get(0)
         if coulomb is not None and value[0] - 2.0 * std[0] > MOST_STRIBECK * max(coulomb, 0.0):
@@ -133,7 +133,7 @@ class AsymmetricFriction:
         return "asymmetric_friction"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 
@@ -186,7 +186,7 @@ class PositionDependentFriction:
         return "position_dependent_friction"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 
@@ -261,7 +261,7 @@ class FrictionCoupling:
         return "friction_coupling"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.terms import Column
+from scara_ident.model.terms import Column
 
 Array = NDArray[np.float64]
 
@@ -35,9 +35,9 @@ class TransmissionLoss:
         return "transmission_loss"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """The lost share as the second-order term has it; it is not reported beside the coefficient."""
-        return (Knob("_lost_share", "1", 0.005, MOST_LOST),)
+        return (NonlinearParameter("_lost_share", "1", 0.005, MOST_LOST),)
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Three per joint."""
@@ -50,7 +50,7 @@ class TransmissionLoss:
 
     def regressor(self, signals: Signals, member: Member) -> Array:
         """Return ``|tau_l| sign(v)`` with its share of the second-order term, shape (n, 1, N)."""
-        j, share = member.joint or 0, member.knobs[0]
+        j, share = member.joint or 0, member.nonlinear[0]
         load = signals.load(j)
         return signals.row(j, [np.abs(load) * signals.sign[j] + (np.sqrt(1.0 + share**2) - 1.0) / share * load])
 

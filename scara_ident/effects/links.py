@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion import Motion
-from scara_ident.regressor import RegressorKernel, build_kernel
-from scara_ident.robot import Robot
+from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.audit.samples import GAP_STEPS
-from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion import UNIFORM_TOLERANCE, differentiate
-from scara_ident.recording import Recording
-from scara_ident.terms import Column
+from scara_ident.model.terms import Column
+from scara_ident.motion.motion import UNIFORM_TOLERANCE, differentiate
+from scara_ident.recording.audit.samples import GAP_STEPS
+from scara_ident.recording.recording import Recording
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class TorqueSensorNonlinearity:
         return "torque_sensor_nonlinearity"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 
@@ -92,7 +92,7 @@ class TorqueGainMismatch:
         return "torque_gain_mismatch"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 
@@ -139,7 +139,7 @@ class TimeDelay:
         return "time_delay"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 

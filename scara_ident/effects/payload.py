@@ -10,14 +10,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.base_parameters import BODY_PARAMETERS, BODY_UNITS
-from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
 from scara_ident.effects.links import point_mass, shared, tool_of
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion import Motion
-from scara_ident.recording import split_name
-from scara_ident.robot import Robot
-from scara_ident.terms import Column
+from scara_ident.model.base_parameters import BODY_PARAMETERS, BODY_UNITS
+from scara_ident.model.terms import Column
+from scara_ident.motion.motion import Motion
+from scara_ident.recording.recording import split_name
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ class PayloadChange:
         return "payload_change"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """The time in the run."""
         return (_TIME,)
 
@@ -57,7 +57,7 @@ class PayloadChange:
 
     def regressor(self, signals: Signals, member: Member) -> Array:
         """Return the torque of 1 kg at the tool from then on, shape (n, 1, N)."""
-        return np.asarray(_at_tool(signals) * _after(signals, member.knobs[0]))
+        return np.asarray(_at_tool(signals) * _after(signals, member.nonlinear[0]))
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """No arm carries or drops more than it weighs."""
@@ -86,7 +86,7 @@ class FreePayloadChange:
         return "payload_change"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """The time in the run."""
         return (_TIME,)
 
@@ -112,7 +112,7 @@ class FreePayloadChange:
         columns = shared(
             signals, "free payload", lambda: tool_of(robot).columns(robot, signals.motion)[:, list(_shown(robot))]
         )
-        return np.asarray(columns * _after(signals, member.knobs[0]))
+        return np.asarray(columns * _after(signals, member.nonlinear[0]))
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """No arm carries more than it weighs, and mass and inertia have one sign."""
@@ -155,7 +155,7 @@ class PayloadOfRecordings:
         return "payload_change"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 
@@ -207,7 +207,7 @@ class GravityCounterbalance:
         return "gravity_counterbalance"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 
@@ -250,7 +250,7 @@ class GravityCounterbalance:
         return "a spring or weight that balances the joint"
 
 
-_TIME = Knob("time", "s", 0.0, np.inf, logarithmic=False)
+_TIME = NonlinearParameter("time", "s", 0.0, np.inf, logarithmic=False)
 
 
 def _instants(scene: Scene, count: int) -> Iterable[float]:
@@ -308,7 +308,7 @@ def _shown(robot: Robot) -> tuple[int, ...]:
 @lru_cache(maxsize=8)
 def _loaded_by_gravity(robot: Robot) -> tuple[bool, ...]:
     """Return which revolute joints gravity loads, from the motion of masses alone."""
-    from scara_ident.base_parameters import standard_regressor
+    from scara_ident.model.base_parameters import standard_regressor
 
     rng = np.random.default_rng(0)
     q = np.where(robot.prismatic, 0.3, np.pi)[:, None] * rng.uniform(-1.0, 1.0, (robot.n, 20))

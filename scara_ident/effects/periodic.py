@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
 from scara_ident.effects.friction import amplitude_and_phase, friction_slope, moving
 from scara_ident.effects.links import rigid_torque, shared
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.terms import Column
+from scara_ident.model.terms import Column
 
 Array = NDArray[np.float64]
 
@@ -46,9 +46,9 @@ class TorqueRipple:
         return "torque_ripple"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """Periods per motor turn."""
-        return (Knob("order", "1 / motor turn", 0.05, 1000.0, False),)
+        return (NonlinearParameter("order", "1 / motor turn", 0.05, 1000.0, False),)
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Every joint at the orders of gears and motors, as far as they can be seen."""
@@ -63,13 +63,15 @@ class TorqueRipple:
         j = member.joint or 0
         joint, unit = scene.robot.joints[j], scene.robot.torque_unit(j)
         return tuple(
-            Column(f"ripple_{part}", joint, unit, f"{part} of {member.knobs[0]:g} times the motor's angle of {joint}")
+            Column(
+                f"ripple_{part}", joint, unit, f"{part} of {member.nonlinear[0]:g} times the motor's angle of {joint}"
+            )
             for part in ("sine", "cosine")
         )
 
     def regressor(self, signals: Signals, member: Member) -> Array:
         """Return sine and cosine of the order times the motor's angle, shape (n, 2, N)."""
-        j, order = member.joint or 0, member.knobs[0]
+        j, order = member.joint or 0, member.nonlinear[0]
         angle = order * signals.motor_turns[j]
         seen = _seen(signals, j, order)
         return signals.row(j, [seen * np.sin(angle), seen * np.cos(angle)])
@@ -89,7 +91,7 @@ class TorqueRipple:
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say what it is."""
-        return f"a torque ripple of {member.knobs[0]:.4g} periods per motor turn"
+        return f"a torque ripple of {member.nonlinear[0]:.4g} periods per motor turn"
 
 
 @dataclass(frozen=True)
@@ -110,9 +112,9 @@ class EncoderEccentricity:
         return "encoder_eccentricity"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """Periods per motor turn."""
-        return (Knob("order", "1 / motor turn", 0.05, 1000.0, False),)
+        return (NonlinearParameter("order", "1 / motor turn", 0.05, 1000.0, False),)
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Every joint at one and two periods per motor turn, as far as they can be seen."""
@@ -139,7 +141,7 @@ class EncoderEccentricity:
 
     def regressor(self, signals: Signals, member: Member) -> Array:
         """Return the change of torque per amplitude of sine and of cosine, shape (n, 2, N)."""
-        j, order = member.joint or 0, member.knobs[0]
+        j, order = member.joint or 0, member.nonlinear[0]
         motion = signals.motion
         per_turn = order * signals.scene.robot.reduction[j]
         angle = per_turn * motion.q[j]
@@ -154,7 +156,7 @@ class EncoderEccentricity:
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """No encoder errs by much of a turn."""
-        at_motor = abs(float(scene.robot.reduction[member.joint or 0])) * max(member.knobs[0], 1.0)
+        at_motor = abs(float(scene.robot.reduction[member.joint or 0])) * max(member.nonlinear[0], 1.0)
         if at_motor * (float(np.hypot(*value)) - 2.0 * float(np.max(std))) > LARGEST_ECCENTRICITY:
             return "no encoder errs by that much"
         return None
@@ -166,7 +168,7 @@ class EncoderEccentricity:
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say what it is."""
-        return f"an encoder that errs {member.knobs[0]:.4g} times per motor turn"
+        return f"an encoder that errs {member.nonlinear[0]:.4g} times per motor turn"
 
 
 @dataclass(frozen=True)
@@ -195,9 +197,9 @@ class Vibration:
         return "vibration"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """The frequency."""
-        return (Knob("frequency", "Hz", 0.05, 1000.0, False),)
+        return (NonlinearParameter("frequency", "Hz", 0.05, 1000.0, False),)
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return none: see `at`."""
@@ -216,7 +218,7 @@ class Vibration:
         """Return sine and cosine, or those of every recording."""
         j = member.joint or 0
         joint, unit = scene.robot.joints[j], scene.robot.torque_unit(j)
-        what = f"of {member.knobs[0]:g} Hz on {joint}"
+        what = f"of {member.nonlinear[0]:g} Hz on {joint}"
         if not self.free_phase:
             return tuple(Column(f"vibration_{part}", joint, unit, f"{part} {what}") for part in ("sine", "cosine"))
         return tuple(
@@ -227,7 +229,7 @@ class Vibration:
 
     def regressor(self, signals: Signals, member: Member) -> Array:
         """Return sine and cosine of time, shape (n, k, N)."""
-        angle = 2.0 * np.pi * member.knobs[0] * signals.time
+        angle = 2.0 * np.pi * member.nonlinear[0] * signals.time
         pair = [np.sin(angle), np.cos(angle)]
         if not self.free_phase:
             return signals.row(member.joint or 0, pair)
@@ -258,7 +260,7 @@ class Vibration:
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say what it is."""
-        return f"a vibration of {member.knobs[0]:.4g} Hz"
+        return f"a vibration of {member.nonlinear[0]:.4g} Hz"
 
     def _amplitude(self, value: Array) -> float:
         return float(np.sqrt(np.sum(value**2) / (0.5 * len(value))))

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.terms import Column
-from scara_ident.terms.friction import Offset
+from scara_ident.model.terms import Column
+from scara_ident.model.terms.friction import Offset
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ class Spring:
         return "spring"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
 from scara_ident.effects.friction import deviation, friction_of, moving
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.terms import Column
+from scara_ident.model.terms import Column
 
 Array = NDArray[np.float64]
 
@@ -42,9 +42,9 @@ class Presliding:
         return "presliding"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """The distance over which friction builds up."""
-        return (Knob("presliding_distance", "rad", 1e-5, 0.3),)
+        return (NonlinearParameter("presliding_distance", "rad", 1e-5, 0.3),)
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Every joint, at distances that its travel holds many times."""
@@ -65,7 +65,7 @@ class Presliding:
     def regressor(self, signals: Signals, member: Member) -> Array:
         """Return ``z - sign(v)`` in the drive's direction, shape (n, 1, N)."""
         j = member.joint or 0
-        z = dahl_state(signals.motion.q[j], member.knobs[0])
+        z = dahl_state(signals.motion.q[j], member.nonlinear[0])
         return signals.row(j, [signals.scene.robot.drive_sign[j] * z - signals.sign[j]])
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
@@ -73,7 +73,7 @@ class Presliding:
         j = member.joint or 0
         if value[0] < -2.0 * std[0]:
             return "friction would be largest just after a reversal"
-        if member.knobs[0] > LONGEST_SHARE * scene.travel[j]:
+        if member.nonlinear[0] > LONGEST_SHARE * scene.travel[j]:
             return "over so long a way it is a spring, not friction"
         coulomb = friction_of(scene, j).get(0)
         if coulomb is not None and value[0] + 2.0 * std[0] < LEAST_OF_COULOMB * max(coulomb, 0.0):

@@ -9,11 +9,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Knob, Member, Parameter
+from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
 from scara_ident.effects.links import first_moments, gravity_columns, shared
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.robot import Robot
-from scara_ident.terms import Column, RigidBody
+from scara_ident.model.terms import Column, RigidBody
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -138,7 +138,7 @@ class BaseTilt:
         return "base_tilt"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """It has no nonlinear parameter."""
         return ()
 
@@ -205,9 +205,9 @@ class NominalBaseTilt:
         return "base_tilt"
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
         """The factor on the nominal first moments."""
-        return (Knob("moment_factor", "1", 1.0 / MOMENT_FACTOR, MOMENT_FACTOR),)
+        return (NonlinearParameter("moment_factor", "1", 1.0 / MOMENT_FACTOR, MOMENT_FACTOR),)
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return five factors; one where nothing else is known of gravity and factor and tilt are one."""
@@ -225,7 +225,7 @@ class NominalBaseTilt:
     def regressor(self, signals: Signals, member: Member) -> Array:
         """Return the torque under sideways gravity, shape (n, k, N)."""
         gravity = _gravity(signals.scene.model.rigid_body)
-        factor = member.knobs[0] if gravity.known_axes else 1.0
+        factor = member.nonlinear[0] if gravity.known_axes else 1.0
         parts = _parts(signals)
         axes = np.array(self._axes(signals.scene))
         return np.asarray(parts[:, axes] + factor * parts[:, 2 + axes])

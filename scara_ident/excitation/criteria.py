@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.errors import UsageError
-from scara_ident.model import TorqueModel
+from scara_ident.model.model import TorqueModel
 
 Array = NDArray[np.float64]
 

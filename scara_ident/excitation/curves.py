@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.errors import UsageError
-from scara_ident.motion import Motion
+from scara_ident.motion.motion import Motion
 
 Array = NDArray[np.float64]
 Family = Literal["fourier", "spline"]

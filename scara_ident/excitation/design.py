@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.errors import UsageError
+from scara_ident.estimation.information import Information, merge
 from scara_ident.excitation.criteria import Criterion, LogDet
 from scara_ident.excitation.curves import ExcitationTrajectory, Family, make_basis
 from scara_ident.excitation.limits import Limits, limits_of, nominal_parameters, resting_posture, without_coulomb
@@ -17,9 +18,8 @@ from scara_ident.excitation.problem import NARROWEST, Task
 from scara_ident.excitation.search import Effort, Progress, search
 from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.verification import Reached, reached
-from scara_ident.information import Information, merge
-from scara_ident.model import TorqueModel
-from scara_ident.motion import Motion
+from scara_ident.model.model import TorqueModel
+from scara_ident.motion.motion import Motion
 
 Array = NDArray[np.float64]
 

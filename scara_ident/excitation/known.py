@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from scara_ident.errors import ScaraIdentError
-from scara_ident.model import TorqueModel
+from scara_ident.model.model import TorqueModel
 
 
 def read_parameters(path: Path, model: TorqueModel) -> dict[str, float]:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from scara_ident.errors import RobotError, ScaraIdentError, UsageError
 from scara_ident.excitation.tool import Tool, tool_motion, tool_of
-from scara_ident.indri2002 import PARAMETERS, table5_parameters
-from scara_ident.model import TorqueModel
-from scara_ident.motion import Motion
-from scara_ident.robot import Robot
-from scara_ident.terms import Friction
+from scara_ident.model.model import TorqueModel
+from scara_ident.model.terms import Friction
+from scara_ident.motion.motion import Motion
+from scara_ident.paper import PARAMETERS, table5_parameters
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 Value = TypeVar("Value")

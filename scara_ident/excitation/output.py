@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.columns import write_columns
 from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.estimation.information import Information
 from scara_ident.excitation.criteria import BlockLogDet, Condition
 from scara_ident.excitation.curves import Basis, ExcitationTrajectory
 from scara_ident.excitation.design import Design, information_of
 from scara_ident.excitation.limits import scara03_friction
-from scara_ident.information import Information
+from scara_ident.recording.files.parquet_csv import write_columns
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from scara_ident.excitation.curves import Basis
 from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.tool import ToolMotion, tool_motion
-from scara_ident.motion import Motion
+from scara_ident.motion.motion import Motion
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from scara_ident.excitation.limits import InfeasibleLimits
 from scara_ident.excitation.parallel import map_in_order
 from scara_ident.excitation.problem import Problem, Task, row_names
 from scara_ident.excitation.verification import extremes, grid
-from scara_ident.motion import Motion
+from scara_ident.motion.motion import Motion
 from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]

@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.model import TorqueModel
-from scara_ident.motion import Motion
-from scara_ident.terms import Friction, Offset, RigidBody, Term
+from scara_ident.model.model import TorqueModel
+from scara_ident.model.terms import Friction, Offset, RigidBody, Term
+from scara_ident.motion.motion import Motion
 
 Array = NDArray[np.float64]
 Stencil = tuple[tuple[float, float], ...]

@@ -9,8 +9,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from scara_ident.errors import RobotError
-from scara_ident.recursion import JointGeometry, joint_geometry
-from scara_ident.robot import Robot
+from scara_ident.model.regressor.recursion import JointGeometry, joint_geometry
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 

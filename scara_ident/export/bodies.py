@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from scara_ident.base_parameters import pseudo_inertia
 from scara_ident.errors import ScaraIdentError
-from scara_ident.robot import Robot
+from scara_ident.model.base_parameters import pseudo_inertia
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 

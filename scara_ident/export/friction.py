@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.estimators.estimate import Estimate
-from scara_ident.robot import Robot
-from scara_ident.terms import Friction
+from scara_ident.estimation.estimate import Estimate
+from scara_ident.model.terms import Friction
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.export.bodies import Body, body_about_com, check_standard
 from scara_ident.export.friction import JointFriction, JointSideFriction, joint_side
 from scara_ident.export.xml_text import format_numbers
-from scara_ident.robot import Robot
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -32,7 +32,7 @@ from scara_ident.export.xml_text import (
     same_numbers,
     set_numbers,
 )
-from scara_ident.robot import Robot
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 

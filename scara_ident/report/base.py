@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from scara_ident.base_parameters import check_base_parameters
-from scara_ident.robot import Robot
-from scara_ident.terms.rigid_body import rigid_body
+from scara_ident.model.base_parameters import check_base_parameters
+from scara_ident.model.terms.rigid_body import rigid_body
+from scara_ident.robot.robot import Robot
 
 
 def base_dict(robot: Robot) -> dict[str, Any]:

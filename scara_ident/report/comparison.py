@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from scara_ident.comparison import Comparison
+from scara_ident.identification.compare import Comparison
 
 
 def comparison_dict(comparison: Comparison) -> dict[str, Any]:

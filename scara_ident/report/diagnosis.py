@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.decision import Decision
-from scara_ident.diagnosis.diagnosis import Diagnosis
-from scara_ident.diagnosis.outcome import Unexplained, joint_errors
+from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.diagnosis.model_selection import Unexplained, joint_errors
 from scara_ident.effects import Parameter
-from scara_ident.evidence import Evidence
-from scara_ident.terms.friction import Friction
+from scara_ident.estimation.observations import Evidence
+from scara_ident.model.terms.friction import Friction
 
 Array = NDArray[np.float64]
 
@@ -42,10 +42,10 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
                     name: {"value": parameter.value, "std": parameter.std, "unit": parameter.unit}
                     for name, parameter in effect.parameters.items()
                 },
-                "confounded_with": list(dict.fromkeys(rival.effect for rival in effect.confounded_with)),
-                "rivals": [
-                    {"effect": rival.effect, "joint": rival.joint, "gain": rival.gain}
-                    for rival in effect.confounded_with
+                "confounded_with": list(dict.fromkeys(confounder.effect for confounder in effect.confounded_with)),
+                "confounders": [
+                    {"effect": confounder.effect, "joint": confounder.joint, "gain": confounder.gain}
+                    for confounder in effect.confounded_with
                 ],
                 "p_value": effect.p_value,
                 "gain": effect.gain,
@@ -127,9 +127,11 @@ def _candidate(decision: Decision, diagnosis: Diagnosis) -> dict[str, Any]:
         "gain": decision.gain,
         "helps_in": [helps, voting],
         "outside_model": decision.examination.outside,
-        "knobs": {
-            knob.name: value
-            for knob, value in zip(decision.candidate.effect.knobs, decision.candidate.member.knobs, strict=True)
+        "nonlinear": {
+            parameter.name: value
+            for parameter, value in zip(
+                decision.candidate.effect.nonlinear, decision.candidate.member.nonlinear, strict=True
+            )
         },
     }
 
@@ -206,7 +208,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())
         found.append(f"Found {effect.effect}{where}: {effect.description}; {values}.")
         if effect.confounded_with:
-            others = ", ".join(rival.label for rival in effect.confounded_with)
+            others = ", ".join(confounder.label for confounder in effect.confounded_with)
             found.append(f"These recordings cannot tell it from: {others}.")
     kind = "held-out" if diagnosis.validation_before else "training"
     old = diagnosis.validation_before or diagnosis.training_before

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.identification import Identification
-from scara_ident.motion import low_pass, stretches
-from scara_ident.recording import Recording
-from scara_ident.rows import raw_rows
+from scara_ident.identification.identify import Identification
+from scara_ident.motion.motion import low_pass, stretches
+from scara_ident.motion.prepared import raw_rows
+from scara_ident.recording.recording import Recording
 
 Array = NDArray[np.float64]
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from scara_ident.estimators import JointError
-from scara_ident.estimators.consistent import ConsistentEstimate, links
-from scara_ident.estimators.estimate import PAPER_SAMPLES
-from scara_ident.evidence import Evidence
-from scara_ident.identification import Identification, not_told_from_zero, undetermined, worst_validation
-from scara_ident.robot import Robot
+from scara_ident.estimation import JointError
+from scara_ident.estimation.consistent.estimator import ConsistentEstimate, links
+from scara_ident.estimation.estimate import PAPER_SAMPLES
+from scara_ident.estimation.observations import Evidence
+from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
+from scara_ident.robot.robot import Robot
 
 
 def identification_dict(identification: Identification) -> dict[str, Any]:
     """Return the content of ``identification.json``."""
     estimate = identification.estimate
     robot = identification.model.robot
-    possible = identification.possibility
+    possible = identification.physical_consistency
     content: dict[str, Any] = {
         "robot": robot.name,
         "model": identification.model.name,
@@ -112,7 +112,7 @@ def sentences(identification: Identification) -> tuple[str, ...]:
         )
     else:
         found.append("Every parameter is determined.")
-    possible = identification.possibility
+    possible = identification.physical_consistency
     if possible.possible:
         found.append("An arm with these parameters can exist.")
     else:

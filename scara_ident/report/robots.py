@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from scara_ident.estimators.consistent import ConsistentEstimate
+from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.export.friction import friction_of
 from scara_ident.export.mjcf import mjcf_text
 from scara_ident.export.urdf import urdf_text

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import pytest
 
 from scara_ident.cli.main import run
-from scara_ident.recording import write_recording
+from scara_ident.recording.recording import write_recording
 from tests.report.simulated import run as simulate
 
 

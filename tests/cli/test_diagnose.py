@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from scara_ident.recording import write_recording
+from scara_ident.recording.recording import write_recording
 from tests.diagnosis.made import held_out_run, virtual_runs
 
 EFFECT = "spring:joint1"

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from scara_ident.cli.main import run
-from scara_ident.robot import embedded_urdf, load_robot
-from tests.importers.formats import recorded, write_plotjuggler
+from scara_ident.robot.robot import embedded_urdf, load_robot
 from tests.made_recordings import save
+from tests.recording.files.formats import recorded, write_plotjuggler
 from tests.shared import shared_path
 
 MADE = recorded(600)

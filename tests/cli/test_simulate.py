@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from scara_ident.robot import load_robot
+from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import multisine
 
 

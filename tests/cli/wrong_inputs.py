@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scara_ident.robot import embedded_urdf
+from scara_ident.robot.robot import embedded_urdf
 from tests.made_recordings import columns, save
 
 LONG = 1200

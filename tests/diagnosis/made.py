@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from scara_ident.diagnosis.table import Table
 from scara_ident.effects import Scene
-from scara_ident.estimators import Estimate
-from scara_ident.estimators.least_squares import wls
-from scara_ident.evidence import Evidence, gather_all
-from scara_ident.indri2002 import table5_parameters
-from scara_ident.information import merge
-from scara_ident.model import TorqueModel, build_model
-from scara_ident.motion import motion_of, stretches
-from scara_ident.recording import Recording
-from scara_ident.robot import load_robot
-from scara_ident.virtual import ReferenceMotion, parse_effect, sampled, simulate, virtual_arm
+from scara_ident.estimation import Estimate
+from scara_ident.estimation.information import merge
+from scara_ident.estimation.least_squares import wls
+from scara_ident.estimation.observations import Evidence, gather_all
+from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.motion.motion import motion_of, stretches
+from scara_ident.paper import table5_parameters
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import ReferenceMotion, parse_effect, sampled, simulate, virtual_arm
 from tests.arms import noisy, recorded_torque, recording
 
 Array = NDArray[np.float64]

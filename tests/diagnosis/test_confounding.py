@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scara_ident.diagnosis.confounding import rivals
+from scara_ident.diagnosis.confounding import confounders
 from scara_ident.diagnosis.search import search
 from scara_ident.effects import Member
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.position import Spring
-from scara_ident.terms import Column
+from scara_ident.model.terms import Column
 from tests.diagnosis.made import BANDS, complete, exact_runs, with_torque
 
 MIDDLE = 1.57
@@ -23,7 +23,7 @@ class Pendulum:
     """What gravity does to a joint of a base that stands on edge: the sine of the angle where a spring has the angle."""
 
     name = "pendulum"
-    knobs = ()
+    nonlinear = ()
 
     def members(self, scene):
         return (Member(0),)
@@ -45,12 +45,12 @@ class Pendulum:
 
 
 def groups(size: float, added) -> dict[str, dict[str, float]]:
-    """Each effect found with its rivals and their gain as a share of its own."""
+    """Each effect found with its confounders and their gain as a share of its own."""
     runs = with_torque(exact_runs(size=size), 0, added)
     result = search(complete(), runs, BANDS, catalogue=(Spring(), Pendulum(), AsymmetricFriction()))
-    found = rivals(result, result.steps[-1].estimate.weights)
+    found = confounders(result, result.steps[-1].estimate.weights)
     return {
-        item.label(result.scene): {rival.label: rival.gain / rival.found_gain for rival in others}
+        item.label(result.scene): {confounder.label: confounder.gain / confounder.found_gain for confounder in others}
         for item, others in zip(result.chosen, found, strict=True)
     }
 

@@ -28,7 +28,7 @@ def test_a_line_in_motor_angle_becomes_a_ripple_of_its_order():
     runs = with_torque(exact_runs(), 1, lambda motion: 0.01 * np.sin(1.37 * 100.0 * motion.q[1] + 0.5))
     ripples = [item for item in candidates(runs) if isinstance(item.effect, TorqueRipple)]
     assert [item.member.joint for item in ripples] == [1]
-    assert ripples[0].member.knobs[0] == pytest.approx(1.37, abs=0.01)
+    assert ripples[0].member.nonlinear[0] == pytest.approx(1.37, abs=0.01)
 
 
 def test_a_line_in_time_becomes_a_vibration_of_its_frequency():
@@ -36,7 +36,7 @@ def test_a_line_in_time_becomes_a_vibration_of_its_frequency():
     found = [item for item in candidates(runs) if isinstance(item.effect, Vibration)]
     assert found
     assert all(item.member.joint == 0 for item in found)
-    assert all(item.member.knobs[0] == pytest.approx(17.3, abs=0.05) for item in found)
+    assert all(item.member.nonlinear[0] == pytest.approx(17.3, abs=0.05) for item in found)
 
 
 def test_only_families_of_the_catalogue_are_offered():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.bank import Candidate
+from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.search import Beside, best_of_each, model_with, refine, search
 from scara_ident.diagnosis.table import tabulate
 from scara_ident.effects import Member
@@ -75,7 +75,7 @@ def test_refinement_finds_a_nonlinear_parameter_between_scan_points():
     leader = max(rough, key=lambda item: item.examination.gain)
     (fine,) = refine(beside, [leader])
     assert fine.examination.gain >= leader.examination.gain
-    assert fine.candidate.member.knobs[0] == pytest.approx(0.43, rel=0.1)
+    assert fine.candidate.member.nonlinear[0] == pytest.approx(0.43, rel=0.1)
     assert fine.candidate.member.joint == 0
 
 

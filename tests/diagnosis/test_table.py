@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from scara_ident.diagnosis.bank import Bank, Candidate
+from scara_ident.diagnosis.candidates import Bank, Candidate
 from scara_ident.diagnosis.table import PARTS, tabulate, tabulate_candidates
 from scara_ident.effects import Member
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.position import Spring
-from scara_ident.evidence import gather_all
-from scara_ident.information import merge
-from scara_ident.model import TorqueModel
+from scara_ident.estimation.information import merge
+from scara_ident.estimation.observations import gather_all
+from scara_ident.model.model import TorqueModel
 from tests.diagnosis.made import BANDS, complete, exact_runs, fitted, scene_of
 
 

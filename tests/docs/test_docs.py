@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scara_ident.base_parameters import find_base_parameters
 from scara_ident.cli.main import app
-from scara_ident.diagnosis import confounding, decision, examination
+from scara_ident.diagnosis import acceptance, candidate_tests, confounding
 from scara_ident.diagnosis.search import MOST_EFFECTS
 from scara_ident.effects import CATALOGUE
 from scara_ident.effects.aliases import OPENED_BY
-from scara_ident.indri2002 import OJD, OJK
-from scara_ident.recording import write_recording
-from scara_ident.robot import embedded_urdf, load_robot
-from scara_ident.virtual import sampled, simulate, virtual_arm
+from scara_ident.model.base_parameters import find_base_parameters
+from scara_ident.paper import OJD, OJK
+from scara_ident.recording.recording import write_recording
+from scara_ident.robot.robot import embedded_urdf, load_robot
+from scara_ident.simulation import sampled, simulate, virtual_arm
 from tests.docs.pages import PAGES, Block, blocks, run, run_bash
 from tests.shared import ROOT
 
@@ -54,10 +54,10 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     assert "arithmatex" not in theory
     api = (tmp_path / "site" / "api.html").read_text(encoding="utf-8")
     for public in (
-        "identification.identify",
-        "diagnosis.diagnosis.diagnose",
+        "identification.identify.identify",
+        "diagnosis.diagnose.diagnose",
         "effects.Effect",
-        "virtual.simulate.simulate",
+        "simulation.simulate.simulate",
     ):
         assert f'id="scara_ident.{public}"' in api
 
@@ -150,10 +150,10 @@ def test_the_diagnosis_page_lists_every_alias_and_the_limits_of_the_program() ->
     page = (DOCS / "diagnosis.md").read_text(encoding="utf-8")
     assert [alias for alias in OPENED_BY if f"`{alias}`" not in page] == []
     for said in (
-        f"| lies outside the model | at least {examination.WEAK:.0e} ",
-        f"| significant | p times candidates tried below {100 * decision.FAMILY_ERROR:g} % |",
-        f"| gain on data not fitted to | at least {100 * decision.LEAST_GAIN:g} % ",
-        f"| helps in | at least {100 * decision.LEAST_VOTES:g} % ",
+        f"| lies outside the model | at least {candidate_tests.WEAK:.0e} ",
+        f"| significant | p times candidates tried below {100 * acceptance.FAMILY_ERROR:g} % |",
+        f"| gain on data not fitted to | at least {100 * acceptance.LEAST_GAIN:g} % ",
+        f"| helps in | at least {100 * acceptance.LEAST_VOTES:g} % ",
         f"At most {MOST_EFFECTS} effects",
         f"at least {100 * confounding.LEAST_SHARE:g} % of what it removes",
     ):

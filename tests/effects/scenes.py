@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
-from scara_ident.estimators.least_squares import wls
-from scara_ident.evidence import gather_all
-from scara_ident.model import TorqueModel, build_model
-from scara_ident.motion import Motion
-from scara_ident.recording import Recording
-from scara_ident.robot import Robot
-from scara_ident.terms import RigidBody
-from scara_ident.virtual import ReferenceMotion, VirtualArm, sampled
+from scara_ident.estimation.least_squares import wls
+from scara_ident.estimation.observations import gather_all
+from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.model.terms import RigidBody
+from scara_ident.motion.motion import Motion
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import Robot
+from scara_ident.simulation import ReferenceMotion, VirtualArm, sampled
 from tests.arms import motion, sines
 
 Array = NDArray[np.float64]

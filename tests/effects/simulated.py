@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.effects import Scene
-from scara_ident.motion import Motion
-from scara_ident.robot import load_robot
-from scara_ident.virtual import Effect, SimulationResult, VirtualArm, ideal, on_side, simulate, truth, virtual_arm
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import Effect, SimulationResult, VirtualArm, ideal, on_side, simulate, truth, virtual_arm
 from tests.effects.scenes import scene_of
-from tests.virtual.made import scara, swing, tree
+from tests.simulation.made import scara, swing, tree
 
 Array = NDArray[np.float64]
 

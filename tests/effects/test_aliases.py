@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from scara_ident.effects.aliases import aliases
-from scara_ident.model import build_model
-from scara_ident.robot import load_robot
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import load_robot
 from tests.arms import PLANAR_2R, example_urdf, write_urdf
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from scara_ident.effects import Member, Signals
 from scara_ident.effects.coupling import DriveCoupling, InertiaCoupling
-from scara_ident.model import build_model
-from scara_ident.robot import load_robot
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import load_robot
 from tests.arms import example_urdf, recorded_torque, recording, sines
 from tests.effects.scenes import columns, fit, moving, scene_of
 

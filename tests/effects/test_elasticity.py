@@ -9,9 +9,9 @@ import pytest
 from scara_ident.effects import Member, Signals
 from scara_ident.effects.elasticity import Backlash, JointElasticity, flank, swing
 from scara_ident.effects.links import lagging, link_inertia, usual_link_inertia
-from scara_ident.model import build_model
-from scara_ident.robot import load_robot
-from scara_ident.virtual import parse_effect, simulate, virtual_arm
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import parse_effect, simulate, virtual_arm
 from tests.arms import example_urdf, rnea
 from tests.effects.scenes import columns, fit, moving, scene_of, wandering
 

@@ -18,13 +18,13 @@ from scara_ident.effects.friction import (
     amplitude_and_phase,
     friction_of,
 )
-from scara_ident.model import build_model
-from scara_ident.robot import load_robot
-from scara_ident.virtual import effects as fx
-from scara_ident.virtual import simulate, virtual_arm
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import effects as fx
+from scara_ident.simulation import simulate, virtual_arm
 from tests.effects.scenes import columns, fit, moving, scene_of, wandering
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
-from tests.virtual.made import left_over
+from tests.simulation.made import left_over
 
 
 @pytest.mark.parametrize("kind", ARMS)
@@ -99,8 +99,8 @@ def test_members_are_those_that_can_be_seen():
     short = replace(scene, travel=np.array([2.0, 0.1]))
     assert [member.joint for member in PositionDependentFriction().members(short)] == [0]
     for effect in (Stribeck(), WarmUp()):
-        (knob,) = effect.knobs
-        assert all(knob.lower < member.knobs[0] < knob.upper for member in effect.members(scene))
+        (parameter,) = effect.nonlinear
+        assert all(parameter.lower < member.nonlinear[0] < parameter.upper for member in effect.members(scene))
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_what_no_arm_can_have_is_refused(effect, member, possible, impossible):
     for value in impossible:
         assert effect.inadmissible(scene, member, np.array(value), np.full(len(value), 1e-4))
         assert effect.inadmissible(scene, member, np.array(value), np.full(len(value), 10.0)) is None or (
-            member.knobs and member.knobs[0] > 1.0
+            member.nonlinear and member.nonlinear[0] > 1.0
         )
 
 

@@ -15,9 +15,9 @@ from scara_ident.effects.measurement import (
     shifted,
     within_sampling,
 )
-from scara_ident.model import build_model
-from scara_ident.recording import Recording
-from scara_ident.robot import load_robot
+from scara_ident.model.model import build_model
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import load_robot
 from tests.arms import recorded_torque, recording, sines
 from tests.effects.scenes import columns, fit, moving, scene_of
 

@@ -12,11 +12,11 @@ import pytest
 from scara_ident.effects import Member
 from scara_ident.effects.links import point_mass, tool_of
 from scara_ident.effects.payload import FreePayloadChange, GravityCounterbalance, PayloadChange, PayloadOfRecordings
-from scara_ident.model import build_model
-from scara_ident.robot import Robot, load_robot
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import PLANAR_2R, example_urdf, recorded_torque, recording, rnea, sines, write_urdf
 from tests.effects.scenes import columns, fit, moving, scene_of
-from tests.virtual.made import tree
+from tests.simulation.made import tree
 
 FRICTION = ((0.1, 0.05, -0.004, 0.0, 0.02), (0.04, 0.03, 0.0, 0.0, -0.01))
 
@@ -102,7 +102,7 @@ def test_mass_and_time_are_recovered():
 
 def test_the_instants_cover_the_run_and_a_shift_of_less_than_a_sample_changes_the_column():
     scene = scene_of(load_robot())
-    times = [member.knobs[0] for member in PayloadChange().members(scene)]
+    times = [member.nonlinear[0] for member in PayloadChange().members(scene)]
     assert np.diff([0.0, *times, scene.duration]).max() < 1.2
     item = moving(scene.robot, 1.0)
     near = [columns(PayloadChange(), scene, item, Member(None, (t,))) for t in (0.4, 0.4003)]

@@ -10,14 +10,14 @@ import pytest
 
 from scara_ident.effects import Member
 from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
-from scara_ident.model import build_model
-from scara_ident.motion import Motion
-from scara_ident.robot import load_robot
-from scara_ident.virtual import effects as fx
-from scara_ident.virtual import simulate, virtual_arm
+from scara_ident.model.model import build_model
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import effects as fx
+from scara_ident.simulation import simulate, virtual_arm
 from tests.effects.scenes import columns, fit, moving, scene_of, wandering
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
-from tests.virtual.made import left_over
+from tests.simulation.made import left_over
 
 
 @pytest.mark.parametrize("kind", ARMS)
@@ -87,7 +87,7 @@ def test_members_are_those_that_can_be_seen():
     scene = scene_of(load_robot())
     assert Member(0, (2.0,)) in TorqueRipple().members(scene)
     narrow = replace(scene, band=2.0)
-    assert max(member.knobs[0] for member in TorqueRipple().members(narrow)) < 12.0
+    assert max(member.nonlinear[0] for member in TorqueRipple().members(narrow)) < 12.0
     short = replace(scene, travel=np.array([0.03, 2.0]))
     assert {member.joint for member in EncoderEccentricity().members(short)} == {1}
     assert Vibration().members(scene) == ()

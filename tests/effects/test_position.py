@@ -9,12 +9,12 @@ import pytest
 
 from scara_ident.effects import Member, Scene
 from scara_ident.effects.position import Spring
-from scara_ident.model import TorqueModel
-from scara_ident.terms.friction import Offset
-from scara_ident.virtual import effects as fx
+from scara_ident.model.model import TorqueModel
+from scara_ident.model.terms.friction import Offset
+from scara_ident.simulation import effects as fx
 from tests.effects.scenes import columns, scene_of
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
-from tests.virtual.made import left_over, scara
+from tests.simulation.made import left_over, scara
 
 STIFFNESS, REST = 0.07, 0.4
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from scara_ident.effects import Member
 from scara_ident.effects.presliding import DISTANCES, LEAST_REVERSAL, Presliding, dahl_state, turning_points
-from scara_ident.model import build_model
-from scara_ident.robot import load_robot
-from scara_ident.virtual import effects as fx
-from scara_ident.virtual import simulate, virtual_arm
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import effects as fx
+from scara_ident.simulation import simulate, virtual_arm
 from tests.effects.scenes import columns, fit, scene_of, wandering
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
 
@@ -81,8 +81,8 @@ def test_the_column_is_what_the_simulated_arm_adds(kind: str, tmp_path: Path):
 
 def test_members_are_shorter_than_the_travel():
     scene = scene_of(load_robot())
-    assert {member.knobs[0] for member in Presliding().members(scene)} == set(DISTANCES)
-    assert all(Presliding().knobs[0].lower < distance < Presliding().knobs[0].upper for distance in DISTANCES)
+    assert {member.nonlinear[0] for member in Presliding().members(scene)} == set(DISTANCES)
+    assert all(Presliding().nonlinear[0].lower < distance < Presliding().nonlinear[0].upper for distance in DISTANCES)
 
 
 def test_the_coulomb_friction_is_recovered_and_the_distance_fits_best():

@@ -10,11 +10,11 @@ import pytest
 
 from scara_ident.effects import Member
 from scara_ident.effects.tilt import BaseTilt, NominalBaseTilt
-from scara_ident.model import build_model
-from scara_ident.robot import Robot, load_robot
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import PLANAR_2R, example_urdf, recorded_torque, recording, rnea, sines, write_urdf
 from tests.effects.scenes import columns, fit, moving, scene_of
-from tests.virtual.made import tree
+from tests.simulation.made import tree
 
 TILT = (0.03, -0.02)
 
@@ -52,7 +52,7 @@ def test_the_columns_are_what_tilted_gravity_adds(name: str, tmp_path: Path):
         if f"tilt_{axis}" in names:
             assert value[names.index(f"tilt_{axis}")] == pytest.approx(tilt, rel=1e-4)
     for member in NominalBaseTilt().members(scene)[2:3]:
-        assert member.knobs == pytest.approx([1.0])
+        assert member.nonlinear == pytest.approx([1.0])
         nominal = columns(NominalBaseTilt(), scene, item, member)
         assert np.abs(np.einsum("jkn,k->jn", nominal, np.array(TILT)) - added).max() < 1e-6 * size
 

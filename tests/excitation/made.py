@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from scara_ident.description import JointDescription, RobotDescription
 from scara_ident.excitation.criteria import Criterion, LogDet
 from scara_ident.excitation.curves import make_basis
 from scara_ident.excitation.limits import limits_of, nominal_parameters, resting_posture
 from scara_ident.excitation.problem import Problem, Task, row_names
 from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.verification import grid
-from scara_ident.model import TorqueModel
-from scara_ident.robot import Robot, build_robot, embedded_urdf
-from scara_ident.terms import RigidBody
-from scara_ident.terms.rigid_body import rigid_body
+from scara_ident.model.model import TorqueModel
+from scara_ident.model.terms import RigidBody
+from scara_ident.model.terms.rigid_body import rigid_body
+from scara_ident.robot.description import JointDescription, RobotDescription
+from scara_ident.robot.robot import Robot, build_robot, embedded_urdf
 from tests.arms import example_urdf
 
 

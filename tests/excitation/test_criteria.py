@@ -4,10 +4,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scara_ident.errors import UsageError
+from scara_ident.estimation.information import Information
 from scara_ident.excitation.criteria import BlockLogDet, Condition, LogDet, block_of, criterion_of
-from scara_ident.information import Information
-from scara_ident.model import build_model
-from scara_ident.robot import load_robot
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import load_robot
 
 CRITERIA = (
     LogDet(),

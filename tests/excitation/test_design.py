@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import RobotError, UsageError
+from scara_ident.estimation.information import Information
 from scara_ident.excitation import (
     Condition,
     Effort,
@@ -17,10 +18,9 @@ from scara_ident.excitation import (
     limits_of,
     nominal_parameters,
 )
-from scara_ident.indri2002 import OJD, criteria, regressor, table5_parameters, tool_acceleration
-from scara_ident.information import Information
-from scara_ident.model import build_model
-from scara_ident.robot import Robot, load_robot
+from scara_ident.model.model import build_model
+from scara_ident.paper import OJD, criteria, regressor, table5_parameters, tool_acceleration
+from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import PLANAR_2R, Link, example_urdf, rnea, write_urdf
 from tests.excitation.made import panda, rigid_model, scara_with_quill
 

@@ -4,8 +4,8 @@ import pytest
 
 from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation.known import read_parameters
-from scara_ident.model import build_model
-from scara_ident.robot import load_robot
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import load_robot
 
 MODEL = build_model(load_robot(), "basic")
 

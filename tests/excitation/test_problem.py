@@ -4,8 +4,8 @@ import pytest
 from scara_ident.excitation.criteria import BlockLogDet, Condition, LogDet
 from scara_ident.excitation.interior_point import Schedule, minimise, shrunk_inside
 from scara_ident.excitation.search import _random_motion
-from scara_ident.model import build_model
-from scara_ident.robot import load_robot
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import load_robot
 from tests.arms import example_urdf
 from tests.excitation.made import rigid_model, scara_with_quill, small_problem
 

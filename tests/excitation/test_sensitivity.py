@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scara_ident.excitation.sensitivity import SmoothModel
-from scara_ident.model import build_model
-from scara_ident.robot import load_robot
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import load_robot
 from tests.arms import example_urdf, motion
 from tests.excitation.made import panda, rigid_model, scara_with_quill
 

@@ -4,8 +4,8 @@ import pytest
 
 from scara_ident.errors import RobotError
 from scara_ident.excitation.tool import tool_motion, tool_of
-from scara_ident.indri2002 import OJD, tool_acceleration
-from scara_ident.robot import load_robot
+from scara_ident.paper import OJD, tool_acceleration
+from scara_ident.robot.robot import load_robot
 from tests.arms import example_urdf
 from tests.excitation.made import panda, scara_with_quill
 

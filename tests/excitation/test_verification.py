@@ -5,8 +5,8 @@ from scara_ident.excitation import verification
 from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.search import _random_motion
 from scara_ident.excitation.verification import Reached, extremes
-from scara_ident.model import build_model
-from scara_ident.robot import load_robot
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import load_robot
 from tests.excitation.made import small_problem
 
 TASK = small_problem(build_model(load_robot()), trajectories=2, tool_speed=1.5).task

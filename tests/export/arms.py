@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from scara_ident.base_parameters import standard_regressor
-from scara_ident.robot import Robot, load_robot
+from scara_ident.model.base_parameters import standard_regressor
+from scara_ident.robot.robot import Robot, load_robot
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from scara_ident.errors import ScaraIdentError
 from scara_ident.export.bodies import Member, body_about_com, body_parameters, check_standard, share
-from scara_ident.robot import load_robot
+from scara_ident.robot.robot import load_robot
 from tests.export.arms import Array
 
 SEEDS = st.integers(0, 2**31)

@@ -6,14 +6,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from scara_ident.estimators.estimate import Estimate
+from scara_ident.estimation.estimate import Estimate
+from scara_ident.estimation.information import Information
 from scara_ident.export.friction import JointFriction, friction_of
 from scara_ident.export.urdf import urdf_text
-from scara_ident.information import Information
-from scara_ident.model import ModelName, build_model
-from scara_ident.motion import Motion
-from scara_ident.robot import Robot, load_robot
-from scara_ident.terms import Friction
+from scara_ident.model.model import ModelName, build_model
+from scara_ident.model.terms import Friction
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import Robot, load_robot
 from tests.export.arms import branched, random_motion
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scara_ident.errors import ScaraIdentError
 from scara_ident.export.friction import JointFriction
 from scara_ident.export.mjcf import mjcf_text
-from scara_ident.robot import Robot, load_robot
+from scara_ident.robot.robot import Robot, load_robot
 from tests.export.arms import ARMS, Array, joint_torque, random_motion, random_standard
 
 mujoco = pytest.importorskip("mujoco", reason="needs MuJoCo, from the extra 'test'")

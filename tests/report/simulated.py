@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scara_ident.identification import Identification, identify
-from scara_ident.indri2002 import OJD, table5_parameters
-from scara_ident.recording import Recording
-from scara_ident.robot import load_robot
+from scara_ident.identification.identify import Identification, identify
+from scara_ident.paper import OJD, table5_parameters
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import load_robot
 from tests.arms import noisy, recorded_torque, recording
 
 RATE = 250.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from scara_ident.report.base import base_dict
 from scara_ident.report.files import plain
-from scara_ident.robot import load_robot
+from scara_ident.robot.robot import load_robot
 from tests.arms import example_urdf
 
 

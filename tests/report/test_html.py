@@ -15,11 +15,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scara_ident.comparison import compare
 from scara_ident.diagnosis import diagnose
 from scara_ident.effects.position import Spring
 from scara_ident.errors import ScaraIdentError
-from scara_ident.motion import Motion
+from scara_ident.identification.compare import compare
+from scara_ident.model.terms import Friction
+from scara_ident.motion.motion import Motion
 from scara_ident.report.comparison import comparison_dict
 from scara_ident.report.files import plain
 from scara_ident.report.html import comparison_report, diagnosis_report, excitation_report, identification_report
@@ -31,8 +32,7 @@ from scara_ident.report.html.plot import packed
 from scara_ident.report.html.spectra import autocorrelation, orders, spectrum
 from scara_ident.report.html.torque import envelope
 from scara_ident.report.html.traces import Trace, traces
-from scara_ident.robot import load_robot
-from scara_ident.terms import Friction
+from scara_ident.robot.robot import load_robot
 from tests.arms import noisy, recorded_torque, recording, sines
 from tests.report.simulated import made, run
 

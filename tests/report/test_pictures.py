@@ -9,7 +9,7 @@ import pytest
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.effects.position import Spring
-from scara_ident.motion import Motion
+from scara_ident.motion.motion import Motion
 from scara_ident.report.diagnosis import diagnosis_markdown
 from scara_ident.report.html import diagnosis_report
 from scara_ident.report.html.chapters import Chapter
@@ -18,7 +18,7 @@ from scara_ident.report.html.story import chapter_group
 from scara_ident.report.html.torque import torque_group
 from scara_ident.report.html.traces import Trace
 from scara_ident.report.pictures import COLORS, diagnosis_pictures, remove_stale
-from scara_ident.robot import load_robot
+from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, with_torque
 
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.diagnosis import Diagnosis, FoundEffect
+from scara_ident.diagnosis.diagnose import Diagnosis, FoundEffect
 from scara_ident.diagnosis.search import DELAY
-from scara_ident.estimators import Estimate
-from scara_ident.recording import Recording
+from scara_ident.estimation import Estimate
+from scara_ident.recording.recording import Recording
 from scara_ident.report.html.traces import Trace, traces
 
 Array = NDArray[np.float64]

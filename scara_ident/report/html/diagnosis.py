@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from scara_ident.diagnosis.diagnosis import Diagnosis, FoundEffect
+from scara_ident.diagnosis.diagnose import Diagnosis, FoundEffect
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.effects.measurement import shifted
-from scara_ident.recording import Recording
+from scara_ident.recording.recording import Recording
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.html.candidates import candidate_blocks
 from scara_ident.report.html.chapters import chapters
@@ -264,7 +264,8 @@ def _effect_words(effect: FoundEffect, diagnosis: Diagnosis) -> list[Block]:
     blocks: list[Block] = [paragraph(words), table(("parameter", "value", "std", "unit"), rows, numeric=(1, 2))]
     if effect.confounded_with:
         others = ", ".join(
-            f"{rival.label} (would remove {rival.gain:.0%} in its place)" for rival in effect.confounded_with
+            f"{confounder.label} (would remove {confounder.gain:.0%} in its place)"
+            for confounder in effect.confounded_with
         )
         blocks.append(paragraph(f"These recordings cannot tell it from: {others}."))
     return blocks
@@ -345,7 +346,7 @@ def _limit_blocks(diagnosis: Diagnosis, content: dict[str, Any]) -> list[Block]:
     if groups:
         blocks.append(
             listing(
-                f"{_title(effect)} | {' | '.join(dict.fromkeys(rival.label for rival in effect.confounded_with))}"
+                f"{_title(effect)} | {' | '.join(dict.fromkeys(confounder.label for confounder in effect.confounded_with))}"
                 for effect in groups
             )
         )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.motion import Motion
+from scara_ident.motion.motion import Motion
 from scara_ident.report.html.page import (
     Arm,
     Beside,
@@ -29,7 +29,7 @@ from scara_ident.report.html.page import (
     track,
 )
 from scara_ident.report.html.plot import Figure, Grid, Layer, Level, Line, Mark, Panel, Plot, single
-from scara_ident.robot import Robot
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from scara_ident.diagnosis.decision import FAMILY_ERROR, Decision
-from scara_ident.diagnosis.diagnosis import Diagnosis
-from scara_ident.diagnosis.examination import WEAK
+from scara_ident.diagnosis.acceptance import FAMILY_ERROR, Decision
+from scara_ident.diagnosis.candidate_tests import WEAK
+from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.search import DELAY
 from scara_ident.effects.measurement import within_sampling
 from scara_ident.report.diagnosis import best_by_label
@@ -53,7 +53,7 @@ def next_experiments(diagnosis: Diagnosis) -> list[str]:
             found.append(f"To learn what is left on {remainder.joint}: repeat one trajectory at half the speed; how the remainder scales tells friction from inertia and from delays.")  # fmt: skip
     for effect in diagnosis.effects:
         if effect.confounded_with:
-            others = ", ".join(dict.fromkeys(rival.label for rival in effect.confounded_with))
+            others = ", ".join(dict.fromkeys(confounder.label for confounder in effect.confounded_with))
             found.append(f"To tell {_label(effect.effect, effect.joint)} from {others}: {_experiment(effect.effect)}.")
     if not diagnosis.fit_after:
         found.append("To know the noise floor: record every trajectory at least twice.")

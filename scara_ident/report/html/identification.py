@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
 
-from scara_ident.diagnosis.outcome import joint_errors
-from scara_ident.estimators.consistent import ConsistentEstimate
-from scara_ident.identification import Identification, undetermined
-from scara_ident.recording import Recording
+from scara_ident.diagnosis.model_selection import joint_errors
+from scara_ident.estimation.consistent.estimator import ConsistentEstimate
+from scara_ident.identification.identify import Identification, undetermined
+from scara_ident.recording.recording import Recording
 from scara_ident.report.html.friction import friction_group
 from scara_ident.report.html.page import Block, Page, Section, count, heading, listing, paragraph
 from scara_ident.report.html.parameters import (

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.estimators import Estimate, History, rls
-from scara_ident.estimators.consistent import ConsistentEstimate, links
-from scara_ident.evidence import Evidence
-from scara_ident.information import merge
+from scara_ident.estimation import Estimate, History, rls
+from scara_ident.estimation.consistent.estimator import ConsistentEstimate, links
+from scara_ident.estimation.information import merge
+from scara_ident.estimation.observations import Evidence
 from scara_ident.report.html.page import Cell, Group, Selector, Text, bar, escape, number, superscripts, table, tag
 from scara_ident.report.html.plot import Band, Drawing, Figure, Layer, Level, Line, Mark, Matrix, Panel, Plot, single
 from scara_ident.threads import one_blas_thread

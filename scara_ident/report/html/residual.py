@@ -13,7 +13,7 @@ from scara_ident.report.html.page import Block, Group, Selector, heading, paragr
 from scara_ident.report.html.plot import Band, Density, Drawing, Figure, Layer, Level, Line, Mark, Panel, Plot, Region
 from scara_ident.report.html.spectra import ORDER_WORDS, autocorrelation, orders, spectrum
 from scara_ident.report.html.traces import Trace, kept
-from scara_ident.robot import Robot
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 Sets = Mapping[str, Sequence[Trace]]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.report.html.traces import Trace
-from scara_ident.robot import Robot
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from scara_ident.report.html.plot import Band, Figure, Layer, Line, Panel, Plot,
 from scara_ident.report.html.spectra import ORDER_WORDS, orders, spectrum
 from scara_ident.report.html.torque import banded, unused_regions
 from scara_ident.report.html.traces import Trace, kept
-from scara_ident.robot import Robot
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.estimators import JointError
+from scara_ident.estimation import JointError
 from scara_ident.report.html.page import Cell, Group, Selector, Text, escape, number, table
 from scara_ident.report.html.plot import Drawing, Figure, Grid, Layer, Line, Panel, Plot, Region
 from scara_ident.report.html.traces import Trace
-from scara_ident.robot import Robot
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.effects.effect import EffectTerm
-from scara_ident.model import TorqueModel
-from scara_ident.motion import Motion, Stretch, low_pass, motion_of, stretches, torque_of
-from scara_ident.recording import Recording
-from scara_ident.rows import position_cuts, row_step, standstill, trim_of
-from scara_ident.terms import Friction
+from scara_ident.model.model import TorqueModel
+from scara_ident.model.terms import Friction
+from scara_ident.motion.motion import Motion, Stretch, low_pass, motion_of, stretches, torque_of
+from scara_ident.motion.prepared import position_cuts, row_step, standstill, trim_of
+from scara_ident.recording.recording import Recording
 
 Array = NDArray[np.float64]
 

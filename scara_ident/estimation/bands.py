@@ -1,0 +1,209 @@
+"""The band in which motion explains torque, chosen from the data joint by joint.
+
+Differentiated twice, the noise of a position grows with the square of frequency, so above some frequency the
+regressor is noise. Where that is, the torque tells: with parameters fitted at low frequency, the torque that a
+hardly filtered motion predicts is compared with the recorded one, frequency by frequency. Where the prediction
+leaves more than half of the torque's power, motion and torque no longer speak of the same thing, be it for noise
+in the position or in the torque, and the band ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.estimation.information import merge
+from scara_ident.estimation.observations import gather_all
+from scara_ident.model.model import TorqueModel
+from scara_ident.motion.motion import Stretch, motion_of, stretches, torque_of
+from scara_ident.recording.recording import Recording
+
+Array = NDArray[np.float64]
+
+# The first fit uses the band that holds this share of the torque's power.
+FIRST_POWER = 0.95
+# It is not narrower than this many periods in the longest recording.
+FIRST_PERIODS = 10.0
+# Nor than this, Hz: in a narrower one too much about turning points would be left out to fit the rest.
+FIRST_BAND = 2.0
+# The fit and the choice of its band are repeated until they agree, at the most so often.
+MOST_ROUNDS = 3
+MOST_HALVINGS = 4
+# Share of the torque's power that the motion must explain at the band's edge.
+EXPLAINED = 0.5
+# Highest band as a share of the sample rate, and of the position filter that shows where the noise begins.
+HIGHEST_BAND = 0.2
+WIDE_FILTER = 0.4
+# Frequencies are pooled into this many bins per octave.
+BINS_PER_OCTAVE = 3
+# Segments of the spectra, s.
+SEGMENT_SECONDS = 4.0
+# Samples that the choice looks at, at the most.
+ENOUGH_SAMPLES = 60_000
+
+
+@dataclass(frozen=True)
+class BandChoice:
+    """Bands and how they came about.
+
+    Attributes
+    ----------
+    bands : tuple of float
+        Cut-off per joint, Hz.
+    explained : tuple of float
+        Share of the torque's power within the band that the first fit explains, per joint.
+    notes : tuple of str
+        What a person should know, such as a joint whose torque the motion does not explain.
+    """
+
+    bands: tuple[float, ...]
+    explained: tuple[float, ...]
+    notes: tuple[str, ...]
+
+
+def choose_bands(model: TorqueModel, recordings: Sequence[Recording]) -> BandChoice:
+    """Choose the low-pass band of every joint.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    recordings : sequence of Recording
+        With effort. The first repetition of each trajectory is looked at first.
+
+    Returns
+    -------
+    BandChoice
+    """
+    chosen = _sample(recordings)
+    parts = [part for recording in chosen for part in stretches(recording)]
+    edges = _edges(parts)
+    highest = HIGHEST_BAND * min(part.rate for part in parts)
+    start = _first_bands(parts, edges, model.robot.n)
+    choice = _refined(model, chosen, parts, edges, start, highest)
+    # Where the first band holds so much noise that nothing is explained, a narrower one may show what is.
+    for _ in range(MOST_HALVINGS):
+        if any(share > 0.0 for share in choice.explained):
+            break
+        start = [0.5 * band for band in start]
+        choice = _refined(model, chosen, parts, edges, start, highest)
+    return choice
+
+
+def _refined(
+    model: TorqueModel,
+    chosen: Sequence[Recording],
+    parts: Sequence[Stretch],
+    edges: Array,
+    start: Sequence[float],
+    highest: float,
+) -> BandChoice:
+    """Repeat fit and choice of bands from a first band on until they agree."""
+    n = model.robot.n
+    choice = BandChoice((max(start),) * n, (0.0,) * n, ())
+    for _ in range(MOST_ROUNDS):
+        before = choice.bands
+        evidence = gather_all(model, chosen, before)
+        value = merge(item.joint(j) for item in evidence for j in range(n)).solve().value
+        choice = _explained_bands(model, parts, edges, value, start, highest)
+        if choice.bands == before:
+            break
+    return choice
+
+
+def _explained_bands(
+    model: TorqueModel, parts: Sequence[Stretch], edges: Array, value: Array, start: Sequence[float], highest: float
+) -> BandChoice:
+    """Return the bands up to which parameters explain the torque."""
+    torque = np.zeros((model.robot.n, len(edges) - 1))
+    error = np.zeros_like(torque)
+    for part in parts:
+        motion = motion_of(part, [WIDE_FILTER * part.rate] * model.robot.n)
+        predicted = np.einsum("jpn,p->jn", model.regressor(motion), value)
+        recorded = torque_of(part)
+        torque += binned_power(recorded, part.rate, edges)
+        error += binned_power(recorded - predicted, part.rate, edges)
+    bands, explained, notes = [], [], []
+    for j, joint in enumerate(model.robot.joints):
+        gain = np.cumsum(torque[j] * (1.0 - EXPLAINED) - error[j])
+        best = int(np.argmax(gain))
+        if gain[best] <= 0.0:
+            bands.append(min(start[j], highest))
+            explained.append(0.0)
+            notes.append(
+                f"{joint}: its motion explains under half of its torque at every frequency; "
+                f"the band of {bands[-1]:.3g} Hz holds {FIRST_POWER:.0%} of the torque"
+            )
+            continue
+        bands.append(float(min(edges[best + 1], highest)))
+        explained.append(float(1.0 - np.sum(error[j, : best + 1]) / np.sum(torque[j, : best + 1])))
+    return BandChoice(tuple(bands), tuple(explained), tuple(notes))
+
+
+def _sample(recordings: Sequence[Recording]) -> list[Recording]:
+    """Take one repetition of each trajectory, then more, until there is enough to look at."""
+    seen: dict[str, int] = {}
+    ranked = []
+    for place, recording in enumerate(recordings):
+        turn = seen.get(recording.trajectory, 0)
+        seen[recording.trajectory] = turn + 1
+        ranked.append((turn, place, recording))
+    chosen: list[Recording] = []
+    total = 0
+    for _, _, recording in sorted(ranked, key=lambda item: item[:2]):
+        if chosen and total + len(recording.time) > ENOUGH_SAMPLES:
+            continue
+        chosen.append(recording)
+        total += len(recording.time)
+    return chosen
+
+
+def _edges(parts: Sequence[Stretch]) -> Array:
+    longest = max(len(part.time) / part.rate for part in parts)
+    lowest = 1.0 / min(SEGMENT_SECONDS, longest)
+    highest = 0.5 * max(part.rate for part in parts)
+    count = max(2, int(np.ceil(BINS_PER_OCTAVE * np.log2(highest / lowest))))
+    return np.concatenate([[0.0], np.geomspace(1.5 * lowest, highest, count)])
+
+
+def _first_bands(parts: Sequence[Stretch], edges: Array, n: int) -> list[float]:
+    power = np.zeros((n, len(edges) - 1))
+    for part in parts:
+        power += binned_power(torque_of(part), part.rate, edges)
+    longest = max(len(part.time) / part.rate for part in parts)
+    slowest = max(FIRST_BAND, FIRST_PERIODS / longest)
+    fastest = max(slowest, HIGHEST_BAND * min(part.rate for part in parts))
+    share = np.cumsum(power, axis=1) / np.maximum(np.sum(power, axis=1, keepdims=True), np.finfo(float).tiny)
+    first = [float(edges[int(np.argmax(row >= FIRST_POWER)) + 1]) for row in share]
+    return [float(np.clip(band, slowest, fastest)) for band in first]
+
+
+def binned_power(signals: Array, rate: float, edges: Array) -> Array:
+    """Return the power of signals in bins of frequency, mean removed.
+
+    Parameters
+    ----------
+    signals : ndarray, shape (k, N)
+    rate : float
+        Samples per second.
+    edges : ndarray, shape (m + 1,)
+        Hz.
+
+    Returns
+    -------
+    ndarray, shape (k, m)
+        Sum of squares times samples, so that recordings add up. Hann windows with half overlap.
+    """
+    count = signals.shape[1]
+    length = min(count, max(8, int(SEGMENT_SECONDS * rate)))
+    starts = range(0, count - length + 1, max(1, length // 2))
+    window = np.hanning(length)
+    centred = signals - np.mean(signals, axis=1, keepdims=True)
+    power = sum(np.abs(np.fft.rfft(centred[:, s : s + length] * window, axis=1)) ** 2 for s in starts)
+    frequency = np.fft.rfftfreq(length, 1.0 / rate)
+    place = np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, len(edges) - 2)
+    result = np.zeros((signals.shape[0], len(edges) - 1))
+    np.add.at(result.T, place, np.asarray(power).T)
+    return np.asarray(result * (count / (len(starts) * length)))

@@ -1,0 +1,220 @@
+"""Least squares over arms that can exist: physically consistent parameters, bodies and friction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.errors import EstimationError, UsageError
+from scara_ident.estimation.consistent.activity import active, tangent
+from scara_ident.estimation.consistent.bodies import LinkInertia, link_inertia
+from scara_ident.estimation.consistent.feasibility import PhysicalConsistency, check_possible
+from scara_ident.estimation.consistent.matching import sizes
+from scara_ident.estimation.consistent.options import ConsistentOptions
+from scara_ident.estimation.consistent.programme import MARGIN, Programme
+from scara_ident.estimation.consistent.solution import StandardPrior, fill, solve_joints
+from scara_ident.estimation.consistent.unknowns import Unknowns
+from scara_ident.estimation.covariance import block_covariance
+from scara_ident.estimation.estimate import Estimate, weighted_blocks
+from scara_ident.estimation.information import UNDETERMINED, Information, merge
+from scara_ident.estimation.observations import Evidence
+from scara_ident.model.model import TorqueModel
+from scara_ident.threads import one_blas_thread
+
+__all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "physical_consistency"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ConsistentEstimate(Estimate):
+    """An estimate that belongs to an arm that can exist, and that arm.
+
+    Where plain least squares already belongs to one it is the estimate, and ``std`` is its standard deviation.
+    Where constraints hold the estimate, ``std`` is that of the directions in which it can still move: a parameter
+    fixed by active constraints has a standard deviation of 0, which says that the constraint and not the data
+    determines it. The curvature of the constraints is left out, which makes ``std`` rather too large than too small.
+
+    Attributes
+    ----------
+    standard : ndarray, shape (11 n,)
+        Standard parameters of bodies and rotors, see `Robot.standard_parameters`. They give the estimated base
+        parameters to rounding and are nearest to the URDF's in everything else.
+    active : tuple of str
+        What holds the estimate, such as ``inertia of link2`` or ``friction of joint1``.
+    was_possible : bool
+        Whether plain least squares was possible, so that nothing had to give.
+    notes : tuple of str
+        What a person should know, such as nominal bodies that the URDF lacks.
+    """
+
+    standard: Array
+    active: tuple[str, ...]
+    was_possible: bool
+    notes: tuple[str, ...]
+
+
+@one_blas_thread()
+def consistent(
+    model: TorqueModel,
+    evidence: Sequence[Evidence],
+    *,
+    options: ConsistentOptions | None = None,
+    programme: Programme | None = None,
+) -> ConsistentEstimate:
+    """Estimate by least squares among all arms that can exist.
+
+    Every body has a positive semidefinite pseudo-inertia (Wensing, Kim, Slotine 2018) and every rotor a positive
+    inertia; friction takes energy out and can be overcome by the motor; each further term keeps what it declares.
+    What torque cannot determine is filled from the nominal bodies (see `nearest_to_nominal`). Where plain least
+    squares is possible it is the result; else directions that the data hardly determine are drawn to the nominal
+    bodies as well, see ``prior_weight`` of `ConsistentOptions`.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    evidence : sequence of Evidence
+        One per recording.
+    options : ConsistentOptions, optional
+    programme : Programme, optional
+        Compiled with the same model and options, to spare compiling it again.
+
+    Returns
+    -------
+    ConsistentEstimate
+
+    Raises
+    ------
+    EstimationError
+        If there is no evidence or the programme cannot be solved.
+    UsageError
+        If an option names what the robot or the model does not have.
+    """
+    if programme is None:
+        programme = Programme(model, options)
+    options = programme.options
+    if not evidence:
+        raise EstimationError("no recording to estimate from")
+    u = programme.unknowns
+    parameter_prior, standard_prior = _priors(u, options)
+    joints = [merge(item.joint(j) for item in evidence) for j in range(model.robot.n)]
+    found, information, weights = solve_joints(
+        programme, joints, parameter_prior=parameter_prior, standard_prior=standard_prior
+    )
+    x = fill(programme, information, found.x, standard_prior=standard_prior)
+    value = u.parameters(x)
+    held, labels = active(u, found.point) if found.point is not None else (np.zeros((0, u.size + u.auxiliary)), ())
+    spread = block_covariance(
+        _inverse_along(information, tangent(u, held), sizes(u, value)), value, weighted_blocks(evidence, weights)
+    )
+    undetermined = information.solve().undetermined
+    covariance = spread.matrix.copy()
+    covariance[np.diag_indices_from(covariance)] = np.where(undetermined, np.inf, np.diag(covariance))
+    return ConsistentEstimate(
+        model=model,
+        method="consistent",
+        value=value,
+        covariance=covariance,
+        undetermined=undetermined,
+        information=information,
+        weights=weights,
+        std_kind=spread.kind,
+        standard=u.standard(x),
+        active=labels,
+        was_possible=found.was_possible,
+        notes=_notes(u, options, labels, value, covariance),
+    )
+
+
+def links(estimate: ConsistentEstimate) -> tuple[LinkInertia, ...]:
+    """Return mass, centre of mass and inertia of every identified link.
+
+    Parameters
+    ----------
+    estimate : ConsistentEstimate
+
+    Returns
+    -------
+    tuple of LinkInertia
+        In the order of the robot's joints; a link includes what is fixed or locked to it.
+    """
+    robot = estimate.model.robot
+    bodies = estimate.standard[: 10 * robot.n].reshape(robot.n, 10)
+    return tuple(link_inertia(name, body) for name, body in zip(robot.links, bodies, strict=True))
+
+
+def physical_consistency(estimate: Estimate) -> PhysicalConsistency:
+    """Say whether an arm with the estimated parameters can exist, for any method.
+
+    Parameters
+    ----------
+    estimate : Estimate
+
+    Returns
+    -------
+    PhysicalConsistency
+    """
+    return check_possible(estimate.model, estimate.value, information=estimate.information)
+
+
+def _priors(u: Unknowns, options: ConsistentOptions) -> tuple[Information | None, StandardPrior | None]:
+    """Sort the user's priors into those on the model's parameters and those on standard parameters."""
+    if not options.priors:
+        return None, None
+    names, standard_names = u.model.names, u.model.rigid_body.base.standard_names
+    mean, std = np.zeros(len(names)), np.full(len(names), np.inf)
+    rows, target = [], []
+    for name, (value, spread) in options.priors.items():
+        if name in names:
+            mean[names.index(name)], std[names.index(name)] = value, spread
+        elif name in standard_names:
+            rows.append(np.eye(len(standard_names))[standard_names.index(name)] / spread)
+            target.append(value / spread)
+        else:
+            raise UsageError(
+                f"prior of {name!r}: neither a parameter of the model ({', '.join(names)}) nor a standard parameter "
+                f"({', '.join(standard_names[:10])}, ...)"
+            )
+    on_model = Information.prior(mean, std) if np.any(np.isfinite(std)) else None
+    return on_model, StandardPrior(np.array(rows), np.array(target)) if rows else None
+
+
+def _inverse_along(information: Information, directions: Array, size: Array) -> Array:
+    """Inverse of ``W.T @ W`` on the determined part of the directions, shape (p, p)."""
+    left, singular, _ = np.linalg.svd(directions / size[:, None], full_matrices=False)
+    basis = size[:, None] * left[:, singular > 1e-9 * singular[0]] if singular.size else np.zeros((len(size), 0))
+    seen = information.regressor_factor @ basis
+    length = np.linalg.norm(seen, axis=0)
+    basis, seen = basis[:, length > 0.0] / length[length > 0.0], seen[:, length > 0.0] / length[length > 0.0]
+    if not seen.shape[1]:
+        return np.zeros((len(size), len(size)))
+    _, singular, right = np.linalg.svd(seen, full_matrices=False)
+    known = singular > UNDETERMINED * singular[0]
+    half = basis @ (right[known].T / singular[known])
+    return np.asarray(half @ half.T)
+
+
+def _notes(
+    u: Unknowns, options: ConsistentOptions, held_by: tuple[str, ...], value: Array, covariance: Array
+) -> tuple[str, ...]:
+    notes = list(u.nominal.notes)
+    if options.friction != "free":
+        slow = [p.joint for p in u.polynomials if not np.isfinite(p.speed)]
+        if slow:
+            notes.append(
+                f"{', '.join(slow)}: no velocity limit is known; friction takes energy out at every speed, and the "
+                "motor's limit is not used"
+            )
+    if held_by:
+        notes.append(f"held by what an arm can have: {', '.join(held_by)}")
+    moved = MARGIN * sizes(u, value)
+    std = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    if held_by and np.any((std > 0.0) & (moved > 0.1 * std)):
+        notes.append(
+            f"the data are so good that the distance of {MARGIN:g} kept from bodies without extent is more than a "
+            "tenth of a standard deviation"
+        )
+    return tuple(notes)

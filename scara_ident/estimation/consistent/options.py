@@ -1,0 +1,99 @@
+"""What a user may know of the arm beyond its recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.errors import UsageError
+
+Array = NDArray[np.float64]
+FrictionShape = Literal["free", "dissipative", "lubricated"]
+Weighting = Literal["auto", "equal", "noise"]
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """A region that holds a link's centre of mass.
+
+    Attributes
+    ----------
+    centre : tuple of float
+        In the link's frame, m.
+    radii : tuple of float
+        Semi-axes along the link's axes, m.
+    """
+
+    centre: tuple[float, float, float]
+    radii: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class ConsistentOptions:
+    """Options of the physically consistent estimate.
+
+    Attributes
+    ----------
+    friction : {"dissipative", "lubricated", "free"}
+        What the friction of every joint fulfils: it takes energy out and the motor can overcome it up to the
+        velocity limit; that, and it is non-decreasing and concave in speed; or nothing.
+    speed : mapping of str to float
+        Velocity limits to use instead of the URDF's, by joint, rad/s or m/s.
+    total_mass : (float, float), optional
+        Mass of all moving links and its tolerance, kg.
+    link_mass : mapping of str to (float, float)
+        Mass of a link with all that is fixed to it, and its tolerance, kg; by the name of the link or its joint.
+    com : {"free", "visual"} or mapping of str to Ellipsoid
+        Where the centres of mass may lie: anywhere, within the bounding box of the link's visual shape, or
+        within an ellipsoid, by the name of the link or its joint.
+    priors : mapping of str to (float, float)
+        Mean and standard deviation of parameters, by the name of the model's parameter or of a standard
+        parameter such as ``m2``.
+    weighting : {"auto", "equal", "noise"}
+        Every joint's rows count the same, as in ordinary least squares, or are divided by the joint's noise. By
+        default ordinary least squares is the answer where it is possible; where something has to give, it gives
+        where the data are least sure, which takes each joint's noise.
+    noise : ndarray, shape (n,), optional
+        Standard deviation of each joint's torque; by default its residual in ordinary least squares.
+    prior_weight : float
+        Weight of the nominal bodies against the data where plain least squares is impossible: a change of a body by
+        its own size against one standard deviation of the noise. The default of 0.01 moves no direction that the
+        data determine by as much as a tenth of its standard deviation, however wrong the URDF is, see
+        `scara_ident.estimation.consistent.pull`.
+    """
+
+    friction: FrictionShape = "dissipative"
+    speed: Mapping[str, float] = field(default_factory=dict)
+    total_mass: tuple[float, float] | None = None
+    link_mass: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    com: Literal["free", "visual"] | Mapping[str, Ellipsoid] = "free"
+    priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    weighting: Weighting = "auto"
+    noise: Array | None = None
+    prior_weight: float = 0.01
+
+    def __post_init__(self) -> None:
+        if self.friction not in get_args(FrictionShape):
+            raise UsageError(f"friction {self.friction!r}: expected one of {', '.join(get_args(FrictionShape))}")
+        if self.weighting not in get_args(Weighting):
+            raise UsageError(f"weighting {self.weighting!r}: expected one of {', '.join(get_args(Weighting))}")
+        if isinstance(self.com, str) and self.com not in ("free", "visual"):
+            raise UsageError(f"com {self.com!r}: expected free, visual or ellipsoids by link")
+        if not self.prior_weight > 0.0:
+            raise UsageError(f"prior_weight is {self.prior_weight:g}; expected a number above 0")
+        masses = dict(self.link_mass)
+        if self.total_mass is not None:
+            masses["total_mass"] = self.total_mass
+        for name, (value, tolerance) in masses.items():
+            if not (value > 0.0 and tolerance > 0.0):
+                raise UsageError(f"mass of {name}: {value:g} within {tolerance:g}; both must be above 0")
+        for name, speed in self.speed.items():
+            if not speed > 0.0:
+                raise UsageError(f"speed of {name} is {speed:g}; expected a velocity limit above 0")
+        for name, (_, std) in self.priors.items():
+            if not std > 0.0:
+                raise UsageError(f"prior of {name}: standard deviation {std:g}; it must be above 0")

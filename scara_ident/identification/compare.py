@@ -1,0 +1,176 @@
+"""Every trajectory's parameters against every trajectory (Tables 1 to 5 of Indri et al. 2002), for any arm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.errors import UsageError
+from scara_ident.estimation import Estimate
+from scara_ident.estimation.bands import choose_bands
+from scara_ident.estimation.estimate import paper_criteria, pooled_information
+from scara_ident.estimation.information import merge
+from scara_ident.estimation.observations import Evidence, gather_all
+from scara_ident.identification.identify import Method, data_notes, estimate_by
+from scara_ident.model.model import ModelName, TorqueModel, build_model
+from scara_ident.motion.motion import motion_of, stretches
+from scara_ident.motion.repeatability import repeatability
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectorySummary:
+    """What one trajectory is and what it gives (a column of Tables 1 and 5).
+
+    Attributes
+    ----------
+    name : str
+    recordings : tuple of str
+    log_det, condition : float
+        J_d and J_k for 2500 samples.
+    sigma : ndarray, shape (n,) or None
+        Repeatability of the torque; None without repetitions.
+    peak_velocity, peak_acceleration : ndarray, shape (n,)
+        Within the band.
+    torque_rms : ndarray, shape (n,)
+        Within the band.
+    estimate : Estimate
+        From this trajectory alone.
+    """
+
+    name: str
+    recordings: tuple[str, ...]
+    log_det: float
+    condition: float
+    sigma: Array | None
+    peak_velocity: Array
+    peak_acceleration: Array
+    torque_rms: Array
+    estimate: Estimate
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Every trajectory's parameters against every trajectory.
+
+    Attributes
+    ----------
+    model : TorqueModel
+    method : str
+    bands : tuple of float or None
+    trajectories : tuple of TrajectorySummary
+    errors : ndarray, shape (t, t, n)
+        ``errors[i, k, j]``: rms error on trajectory i, joint j, of the parameters from trajectory k.
+    expected : ndarray, shape (t, t, n)
+        The same as the covariance of the parameters and the error of i's own parameters predict it: where the
+        error is much larger, bias is at work and not noise.
+    notes : tuple of str
+    """
+
+    model: TorqueModel
+    method: str
+    bands: tuple[float | None, ...]
+    trajectories: tuple[TrajectorySummary, ...]
+    errors: Array
+    expected: Array
+    notes: tuple[str, ...]
+
+
+def compare(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    *,
+    model: ModelName | TorqueModel = "complete",
+    method: Method = "ols",
+    bands: Sequence[float | None] | None = None,
+    progress: Callable[[str], None] = lambda step: None,
+) -> Comparison:
+    """Estimate from each trajectory alone and predict all of them.
+
+    Parameters
+    ----------
+    robot : Robot
+    recordings : sequence of Recording
+        Repetitions of at least two trajectories.
+    model, method, bands, progress
+        As in `identify`; the bands are chosen from all recordings together.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    UsageError
+        If there are fewer than two trajectories.
+    """
+    names = list(dict.fromkeys(recording.trajectory for recording in recordings))
+    if len(names) < 2:
+        raise UsageError(
+            f"compare needs recordings of at least two trajectories, found {len(names)}; "
+            "a trajectory's name is the file's stem without its last _<number>"
+        )
+    equation = build_model(robot, model) if isinstance(model, str) else model
+    notes = list(data_notes(recordings))
+    if bands is None:
+        progress("choosing the bands")
+        choice = choose_bands(equation, recordings)
+        bands, notes = choice.bands, [*notes, *choice.notes]
+    progress("absorbing the recordings")
+    evidence = gather_all(equation, recordings, bands)
+    noise = repeatability(recordings)
+    summaries, rows = [], []
+    for name in names:
+        progress(f"estimating from {name}")
+        own = [item for item in evidence if item.trajectory == name]
+        runs = [recording for recording in recordings if recording.trajectory == name]
+        rows.append([merge(item.joint(j) for item in own) for j in range(robot.n)])
+        summaries.append(_summary(name, equation, own, runs, bands, method, noise.get(name)))
+    errors = np.zeros((len(names), len(names), robot.n))
+    expected = np.zeros_like(errors)
+    for i, predicted in enumerate(rows):
+        for k, summary in enumerate(summaries):
+            for j, information in enumerate(predicted):
+                if not information.rows:
+                    errors[i, k, j] = expected[i, k, j] = np.nan
+                    continue
+                errors[i, k, j] = information.rms(summary.estimate.value)
+                factor = information.regressor_factor
+                covariance = summary.estimate.covariance
+                spread = np.inf if np.any(np.isinf(covariance)) else float(np.sum((factor @ covariance) * factor))
+                expected[i, k, j] = np.sqrt(
+                    information.rms(summaries[i].estimate.value) ** 2 + max(spread, 0.0) / information.rows
+                )
+    return Comparison(equation, method, tuple(bands), tuple(summaries), errors, expected, tuple(notes))
+
+
+def _summary(
+    name: str,
+    model: TorqueModel,
+    evidence: Sequence[Evidence],
+    recordings: Sequence[Recording],
+    bands: Sequence[float | None],
+    method: Method,
+    sigma: Array | None,
+) -> TrajectorySummary:
+    n = model.robot.n
+    estimate, _ = estimate_by(method, model, evidence)
+    log_det, condition = paper_criteria(pooled_information(evidence, np.ones(n)), evidence)
+    motions = [motion_of(part, bands) for recording in recordings[:1] for part in stretches(recording)]
+    return TrajectorySummary(
+        name,
+        tuple(item.recording for item in evidence),
+        log_det,
+        condition,
+        sigma,
+        np.max([np.max(np.abs(motion.v), axis=1) for motion in motions], axis=0),
+        np.max([np.max(np.abs(motion.a), axis=1) for motion in motions], axis=0),
+        np.array([merge(item.joint(j) for item in evidence).torque_rms for j in range(n)]),
+        estimate,
+    )

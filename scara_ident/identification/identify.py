@@ -1,0 +1,287 @@
+"""The main job: from recordings to parameters, how sure they are, and what they predict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.errors import UsageError
+from scara_ident.estimation import Estimate, History, JointError, ols, rls, wls
+from scara_ident.estimation.bands import choose_bands
+from scara_ident.estimation.consistent.estimator import ConsistentEstimate, consistent, physical_consistency
+from scara_ident.estimation.consistent.feasibility import PhysicalConsistency
+from scara_ident.estimation.consistent.options import ConsistentOptions
+from scara_ident.estimation.estimate import paper_criteria, pooled_information
+from scara_ident.estimation.information import Information, merge
+from scara_ident.estimation.observations import Evidence, gather_all
+from scara_ident.identification.channel_check import mapping_faults
+from scara_ident.model.model import ModelName, TorqueModel, build_model
+from scara_ident.motion.motion import stretches
+from scara_ident.motion.repeatability import repeatability
+from scara_ident.motion.velocity_audit import audit_velocity
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import Robot
+
+Array = NDArray[np.float64]
+Method = Literal["ols", "wls", "rls", "consistent"]
+METHODS: tuple[str, ...] = get_args(Method)
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Everything that one identification found.
+
+    Attributes
+    ----------
+    estimate : Estimate
+    history : History or None
+        Of the recursive estimate.
+    bands : tuple of float or None
+        Low-pass on both sides of each joint's equation, Hz; None where nothing was filtered.
+    training, validation : tuple of Evidence
+        What each recording says; validation took no part in any choice.
+    noise : mapping of str to ndarray
+        Repeatability of the torque per trajectory, see `repeatability`.
+    physical_consistency : PhysicalConsistency
+        Whether an arm with these parameters can exist, and what contradicts it.
+    log_det, condition : float
+        J_d and J_k of the training recordings for the paper's 2500 samples.
+    notes : tuple of str
+        What was found in the data and what was done about it.
+    """
+
+    estimate: Estimate
+    history: History | None
+    bands: tuple[float | None, ...]
+    training: tuple[Evidence, ...]
+    validation: tuple[Evidence, ...]
+    noise: Mapping[str, Array]
+    physical_consistency: PhysicalConsistency
+    log_det: float
+    condition: float
+    notes: tuple[str, ...]
+
+    @property
+    def model(self) -> TorqueModel:
+        """The model that was fitted."""
+        return self.estimate.model
+
+    def training_errors(self) -> dict[str, tuple[JointError | None, ...]]:
+        """Return the errors on the recordings that were fitted, by recording."""
+        return {item.recording: self.estimate.errors(item) for item in self.training}
+
+    def validation_errors(self) -> dict[str, tuple[JointError | None, ...]]:
+        """Return the errors on the recordings that were not, by recording."""
+        return {item.recording: self.estimate.errors(item) for item in self.validation}
+
+
+def identify(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    *,
+    model: ModelName | TorqueModel = "complete",
+    method: Method = "ols",
+    validation: Sequence[Recording] = (),
+    bands: Sequence[float | None] | None = None,
+    options: ConsistentOptions | None = None,
+    progress: Callable[[str], None] = lambda step: None,
+) -> Identification:
+    """Identify a robot from recordings of its motion.
+
+    Parameters
+    ----------
+    robot : Robot
+    recordings : sequence of Recording
+        The recordings to fit.
+    model : {"complete", "reduced", "basic"} or TorqueModel, optional
+    method : {"ols", "wls", "rls", "consistent"}, optional
+    validation : sequence of Recording, optional
+        Recordings that take no part in the fit nor in any choice.
+    bands : sequence of float or None, one per joint, optional
+        Low-pass on both sides of each joint's equation, Hz; chosen from the recordings by default.
+    options : ConsistentOptions, optional
+        Of the method ``consistent``: friction's shape, masses, centres of mass, priors.
+    progress : callable, optional
+        Called with the name of every step.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    UsageError
+        If there are no recordings, the method is unknown, a recording is both fitted and held out, or a band is no
+        frequency that the slowest recording carries.
+    RecordingError
+        If a recording cannot be used.
+    """
+    if not recordings:
+        raise UsageError("no recordings to identify from")
+    if method not in METHODS:
+        raise UsageError(f"method {method!r}: expected one of {', '.join(METHODS)}")
+    check_held_out(recordings, validation)
+    equation = build_model(robot, model) if isinstance(model, str) else model
+    notes = data_notes((*recordings, *validation))
+    if bands is None:
+        progress("choosing the bands")
+        choice = choose_bands(equation, recordings)
+        bands = choice.bands
+        notes += choice.notes
+    else:
+        _check_bands(robot, bands, (*recordings, *validation))
+    progress("absorbing the recordings")
+    training = gather_all(equation, recordings, bands)
+    held_out = gather_all(equation, validation, bands)
+    notes += [str(fault) for fault in mapping_faults(equation, recordings, bands)]
+    progress("estimating")
+    noise = repeatability(recordings)
+    estimate, history = estimate_by(method, equation, training, _joint_noise(noise), options)
+    if isinstance(estimate, ConsistentEstimate):
+        notes += estimate.notes
+    progress("checking whether such an arm can exist")
+    possible = physical_consistency(estimate)
+    unweighted = pooled_information(training, np.ones(robot.n))
+    log_det, condition = paper_criteria(unweighted, training)
+    return Identification(
+        estimate, history, tuple(bands), training, held_out, noise, possible, log_det, condition, tuple(notes)
+    )
+
+
+def identified_arm(identification: Identification) -> ConsistentEstimate | None:
+    """Return the estimate with all standard parameters of the links, None where no such arm can exist.
+
+    Where plain least squares belongs to an arm that can exist, that arm has its base parameters.
+    """
+    estimate = identification.estimate
+    if isinstance(estimate, ConsistentEstimate):
+        return estimate
+    if not identification.physical_consistency.possible:
+        return None
+    return consistent(identification.model, identification.training)
+
+
+def known_information(model: TorqueModel, recordings: Sequence[Recording], rate: float) -> Information:
+    """Return what recordings already say of a model, as if sampled at ``rate`` per second.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    recordings : sequence of Recording
+    rate : float
+        Samples per second that the design they are to be joined with counts.
+    """
+    evidence = gather_all(model, recordings, choose_bands(model, recordings).bands)
+    sampled = [
+        item.joint(j).scaled(float(np.sqrt(rate / recording.rate)))
+        for item, recording in zip(evidence, recordings, strict=True)
+        for j in range(model.robot.n)
+    ]
+    return merge(sampled)
+
+
+def _check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequence[Recording]) -> None:
+    if len(bands) != robot.n:
+        raise UsageError(f"bands: {len(bands)} given; expected one for each of {', '.join(robot.joints)}")
+    for joint, band in zip(robot.joints, bands, strict=True):
+        if band is not None and not 0.0 < band < np.inf:
+            raise UsageError(f"band of {joint} is {band:g} Hz; expected a frequency above 0, or none")
+        slowest = min(recordings, key=lambda recording: recording.rate)
+        if band is not None and band >= 0.5 * slowest.rate:
+            raise UsageError(
+                f"band of {joint} is {band:g} Hz; {slowest.name} has {slowest.rate:.4g} samples per second, which carry "
+                f"less than {0.5 * slowest.rate:.4g} Hz; give a lower band"
+            )
+
+
+def estimate_by(
+    method: Method,
+    model: TorqueModel,
+    evidence: Sequence[Evidence],
+    noise: Array | None = None,
+    options: ConsistentOptions | None = None,
+) -> tuple[Estimate, History | None]:
+    """Estimate by a method given by name; ``noise`` is each joint's, where repetitions tell it."""
+    if method == "consistent":
+        return consistent(model, evidence, options=options), None
+    if method == "rls":
+        return rls(model, evidence)
+    if method == "wls":
+        return wls(model, evidence, noise), None
+    return ols(model, evidence), None
+
+
+def _joint_noise(noise: Mapping[str, Array]) -> Array | None:
+    """Pool the repeatability of all trajectories; None without repetitions."""
+    if not noise:
+        return None
+    sigma = np.sqrt(np.mean([value**2 for value in noise.values()], axis=0))
+    return sigma if np.all(sigma > 0.0) else None
+
+
+def check_held_out(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:
+    """Refuse a recording that is both fitted and held out.
+
+    Raises
+    ------
+    UsageError
+    """
+    fitted = {recording.path.resolve() for recording in recordings if recording.path is not None}
+    for recording in validation:
+        known = recording.path is not None and recording.path.resolve() in fitted
+        if known or any(recording is other for other in recordings):
+            raise UsageError(
+                f"{recording.path or recording.name}: given to fit and to validate; a validation recording must be held out"
+            )
+
+
+def data_notes(recordings: Sequence[Recording]) -> list[str]:
+    """Return what the audits found, the same remark on many recordings in one line."""
+    found: dict[str, list[str]] = {}
+    for recording in recordings:
+        remarks = [finding.message for finding in recording.findings]
+        longest = max(stretches(recording), key=lambda part: len(part.time))
+        verdicts: dict[str, list[str]] = {}
+        for audit in audit_velocity(recording, longest):
+            verdict = audit.verdict(longest.rate)
+            if verdict is not None:
+                verdicts.setdefault(verdict, []).append(audit.joint)
+        remarks += [
+            f"recorded velocity of {', '.join(joints)} is not used: {verdict}" for verdict, joints in verdicts.items()
+        ]
+        for remark in remarks:
+            found.setdefault(remark, []).append(recording.name)
+    return [f"{_listed(names)}: {remark}" for remark, names in found.items()]
+
+
+def _listed(names: Sequence[str], most: int = 3) -> str:
+    return ", ".join(names) if len(names) <= most else f"{names[0]} and {len(names) - 1} more recordings"
+
+
+def undetermined(identification: Identification) -> list[str]:
+    """Return the names of the parameters that the data leave open."""
+    estimate = identification.estimate
+    return [name for name, open_ in zip(estimate.model.names, estimate.undetermined, strict=True) if open_]
+
+
+def not_told_from_zero(identification: Identification) -> list[str]:
+    """Return the names of the determined parameters that are within two standard deviations of zero."""
+    estimate = identification.estimate
+    small = (np.abs(estimate.value) < 2.0 * estimate.std) & ~estimate.undetermined
+    return [name for name, is_small in zip(estimate.model.names, small, strict=True) if is_small]
+
+
+def worst_validation(identification: Identification) -> tuple[str, str, JointError] | None:
+    """Return the held-out recording and joint with the largest relative error within the band."""
+    worst: tuple[str, str, JointError] | None = None
+    for name, errors in identification.validation_errors().items():
+        for joint, error in zip(identification.model.robot.joints, errors, strict=True):
+            if error is None or error.relative is None:
+                continue
+            if worst is None or worst[2].relative is None or error.relative > worst[2].relative:
+                worst = (name, joint, error)
+    return worst

@@ -1,0 +1,1 @@
+"""The torque equation, linear in its parameters."""

@@ -1,0 +1,1 @@
+"""The joint-torque regressor, generated for one arm."""

@@ -1,0 +1,239 @@
+"""Pinocchio's joint-torque regressor for a whole recording at once.
+
+The recursion is traced once for a model and emitted as straight-line vector code, which is then checked against
+Pinocchio on random states whenever it is built: Pinocchio stays the truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from scara_ident.errors import RegressorMismatch
+from scara_ident.model.regressor.recursion import JointGeometry, joint_geometry, trace_regressor
+from scara_ident.model.regressor.tracing import Program, compile_program
+
+Array = NDArray[np.float64]
+
+PARAMETERS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+"""Standard parameters of a body in Pinocchio's order; the inertia is about the origin of the joint's frame."""
+
+_KINDS = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
+"""Mass, first moment, inertia: parameters whose columns have one unit."""
+_CHUNK = 4096
+"""Samples at a time: few enough for the cache, enough to hide the cost of a call.
+
+Two threads over the chunks gain nothing at this size, since every operation takes the interpreter's lock.
+"""
+_TOLERANCE = 1e-10
+_SMALLEST_SCALE = 1e-3
+_NOTHING = 1e-9
+"""Entries of this size, at speeds and accelerations of order 10, are rounding."""
+_STATES = 48
+
+
+@dataclass(frozen=True, eq=False)
+class RegressorKernel:
+    """The joint-torque regressor of one model, evaluated over vectors of samples.
+
+    It is on the joint side, without rotor inertia and reductions, in Pinocchio's velocity order.
+
+    Attributes
+    ----------
+    nv : int
+        Number of joints.
+    columns : ndarray of intp (p,)
+        Standard parameters that it gives: 10 per body, bodies in Pinocchio's order, within a body `PARAMETERS`.
+    pattern : ndarray of bool (nv, p)
+        False where the entry is zero for every state.
+    """
+
+    nv: int
+    columns: NDArray[np.intp]
+    pattern: NDArray[np.bool_]
+    _program: Program = field(repr=False)
+
+    def __call__(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: Array | None = None) -> Array:
+        """Evaluate the regressor.
+
+        Parameters
+        ----------
+        q, v, a : array_like (nv, samples)
+            Joint positions (the angle itself for a continuous joint), velocities and accelerations;
+            rad or m, and per s and s^2.
+        out : ndarray (nv, p, samples), optional
+            Where to write; also the first samples of a longer array in C order, ``buffer[:, :, :samples]``.
+
+        Returns
+        -------
+        ndarray (nv, p, samples)
+            `out` if given. In C order; the torque of sample k is ``result[:, :, k] @ parameters``, N m or N.
+
+        Raises
+        ------
+        ValueError
+            An array has the wrong shape, or `out` is not of floats in C order.
+        """
+        states = self._states(q, v, a)
+        samples = states.shape[1]
+        shape = (self.nv, len(self.columns), samples)
+        zeros: list[slice] = []
+        if out is None:
+            out = np.zeros(shape)
+        else:
+            zeros = list(_runs(~self.pattern.ravel()))
+        rows = _flat(out, shape)
+        program = self._program
+        buffers = np.empty((program.buffers, min(_CHUNK, samples)))
+        for start in range(0, samples, _CHUNK):
+            stop = min(start + _CHUNK, samples)
+            target = rows[:, start:stop]
+            for run in zeros:
+                target[run] = 0.0
+            program.evaluate(states[:, start:stop], target, buffers[:, : stop - start])
+        return out
+
+    def _states(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Return the three inputs as one array (3 nv, samples)."""
+        parts = [np.asarray(values, dtype=np.float64) for values in (q, v, a)]
+        for name, part in zip("qva", parts, strict=True):
+            if part.ndim != 2 or part.shape[0] != self.nv or part.shape != parts[0].shape:
+                shapes = ", ".join(str(part.shape) for part in parts)
+                raise ValueError(f"{name}: expected ({self.nv}, samples), the same for q, v and a; given {shapes}")
+        return np.concatenate(parts)
+
+
+def build_kernel(model: pin.Model, columns: Sequence[int] | NDArray[np.intp] | None = None) -> RegressorKernel:
+    """Trace, emit and check the regressor of a model.
+
+    Parameters
+    ----------
+    model : pin.Model
+        Revolute, continuous and prismatic joints, in a chain or a tree; its gravity is used.
+    columns : sequence of int, optional
+        Standard parameters whose columns are wanted, each in 0 .. 10 nbodies - 1; all by default.
+
+    Returns
+    -------
+    RegressorKernel
+
+    Raises
+    ------
+    RobotError
+        The model has a joint of another kind.
+    RegressorMismatch
+        The kernel does not reproduce Pinocchio's regressor.
+    ValueError
+        There is no such column.
+    """
+    kernel = _emit_kernel(joint_geometry(model), model.gravity, columns)
+    _check(kernel, model)
+    return kernel
+
+
+def pinocchio_regressor(model: pin.Model, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+    """Loop over ``pin.computeJointTorqueRegressor``: slow, and the truth.
+
+    Parameters
+    ----------
+    model : pin.Model
+    q, v, a : array_like (nv, samples)
+        As for `RegressorKernel`: one angle for a continuous joint too.
+
+    Returns
+    -------
+    ndarray (nv, 10 nbodies, samples)
+    """
+    v, a = np.asarray(v, dtype=np.float64), np.asarray(a, dtype=np.float64)
+    configurations = _configurations(model, np.asarray(q, dtype=np.float64))
+    data = model.createData()
+    result = np.empty((v.shape[1], model.nv, 10 * (model.njoints - 1)))
+    for k in range(v.shape[1]):
+        result[k] = pin.computeJointTorqueRegressor(model, data, configurations[:, k], v[:, k], a[:, k])
+    return np.ascontiguousarray(np.moveaxis(result, 0, -1))
+
+
+def _emit_kernel(
+    joints: Sequence[JointGeometry], gravity: pin.Motion, columns: Sequence[int] | NDArray[np.intp] | None
+) -> RegressorKernel:
+    nv, width = len(joints), 10 * len(joints)
+    wanted = np.arange(width) if columns is None else np.array(columns, dtype=np.intp)
+    if wanted.ndim != 1 or np.any((wanted < 0) | (wanted >= width)):
+        raise ValueError(f"columns: expected standard parameters in 0 .. {width - 1}, given {columns}")
+    trace, entries = trace_regressor(joints, gravity, sorted(set(wanted.tolist())))
+    pattern = np.zeros((nv, len(wanted)), dtype=np.bool_)
+    outputs = []
+    # Body by body, so that what a body needs is used while it is in the cache.
+    for place in np.argsort(wanted // 10, kind="stable").tolist():
+        for row in range(nv):
+            entry = entries.get((row, int(wanted[place])))
+            if entry is not None:
+                pattern[row, place] = True
+                outputs.append((row * len(wanted) + place, entry))
+    for array in (wanted, pattern):
+        array.flags.writeable = False
+    return RegressorKernel(nv, wanted, pattern, compile_program(trace, outputs))
+
+
+def _check(kernel: RegressorKernel, model: pin.Model) -> None:
+    """Compare a kernel with Pinocchio on random states.
+
+    The states spread over several turns or metres. A difference counts relative to the largest entry of its column,
+    but at least to a thousandth of the largest of all columns of its unit (of 1 where these are all zero, as the
+    inertias of a single slide): a column that is zero but for rounding has no digits to agree in.
+    """
+    generator = np.random.default_rng(20020)
+    q, v, a = (generator.uniform(-bound, bound, (kernel.nv, _STATES)) for bound in (10.0, 3.0, 10.0))
+    everything = pinocchio_regressor(model, q, v, a)
+    largest = np.abs(everything).max(axis=(0, 2))
+    kinds = np.tile(_KINDS, model.njoints - 1)
+    for kind in range(3):
+        same = kinds == kind
+        size = largest[same].max()
+        largest[same] = np.maximum(largest[same], _SMALLEST_SCALE * (size if size > _NOTHING else 1.0))
+    difference = np.abs(kernel(q, v, a) - everything[:, kernel.columns]).max(axis=2)
+    relative = difference / largest[kernel.columns]
+    relative[np.isnan(relative)] = np.inf
+    if relative.max(initial=0.0) > _TOLERANCE:
+        row, place = np.unravel_index(np.argmax(relative), relative.shape)
+        body, parameter = divmod(int(kernel.columns[place]), 10)
+        names = list(model.names)[1:]
+        by_row = {joint.idx_v: names[k] for k, joint in enumerate(list(model.joints)[1:])}
+        raise RegressorMismatch(
+            f"{model.name}: the regressor of joint '{by_row[int(row)]}' for {PARAMETERS[parameter]} of body "
+            f"'{names[body]}' differs from Pinocchio's by {relative[row, place]:.1e} relative "
+            f"(at most {_TOLERANCE:.0e} is accepted); please report this robot"
+        )
+
+
+def _configurations(model: pin.Model, q: Array) -> Array:
+    """Return Pinocchio's configurations (nq, samples): cosine and sine of the angle of a continuous joint."""
+    result = np.empty((model.nq, q.shape[1]))
+    for joint in list(model.joints)[1:]:
+        if joint.nq == 2:
+            result[joint.idx_q] = np.cos(q[joint.idx_v])
+            result[joint.idx_q + 1] = np.sin(q[joint.idx_v])
+        else:
+            result[joint.idx_q] = q[joint.idx_v]
+    return result
+
+
+def _runs(mask: NDArray[np.bool_]) -> Iterator[slice]:
+    """Give the stretches of True."""
+    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
+    for start, stop in edges.reshape(-1, 2).tolist():
+        yield slice(start, stop)
+
+
+def _flat(out: Array, shape: tuple[int, int, int]) -> Array:
+    """Return a view (nv p, samples) of an array (nv, p, samples)."""
+    if out.shape != shape or out.dtype != np.float64:
+        raise ValueError(f"out: expected {shape} of float64, given {out.shape} of {out.dtype}")
+    rows = out.reshape(shape[0] * shape[1], shape[2])
+    if out.size and not np.may_share_memory(rows, out):
+        raise ValueError("out: expected an array in C order, or the first samples of one")
+    return rows

@@ -1,0 +1,119 @@
+"""Friction as a polynomial of speed, and the torque offset."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.model.terms.constraints import BrakingPolynomial, Constraint
+from scara_ident.model.terms.term import Column, per_speed
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import Robot
+
+_WORDS = ("Coulomb", "viscous", "quadratic", "cubic")
+
+
+@dataclass(frozen=True, eq=False)
+class Friction:
+    """Friction of every joint as a polynomial of its own speed (equation 3 of Indri et al. 2002).
+
+    ``u_f = a0 sign(v) + a1 v + a2 sign(v) v^2 + a3 v^3`` with the joint's speed v, on the side of the recorded
+    torque; where the gear reverses, in the motor's direction, so that a friction that brakes is positive.
+
+    Attributes
+    ----------
+    robot : Robot
+    powers : tuple of int
+        Which powers of speed there are; 0 is Coulomb friction.
+    """
+
+    robot: Robot
+    powers: tuple[int, ...] = (0, 1, 2, 3)
+
+    @property
+    def name(self) -> str:
+        """Name of the term."""
+        return "friction"
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Columns joint by joint: ``a01 a11 .. a02 ..`` where the last digits are the joint's number."""
+        return tuple(
+            Column(
+                name=f"a{power}{i + 1}",
+                joint=joint,
+                unit=per_speed(self.robot, i, power),
+                meaning=f"{_WORDS[power]} friction of {joint}",
+                # A speed without friction may not push, so the Coulomb part cannot be negative; the others may.
+                nonnegative=power == 0 or self.powers == (0, 1),
+            )
+            for i, joint in enumerate(self.robot.joints)
+            for power in self.powers
+        )
+
+    @property
+    def pattern(self) -> NDArray[np.bool_]:
+        """Each joint's friction acts on that joint only."""
+        return np.repeat(np.eye(self.robot.n, dtype=bool), len(self.powers), axis=1)
+
+    def constraints(self) -> tuple[Constraint, ...]:
+        """Return that every joint's friction brakes and leaves the motor able to reach the velocity limit."""
+        k = len(self.powers)
+        return tuple(
+            BrakingPolynomial(
+                joint=joint,
+                columns=tuple(range(i * k, (i + 1) * k)),
+                powers=self.powers,
+                speed=float(self.robot.velocity_limit[i]),
+                limit=float(self.robot.torque_limit[i]),
+            )
+            for i, joint in enumerate(self.robot.joints)
+        )
+
+    def regressor(self, motion: Motion) -> NDArray[np.float64]:
+        """Return the columns on a stretch of motion, shape (n, p, N)."""
+        n, k = self.robot.n, len(self.powers)
+        result = np.zeros((n, n * k, motion.samples))
+        for i in range(n):
+            v = self.robot.drive_sign[i] * motion.v[i]
+            for place, power in enumerate(self.powers):
+                column = result[i, i * k + place]
+                if power % 2:
+                    np.power(v, power, out=column)
+                else:
+                    np.multiply(np.sign(v), v**power, out=column)
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Offset:
+    """A constant torque on every joint: offset of the measurement or friction that differs by direction."""
+
+    robot: Robot
+
+    @property
+    def name(self) -> str:
+        """Name of the term."""
+        return "offset"
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """One column per joint, ``p_o1 ..``."""
+        return tuple(
+            Column(f"p_o{i + 1}", joint, self.robot.torque_unit(i), f"torque offset of {joint}")
+            for i, joint in enumerate(self.robot.joints)
+        )
+
+    @property
+    def pattern(self) -> NDArray[np.bool_]:
+        """Each joint's offset acts on that joint only."""
+        return np.eye(self.robot.n, dtype=bool)
+
+    def regressor(self, motion: Motion) -> NDArray[np.float64]:
+        """Return the columns on a stretch of motion, shape (n, n, N)."""
+        n = self.robot.n
+        result = np.zeros((n, n, motion.samples))
+        result[np.arange(n), np.arange(n)] = 1.0
+        return result

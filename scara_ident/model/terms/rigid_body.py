@@ -1,0 +1,134 @@
+"""The rigid bodies and the rotors, seen through the base parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.model.base_parameters import BaseParameters, find_base_parameters
+from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
+from scara_ident.model.terms.constraints import Constraint, RealBodies
+from scara_ident.model.terms.term import Column
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import Robot
+
+# The SCARA of Indri et al. 2002 and its P_d (equation 2), told by what the reduction finds.
+_SCARA_LEADS = ("I1zz", "mx2", "my2", "I2zz", "Ia2")
+_SCARA_MEANINGS = ("I1z + m2 l1^2 + Jm1/tau1^2", "m2 s2x", "m2 s2y", "I2z", "Jm2/tau2^2")
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """Inertia, Coriolis and gravity torques of the links and the inertia of the rotors.
+
+    Attributes
+    ----------
+    robot : Robot
+    base : BaseParameters
+        The reduction; its base parameters are the columns.
+    kept : ndarray of int
+        Which of the base parameters are columns of the model.
+    columns : tuple of Column
+    pattern : ndarray of bool, shape (n, p)
+    kernel : RegressorKernel or None
+        Generates the columns led by link parameters; None where there are none.
+    """
+
+    robot: Robot
+    base: BaseParameters
+    kept: NDArray[np.intp]
+    columns: tuple[Column, ...]
+    pattern: NDArray[np.bool_]
+    kernel: RegressorKernel | None
+
+    @property
+    def name(self) -> str:
+        """Name of the term."""
+        return "rigid_body"
+
+    def constraints(self) -> tuple[Constraint, ...]:
+        """Return that the columns belong to bodies that can exist."""
+        return (RealBodies(),)
+
+    def regressor(self, motion: Motion) -> NDArray[np.float64]:
+        """Return the columns on a stretch of motion, shape (n, p, N), on the side of the recorded torque."""
+        robot = self.robot
+        result = np.zeros((robot.n, len(self.columns), motion.samples))
+        links, rotors = _split(self.base.kept[self.kept], robot.n)
+        if self.kernel is not None:
+            back = np.argsort(robot.order)
+            columns = self.kernel(motion.q[back], motion.v[back], motion.a[back])
+            result[:, links] = columns[robot.order]
+        for place in rotors:
+            joint = int(self.base.kept[self.kept[place]]) - 10 * robot.n
+            result[joint, place] = motion.a[joint]
+        result *= robot.row_scale[:, None, None]
+        return result
+
+
+def rigid_body(robot: Robot, *, without: Sequence[str] = ()) -> RigidBody:
+    """Build the rigid-body term of a robot.
+
+    Parameters
+    ----------
+    robot : Robot
+    without : sequence of str, optional
+        Columns to leave out, by name: parameters held to be zero.
+
+    Raises
+    ------
+    RegressorMismatch
+        If the batch kernel does not reproduce Pinocchio.
+    """
+    base = find_base_parameters(robot)
+    names, meanings = _names(robot, base)
+    kept = np.array([k for k in range(base.count) if names[k] not in without], dtype=np.intp)
+    standard = base.kept[kept]
+    links, _ = _split(standard, robot.n)
+    # Standard parameters stand in the order of the description; the kernel wants Pinocchio's.
+    in_pinocchio = [10 * int(robot.order[k // 10]) + int(k % 10) for k in standard[links]]
+    kernel = build_kernel(robot.model, in_pinocchio) if in_pinocchio else None
+    pattern = np.zeros((robot.n, len(kept)), dtype=bool)
+    if kernel is not None:
+        pattern[:, links] = kernel.pattern[robot.order]
+    for place, k in enumerate(standard):
+        if k >= 10 * robot.n:
+            pattern[int(k) - 10 * robot.n, place] = True
+    columns = tuple(
+        Column(
+            name=names[k],
+            joint=_joint_of(robot, int(base.kept[k])),
+            unit=base.units[k],
+            meaning=meanings[k],
+            nonnegative=_cannot_be_negative(base, k),
+        )
+        for k in kept
+    )
+    return RigidBody(robot, base, kept, columns, pattern, kernel)
+
+
+def _split(standard: NDArray[np.intp], n: int) -> tuple[list[int], list[int]]:
+    """Places of columns led by link parameters and by armatures."""
+    links = [place for place, k in enumerate(standard) if k < 10 * n]
+    return links, [place for place, k in enumerate(standard) if k >= 10 * n]
+
+
+def _joint_of(robot: Robot, standard: int) -> str:
+    return robot.joints[standard // 10 if standard < 10 * robot.n else standard - 10 * robot.n]
+
+
+def _names(robot: Robot, base: BaseParameters) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    if robot.name == "scara03" and base.names == _SCARA_LEADS:
+        return tuple(f"P_d{i + 1}" for i in range(5)), _SCARA_MEANINGS
+    return base.names, tuple(base.expression(k) for k in range(base.count))
+
+
+def _cannot_be_negative(base: BaseParameters, index: int) -> bool:
+    """Whether a base parameter is a sum with positive factors of masses, moments of inertia and armatures."""
+    row = base.grouping[index]
+    used = np.flatnonzero(row)
+    positive = all(k >= 10 * len(base.reduction) or int(k) % 10 in (0, 4, 6, 9) for k in used)
+    return positive and bool(np.all(row[used] > 0.0))

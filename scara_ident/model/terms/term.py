@@ -1,0 +1,69 @@
+"""What a term of the torque equation is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of the regressor: one parameter of the model.
+
+    Attributes
+    ----------
+    name : str
+        Name of the parameter.
+    joint : str or None
+        The joint it belongs to; None where it belongs to no one joint.
+    unit : str
+    meaning : str
+        What the parameter is made of, in words or standard parameters.
+    nonnegative : bool
+        Whether no real arm can have a negative value.
+    """
+
+    name: str
+    joint: str | None
+    unit: str
+    meaning: str
+    nonnegative: bool = False
+
+
+class Term(Protocol):
+    """A named block of columns of the torque equation."""
+
+    @property
+    def name(self) -> str:
+        """Name of the term."""
+        ...
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """The term's p columns."""
+        ...
+
+    @property
+    def pattern(self) -> NDArray[np.bool_]:
+        """Which entries can differ from zero, shape (n, p)."""
+        ...
+
+    def regressor(self, motion: Motion) -> NDArray[np.float64]:
+        """Return the term's columns on a stretch of motion, shape (n, p, N), on the side of the recorded torque."""
+        ...
+
+
+def per_speed(robot: Robot, joint: int, power: int) -> str:
+    """Return the unit of torque divided by speed to a power, such as ``N m s^2/rad^2``."""
+    torque = robot.torque_unit(joint)
+    length = "m" if robot.prismatic[joint] else "rad"
+    if power == 0:
+        return torque
+    exponent = "" if power == 1 else f"^{power}"
+    return f"{torque} s{exponent}/{length}{exponent}"

@@ -1,0 +1,1 @@
+"""From recorded positions to motion."""

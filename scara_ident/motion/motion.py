@@ -1,0 +1,333 @@
+"""From recorded positions to motion: uniform time, zero-phase low-pass, velocities and accelerations.
+
+One filter serves all: the squared magnitude of a fourth-order Butterworth low-pass, 1 / (1 + (f/fc)^8), applied
+in the frequency domain to the signal continued by odd reflection. It has no phase, and derivatives are taken in
+the same step, exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.errors import RecordingError
+from scara_ident.recording.audit.samples import GAP_STEPS
+from scara_ident.recording.recording import Recording
+
+Array = NDArray[np.float64]
+
+# Longer parts are cut, so that memory does not grow with the length of a recording.
+MOST_SAMPLES = 60_000
+# A time step that differs by less than this share from the median is not jitter.
+UNIFORM_TOLERANCE = 1e-3
+# The filter's memory in periods of its cut-off: 4 of them leave under 1e-4 of a step.
+MEMORY_PERIODS = 4.0
+# A stretch shorter than this many periods of the cut-off holds no usable sample once its ends are left out.
+SHORTEST_PERIODS = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A stretch of motion without gaps, at uniform time steps.
+
+    Attributes
+    ----------
+    name, trajectory : str
+        The recording it belongs to, and that recording's trajectory.
+    time : ndarray, shape (N,)
+        s.
+    q, v, a : ndarray, shape (n, N)
+        Position, velocity and acceleration in the order of the robot's joints.
+    torque : ndarray, shape (n, N) or None
+        Recorded torque, as it was recorded (not filtered).
+    rate : float
+        Samples per second.
+    """
+
+    name: str
+    trajectory: str
+    time: Array
+    q: Array
+    v: Array
+    a: Array
+    torque: Array | None
+    rate: float
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return len(self.time)
+
+    def part(self, start: int, stop: int) -> Motion:
+        """Return the samples from ``start`` to before ``stop``."""
+        window = slice(start, stop)
+        return Motion(
+            self.name,
+            self.trajectory,
+            self.time[window],
+            self.q[:, window],
+            self.v[:, window],
+            self.a[:, window],
+            None if self.torque is None else self.torque[:, window],
+            self.rate,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A gapless part of a recording on a uniform time grid, before any filter."""
+
+    name: str
+    trajectory: str
+    time: Array
+    position: Array
+    torque: Array | None
+    rate: float
+
+
+def stretches(recording: Recording) -> tuple[Stretch, ...]:
+    """Cut a recording at its gaps and put each part on a uniform time grid.
+
+    Jittered positions are interpolated by a cubic spline, torque linearly, at the rate of the samples, those dropped counted in.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    tuple of Stretch
+        At least one; parts of fewer than four samples are left out.
+
+    Raises
+    ------
+    RecordingError
+        If no part is long enough.
+    """
+    step = np.diff(recording.time)
+    median = float(np.median(step))
+    # Nothing is interpolated across a gap.
+    cuts = np.flatnonzero(step > GAP_STEPS * median) + 1
+    bounds = _cut_long([0, *cuts.tolist(), len(recording.time)])
+    found = []
+    for start, stop in pairwise(bounds):
+        if stop - start < 4:
+            continue
+        found.append(_uniform(recording, start, stop, median))
+    if not found:
+        raise RecordingError(f"{recording.path or recording.name}: no four samples in a row without a gap in time")
+    return tuple(found)
+
+
+def _cut_long(bounds: Sequence[int]) -> list[int]:
+    """Divide parts that are too long into equal ones."""
+    found = [bounds[0]]
+    for start, stop in pairwise(bounds):
+        pieces = -(-(stop - start) // MOST_SAMPLES)
+        found += [start + (stop - start) * k // pieces for k in range(1, pieces + 1)]
+    return found
+
+
+def _uniform(recording: Recording, start: int, stop: int, median: float) -> Stretch:
+    time = recording.time[start:stop]
+    position = recording.position[:, start:stop]
+    torque = None if recording.effort is None else recording.effort[:, start:stop]
+    count = len(time)
+    ideal = time[0] + (time[-1] - time[0]) / (count - 1) * np.arange(count)
+    if np.max(np.abs(time - ideal)) > UNIFORM_TOLERANCE * median:
+        from scipy.interpolate import CubicSpline
+
+        # The median of jittered steps is off by up to a per cent; the number of steps is not.
+        steps = int(np.sum(np.maximum(np.rint(np.diff(time) / median), 1.0)))
+        ideal = np.linspace(time[0], time[-1], steps + 1)
+        position = CubicSpline(time, position, axis=1)(ideal)
+        torque = None if torque is None else np.array([np.interp(ideal, time, row) for row in torque])
+    rate = (len(ideal) - 1) / (ideal[-1] - ideal[0])
+    return Stretch(recording.name, recording.trajectory, ideal, position, torque, float(rate))
+
+
+def torque_of(stretch: Stretch) -> Array:
+    """Return the recorded torque of a stretch, shape (n, N).
+
+    Raises
+    ------
+    RecordingError
+        If no effort was recorded.
+    """
+    if stretch.torque is None:
+        raise RecordingError(f"{stretch.name}: no effort was recorded; it is needed to identify")
+    return stretch.torque
+
+
+def low_pass(signal: Array, rate: float, cut: float | None) -> Array:
+    """Low-pass a signal without phase.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (..., N)
+    rate : float
+        Samples per second.
+    cut : float or None
+        Frequency in Hz where half the amplitude is left; None leaves the signal as it is.
+
+    Returns
+    -------
+    ndarray, shape (..., N)
+    """
+    if cut is None:
+        return signal
+    return _filtered(signal, rate, cut, (0,))[0]
+
+
+def low_pass_every(signal: Array, rate: float, cut: float | None, step: int) -> Array:
+    """Return every ``step``-th sample of `low_pass`, from the first on, without computing the others.
+
+    The spectrum is folded at the lower rate, which is what leaving out samples does to it, so that the result is the
+    same to rounding as long as the filter leaves nothing beyond eight times its cut-off.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (k, N)
+    rate : float
+        Samples per second.
+    cut : float or None
+        Frequency in Hz where half the amplitude is left; None filters nothing.
+    step : int
+
+    Returns
+    -------
+    ndarray, shape (k, ceil(N / step))
+    """
+    if cut is None or step == 1:
+        return low_pass(signal, rate, cut)[..., ::step]
+    count = signal.shape[-1]
+    kept = -(-count // step)
+    reach = min(count - 1, int(np.ceil(MEMORY_PERIODS * rate / cut)) + 1)
+    # The first sample must fall on the lower grid.
+    lead = -(-reach // step) * step
+    closed = step * _fast_length(-(-(lead + count + reach) // step))
+    low = closed // step
+    frequency = np.arange(min(closed // 2, int(8.0 * cut * closed / rate)) + 1) * (rate / closed)
+    gain = 1.0 / (1.0 + (frequency / cut) ** 8)
+    result = np.empty((signal.shape[0], kept))
+    for place, row in enumerate(signal):
+        start, stop = 2.0 * row[0] - row[reach], 2.0 * row[-1] - row[-1 - reach]
+        slope = (stop - start) / (count - 1 + 2 * reach)
+        flat = np.zeros(closed)
+        flat[lead : lead + count] = row
+        flat[lead - reach : lead] = 2.0 * row[0] - row[reach:0:-1]
+        flat[lead + count : lead + count + reach] = 2.0 * row[-1] - row[-2 : -reach - 2 : -1]
+        flat[lead - reach : lead + count + reach] -= start + slope * np.arange(count + 2 * reach)
+        spectrum = np.fft.rfft(flat)[: len(frequency)] * gain
+        folded = np.zeros(low, dtype=complex)
+        for begin in range(0, len(spectrum), low):
+            part = spectrum[begin : begin + low]
+            folded[: len(part)] += part
+            # The negative frequencies mirror the positive ones; zero has no mirror image.
+            mirrored = np.conj(part)
+            if begin == 0:
+                mirrored[0] = 0.0
+            folded[(-np.arange(len(part))) % low] += mirrored
+        smooth = np.fft.ifft(folded).real / step
+        ramp = start + slope * (reach + step * np.arange(kept))
+        result[place] = smooth[lead // step : lead // step + kept] + ramp
+    return result
+
+
+def differentiate(signal: Array, rate: float, cut: float | None) -> tuple[Array, Array, Array]:
+    """Low-pass a signal and take its first two derivatives in the same step.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (..., N)
+    rate : float
+        Samples per second.
+    cut : float or None
+        Frequency in Hz where half the amplitude is left; None filters nothing.
+
+    Returns
+    -------
+    tuple of ndarray, each of shape (..., N)
+        The filtered signal, its derivative in 1/s and its second derivative in 1/s^2.
+    """
+    smooth, first, second = _filtered(signal, rate, cut, (0, 1, 2))
+    return smooth, first, second
+
+
+def _filtered(signal: Array, rate: float, cut: float | None, orders: Sequence[int]) -> list[Array]:
+    count = signal.shape[-1]
+    periods = rate / cut if cut is not None else 32.0
+    reach = min(count - 1, int(np.ceil(MEMORY_PERIODS * periods)) + 1)
+    head = 2.0 * signal[..., :1] - signal[..., reach:0:-1]
+    tail = 2.0 * signal[..., -1:] - signal[..., -2 : -reach - 2 : -1]
+    extended = np.concatenate([head, signal, tail], axis=-1)
+    length = extended.shape[-1]
+    # Without its chord the continued signal closes on itself; the chord is put back after.
+    slope = (extended[..., -1:] - extended[..., :1]) / (length - 1)
+    ramp = extended[..., :1] + slope * np.arange(length)
+    flat = extended - ramp
+    if cut is None:
+        # No filter would stop the kink where the ends meet from ringing through the derivatives.
+        fade = np.sin(0.5 * np.pi * np.arange(reach) / reach) ** 2
+        flat[..., :reach] *= fade
+        flat[..., -reach:] *= fade[::-1]
+    closed = _fast_length(length)
+    spectrum = np.fft.rfft(_close(flat, closed), axis=-1)
+    frequency = np.arange(closed // 2 + 1) * (rate / closed)
+    gain = np.ones_like(frequency) if cut is None else 1.0 / (1.0 + (frequency / cut) ** 8)
+    keep = slice(reach, reach + count)
+    results = []
+    for order in orders:
+        factor = gain * (2j * np.pi * frequency) ** order
+        part = np.fft.irfft(spectrum * factor, closed, axis=-1)[..., keep]
+        if order == 0:
+            part = part + ramp[..., keep]
+        elif order == 1:
+            part = part + slope * rate
+        results.append(part)
+    return results
+
+
+def _close(signal: Array, length: int) -> Array:
+    # The ends are zero, so zeros continue the signal.
+    missing = length - signal.shape[-1]
+    return signal if missing == 0 else np.concatenate([signal, np.zeros((*signal.shape[:-1], missing))], axis=-1)
+
+
+def _fast_length(length: int) -> int:
+    """Return the next length whose only prime factors are 2, 3 and 5."""
+    best = 1 << (length - 1).bit_length()
+    five = 1
+    while five < best:
+        three = five
+        while three < best:
+            two = three
+            while two < length:
+                two *= 2
+            best = min(best, two)
+            three *= 3
+        five *= 5
+    return best
+
+
+def motion_of(stretch: Stretch, cuts: Sequence[float | None]) -> Motion:
+    """Filter and differentiate the positions of a stretch.
+
+    Parameters
+    ----------
+    stretch : Stretch
+    cuts : sequence of float or None, one per joint
+        Cut-off frequency of each joint's position in Hz; None filters nothing.
+
+    Returns
+    -------
+    Motion
+        On the stretch's whole time grid; its ends carry the continuation's guess.
+    """
+    parts = [differentiate(row, stretch.rate, cut) for row, cut in zip(stretch.position, cuts, strict=True)]
+    q, v, a = (np.array([part[k] for part in parts]) for k in range(3))
+    return Motion(stretch.name, stretch.trajectory, stretch.time, q, v, a, stretch.torque, stretch.rate)

@@ -1,0 +1,90 @@
+"""Audit of a recorded velocity against the differentiated position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scara_ident.motion.motion import Stretch, differentiate
+from scara_ident.recording.recording import Recording
+
+# What is worth saying: a lag of more than this many samples, a gain off by more, a part that is not velocity.
+LAG_SAMPLES = 0.5
+GAIN_ERROR = 0.02
+UNRELATED = 0.05
+# Cut-off for the comparison as a share of the sample rate.
+COMPARE_BAND = 0.04
+
+
+@dataclass(frozen=True)
+class VelocityAudit:
+    """How a recorded velocity relates to the position's derivative.
+
+    Attributes
+    ----------
+    joint : str
+    gain : float
+        Recorded velocity per derivative of the position; 1 when they agree, 57.3 for degrees.
+    lag : float
+        s by which the recorded velocity comes later, as after a filter.
+    unrelated : float
+        Share of the recorded velocity's rms that neither explains.
+    """
+
+    joint: str
+    gain: float
+    lag: float
+    unrelated: float
+
+    def verdict(self, rate: float) -> str | None:
+        """Return what a person should know, None when the velocity is what it says."""
+        if self.gain == 0.0:
+            return "it is 0 while the position moves"
+        if self.unrelated > UNRELATED:
+            return f"{self.unrelated:.0%} of it is not the derivative of the position"
+        if abs(self.gain - 1.0) > GAIN_ERROR:
+            degrees = " (looks like degrees)" if abs(self.gain / np.degrees(1.0) - 1.0) < GAIN_ERROR else ""
+            return f"it is {self.gain:.4g} times the derivative of the position{degrees}"
+        if abs(self.lag) * rate > LAG_SAMPLES:
+            return f"it {'lags' if self.lag > 0 else 'leads'} the position by {abs(self.lag) * 1e3:.2g} ms, as a filter does"
+        return None
+
+
+def audit_velocity(recording: Recording, part: Stretch) -> tuple[VelocityAudit, ...]:
+    """Compare the recorded velocity with the derivative of the position.
+
+    Both pass the same low-pass; the recorded velocity is then written as gain times velocity minus gain times
+    lag times acceleration, by least squares.
+
+    Parameters
+    ----------
+    recording : Recording
+    part : Stretch
+        A gapless part of it.
+
+    Returns
+    -------
+    tuple of VelocityAudit
+        One per moving joint; empty where no velocity was recorded.
+    """
+    if recording.velocity is None:
+        return ()
+    cut = COMPARE_BAND * part.rate
+    found = []
+    inside = (recording.time >= part.time[0] - 1e-9) & (recording.time <= part.time[-1] + 1e-9)
+    for j, joint in enumerate(recording.joints):
+        recorded = np.interp(part.time, recording.time[inside], recording.velocity[j][inside])
+        _, v, a = differentiate(part.position[j], part.rate, cut)
+        smooth = differentiate(recorded, part.rate, cut)[0]
+        scale = float(np.sqrt(np.mean(smooth**2)))
+        if float(np.max(np.abs(v))) < 1e-4 * max(1.0, float(np.max(np.abs(recorded)))):
+            continue
+        if scale == 0.0:
+            found.append(VelocityAudit(joint, 0.0, 0.0, 0.0))
+            continue
+        columns = np.column_stack([v, a])
+        (gain, change), *_ = np.linalg.lstsq(columns, smooth, rcond=None)
+        left = float(np.sqrt(np.mean((smooth - columns @ [gain, change]) ** 2))) / scale
+        found.append(VelocityAudit(joint, float(gain), float(-change / gain) if gain else 0.0, left))
+    return tuple(found)

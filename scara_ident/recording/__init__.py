@@ -1,0 +1,1 @@
+"""One run: what was recorded, and whether to believe it."""

@@ -1,0 +1,59 @@
+"""What may be wrong with a recording, found before anything is fitted to it.
+
+Every check either passes the samples on, or leaves out or mends a few and says so, or refuses the file. A check relies
+on those before it: units are judged on finite numbers in order of time, spikes on known units, and so on.
+"""
+
+from __future__ import annotations
+
+from scara_ident.recording.audit import clock, effort, position
+from scara_ident.recording.audit.samples import Finding, Samples
+
+CHECKS = (
+    clock.enough,
+    clock.missing_numbers,
+    clock.enough,
+    clock.clock_unit,
+    clock.time_order,
+    clock.enough,
+    clock.sampling,
+    position.position_unit,
+    clock.held_rows,
+    position.whole_turns,
+    position.spikes,
+    position.idle_joints,
+    effort.dead_effort,
+    effort.saturation,
+    position.limits,
+    clock.enough,
+)
+
+
+def audit(samples: Samples) -> tuple[Samples, tuple[Finding, ...]]:
+    """Look for what may be wrong with a recording.
+
+    Parameters
+    ----------
+    samples : Samples
+        All rows of a file, as they stand there.
+
+    Returns
+    -------
+    samples : Samples
+        The rows that can be used, finite and strictly increasing in time.
+    findings : tuple of Finding
+        What was seen and what was done about it, at most a line or two per fault and joint.
+
+    Raises
+    ------
+    RecordingError
+        In one line: the file, the column and row, and what to do.
+    """
+    findings: list[Finding] = []
+    for check in CHECKS:
+        samples, found = check(samples)
+        findings += found
+    return samples, tuple(findings)
+
+
+__all__ = ["Finding", "Samples", "audit"]

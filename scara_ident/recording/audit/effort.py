@@ -1,0 +1,118 @@
+"""Faults of recorded efforts: dead or stuck channels, saturation."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.recording.audit.samples import IDLE_TRAVEL, Array, Finding, Samples, joint_range, runs, several, unit
+
+Checked = tuple[Samples, list[Finding]]
+
+# An effort that keeps one value for longer than this while its joint moves is stuck ...
+STUCK_SECONDS = 0.2
+# ... and dead where it does so for this share of the recording.
+DEAD_SHARE = 0.5
+# Where more than this share of the other samples repeats the one before, the effort has no noise (a simulation, a
+# coarse converter), and a value that lasts says nothing.
+NOISELESS = 0.5
+# A saturated amplifier holds its extreme for this many samples in a row, ...
+PILE_RUN = 3
+# ... for this share of the recording in all, ...
+PILE_SHARE = 1e-3
+# ... and this many times more often than it takes the values next to it: a quantised sine reaches 3.
+PILE_UP = 5.0
+NEXT_VALUES = 3
+
+
+def dead_effort(samples: Samples) -> Checked:
+    """Refuse a dead effort of a joint that moves; leave out rows where it is stuck."""
+    if samples.effort is None:
+        return samples, []
+    idle = samples.idle()
+    found = []
+    keep = np.ones(samples.count, dtype=bool)
+    for joint, values in enumerate(samples.effort):
+        name = samples.robot.joints[joint]
+        same = values[1:] == values[:-1]
+        if same.all():
+            if not idle[joint]:
+                samples.refuse(
+                    f"{name}.effort is {values[0]:g} throughout although the joint moves by "
+                    f"{np.ptp(samples.position[joint]):.3g} {unit(samples.robot, joint)}: a dead channel; "
+                    f"record it again, or identify without {name}"
+                )
+            said = f"{name}.effort is {values[0]:g} throughout, and the joint does not move: used as it is"
+            found.append(Finding("dead_effort", said, samples.count))
+            continue
+        stuck = _stuck(samples, joint, same)
+        count = int(stuck.sum())
+        if not count:
+            continue
+        first = samples.where(int(np.argmax(stuck)))
+        what = f"{name}.effort is stuck at {values[np.argmax(stuck)]:g} from {first}"
+        if count > DEAD_SHARE * samples.count:
+            samples.refuse(f"{what}, {count} of {samples.count} rows, while the joint moves; cut the file there")
+        keep &= ~stuck
+        said = f"{what} while the joint moves: {several(count, 'row')} left out"
+        found.append(Finding("stuck_effort", said, count))
+    return samples.kept(keep), found
+
+
+def saturation(samples: Samples) -> Checked:
+    """Say where efforts pile up at their extremes."""
+    if samples.effort is None:
+        return samples, []
+    found = []
+    for joint, values in enumerate(samples.effort):
+        for extreme, direction in ((values.max(), -1), (values.min(), 1)):
+            at = values == extreme
+            count = int(at.sum())
+            if count < max(PILE_RUN, PILE_SHARE * samples.count) or count == samples.count:
+                continue
+            if not _piles_up(values, at, direction):
+                continue
+            start, _ = runs(at[1:] & at[:-1])
+            name, torque = samples.robot.joints[joint], extreme * samples.robot.effort_gain[joint]
+            said = (
+                f"{name}.effort stays at its extreme {extreme:.4g} ({torque:.4g} {samples.robot.torque_unit(joint)}) "
+                f"for {100 * count / samples.count:.2g} % of the rows, first in {samples.where(int(start[0]))}: "
+                "the amplifier saturates or the log is clipped; used as it is"
+            )
+            found.append(Finding("saturation", said, count))
+    return samples, found
+
+
+def _stuck(samples: Samples, joint: int, same: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell which samples repeat a stuck effort, shape (N,)."""
+    assert samples.effort is not None
+    values = samples.effort[joint]
+    stuck = np.zeros(samples.count, dtype=bool)
+    start, length = runs(same)
+    end = start + length - 1
+    long = samples.time[end] - samples.time[start] > STUCK_SECONDS
+    long &= (values[start] != values.max()) & (values[start] != values.min()) | (length > DEAD_SHARE * samples.count)
+    for first, last in zip(start[long], end[long], strict=True):
+        travel = np.ptp(samples.position[joint, first : last + 1])
+        if travel > IDLE_TRAVEL * joint_range(samples.robot)[joint]:
+            stuck[first : last + 1] = True
+    elsewhere = ~(stuck[1:] & stuck[:-1])
+    if stuck.any() and elsewhere.any() and np.mean(same[elsewhere]) > NOISELESS:
+        stuck[:] = False
+    return stuck
+
+
+def _piles_up(values: Array, at: NDArray[np.bool_], direction: int) -> bool:
+    _, length = runs(at[1:] & at[:-1])
+    if not len(length) or length.max() < PILE_RUN:
+        return False
+    other = values[~at]
+    repeated = (values[1:] == values[:-1])[~at[1:] & ~at[:-1]]
+    if len(repeated) and np.mean(repeated) > NOISELESS:
+        return False
+    # The nearest other values and how often each is taken: a few extremes of what is left suffice.
+    few = min(len(other), int(at.sum()) * NEXT_VALUES)
+    near = np.sort(np.partition(direction * other, few - 1)[:few]) if few else other
+    _, counts = np.unique(near, return_counts=True)
+    beside = counts[:NEXT_VALUES]
+    return bool(len(beside) == 0 or at.sum() > PILE_UP * beside.mean())

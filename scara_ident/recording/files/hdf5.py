@@ -1,0 +1,99 @@
+"""HDF5 files: every data set of numbers, by its path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.errors import RecordingError
+from scara_ident.recording.files import arrays
+from scara_ident.recording.files.files import absent, check_file, damaged, optional_module, refuse_no_numbers
+
+# MATLAB keeps what cells and objects point to in groups of this kind of name.
+HIDDEN = "#"
+
+
+def column_names(path: Path, *, separator: str = "/") -> tuple[str, ...]:
+    """List the columns: data sets by their path, fields of tables after a dot, channels of matrices as ``q[0]``.
+
+    Parameters
+    ----------
+    path : Path
+    separator : str
+        What stands between a group and its members.
+
+    Raises
+    ------
+    RecordingError
+        h5py is not installed, or the file is missing, empty, damaged or without numbers.
+    """
+    with _opened(path) as file:
+        names = [name for key, _, _, shape in _sets(file, separator) for name in arrays.channels(key, shape)]
+    if not names:
+        refuse_no_numbers(path, "save data sets of numbers")
+    return tuple(names)
+
+
+def read_columns(path: Path, names: Sequence[str], *, separator: str = "/") -> dict[str, NDArray[np.float64]]:
+    """Read some columns as float64.
+
+    Raises
+    ------
+    RecordingError
+        The file is damaged or lacks a column.
+    """
+    found: dict[str, NDArray[np.float64]] = {}
+    with _opened(path) as file:
+        for key, data, field, shape in _sets(file, separator):
+            wanted = [name for name in arrays.channels(key, shape) if name in names]
+            if wanted:
+                values = data[()] if field is None else data[field]
+                found |= {name: arrays.column(values, key, name) for name in wanted}
+    for name in names:
+        if name not in found:
+            raise absent(path, name)
+    return {name: found[name] for name in names}
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    check_file(path)
+    h5py = optional_module("h5py", "hdf5", path)
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        if isinstance(error, RecordingError):
+            raise
+        raise damaged(path, path.suffix.lower().lstrip("."), error) from error
+
+
+def _sets(file: Any, separator: str) -> Iterator[tuple[str, Any, str | None, tuple[int, ...]]]:
+    """Yield the name, data set, field and shape of all that holds numbers."""
+    for path, data in _walk(file, ""):
+        name = path.strip("/").replace("/", separator)
+        if data.dtype.names:
+            for field in data.dtype.names:
+                kind = data.dtype[field]
+                if arrays.is_number(kind.base):
+                    yield f"{name}.{field}", data, field, (*data.shape, *kind.shape)
+        elif arrays.is_number(data.dtype) and data.attrs.get("MATLAB_class", b"") != b"char":
+            yield name, data, None, data.shape
+
+
+def _walk(group: Any, path: str) -> Iterator[tuple[str, Any]]:
+    for key in group:
+        # A link may lead nowhere.
+        item = group.get(key)
+        if key.startswith(HIDDEN) or item is None:
+            continue
+        if hasattr(item, "dtype"):
+            if hasattr(item, "shape") and item.shape is not None:
+                yield f"{path}/{key}", item
+        elif hasattr(item, "keys"):
+            yield from _walk(item, f"{path}/{key}")

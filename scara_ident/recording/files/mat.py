@@ -1,0 +1,87 @@
+"""MATLAB files: version 5 to 7.2 by SciPy, version 7.3 as the HDF5 that it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.errors import RecordingError
+from scara_ident.recording.files import arrays, hdf5
+from scara_ident.recording.files.files import absent, check_file, damaged, refuse_no_numbers
+
+HDF5_VERSION = b"MATLAB 7.3"
+
+
+def column_names(path: Path) -> tuple[str, ...]:
+    """List the columns: arrays by their name, fields of structs after dots, channels of matrices as ``q[0]``.
+
+    Raises
+    ------
+    RecordingError
+        The file is missing, empty, damaged or without numbers.
+    """
+    if _is_hdf5(path):
+        return hdf5.column_names(path, separator=".")
+    names = [name for key, array in _arrays(path) for name in arrays.channels(key, array.shape)]
+    if not names:
+        refuse_no_numbers(path, "save arrays or structs of arrays (timeseries and tables cannot be read)")
+    return tuple(names)
+
+
+def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    """Read some columns as float64.
+
+    Raises
+    ------
+    RecordingError
+        The file is damaged or lacks a column.
+    """
+    if _is_hdf5(path):
+        return hdf5.read_columns(path, names, separator=".")
+    found: dict[str, NDArray[np.float64]] = {}
+    for key, array in _arrays(path):
+        for name in arrays.channels(key, array.shape):
+            if name in names:
+                found[name] = arrays.column(array, key, name)
+    for name in names:
+        if name not in found:
+            raise absent(path, name)
+    return {name: found[name] for name in names}
+
+
+def _is_hdf5(path: Path) -> bool:
+    check_file(path)
+    with path.open("rb") as file:
+        return file.read(len(HDF5_VERSION)) == HDF5_VERSION
+
+
+def _arrays(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(path, simplify_cells=True)
+    except MemoryError:
+        raise
+    except Exception as error:
+        # SciPy's parser fails in whatever way the damage makes it fail.
+        raise damaged(path, "mat", error) from error
+    if not content:
+        raise RecordingError(f"{path}: no variable in it; save it again")
+    for name, value in content.items():
+        if not name.startswith("__"):
+            yield from _numbers(name, value)
+
+
+def _numbers(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _numbers(f"{name}.{key}", item)
+    elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object and value.ndim == 1):
+        for index, item in enumerate(value):
+            yield from _numbers(f"{name}[{index}]", item)
+    elif isinstance(value, np.ndarray) and arrays.is_number(value.dtype):
+        yield name, value

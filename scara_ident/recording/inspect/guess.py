@@ -1,0 +1,329 @@
+"""Which columns of a file are the channels of an arm, from their names and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.recording.inspect.names import CURRENT, TORQUE, Meaning, meaning
+from scara_ident.recording.inspect.values import Reading, position_readings, slopes, time_unit, velocity_reading
+from scara_ident.robot.units import COUNT, DRIVE, TIME, Unit, find_unit, table_of
+
+if TYPE_CHECKING:
+    from scara_ident.robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+CLOCKS = ("time", "__time", "timestamp", "t")
+"""Names of clocks; where a file has several, the first of these is taken."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """The columns of one quantity, by the index of the URDF's joint.
+
+    Attributes
+    ----------
+    quantity : str
+    columns : dict of int to str
+    template : str
+        The columns with the joint or its number as a placeholder.
+    first_number : int or None
+        Number of the first joint's column where joints are told by number; None where they are told by name.
+    units : dict of int to str
+        Unit of each joint's column; empty where it is not known.
+    side : {"joint", "motor"}
+        Side of the gear that the numbers belong to.
+    """
+
+    quantity: str
+    columns: Mapping[int, str]
+    template: str
+    first_number: int | None
+    units: Mapping[int, str] = field(default_factory=dict)
+    side: str = "joint"
+
+
+@dataclass
+class Guess:
+    """What a file seems to hold of an arm; ``problems`` keep it from being read, ``notes`` do not."""
+
+    time: str | None = None
+    time_unit: str = "s"
+    signals: dict[str, Signal] = field(default_factory=dict)
+    joints: list[int] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+
+    @property
+    def complete(self) -> bool:
+        """Whether a recording can be read by it."""
+        return not self.problems
+
+
+def guess(meanings: Mapping[str, Meaning], numbers: Mapping[str, Array], robot: Robot) -> Guess:
+    """Guess the channels of an arm.
+
+    Parameters
+    ----------
+    meanings : mapping of str to Meaning
+        Every column and what its name says.
+    numbers : mapping of str to ndarray
+        Columns that hold numbers.
+    robot : Robot
+        All joints of the URDF.
+    """
+    result = Guess()
+    _find_time(result, meanings, numbers)
+    size = len(numbers[result.time]) if result.time else max((len(v) for v in numbers.values()), default=0)
+    usable = {
+        name: said for name, said in meanings.items() if name in numbers and len(numbers[name]) == size and size > 1
+    }
+    for quantity in ("position", "effort", "velocity", "temperature"):
+        signal = _find_signal(result, quantity, usable, numbers, robot)
+        if signal is not None:
+            result.signals[quantity] = signal
+    position, effort = result.signals.get("position"), result.signals.get("effort")
+    if position is None:
+        result.problems.append("no positions found: name their columns under recording: position")
+        return result
+    result.joints = [k for k in range(robot.n) if k in position.columns and (effort is None or k in effort.columns)]
+    if effort is None:
+        result.notes.append("no efforts found: the file cannot be identified from")
+    lacking = [robot.joints[k] for k in range(robot.n) if k not in result.joints]
+    if not result.joints:
+        result.problems.append("no joint has both a position and an effort")
+    elif lacking:
+        result.notes.append(f"no channels for {', '.join(lacking)}: taken as locked")
+    if result.time is not None and result.joints:
+        _find_units(result, meanings, numbers, robot)
+    return result
+
+
+def _find_time(result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping[str, Array]) -> None:
+    named = [name for name, said in meanings.items() if said.quantity == "time" and name in numbers]
+    named.sort(key=lambda name: CLOCKS.index(name.lower()) if name.lower() in CLOCKS else len(CLOCKS))
+    others = [name for name, said in meanings.items() if said.quantity is None and name in numbers]
+    for name in (*named, *others):
+        seen = time_unit(numbers[name])
+        if seen is None or (name in others and np.any(np.diff(numbers[name]) <= 0)):
+            continue
+        said = meanings[name].unit
+        result.time, result.time_unit = name, seen
+        if said is not None and said != seen:
+            result.notes.append(f"{name!r} says {said}, and its steps look like {seen}: {seen} taken")
+        if name in others:
+            result.notes.append(f"{name!r} is taken for the time because it grows evenly")
+        return
+    result.problems.append("no time found: name its column and unit under recording: time")
+
+
+def _find_signal(
+    result: Guess, quantity: str, meanings: Mapping[str, Meaning], numbers: Mapping[str, Array], robot: Robot
+) -> Signal | None:
+    found: list[tuple[tuple[object, ...], Signal, str]] = []
+    short: list[str] = []
+    for order, (template, by_name, members) in enumerate(_groups(quantity, meanings)):
+        signal, note = _of_group(quantity, template, by_name, members, robot)
+        if signal is None:
+            short.append(note)
+            continue
+        said = meanings[next(iter(signal.columns.values()))]
+        still = all(_is_still(numbers[column]) for column in signal.columns.values())
+        rank = (
+            said.commanded,
+            still,
+            -len(signal.columns),
+            not by_name,
+            not said.measured,
+            not said.words & TORQUE,
+            order,
+        )
+        found.append((rank, signal, note))
+    if not found:
+        result.notes += short
+        return None
+    found.sort(key=lambda item: item[0])
+    first, best, note = found[0]
+    if note:
+        result.notes.append(note)
+    taken = set(best.columns.values())
+    others = [signal.template for _, signal, _ in found[1:] if not taken & set(signal.columns.values())]
+    if others:
+        result.notes.append(f"{quantity}: {best.template} taken, not {', '.join(others[:3])}")
+    if first[0]:
+        result.notes.append(f"{quantity}: {best.template} is by its name a command, not a measurement")
+    return best
+
+
+def _groups(quantity: str, meanings: Mapping[str, Meaning]) -> list[tuple[str, bool, dict[int, str]]]:
+    """List the columns that may be one signal: their template, whether joints are told by name, and the columns.
+
+    What is told by name is told by number too: where columns count J0, J1 and joints j1, j2, names mislead.
+    """
+    named: dict[str, dict[int, str]] = {}
+    numbered: dict[str, dict[int, str]] = {}
+    for name, said in meanings.items():
+        if said.quantity != quantity:
+            continue
+        if said.joint is not None:
+            named.setdefault(said.template, {})[said.joint] = name
+        blind = said if said.joint is None else meaning(name)
+        # An arm of one joint needs neither name nor number.
+        if blind.number is not None or said.joint is None:
+            numbered.setdefault(blind.template, {})[blind.number or 0] = name
+    return [(template, True, members) for template, members in named.items()] + [
+        (template, False, members) for template, members in numbered.items()
+    ]
+
+
+def _of_group(
+    quantity: str, template: str, by_name: bool, members: Mapping[int, str], robot: Robot
+) -> tuple[Signal | None, str]:
+    """Return the signal of a group, if it has enough channels, and what there is to say of it."""
+    if by_name:
+        return Signal(quantity, dict(sorted(members.items())), template, None), ""
+    numbered = sorted(members)
+    first = numbered[0]
+    if len(numbered) < robot.n or numbered != list(range(first, first + len(numbered))):
+        said = f"{quantity}: {template} has {len(numbered)} channels for {robot.n} joints: not used without a mapping"
+        return None, said
+    note = ""
+    if len(numbered) > robot.n:
+        note = f"{quantity}: {template} has {len(numbered)} channels; the first {robot.n} taken, in the joints' order"
+    elif robot.n > 1:
+        note = f"{quantity}: {template} matched to the joints by order; check it"
+    return Signal(quantity, {k: members[first + k] for k in range(robot.n)}, template, first), note
+
+
+def _find_units(result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping[str, Array], robot: Robot) -> None:
+    assert result.time is not None
+    time = TIME[result.time_unit].factor * numbers[result.time]
+    position = result.signals["position"]
+    good = np.isfinite(time)
+    for k in result.joints:
+        good &= np.isfinite(numbers[position.columns[k]])
+    if np.count_nonzero(good) < 3:
+        result.problems.append("the positions are hardly ever numbers at one time")
+        return
+    time = time[good]
+    readings: dict[int, Reading] = {}
+    slope: dict[int, Array] = {}
+    for linear in (False, True):
+        group = [k for k in result.joints if bool(robot.prismatic[k]) == linear]
+        if not group:
+            continue
+        values = np.array([numbers[position.columns[k]][good] for k in group])
+        said = [meanings[position.columns[k]].unit for k in group]
+        reading = _position_reading(result, robot, group, time, values, said)
+        readings |= dict.fromkeys(group, reading)
+        if reading.unit == COUNT:
+            continue
+        factor = _factors(robot, group, "position", reading)
+        slope |= dict(zip(group, slopes(time, values * factor[:, None])[0], strict=True))
+    sides = {reading.side for reading in readings.values()}
+    if len(sides) > 1:
+        result.problems.append("some positions fit the motor's side of the gear and some the joint's: state position")
+    result.signals["position"] = _with(position, {k: r.unit for k, r in readings.items()}, sides.pop())
+    _find_velocity_unit(result, numbers, robot, slope, good, time)
+    _find_effort_unit(result, meanings, robot)
+
+
+def _position_reading(
+    result: Guess, robot: Robot, group: list[int], time: Array, values: Array, said: Sequence[str | None]
+) -> Reading:
+    fitting = position_readings(robot, group, time, values)
+    named = next((word for word in said if word is not None), None)
+    kind = "translating" if robot.prismatic[group[0]] else "turning"
+    if named is not None:
+        agreeing = [reading for reading in fitting if reading.unit == named]
+        if not agreeing:
+            likely = f"; they fit {_spoken(fitting[0])}" if fitting else ""
+            result.notes.append(f"position: named {named}, which the limits in the URDF do not allow{likely}")
+        return agreeing[0] if agreeing else Reading(named)
+    if not fitting:
+        result.problems.append(
+            f"the positions of the {kind} joints fit the URDF's limits in no unit: state theirs under position: unit"
+        )
+        return Reading(next(iter(table_of("position", linear=bool(robot.prismatic[group[0]])))))
+    if fitting[0].unit == COUNT:
+        result.problems.append("the positions are whole numbers, encoder counts: state position: counts_per_turn")
+    elif fitting[0] != Reading("rad") and fitting[0] != Reading("m"):
+        result.notes.append(f"position: the URDF's limits allow {', '.join(map(_spoken, fitting[:3]))}; check it")
+    return fitting[0]
+
+
+def _find_velocity_unit(
+    result: Guess, numbers: Mapping[str, Array], robot: Robot, slope: Mapping[int, Array], good: NDArray[np.bool_],
+    time: Array,
+) -> None:  # fmt: skip
+    velocity = result.signals.get("velocity")
+    if velocity is None or not all(k in velocity.columns for k in result.joints):
+        result.signals.pop("velocity", None)
+        return
+    units: dict[int, str] = {}
+    sides: set[str] = set()
+    for linear in (False, True):
+        group = [k for k in result.joints if bool(robot.prismatic[k]) == linear and k in slope]
+        if not group:
+            continue
+        middle = slopes(time, np.zeros((1, len(time))))[1]
+        recorded = np.array([numbers[velocity.columns[k]][good][middle] for k in group])
+        reading = velocity_reading(np.array([slope[k] for k in group]), recorded, robot.reduction[group], linear=linear)
+        if reading is None:
+            result.notes.append("velocity: no slope of the positions in any unit; left out")
+            del result.signals["velocity"]
+            return
+        units |= dict.fromkeys(group, reading.unit)
+        sides.add(reading.side)
+    if len(units) == len(result.joints) and len(sides) == 1:
+        result.signals["velocity"] = _with(velocity, units, sides.pop())
+    else:
+        del result.signals["velocity"]
+
+
+def _find_effort_unit(result: Guess, meanings: Mapping[str, Meaning], robot: Robot) -> None:
+    effort = result.signals.get("effort")
+    if effort is None:
+        return
+    units: dict[int, str] = {}
+    for k in result.joints:
+        said = meanings[effort.columns[k]]
+        table = table_of("effort", linear=bool(robot.prismatic[k]))
+        unit: Unit | None = None if said.unit is None else find_unit(said.unit, table)
+        if unit is not None:
+            units[k] = unit.name
+        elif said.words & CURRENT:
+            units[k] = "A"
+        elif said.words & TORQUE:
+            units[k] = next(iter(table))
+    if len(units) < len(result.joints):
+        result.notes.append("effort: torque or current is not said; state effort_gain, N m per recorded unit")
+    elif any(unit in DRIVE for unit in units.values()):
+        result.notes.append("effort: no torque but what the drive reports; effort_gain is 1 until you state it")
+    result.signals["effort"] = _with(effort, units, "joint")
+
+
+def _factors(robot: Robot, group: Sequence[int], quantity: str, reading: Reading) -> Array:
+    motor = reading.side == "motor"
+    linear = bool(robot.prismatic[group[0]]) and not motor
+    unit = table_of(quantity, linear=linear).get(reading.unit)
+    factor = 1.0 if unit is None else unit.factor
+    return np.array([factor / (robot.reduction[k] if motor else 1.0) for k in group])
+
+
+def _is_still(values: Array) -> bool:
+    finite = values[np.isfinite(values)]
+    return not len(finite) or bool(np.ptp(finite) == 0.0)
+
+
+def _with(signal: Signal, units: Mapping[int, str], side: str) -> Signal:
+    return Signal(signal.quantity, signal.columns, signal.template, signal.first_number, units, side)
+
+
+def _spoken(reading: Reading) -> str:
+    return f"{reading.unit} of the motor" if reading.side == "motor" else reading.unit

@@ -1,0 +1,161 @@
+"""What the name of a column says: quantity, joint, unit, and whether it was measured or commanded."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from scara_ident.robot.units import find_unit, table_of
+
+QUANTITIES = {
+    "position": "position positions pos q jpos qpos angle angles ang theta encoder enc",
+    "velocity": "velocity velocities vel qd dq qdot qvel speed speeds omega",
+    "acceleration": "acceleration accelerations acc accel qdd ddq qddot",
+    "effort": "effort efforts torque torques trq tau current currents curr moment moments force forces",
+    "temperature": "temperature temperatures temp temps",
+    "time": "time times t timestamp timestamps stamp clock",
+}
+"""Words that loggers use for each quantity."""
+
+_WORDS = {word: quantity for quantity, words in QUANTITIES.items() for word in words.split()}
+COMMANDED = frozenset(
+    ["target", "desired", "des", "command", "commanded", "cmd", "ref", "reference", "setpoint", "goal", "planned"]
+)
+MEASURED = frozenset(["actual", "measured", "meas", "feedback", "fb", "sensor"])
+# Of such columns no channel of a joint is made.
+OTHER = frozenset(
+    ["error", "err", "std", "min", "max", "limit", "limits", "tcp", "tool", "cartesian", "pose", "gripper", "imu"]
+)
+GENERIC = frozenset(("joint", "link", "axis", "motor"))
+CURRENT = frozenset(("current", "currents", "curr", "i"))
+TORQUE = frozenset(["torque", "torques", "trq", "tau", "moment", "moments", "force", "forces"])
+
+_TOKEN = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+")
+_BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*?)\s*[\])>}]")
+# Units at the end of a name, as in elbow_pos_deg; a bare letter would be taken for too much.
+_ENDINGS = {
+    "rad": "rad", "radians": "rad", "deg": "deg", "degrees": "deg", "turns": "turn", "rev": "turn", "counts": "count",
+    "ticks": "count", "mm": "mm", "um": "um", "ms": "ms", "us": "us", "ns": "ns", "msec": "ms", "usec": "us",
+    "nsec": "ns", "sec": "s", "seconds": "s", "rpm": "rpm", "nm": "N m", "amps": "A", "percent": "%",
+}  # fmt: skip
+# Units that their capitals tell from other words.
+_CAPITALS = re.compile(r"(?:^|[_ .])(mA|A|mNm|Nm|N)(?=$|[_ .\[])")
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a column's name says.
+
+    Attributes
+    ----------
+    quantity : str or None
+        A key of `QUANTITIES`.
+    joint : int or None
+        Index of the joint that it names.
+    number : int or None
+        The last number in the name, without that of the joint's name.
+    unit : str or None
+        Unit that it names, of that quantity.
+    commanded, measured : bool
+        Whether it says that the value was asked for, or sensed.
+    template : str
+        The name with the joint or number replaced by a placeholder: equal for the channels of one signal.
+    words : frozenset of str
+        Its words in small letters.
+    """
+
+    quantity: str | None
+    joint: int | None
+    number: int | None
+    unit: str | None
+    commanded: bool
+    measured: bool
+    template: str
+    words: frozenset[str]
+
+
+def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
+    """Read the name of a column.
+
+    Parameters
+    ----------
+    name : str
+        Name as it stands in the file.
+    joints : sequence of str
+        Joints of the arm.
+    """
+    tokens = list(_TOKEN.finditer(name))
+    words = [token[0].lower() for token in tokens]
+    joint, span = _joint(words, joints)
+    rest = [k for k in range(len(words)) if span is None or not span[0] <= k < span[1]]
+    numbers = [k for k in rest if words[k].isdigit()]
+    spoken = [words[k] for k in rest]
+    template, number = name, None
+    if span is not None:
+        template = f"{name[: tokens[span[0]].start()]}{{joint}}{name[tokens[span[1] - 1].end() :]}"
+    elif numbers:
+        last = tokens[numbers[-1]]
+        number = int(last[0])
+        template = f"{name[: last.start()]}{{number}}{name[last.end() :]}"
+    found = [_WORDS[word] for word in spoken if word in _WORDS]
+    if not found and "i" in spoken and (joint is not None or number is not None):
+        found = ["effort"]
+    signals = [quantity for quantity in found if quantity != "time"]
+    quantity = signals[-1] if signals else found[-1] if found else None
+    if OTHER & set(spoken) or (quantity == "time" and (joint is not None or number is not None)):
+        quantity = None
+    return Meaning(
+        quantity=quantity,
+        joint=joint,
+        number=number,
+        unit=None if quantity is None else _unit(name, spoken, quantity),
+        commanded=bool(COMMANDED & set(spoken)),
+        measured=bool(MEASURED & set(spoken)),
+        template=template,
+        words=frozenset(spoken),
+    )
+
+
+def _unit(name: str, words: Sequence[str], quantity: str) -> str | None:
+    tables = [table_of(quantity, linear=linear) for linear in (False, True)]
+    last = next((word for word in reversed(words) if not word.isdigit()), "")
+    spelled = [_ENDINGS[last]] if last in _ENDINGS else []
+    for word in (*_BRACKETS.findall(name), *_CAPITALS.findall(name), *spelled):
+        # A speed called deg is in deg/s.
+        for ending in ("", "/s", "/s^2"):
+            for table in tables:
+                unit = find_unit(word + ending, table)
+                if unit is not None:
+                    return unit.name
+    return None
+
+
+def _joint(words: Sequence[str], joints: Sequence[str]) -> tuple[int | None, tuple[int, int] | None]:
+    """Find the joint that a name contains, by its longest form, and the words that it takes."""
+    best: tuple[int, int, tuple[int, int]] | None = None
+    for index, forms in enumerate(_forms(joints)):
+        for form in forms:
+            for start in range(len(words) - len(form) + 1):
+                if tuple(words[start : start + len(form)]) == form and (best is None or len(form) > best[0]):
+                    best = (len(form), index, (start, start + len(form)))
+    return (None, None) if best is None else (best[1], best[2])
+
+
+def _forms(joints: Sequence[str]) -> list[list[tuple[str, ...]]]:
+    """List for every joint the words by which a logger may call it; no form stands for two joints."""
+    full = [tuple(token[0].lower() for token in _TOKEN.finditer(joint)) for joint in joints]
+    shared = 0
+    while len(full) > 1 and all(len(words) > shared + 1 and words[shared] == full[0][shared] for words in full):
+        shared += 1
+    forms: list[list[tuple[str, ...]]] = []
+    for words in full:
+        mine = [words]
+        # panda_joint1 is called joint1, and shoulder_pan_joint shoulder_pan; a number alone is no name.
+        shortened = [words[k:] for k in range(1, shared + 1)]
+        for shorter in (*shortened, tuple(word for word in words if word not in GENERIC)):
+            if shorter not in mine and any(not word.isdigit() and word not in _WORDS for word in shorter):
+                mine.append(shorter)
+        forms.append(mine)
+    every = [form for mine in forms for form in mine]
+    return [[form for form in mine if every.count(form) == 1] for mine in forms]

@@ -1,0 +1,72 @@
+"""How much torque a recorded unit of effort is, by the masses that the URDF states."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scara_ident.errors import ScaraIdentError
+from scara_ident.model.base_parameters import find_base_parameters
+from scara_ident.model.model import build_model
+from scara_ident.motion.motion import stretches
+from scara_ident.motion.prepared import rows_of
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import Robot
+
+# Of both sides of the equation, Hz: gravity and inertia of an arm are below, and no choice is needed for a rough scale.
+BAND = 4.0
+# The URDF's torque tells the scale of a joint where it leaves less than this share of what friction alone leaves.
+MOST_LEFT = 0.35
+# A scale within this factor of 1 is what a URDF with rough masses gives.
+USUAL = 2.0
+
+
+def scale_note(recording: Recording, robot: Robot) -> str | None:
+    """Return what the URDF's masses say of the scale of effort, where it is far from N m (N).
+
+    Parameters
+    ----------
+    recording : Recording
+        Read with ``robot``.
+    robot : Robot
+        With efforts on the joint side.
+
+    Returns
+    -------
+    str or None
+        None where the URDF's torque explains too little of any joint's effort, or the scale is near 1.
+    """
+    try:
+        scales = _scales(recording, robot)
+    except ScaraIdentError:
+        return None
+    told = [
+        f"{scale:.2g} {robot.torque_unit(j)} on {robot.joints[j]}"
+        for j, scale in scales.items()
+        if not 1.0 / USUAL < scale < USUAL
+    ]
+    if not told:
+        return None
+    return f"effort: by the URDF's masses, a recorded unit is roughly {', '.join(told)}: is effort_gain to be stated?"
+
+
+def _scales(recording: Recording, robot: Robot) -> dict[int, float]:
+    """Return the torque per recorded unit of the joints whose rigid-body torque shows in their effort."""
+    model = build_model(robot, "basic")
+    base = find_base_parameters(robot)
+    stated = base.grouping @ robot.standard_parameters()
+    bands = [min(BAND, 0.1 * recording.rate)] * robot.n
+    parts = [rows_of(model, part, bands).banded for part in stretches(recording)]
+    scales = {}
+    for j, joint in enumerate(robot.joints):
+        rows = np.concatenate([part[j] for part in parts], axis=1)
+        friction = [rows[k] for k in range(len(stated), len(rows) - 1) if model.columns[k].joint == joint]
+        rigid, effort = stated @ rows[: len(stated)], rows[-1]
+        if not np.any(rigid):
+            continue
+        with_urdf = np.stack([*friction, rigid], axis=1)
+        value = np.linalg.lstsq(with_urdf, effort, rcond=None)[0]
+        without = np.linalg.lstsq(with_urdf[:, :-1], effort, rcond=None)[0]
+        left = np.linalg.norm(effort - with_urdf @ value)
+        if value[-1] > 0.0 and left < MOST_LEFT * np.linalg.norm(effort - with_urdf[:, :-1] @ without):
+            scales[j] = float(1.0 / value[-1])
+    return scales

@@ -1,0 +1,171 @@
+"""A first ``robot.yaml`` with comments that say what was guessed and what is left to state."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scara_ident.robot.signal_map import fill
+from scara_ident.robot.units import DRIVE, table_of
+
+if TYPE_CHECKING:
+    from scara_ident.recording.inspect.guess import Guess, Signal
+    from scara_ident.robot.robot import Robot
+
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+# Words that YAML takes for truth values or for nothing.
+_TAKEN = frozenset(["y", "n", "yes", "no", "on", "off", "true", "false", "null"])
+
+
+def description_text(guess: Guess, robot: Robot, described: Mapping[str, Any], urdf: Path, recording: Path) -> str:
+    """Write a robot description.
+
+    Parameters
+    ----------
+    guess : Guess
+    robot : Robot
+        All joints of the URDF.
+    described : mapping
+        The key ``recording``; see `mapping`.
+    urdf : Path
+        As it is to stand in the file.
+    recording : Path
+        The file that was inspected, named in a comment.
+    """
+    lines = [
+        f"# First description of {robot.name}, guessed by `scara-ident inspect` from {recording.name} and the URDF.",
+        "# Check every line; what is marked STATE the program cannot know.",
+        f"urdf: {_word(str(urdf))}",
+        "",
+        *_side(robot, guess),
+        "",
+        "# Joints to identify, in order. reduction: motor turns per joint turn (from the URDF's transmissions, else 1);",
+        "# effort_gain: torque in N m (N) = effort_gain x recorded effort.",
+    ]
+    lines += _joints(guess, robot)
+    locked = [robot.joints[k] for k in range(robot.n) if k not in guess.joints]
+    if locked and guess.joints:
+        lines += ["", "# STATE where these stand, rad or m: the file has no channels for them."]
+        lines += [f"locked: {{{', '.join(f'{_word(name)}: 0.0' for name in locked)}}}"]
+    lines += ["", *_recording(described)]
+    lines += ["", "# gravity: [0, 0, -9.81]   # in the base frame; state it if the base is not upright"]
+    for kind, said in (("missing", guess.problems), ("note", guess.notes)):
+        lines += [f"# {kind}: {' '.join(text.split())}" for text in said]
+    return "\n".join(lines) + "\n"
+
+
+def mapping(guess: Guess, robot: Robot) -> dict[str, Any]:
+    """Return the key ``recording`` of a guess; empty where the columns are the contract's, in SI."""
+    result: dict[str, Any] = {}
+    if guess.time is not None and (guess.time, guess.time_unit) != ("time", "s"):
+        result["time"] = {"column": guess.time, "unit": guess.time_unit}
+    for quantity, signal in guess.signals.items():
+        described = _signal(signal, guess, robot)
+        if described:
+            result[quantity] = described
+    return result
+
+
+def _side(robot: Robot, guess: Guess) -> list[str]:
+    if all(robot.reduction == 1.0):
+        return [
+            "# Side of the gear on which effort is measured, motor or joint. No gear is known, which makes them one;",
+            "# STATE the reductions below and the side if it is the motor's.",
+            "effort_side: joint",
+        ]
+    return [
+        "# STATE on which side of the gear effort is measured: motor or joint. Take away the # of the right line.",
+        "# effort_side: motor",
+        "# effort_side: joint",
+    ]
+
+
+def _joints(guess: Guess, robot: Robot) -> list[str]:
+    if not guess.joints:
+        return ["# joints:", *(f"#   {_word(name)}: {{}}" for name in robot.joints)]
+    effort = guess.signals.get("effort")
+    lines = ["joints:"]
+    for k in guess.joints:
+        unit = None if effort is None else effort.units.get(k)
+        entry = f"  {_word(robot.joints[k])}: {{reduction: {_number(float(robot.reduction[k]))}"
+        comment = ""
+        if effort is not None and (unit is None or unit in DRIVE):
+            entry += ", effort_gain: 1.0"
+            force = "N" if robot.prismatic[k] else "N m"
+            what = f"{force} per {unit.removeprefix('m')}" if unit in ("A", "mA") else f"{force} per recorded unit"
+            comment = f"   # STATE effort_gain, {what}"
+        lines.append(f"{entry}}}{comment}")
+    return lines
+
+
+def _recording(described: Mapping[str, Any]) -> list[str]:
+    if not described:
+        return ["# Columns are time, <joint>.position, <joint>.effort, in SI: no key recording is needed."]
+    lines = ["# Columns of the recordings and their units.", "recording:"]
+    for key, value in described.items():
+        if not isinstance(value, dict):
+            lines.append(f"  {key}: {json.dumps(value, ensure_ascii=False)}")
+        elif "columns" in value:
+            rest = {name: item for name, item in value.items() if name != "columns"}
+            lines += [f"  {key}:", "    columns:"]
+            lines += [f"      {_word(joint)}: {_quoted(column)}" for joint, column in value["columns"].items()]
+            lines += [f"    {name}: {_flow(item)}" for name, item in rest.items()]
+        else:
+            lines.append(f"  {key}: {_flow(value)}")
+    return lines
+
+
+def _signal(signal: Signal, guess: Guess, robot: Robot) -> dict[str, Any]:
+    joints = [robot.joints[k] for k in guess.joints]
+    if not all(k in signal.columns for k in guess.joints):
+        return {}
+    columns = [signal.columns[k] for k in guess.joints]
+    result: dict[str, Any] = {}
+    if columns != [f"{joint}.{signal.quantity}" for joint in joints]:
+        result |= _places(signal, joints, columns)
+    # The default of a robot description is the SI unit.
+    usual = {
+        k: next(iter(table_of(signal.quantity, linear=bool(robot.prismatic[k]) and signal.side == "joint")))
+        for k in guess.joints
+    }
+    units = {robot.joints[k]: signal.units[k] for k in guess.joints if signal.units.get(k, usual[k]) != usual[k]}
+    if units or (result and signal.units):
+        every = {robot.joints[k]: signal.units.get(k, usual[k]) for k in guess.joints}
+        result["unit"] = next(iter(every.values())) if len(set(every.values())) == 1 else every
+    if signal.side == "motor":
+        result["side"] = "motor"
+    return result
+
+
+def _places(signal: Signal, joints: list[str], columns: list[str]) -> dict[str, Any]:
+    pattern = signal.template
+    if signal.first_number == 0:
+        pattern = pattern.replace("{number}", "{index}")
+    if [fill(pattern, joint, index) for index, joint in enumerate(joints)] == columns:
+        return {"column": pattern}
+    return {"columns": dict(zip(joints, columns, strict=True))}
+
+
+def _number(value: float) -> str:
+    return str(int(value)) if value.is_integer() and abs(value) < 1e9 else repr(value)
+
+
+def _flow(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_word(str(key))}: {_flow(item)}" for key, item in value.items()) + "}"
+    return _quoted(value) if isinstance(value, str) and not _is_plain(value) else str(value)
+
+
+def _word(text: str) -> str:
+    return text if _is_plain(text) else _quoted(text)
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _is_plain(text: str) -> bool:
+    return bool(_PLAIN.fullmatch(text)) and text.lower() not in _TAKEN

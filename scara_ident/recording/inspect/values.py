@@ -1,0 +1,129 @@
+"""What the numbers of a column say of its unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.robot.units import COUNT, TIME, TURN, table_of
+
+if TYPE_CHECKING:
+    from scara_ident.robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+# No arm is logged slower than 5 Hz or faster than 100 kHz, and most near 500 Hz.
+SLOWEST, FASTEST, USUAL = 0.2, 1e-5, 2e-3
+# Positions may lie beyond the limits by this share of the range, and move this many times faster than the limit.
+SLACK, HASTE = 0.1, 2.0
+# A joint of which nothing is known turns less than this either way, and not faster.
+WIDEST, FASTEST_JOINT = 2 * TURN, 4 * TURN
+LONGEST, FASTEST_SLIDE = 10.0, 10.0
+# Wild samples decide nothing: of positions these percentiles count, and of speeds that one over so many rows.
+LOW, HIGH, FAST, ROWS = 2.0, 98.0, 95.0, 20
+# A recorded velocity is that of the position where it correlates so well with its slope, and fits within this share.
+ALIKE, NEAR = 0.9, 0.1
+# Whole numbers over a wider range are encoder counts: as degrees they would be three turns.
+COUNTS = 1000.0
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A unit, and the side of the gear on which an encoder counts."""
+
+    unit: str
+    side: str = "joint"
+
+
+def time_unit(time: Array) -> str | None:
+    """Return the unit of a clock from its usual step; None where it is no clock."""
+    step = np.diff(time[np.isfinite(time)])
+    if len(step) < 2 or not np.mean(step > 0) > 0.5 or np.mean(step < 0) > 0.01:
+        return None
+    median = float(np.median(step[step > 0]))
+    fitting = {name: unit.factor * median for name, unit in TIME.items() if FASTEST <= unit.factor * median <= SLOWEST}
+    return min(fitting, key=lambda name: abs(np.log(fitting[name] / USUAL))) if fitting else None
+
+
+def position_readings(robot: Robot, joints: list[int], time: Array, position: Array) -> list[Reading]:
+    """List the readings of some joints' positions that their limits and speeds allow, the likeliest first.
+
+    Parameters
+    ----------
+    robot : Robot
+    joints : list of int
+        Joints that all turn or all translate.
+    time : ndarray, shape (N,)
+        In s.
+    position : ndarray, shape (k, N)
+        As recorded, a row for each of `joints`.
+    """
+    linear = bool(robot.prismatic[joints[0]])
+    table = table_of("position", linear=linear)
+    if all(np.ptp(row) > COUNTS and np.array_equal(row, np.rint(row)) for row in position):
+        return [Reading(COUNT)]
+    readings = []
+    for side in ("joint", "motor"):
+        gear = robot.reduction[joints] if side == "motor" else np.ones(len(joints))
+        if side == "motor" and np.all(gear == 1.0):
+            continue
+        for name, unit in table.items() if side == "joint" else table_of("position", linear=False).items():
+            if name != COUNT and _fit(robot, joints, time, position * (unit.factor / gear)[:, None]):
+                readings.append(Reading(name, side))
+    return readings
+
+
+def velocity_reading(slope: Array, velocity: Array, reduction: Array, *, linear: bool) -> Reading | None:
+    """Return the unit in which recorded velocities are the slopes of the positions, if there is one.
+
+    Parameters
+    ----------
+    slope, velocity : ndarray, shape (k, M)
+        Slope of the positions in rad/s (m/s), and what was recorded.
+    reduction : ndarray, shape (k,)
+    linear : bool
+        Whether the joints translate.
+    """
+    moving = np.std(slope, axis=1) > 0
+    if not moving.any() or not np.isfinite(velocity[moving]).all():
+        return None
+    ratios = np.empty(int(moving.sum()))
+    for k, (known, recorded) in enumerate(zip(slope[moving], velocity[moving], strict=True)):
+        if np.std(recorded) == 0 or abs(np.corrcoef(known, recorded)[0, 1]) < ALIKE:
+            return None
+        ratios[k] = float(known @ recorded) / float(known @ known)
+    for side in ("joint", "motor"):
+        gear = reduction[moving] if side == "motor" else np.ones(len(ratios))
+        for name, unit in table_of("velocity", linear=linear and side == "joint").items():
+            if not name.startswith(COUNT) and np.all(np.abs(ratios * unit.factor / gear - 1) < NEAR):
+                return Reading(name, side)
+    return None
+
+
+def slopes(time: Array, values: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return the slope of signals (k, N) over a few samples, shape (k, M), and the rows at which it stands."""
+    rows = max(1, min(ROWS // 2, len(time) // 8))
+    middle = np.arange(rows, len(time) - rows)
+    lasting = time[middle + rows] - time[middle - rows]
+    good = lasting > 0
+    middle = middle[good]
+    return (values[:, middle + rows] - values[:, middle - rows]) / lasting[good], middle
+
+
+def _fit(robot: Robot, joints: list[int], time: Array, position: Array) -> bool:
+    linear = bool(robot.prismatic[joints[0]])
+    low, high = np.percentile(position, (LOW, HIGH), axis=1)
+    lower, upper = robot.lower[joints], robot.upper[joints]
+    widest = LONGEST if linear else WIDEST
+    bounded = np.isfinite(upper - lower) & (upper > lower)
+    lower, upper = np.where(bounded, lower, -widest), np.where(bounded, upper, widest)
+    slack = SLACK * (upper - lower)
+    if np.any(low < lower - slack) or np.any(high > upper + slack):
+        return False
+    speed = np.percentile(np.abs(slopes(time, position)[0]), FAST, axis=1)
+    limit = robot.velocity_limit[joints]
+    fastest = FASTEST_SLIDE if linear else FASTEST_JOINT
+    return bool(np.all(speed <= np.where(np.isfinite(limit), HASTE * limit, fastest)))

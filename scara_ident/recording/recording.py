@@ -1,0 +1,371 @@
+"""One run of one trajectory: reading, writing and gathering recordings."""
+
+from __future__ import annotations
+
+import glob
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.errors import RecordingError, UsageError
+from scara_ident.recording.audit import Finding, Samples, audit
+from scara_ident.recording.files import READERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
+from scara_ident.recording.files.parquet_csv import write_columns
+from scara_ident.robot.signal_map import Channel, Channels, contract_channels
+
+if TYPE_CHECKING:
+    from scara_ident.robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+OPTIONAL = ("velocity", "acceleration", "temperature")
+_OTHERS = ", ".join([*list(READERS)[2:], "rosbag2 folder"])
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One run of one trajectory.
+
+    Attributes
+    ----------
+    name : str
+        Stem of the file.
+    trajectory : str
+        The stem without a trailing ``_<number>``.
+    repetition : int
+        That number, 1 where the stem has none.
+    joints : tuple of str
+        The n joints, in the robot's order.
+    time : ndarray, shape (N,)
+        Time in s, strictly increasing.
+    position : ndarray, shape (n, N)
+        Joint positions in rad or m.
+    effort : ndarray, shape (n, N), or None
+        Torque in N m or force in N on the robot's effort side, after ``effort_gain``.
+    velocity, acceleration : ndarray, shape (n, N), or None
+        As recorded, in rad/s (m/s) and rad/s^2 (m/s^2); None where they are absent for any joint.
+    temperature : ndarray, shape (n, N), or None
+        In deg C.
+    findings : tuple of Finding
+        What the audit saw in the file and did about it.
+    path : Path or None
+        The file that it was read from.
+
+    Raises
+    ------
+    RecordingError
+        If shapes disagree or time does not grow.
+    """
+
+    name: str
+    trajectory: str
+    repetition: int
+    joints: tuple[str, ...]
+    time: Array
+    position: Array
+    effort: Array | None = None
+    velocity: Array | None = None
+    acceleration: Array | None = None
+    temperature: Array | None = None
+    findings: tuple[Finding, ...] = ()
+    path: Path | None = None
+
+    def __post_init__(self) -> None:
+        source = self.path or self.name
+        shape = (len(self.joints), len(self.time))
+        for name in ("position", "effort", *OPTIONAL):
+            signal = getattr(self, name)
+            if signal is not None and np.shape(signal) != shape:
+                raise RecordingError(f"{source}: {name} has shape {np.shape(signal)}, joints and time ask for {shape}")
+        if not np.all(np.diff(self.time) > 0):
+            raise RecordingError(f"{source}: time is not strictly increasing")
+
+    @property
+    def rate(self) -> float:
+        """Median sample rate, Hz."""
+        return 1.0 / float(np.median(np.diff(self.time)))
+
+
+def split_name(stem: str) -> tuple[str, int]:
+    """Split the stem of a file into its trajectory and the number of its repetition.
+
+    Examples
+    --------
+    >>> split_name("OJD_2")
+    ('OJD', 2)
+    >>> split_name("OJD")
+    ('OJD', 1)
+    """
+    match = re.fullmatch(r"(.+)_([0-9]+)", stem, re.DOTALL)
+    return (match[1], int(match[2])) if match else (stem, 1)
+
+
+def recording_name(path: Path) -> str:
+    """Return the name of a recording: the stem of its file, or the name of its folder."""
+    return path.resolve().name if path.is_dir() else path.stem
+
+
+def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) -> Recording:
+    """Read a recording and audit it.
+
+    Parameters
+    ----------
+    path : path
+        A file of a kind that `scara_ident.recording.files` knows by its suffix, or the folder of a rosbag2 recording.
+    robot : Robot
+        Says which joints are wanted, in which order, in which columns and units they stand, and what a recorded
+        effort is worth.
+    need_effort : bool
+        Whether a file without efforts is refused. Where they are not needed, efforts are read if they are complete.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    RecordingError
+        In one line: the file, the column and row, and what to do.
+    """
+    path = Path(path)
+    channels = robot.channels or contract_channels(robot.joints)
+    names = column_names(path, channels.topic)
+    needed = [channels.time, *channels.position, *(channels.effort if need_effort else ())]
+    _refuse_missing(path, names, [channel.column for channel in needed], channels)
+    optional, findings = _optional_channels(path, channels, names, () if need_effort else ("effort",))
+    wanted = [channel.column for channel in (*needed, *chain.from_iterable(optional.values()))]
+    columns = read_columns(path, wanted, channels.topic)
+    if shares_clock(path, channels.time.column):
+        columns = _rows_of_the_arm(columns, [channel.column for channel in needed[1:]])
+
+    def rows(wanted: Sequence[Channel]) -> Array:
+        return np.array([channel.si(columns.pop(channel.column)) for channel in wanted])
+
+    time = channels.time.si(np.array(columns.pop(channels.time.column)))
+    samples = Samples(
+        source=str(path),
+        robot=robot,
+        time=time,
+        position=rows(channels.position),
+        effort=rows(channels.effort) if need_effort else None,
+        row=np.arange(1, len(time) + 1),
+    )
+    samples, audited = audit(samples)
+    findings += audited
+    signals = {"effort": samples.effort}
+    for signal, places in optional.items():
+        values = rows(places)[:, samples.row - 1] if samples.count < len(time) else rows(places)
+        if np.isfinite(values).all():
+            signals[signal] = values
+        else:
+            findings.append(_lacking(samples, signal, [channel.column for channel in places], values))
+    if signals["effort"] is not None:
+        signals["effort"] = signals["effort"] * robot.effort_gain[:, None]
+
+    name = recording_name(path)
+    trajectory, repetition = split_name(name)
+    return Recording(
+        name=name,
+        trajectory=trajectory,
+        repetition=repetition,
+        joints=robot.joints,
+        time=samples.time,
+        position=samples.position,
+        findings=tuple(findings),
+        path=path,
+        **signals,
+    )
+
+
+def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: bool = True) -> tuple[Recording, ...]:
+    """Read files, folders of recordings and globs.
+
+    Parameters
+    ----------
+    words : sequence of path or str
+        Each a file, a folder (its recordings in natural order, not those of its folders; the folder of a rosbag2
+        recording is one recording) or a glob.
+    robot : Robot
+        See `read_recording`.
+    need_effort : bool
+        See `read_recording`.
+
+    Returns
+    -------
+    tuple of Recording
+        In order of appearance, each file once.
+
+    Raises
+    ------
+    UsageError
+        A word that is no file, folder or matching glob.
+    RecordingError
+        A folder or glob without recordings, two files of one stem, or a recording that cannot be used.
+    """
+    return tuple(read_recording(path, robot, need_effort=need_effort) for path in recording_paths(words))
+
+
+def recording_paths(words: Sequence[Path | str]) -> tuple[Path, ...]:
+    """List the files that words on a command line stand for; see `read_recordings`."""
+    found: dict[Path, Path] = {}
+    stems: dict[str, Path] = {}
+    for word in words:
+        for path in _paths(str(word)):
+            real = path.resolve()
+            if real in found:
+                continue
+            name = recording_name(path)
+            if name in stems:
+                raise RecordingError(
+                    f"{stems[name]} and {path}: two recordings named {name!r}; rename one, results are listed by name"
+                )
+            found[real] = stems[name] = path
+    return tuple(found.values())
+
+
+def write_recording(recording: Recording, path: Path | str, *, effort_gain: Array | None = None) -> None:
+    """Write a recording to a file, whole or not at all.
+
+    Parameters
+    ----------
+    recording : Recording
+    path : path
+        Parquet or CSV, by its suffix. An existing file is replaced.
+    effort_gain : ndarray, shape (n,), optional
+        The robot's gains; efforts are divided by them, so that reading with that robot gives them back.
+
+    Raises
+    ------
+    RecordingError
+        Another suffix, or a place that cannot be written to.
+    """
+    columns = {"time": recording.time}
+    for signal in ("position", "velocity", "acceleration", "effort", "temperature"):
+        values = getattr(recording, signal)
+        if values is None:
+            continue
+        if signal == "effort" and effort_gain is not None:
+            values = values / np.asarray(effort_gain, dtype=float)[:, None]
+        columns |= {f"{joint}.{signal}": row for joint, row in zip(recording.joints, values, strict=True)}
+    write_columns(Path(path), columns)
+
+
+def _rows_of_the_arm(columns: dict[str, Array], wanted: Sequence[str]) -> dict[str, Array]:
+    """Leave out the samples of other signals, in which all that is wanted of the arm is empty.
+
+    The rows that are left count from 1, as if the others were not in the file.
+    """
+    keep = np.isfinite([columns[name] for name in wanted]).any(axis=0)
+    return columns if keep.all() else {name: values[keep] for name, values in columns.items()}
+
+
+def _refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str], channels: Channels) -> None:
+    missing = [name for name in wanted if name not in names]
+    if not missing:
+        return
+    if names and all(_is_number(name) for name in names):
+        raise RecordingError(
+            f"{path}: the first line holds numbers; put the column names there (time, {wanted[1]}, ...)"
+        )
+    name = missing[0]
+    more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
+    ending = name.rpartition(".")[2]
+    mapped = _declaring(channels, name)
+    have = [other for other in names if other.endswith(f".{ending}")] if "." in name and not mapped else list(names)
+    lower = {other.lower(): other for other in names}
+    near = get_close_matches(name.lower(), lower, n=1, cutoff=0.75)
+    guess = f"is it {lower[near[0]]!r}? " if near else ""
+    kind = f"{ending} columns" if "." in name and not mapped else "columns"
+    shown = ", ".join(have[:8]) + (", ..." if len(have) > 8 else "") if have else "none"
+    remedy = "rename the column, or correct the joints in the robot description"
+    if mapped:
+        remedy = f"correct recording: {mapped} in the robot description"
+    elif len(missing) == len(wanted):
+        remedy = f"map its columns in the robot description; a first one writes: scara-ident inspect {path.name}"
+    raise RecordingError(f"{path}: no column {name!r}{more}; {guess}its {kind}: {shown}; {remedy}")
+
+
+def _declaring(channels: Channels, column: str) -> str:
+    """Return the signal for which the robot description names a column, or nothing."""
+    for signal in channels.declared:
+        places = (channels.time,) if signal == "time" else channels.of(signal)
+        if any(channel.column == column for channel in places):
+            return signal
+    return ""
+
+
+def _optional_channels(
+    path: Path, channels: Channels, names: Sequence[str], more: Sequence[str]
+) -> tuple[dict[str, tuple[Channel, ...]], list[Finding]]:
+    found: dict[str, tuple[Channel, ...]] = {}
+    findings = []
+    for signal in (*more, *OPTIONAL):
+        wanted = channels.of(signal)
+        absent = [channel.column for channel in wanted if channel.column not in names]
+        if not absent:
+            found[signal] = wanted
+        elif signal in channels.declared:
+            _refuse_missing(path, names, absent, channels)
+        elif len(absent) < len(wanted):
+            said = f"no {', '.join(absent)} beside the other joints' {signal}: the {signal} columns are not used"
+            findings.append(Finding("missing_column", said, len(absent)))
+    return found, findings
+
+
+def _lacking(samples: Samples, signal: str, names: Sequence[str], values: Array) -> Finding:
+    lacking = ~np.isfinite(values)
+    joint = int(np.argmax(lacking.any(axis=1)))
+    said = (
+        f"{names[joint]} is empty, NaN or infinite in {int(lacking[joint].sum())} of {samples.count} rows, "
+        f"first in {samples.where(int(np.argmax(lacking[joint])))}: the {signal} columns are not used"
+    )
+    return Finding("nan", said, int(lacking.sum()))
+
+
+def _paths(word: str) -> list[Path]:
+    path = Path(word)
+    if path.is_dir() and not is_bag_folder(path):
+        found = _in_folder(path)
+        if not found:
+            raise RecordingError(
+                f"{path}: no .parquet or .csv file in this folder, nor another recording ({_OTHERS}); "
+                "name one that holds recordings"
+            )
+        return found
+    if path.exists():
+        return [path]
+    if not glob.has_magic(word):
+        raise UsageError(f"{word}: no such file or folder")
+    matches = [Path(match) for match in sorted(glob.glob(word, recursive=True), key=_natural)]
+    if not matches:
+        raise UsageError(f"{word}: no file matches")
+    found = []
+    for match in matches:
+        found += [match] if is_recording(match) else _in_folder(match) if match.is_dir() else []
+    if not found:
+        raise RecordingError(f"{word}: matches {len(matches)} files but no .parquet or .csv file ({_OTHERS})")
+    return found
+
+
+def _in_folder(folder: Path) -> list[Path]:
+    files = [f for f in folder.iterdir() if is_recording(f) and f.name[0] != "."]
+    return sorted(files, key=lambda file: _natural(file.name))
+
+
+def _natural(text: str) -> list[tuple[int, str]]:
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"([0-9]+)", text)]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

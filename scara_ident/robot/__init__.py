@@ -1,0 +1,1 @@
+"""What is identified: a URDF with what a URDF cannot say."""

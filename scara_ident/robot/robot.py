@@ -1,0 +1,396 @@
+"""The robot: a URDF with what a URDF cannot say."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from scara_ident.errors import RobotError
+from scara_ident.robot.description import JointDescription, RobotDescription, read_description
+from scara_ident.robot.signal_map import Channels, build_channels
+from scara_ident.robot.urdf_validation import urdf_fault
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+MOVABLE = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """An arm whose joints are to be identified.
+
+    Attributes
+    ----------
+    name : str
+        Name of the robot in its URDF.
+    urdf : Path
+        File the model came from.
+    model : pinocchio.Model
+        Model of the identified joints alone; every other movable joint is locked. Every joint has one degree
+        of freedom, so ``model.nv == n``.
+    joints : tuple of str
+        The n joints in the order of the robot description.
+    links : tuple of str
+        For every joint the link that it moves, in the same order.
+    order : ndarray of int, shape (n,)
+        Velocity index in ``model`` of each joint.
+    prismatic : ndarray of bool, shape (n,)
+        Which joints translate.
+    reduction : ndarray, shape (n,)
+        Motor turns per joint turn; negative where the gear reverses, never 0.
+    rotor_inertia : ndarray, shape (n,)
+        Nominal inertia of the rotor on the motor side, kg m^2; 0 where nothing is known.
+    effort_side : {"motor", "joint"}
+        Side of the gear on which effort is measured and the equations are written.
+    effort_gain : ndarray, shape (n,)
+        Torque in N m (N) per unit of the recorded effort.
+    lower, upper : ndarray, shape (n,)
+        Range of each joint, rad or m; infinite where the URDF gives none.
+    velocity_limit, effort_limit : ndarray, shape (n,)
+        Limits on the joint side, rad/s or m/s and N m or N; infinite where the URDF gives none.
+    locked : tuple of (str, float)
+        Locked joints and their positions.
+    channels : Channels or None
+        Columns and units of the recordings; None for the contract's.
+    """
+
+    name: str
+    urdf: Path
+    model: pin.Model
+    joints: tuple[str, ...]
+    links: tuple[str, ...]
+    order: NDArray[np.intp]
+    prismatic: NDArray[np.bool_]
+    reduction: NDArray[np.float64]
+    rotor_inertia: NDArray[np.float64]
+    effort_side: Literal["motor", "joint"]
+    effort_gain: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    velocity_limit: NDArray[np.float64]
+    effort_limit: NDArray[np.float64]
+    locked: tuple[tuple[str, float], ...]
+    channels: Channels | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of identified joints."""
+        return len(self.joints)
+
+    @property
+    def row_scale(self) -> NDArray[np.float64]:
+        """Recorded torque per joint torque, shape (n,): 1/N on the motor side, else 1."""
+        return 1.0 / self.reduction if self.effort_side == "motor" else np.ones(self.n)
+
+    @property
+    def drive_sign(self) -> NDArray[np.float64]:
+        """Direction of the recorded torque relative to the joint's, shape (n,)."""
+        return np.sign(self.row_scale)
+
+    @property
+    def torque_limit(self) -> NDArray[np.float64]:
+        """Effort limit on the side where effort is recorded, shape (n,)."""
+        return self.effort_limit * np.abs(self.row_scale)
+
+    def torque_unit(self, joint: int) -> str:
+        """Return the unit of the recorded torque of a joint after ``effort_gain``."""
+        return "N" if self.prismatic[joint] and self.effort_side == "joint" else "N m"
+
+    def standard_parameters(self) -> NDArray[np.float64]:
+        """Return the nominal standard parameters of the URDF, shape (11 n,).
+
+        Ten per body in the order of ``joints``, each in Pinocchio's order (m, m c, Ixx, Ixy, Iyy, Ixz, Iyz, Izz,
+        the inertia about the joint's frame), then n armatures N^2 Jm.
+        """
+        bodies = [self.model.inertias[int(k) + 1].toDynamicParameters() for k in self.order]
+        return np.concatenate([*bodies, self.reduction**2 * self.rotor_inertia])
+
+
+def load_robot(path: Path | str | None = None) -> Robot:
+    """Load a robot from its description.
+
+    Parameters
+    ----------
+    path : path, optional
+        A ``robot.yaml``, or a URDF whose movable joints are all to be identified with effort at the joints.
+        Without it the embedded SCARA03 is loaded.
+
+    Returns
+    -------
+    Robot
+
+    Raises
+    ------
+    RobotError
+        In one line: file, key and what was expected.
+    """
+    if path is None:
+        return build_robot(RobotDescription(urdf=embedded_urdf(), effort_side="motor"), embedded_urdf())
+    source = Path(path)
+    if source.suffix.lower() in (".urdf", ".xml"):
+        return build_robot(RobotDescription(urdf=source.resolve(), effort_side="joint"), source)
+    return build_robot(read_description(source), source)
+
+
+def embedded_urdf() -> Path:
+    """Return the URDF of the SCARA03: in the installed package, or at the top of a checkout."""
+    here = Path(__file__).resolve().parent
+    packed = here.parent / "urdf" / "scara03.urdf"
+    return packed if packed.exists() else here.parent.parent / "urdf" / "scara03.urdf"
+
+
+def build_robot(description: RobotDescription, source: Path) -> Robot:
+    """Build a robot from a checked description; ``source`` is named in errors."""
+    urdf = description.urdf
+    tree = _parse_xml(urdf, source)
+    full = _pinocchio_model(urdf, tree)
+    names = _identified_joints(description, full, tree, source)
+    described = description.joints or {}
+    joints = [described.get(name) or JointDescription() for name in names]
+    model, locked = _lock(full, names, description, source)
+    if description.gravity is not None:
+        model.gravity.linear = np.asarray(description.gravity, dtype=float)
+
+    ids = [model.getJointId(name) for name in names]
+    order = np.array([model.joints[i].idx_v for i in ids], dtype=np.intp)
+    position = np.array([model.joints[i].idx_q for i in ids], dtype=np.intp)
+    unbounded = np.array([model.joints[i].nq != 1 for i in ids])
+    reduction = _reductions(names, joints, urdf, tree)
+    prismatic = ["P" in model.joints[i].shortname().removeprefix("JointModel") for i in ids]
+    side = description.effort_side
+    if side is None:
+        if np.any(reduction != 1.0):
+            raise RobotError(
+                f"{source}: effort_side: missing; the joints have reductions, so say whether effort is "
+                "measured at the motor or at the joint ('motor' or 'joint')"
+            )
+        side = "joint"
+    return Robot(
+        name=full.name,
+        urdf=urdf,
+        model=model,
+        joints=tuple(names),
+        links=tuple(_moved_link(model, i) for i in ids),
+        order=order,
+        prismatic=np.array(prismatic),
+        reduction=reduction,
+        rotor_inertia=_rotor_inertias(names, joints, urdf, tree),
+        effort_side=side,
+        effort_gain=np.array([joint.effort_gain for joint in joints]),
+        lower=np.where(unbounded, -np.inf, _given(model.lowerPositionLimit[position])),
+        upper=np.where(unbounded, np.inf, _given(model.upperPositionLimit[position])),
+        velocity_limit=_positive_or_inf(_upper_velocity(model)[order]),
+        effort_limit=_positive_or_inf(_upper_effort(model)[order]),
+        locked=locked,
+        channels=None
+        if description.recording is None
+        else build_channels(
+            description.recording,
+            source,
+            names,
+            prismatic=prismatic,
+            reduction=[float(value) for value in reduction],
+            has_gain=["effort_gain" in joint.model_fields_set for joint in joints],
+        ),
+    )
+
+
+def _upper_velocity(model: pin.Model) -> NDArray[np.float64]:
+    return np.asarray(model.upperVelocityLimit if hasattr(model, "upperVelocityLimit") else model.velocityLimit)
+
+
+def _upper_effort(model: pin.Model) -> NDArray[np.float64]:
+    return np.asarray(model.upperEffortLimit if hasattr(model, "upperEffortLimit") else model.effortLimit)
+
+
+def _given(limit: NDArray[np.float64]) -> NDArray[np.float64]:
+    # Pinocchio writes the largest double where the URDF has no limit.
+    return np.where(np.abs(limit) > 1e300, np.copysign(np.inf, limit), limit)
+
+
+def _positive_or_inf(limit: NDArray[np.float64]) -> NDArray[np.float64]:
+    limit = _given(np.array(limit, dtype=float))
+    return np.where(limit > 0.0, limit, np.inf)
+
+
+def _parse_xml(urdf: Path, source: Path) -> ElementTree.Element:
+    try:
+        root = ElementTree.parse(urdf).getroot()
+    except FileNotFoundError:
+        raise RobotError(f"{source}: urdf: no such file: {urdf}") from None
+    except OSError as error:
+        raise RobotError(f"{source}: urdf: cannot read {urdf}: {error.strerror}") from None
+    except ElementTree.ParseError as error:
+        raise RobotError(f"{urdf}: not well-formed XML: {error}") from None
+    if root.tag != "robot":
+        raise RobotError(f"{urdf}: the root element is <{root.tag}>, a URDF has <robot>")
+    return root
+
+
+@contextmanager
+def _quiet_stderr() -> Iterator[None]:
+    # The URDF parser writes its own lines to the C stream; the user gets ours instead.
+    try:
+        saved = os.dup(2)
+    except OSError:
+        yield
+        return
+    try:
+        with open(os.devnull, "wb") as sink:
+            os.dup2(sink.fileno(), 2)
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+
+
+def _pinocchio_model(urdf: Path, tree: ElementTree.Element) -> pin.Model:
+    try:
+        with _quiet_stderr():
+            return pin.buildModelFromUrdf(str(urdf))
+    except (ValueError, RuntimeError) as error:
+        reason = urdf_fault(tree) or " ".join(str(error).split()) or "Pinocchio refuses it"
+        raise RobotError(f"{urdf}: not a usable URDF: {reason}") from None
+
+
+def _movable(tree: ElementTree.Element) -> list[str]:
+    return [joint.get("name", "") for joint in tree.findall("joint") if joint.get("type") in MOVABLE]
+
+
+def _identified_joints(
+    description: RobotDescription, model: pin.Model, tree: ElementTree.Element, source: Path
+) -> list[str]:
+    movable = _movable(tree)
+    if description.joints is None:
+        names = [name for name in movable if name not in description.locked]
+        if source.suffix.lower() != ".yaml" and source == embedded_urdf():
+            names = ["joint1", "joint2"]
+    else:
+        names = list(description.joints)
+    for key, given in (("joints", names), ("locked", list(description.locked))):
+        for name in given:
+            if name not in movable:
+                raise RobotError(f"{source}: {key}.{name}: {_unknown_joint(name, movable, tree)}")
+    for name in description.locked:
+        if name in names:
+            raise RobotError(f"{source}: locked.{name}: the joint is also under joints; name it in one of them")
+    if not names:
+        raise RobotError(f"{source}: joints: none to identify; {description.urdf} has {_listed(movable)}")
+    kinds = {joint.get("name", ""): joint.get("type") for joint in tree.findall("joint")}
+    for name, kind in kinds.items():
+        if kind not in (*MOVABLE, "fixed"):
+            raise RobotError(
+                f"{description.urdf}: joint {name} is of type {kind}; revolute, continuous, prismatic "
+                "and fixed joints are supported"
+            )
+    return names
+
+
+def _unknown_joint(name: str, movable: Sequence[str], tree: ElementTree.Element) -> str:
+    everything = {joint.get("name"): joint.get("type") for joint in tree.findall("joint")}
+    if name in everything:
+        return f"a {everything[name]} joint cannot be identified; the movable joints are {_listed(movable)}"
+    lower = {other.lower(): other for other in movable}
+    near = get_close_matches(name.lower(), lower, n=1)
+    hint = f"did you mean {lower[near[0]]}?" if near else f"it has {_listed(movable)}"
+    return f"the URDF has no such joint; {hint}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) if names else "no movable joint"
+
+
+def _lock(
+    model: pin.Model, names: Sequence[str], description: RobotDescription, source: Path
+) -> tuple[pin.Model, tuple[tuple[str, float], ...]]:
+    reference = pin.neutral(model)
+    locked: list[tuple[str, float]] = []
+    ids: list[int] = []
+    for joint_id in range(1, model.njoints):
+        name = model.names[joint_id]
+        if name in names:
+            continue
+        value = float(description.locked.get(name, 0.0))
+        joint = model.joints[joint_id]
+        if joint.nq == 1:
+            reference[joint.idx_q] = value
+        else:
+            reference[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
+        locked.append((name, value))
+        ids.append(joint_id)
+    try:
+        reduced = pin.buildReducedModel(model, ids, reference) if ids else model
+    except (ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        raise RobotError(
+            f"{description.urdf}: cannot lock {', '.join(name for name, _ in locked)}: {reason}; "
+            "a joint and a link may have the same name"
+        ) from None
+    for joint_id in range(1, reduced.njoints):
+        if reduced.joints[joint_id].nv != 1:
+            raise RobotError(f"{source}: joints.{reduced.names[joint_id]}: has more than one degree of freedom")
+    return reduced, tuple(locked)
+
+
+def _moved_link(model: pin.Model, joint_id: int) -> str:
+    frame = model.getFrameId(model.names[joint_id], pin.FrameType.JOINT)
+    for body in model.frames:
+        if body.type == pin.FrameType.BODY and body.parentFrame == frame:
+            return str(body.name)
+    return str(model.names[joint_id])
+
+
+def _reductions(
+    names: Sequence[str], joints: Sequence[JointDescription], urdf: Path, tree: ElementTree.Element
+) -> NDArray[np.float64]:
+    from_urdf = _actuator_numbers(tree, urdf, ("mechanicalReduction", "mechanical_reduction"))
+    for name, value in from_urdf.items():
+        if value == 0.0:
+            raise RobotError(f"{urdf}: transmission of {name}: mechanicalReduction is 0; expected another number")
+    given = [joint.reduction for joint in joints]
+    return np.array([_first(value, from_urdf.get(name), 1.0) for name, value in zip(names, given, strict=True)])
+
+
+def _rotor_inertias(
+    names: Sequence[str], joints: Sequence[JointDescription], urdf: Path, tree: ElementTree.Element
+) -> NDArray[np.float64]:
+    from_urdf = _actuator_numbers(tree, urdf, ("rotorInertia",))
+    given = [joint.rotor_inertia for joint in joints]
+    return np.array([_first(value, from_urdf.get(name), 0.0) for name, value in zip(names, given, strict=True)])
+
+
+def _first(*values: float | None) -> float:
+    return float(next(value for value in values if value is not None))
+
+
+def _actuator_numbers(tree: ElementTree.Element, urdf: Path, tags: Sequence[str]) -> dict[str, float]:
+    """Read a number from the transmission of every joint that has one.
+
+    yourdfpy 0.0.60 parses the element but loses its text (an element without children is false), so the
+    file is read here.
+    """
+    found: dict[str, float] = {}
+    for transmission in tree.iter("transmission"):
+        texts = [element.text for tag in tags for element in transmission.iter(tag)]
+        names = [joint.get("name", "") for joint in transmission.findall("joint")]
+        if not texts:
+            continue
+        for name in names:
+            try:
+                found[name] = float(texts[0] or "")
+            except ValueError:
+                found[name] = np.nan
+            if not np.isfinite(found[name]):
+                raise RobotError(f"{urdf}: transmission of {name}: {tags[0]} is {texts[0]!r}; expected a number")
+    return found

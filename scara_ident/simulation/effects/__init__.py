@@ -1,0 +1,117 @@
+"""Effects that can be switched on: one frozen dataclass each, found by the contract's names."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from difflib import get_close_matches
+from typing import Any
+
+from scara_ident.errors import UsageError
+from scara_ident.simulation.effects.drive import Spring, TorqueRipple, Vibration
+from scara_ident.simulation.effects.effect import BY_ARM, Effect
+from scara_ident.simulation.effects.friction import (
+    AsymmetricFriction,
+    FrictionCoupling,
+    PositionDependentFriction,
+    Presliding,
+    Stribeck,
+    WarmUp,
+)
+from scara_ident.simulation.effects.sensors import (
+    EncoderEccentricity,
+    OffsetDrift,
+    TimeDelay,
+    TorqueGainMismatch,
+    TorqueSensorNonlinearity,
+)
+from scara_ident.simulation.effects.structure import BaseTilt, PayloadChange
+from scara_ident.simulation.effects.transmission import Backlash, JointElasticity, TransmissionLoss
+from scara_ident.simulation.effects.unlisted import UnlistedSignedSine, UnlistedSwingingViscous
+
+CATALOGUE: tuple[type[Effect], ...] = (
+    TransmissionLoss,
+    Stribeck,
+    AsymmetricFriction,
+    Presliding,
+    WarmUp,
+    TorqueRipple,
+    PositionDependentFriction,
+    Spring,
+    BaseTilt,
+    PayloadChange,
+    TimeDelay,
+    TorqueSensorNonlinearity,
+    TorqueGainMismatch,
+    JointElasticity,
+    Backlash,
+    EncoderEccentricity,
+    FrictionCoupling,
+    OffsetDrift,
+    Vibration,
+)
+UNLISTED: tuple[type[Effect], ...] = (UnlistedSignedSine, UnlistedSwingingViscous)
+EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in (*CATALOGUE, *UNLISTED)}
+
+__all__ = [
+    "BY_ARM",
+    "CATALOGUE",
+    "EFFECTS",
+    "Effect",
+    "UNLISTED",
+    "parse_effect",
+    *(effect.__name__ for effect in (*CATALOGUE, *UNLISTED)),
+]
+
+
+def parse_effect(text: str) -> Effect:
+    """Read an effect from the command line.
+
+    Parameters
+    ----------
+    text : str
+        ``NAME``, ``NAME:JOINT``, ``NAME:JOINT:KEY=VALUE,KEY=VALUE`` or ``NAME:KEY=VALUE``; what is left out has a
+        default that suits the arm.
+
+    Raises
+    ------
+    UsageError
+        An unknown name or key, or a value that is no number; the line lists what there is.
+
+    Examples
+    --------
+    >>> parse_effect("spring:joint2:stiffness=0.05")
+    Spring(joint='joint2', stiffness=0.05, rest_position=0.3)
+    """
+    name, *rest = (part.strip() for part in text.split(":"))
+    if name not in EFFECTS:
+        near = get_close_matches(name, EFFECTS, n=1)
+        hint = f"did you mean {near[0]}? " if near else ""
+        raise UsageError(f"effect {name!r}: no such effect; {hint}there are {', '.join(EFFECTS)}")
+    kind = EFFECTS[name]
+    joint: str | None = None
+    values: dict[str, Any] = {}
+    for part in rest:
+        if "=" not in part:
+            if joint is not None or values or not part:
+                raise UsageError(f"effect {text!r}: expected NAME:JOINT:KEY=VALUE,KEY=VALUE")
+            joint = part
+            continue
+        for pair in part.split(","):
+            key, _, value = (word.strip() for word in pair.partition("="))
+            if key in values:
+                raise UsageError(f"effect {text!r}: {key} is given twice")
+            values[key] = _number(kind, text, key, value)
+    return kind(joint=joint, **values)
+
+
+def _number(kind: type[Effect], text: str, key: str, value: str) -> float | bool:
+    if key not in kind.parameter_names():
+        raise UsageError(f"effect {text!r}: {kind.name} has no {key!r}; it has {', '.join(kind.parameter_names())}")
+    if {field.name: field.type for field in fields(kind)}[key] == "bool":
+        if value.lower() not in ("true", "false", "1", "0"):
+            raise UsageError(f"effect {text!r}: {key} is {value!r}; expected true or false")
+        return value.lower() in ("true", "1")
+    try:
+        return float(value)
+    except ValueError:
+        raise UsageError(f"effect {text!r}: {key} is {value!r}; expected a number") from None

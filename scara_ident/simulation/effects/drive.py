@@ -1,0 +1,93 @@
+"""Torques in the drive that depend on position or time alone: ripple, spring, vibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from scara_ident.simulation.effects.effect import BY_ARM, Effect, vacant
+
+if TYPE_CHECKING:
+    from scara_ident.simulation.arm import VirtualArm
+    from scara_ident.simulation.plant import PlantDraft
+
+
+@dataclass(frozen=True)
+class TorqueRipple(Effect):
+    """A torque periodic in the motor's angle: ``amplitude sin(order N q + phase)``.
+
+    It acts in the drive, so that at speed, where the controller cannot follow, it shows in the motion and not in the
+    recorded torque. With ``sensor`` only the torque measurement has it. May be given several times.
+    """
+
+    name: ClassVar[str] = "torque_ripple"
+    equation: ClassVar[str] = "u += amplitude sin(order N q + phase)"
+    units: ClassVar[dict[str, str]] = {"order": "1 / motor turn", "amplitude": "N m", "phase": "rad"}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"order": (0.0, np.inf), "amplitude": (0.0, np.inf)}
+    order: float = 2.0
+    amplitude: float = BY_ARM
+    phase: float = 0.7
+    sensor: bool = False
+
+    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+        """Give a share of the usual torque."""
+        return {"amplitude": float(0.06 * arm.torque_scale[joint])}
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Append a row."""
+        j = self.place(arm)
+        order = self.order * draft.reduction[j]
+        if self.sensor:
+            draft.pickup.append((j, order, self.amplitude, self.phase))
+        else:
+            draft.append("ripple", j, order, draft.scale[j] * self.amplitude, self.phase)
+
+
+@dataclass(frozen=True)
+class Spring(Effect):
+    """A spring across the joint, such as a cable: ``stiffness (q - rest_position)``; not seen by the gear's loss."""
+
+    name: ClassVar[str] = "spring"
+    equation: ClassVar[str] = "u += stiffness (q - rest_position)"
+    units: ClassVar[dict[str, str]] = {"stiffness": "N m/rad", "rest_position": "rad"}
+    stiffness: float = BY_ARM
+    rest_position: float = 0.3
+
+    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+        """Give a share of the usual torque over a radian, or over a tenth of a metre."""
+        way = 0.1 if arm.robot.prismatic[joint] else 1.0
+        return {"stiffness": float(0.1 * arm.torque_scale[joint]) / way}
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set stiffness and rest position."""
+        j = self.place(arm)
+        vacant(self, draft.arrays["spring"][j])
+        draft.arrays["spring"][j] = abs(draft.scale[j]) * self.stiffness
+        draft.arrays["spring_rest"][j] = self.rest_position
+
+
+@dataclass(frozen=True)
+class Vibration(Effect):
+    """A torque periodic in time, whatever the arm does: ``amplitude sin(2 pi frequency t + phase)``.
+
+    It acts in the drive. May be given several times.
+    """
+
+    name: ClassVar[str] = "vibration"
+    equation: ClassVar[str] = "u += amplitude sin(2 pi frequency t + phase)"
+    units: ClassVar[dict[str, str]] = {"frequency": "Hz", "amplitude": "N m", "phase": "rad"}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"frequency": (0.0, np.inf), "amplitude": (0.0, np.inf)}
+    frequency: float = 6.0
+    amplitude: float = BY_ARM
+    phase: float = 0.4
+
+    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+        """Give a share of the usual torque."""
+        return {"amplitude": float(0.05 * arm.torque_scale[joint])}
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Append a row."""
+        j = self.place(arm)
+        draft.append("vibration", j, self.frequency, draft.scale[j] * self.amplitude, self.phase)

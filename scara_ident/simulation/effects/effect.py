@@ -1,0 +1,115 @@
+"""What all effects share: a joint, sizes that may be left to the arm, and how they add themselves to it."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+
+from scara_ident.errors import UsageError
+
+if TYPE_CHECKING:
+    from scara_ident.simulation.arm import VirtualArm
+    from scara_ident.simulation.plant import PlantDraft
+
+# A size that is left to the arm: `Effect.resolve` puts a number that suits the arm's torques in its place.
+BY_ARM = math.nan
+
+
+@dataclass(frozen=True)
+class Effect(ABC):
+    """One physical effect that a rigid body with polynomial friction and offset lacks.
+
+    Attributes
+    ----------
+    joint : str or None
+        The joint that it belongs to; None is the first joint, or the whole arm where `whole_arm` says so.
+    """
+
+    name: ClassVar[str] = ""
+    equation: ClassVar[str] = ""
+    # Parameter -> unit, in the contract's words.
+    units: ClassVar[dict[str, str]] = {}
+    # Parameter -> smallest and largest value; both may be reached.
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {}
+    whole_arm: ClassVar[Literal["never", "may be", "always"]] = "never"
+
+    joint: str | None = None
+
+    @classmethod
+    def parameter_names(cls) -> tuple[str, ...]:
+        """Names of the parameters, in order."""
+        return tuple(field.name for field in fields(cls) if field.name != "joint")
+
+    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+        """Return values for the parameters that are left to the arm."""
+        return {}
+
+    def first_choice(self, arm: VirtualArm) -> str:
+        """Return the joint meant where none is named."""
+        return arm.robot.joints[0]
+
+    def resolve(self, arm: VirtualArm) -> Self:
+        """Return the effect with its joint and all its sizes.
+
+        Raises
+        ------
+        UsageError
+            If the joint is unknown or a parameter is out of its bounds.
+        """
+        joint = self.joint
+        if self.whole_arm == "always" and joint is not None:
+            raise UsageError(f"{self.name} belongs to the whole arm; leave out the joint {joint!r}")
+        if self.whole_arm == "never" and joint is None:
+            joint = self.first_choice(arm)
+        index = arm.joint_index(joint) if joint is not None else 0
+        sizes = self.sizes(arm, index)
+        left = {key: value for key, value in sizes.items() if _is_left(getattr(self, key))}
+        resolved = replace(self, joint=joint, **left)
+        for key in self.units:
+            value = getattr(resolved, key)
+            low, high = self.bounds.get(key, (-math.inf, math.inf))
+            if not math.isfinite(value) or not low <= value <= high:
+                raise UsageError(
+                    f"{self.name}: {key} is {value:g}; expected {_range(low, high)}{_unit(self.units[key])}"
+                )
+        return resolved
+
+    def place(self, arm: VirtualArm) -> int:
+        """Return the row of its joint in Pinocchio's order."""
+        return int(arm.robot.order[arm.joint_index(self.joint or arm.robot.joints[0])])
+
+    @abstractmethod
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Add the effect, which must be resolved, to the arm's arrays."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return name, joint and parameters, ready for JSON."""
+        return {
+            "effect": self.name,
+            "joint": self.joint,
+            "parameters": {key: getattr(self, key) for key in self.parameter_names()},
+        }
+
+
+def vacant(effect: Effect, value: float, absent: float = 0.0) -> None:
+    """Refuse an effect that the joint has already."""
+    if value != absent:
+        raise UsageError(f"{effect.name} is given twice for {effect.joint or 'the arm'}; give it once")
+
+
+def _is_left(value: object) -> bool:
+    return isinstance(value, float) and math.isnan(value)
+
+
+def _range(low: float, high: float) -> str:
+    if math.isinf(low) and math.isinf(high):
+        return "a finite number"
+    if math.isinf(high):
+        return f"{low:g} or more"
+    return f"{low:g} to {high:g}"
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"

@@ -1,0 +1,156 @@
+"""Friction beyond a polynomial of the joint's own speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from scara_ident.errors import UsageError
+from scara_ident.simulation.effects.effect import BY_ARM, Effect, vacant
+
+if TYPE_CHECKING:
+    from scara_ident.simulation.arm import VirtualArm
+    from scara_ident.simulation.plant import PlantDraft
+
+
+@dataclass(frozen=True)
+class Stribeck(Effect):
+    """More friction at low speed: ``amplitude sign(v) exp(-(v/velocity)^2)``."""
+
+    name: ClassVar[str] = "stribeck"
+    equation: ClassVar[str] = "u += amplitude sign(v) exp(-(v/velocity)^2)"
+    units: ClassVar[dict[str, str]] = {"amplitude": "N m", "velocity": "rad/s"}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"amplitude": (0.0, np.inf), "velocity": (1e-6, np.inf)}
+    amplitude: float = BY_ARM
+    velocity: float = 0.1
+
+    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+        """Give half of the Coulomb friction, or a share of the torque where there is none."""
+        return {"amplitude": float(0.5 * arm.friction[joint, 0] or 0.05 * arm.torque_scale[joint])}
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set amplitude and velocity."""
+        j = self.place(arm)
+        vacant(self, draft.arrays["stribeck_amplitude"][j])
+        draft.arrays["stribeck_amplitude"][j] = abs(draft.scale[j]) * self.amplitude
+        draft.arrays["stribeck_velocity"][j] = self.velocity
+
+
+@dataclass(frozen=True)
+class AsymmetricFriction(Effect):
+    """Viscous friction that differs by direction: ``viscous_difference / 2 |v|``.
+
+    The direction is the motor's, as for all friction; it matters where the gear reverses.
+    """
+
+    name: ClassVar[str] = "asymmetric_friction"
+    equation: ClassVar[str] = "u += viscous_difference/2 |v|"
+    units: ClassVar[dict[str, str]] = {"viscous_difference": "N m s/rad"}
+    viscous_difference: float = BY_ARM
+
+    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+        """Give two fifths of the viscous friction."""
+        return {"viscous_difference": float(0.4 * arm.friction[joint, 1] or 0.03 * arm.torque_scale[joint])}
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set the difference."""
+        j = self.place(arm)
+        vacant(self, draft.arrays["asymmetry"][j])
+        draft.arrays["asymmetry"][j] = 0.5 * draft.scale[j] * self.viscous_difference
+
+
+@dataclass(frozen=True)
+class Presliding(Effect):
+    """Dry friction that builds up over a distance, with a state z (Dahl 1968).
+
+    ``dz/dt = v/distance (1 - z sign(v))``, and all dry friction of the joint is times z where it was times sign(v).
+    The joint then never sticks; it creeps elastically.
+    """
+
+    name: ClassVar[str] = "presliding"
+    equation: ClassVar[str] = "sign(v) -> z in the dry friction, dz/dt = v/presliding_distance (1 - z sign(v))"
+    units: ClassVar[dict[str, str]] = {"presliding_distance": "rad"}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"presliding_distance": (0.0, np.inf)}
+    presliding_distance: float = 0.005
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set the distance."""
+        j = self.place(arm)
+        vacant(self, draft.arrays["presliding"][j])
+        draft.arrays["presliding"][j] = self.presliding_distance
+
+
+@dataclass(frozen=True)
+class WarmUp(Effect):
+    """Friction that is larger at the start of a run: the polynomial times ``1 + share exp(-t/time_constant)``."""
+
+    name: ClassVar[str] = "warm_up"
+    equation: ClassVar[str] = "u += share exp(-t/time_constant) (a0 sign(v) + a1 v + a2 sign(v) v^2 + a3 v^3)"
+    units: ClassVar[dict[str, str]] = {"share": "1", "time_constant": "s"}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"share": (-1.0, np.inf), "time_constant": (1e-6, np.inf)}
+    share: float = 0.3
+    time_constant: float = 8.0
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set share and time constant."""
+        j = self.place(arm)
+        vacant(self, draft.arrays["warm_share"][j])
+        draft.arrays["warm_share"][j] = self.share
+        draft.arrays["warm_time"][j] = self.time_constant
+
+
+@dataclass(frozen=True)
+class PositionDependentFriction(Effect):
+    """Coulomb friction that varies with the joint's position: a0 times ``1 + share sin(q + phase)``."""
+
+    name: ClassVar[str] = "position_dependent_friction"
+    equation: ClassVar[str] = "u += a0 share sin(q + phase) sign(v)"
+    units: ClassVar[dict[str, str]] = {"share": "1", "phase": "rad"}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"share": (-1.0, 1.0)}
+    share: float = 0.3
+    phase: float = 0.5
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set share and phase."""
+        j = self.place(arm)
+        vacant(self, draft.arrays["position_share"][j])
+        draft.arrays["position_share"][j] = self.share
+        draft.arrays["position_phase"][j] = self.phase
+
+
+@dataclass(frozen=True)
+class FrictionCoupling(Effect):
+    """Friction of a joint driven by the other joint's velocity: ``viscous v_k + coulomb sign(v_k)``.
+
+    The other joint k is the next one, for the last joint the one before it.
+    """
+
+    name: ClassVar[str] = "friction_coupling"
+    equation: ClassVar[str] = "u_j += viscous v_k + coulomb sign(v_k)"
+    units: ClassVar[dict[str, str]] = {"viscous": "N m s/rad", "coulomb": "N m"}
+    viscous: float = BY_ARM
+    coulomb: float = BY_ARM
+
+    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+        """Give small shares of the joint's own friction."""
+        scale = float(arm.torque_scale[joint])
+        return {
+            "viscous": float(0.3 * arm.friction[joint, 1] or 0.02 * scale),
+            "coulomb": float(0.15 * arm.friction[joint, 0] or 0.02 * scale),
+        }
+
+    def other(self, arm: VirtualArm) -> str:
+        """Name of the joint whose velocity drives the friction."""
+        n, j = arm.robot.n, arm.joint_index(self.joint or arm.robot.joints[0])
+        if n < 2:
+            raise UsageError(f"{self.name}: {arm.robot.name} has one joint; a coupling needs two")
+        return arm.robot.joints[j + 1 if j + 1 < n else j - 1]
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set the row of the coupling matrices."""
+        j, k = self.place(arm), int(arm.robot.order[arm.joint_index(self.other(arm))])
+        vacant(self, draft.arrays["coupling_viscous"][j, k] or draft.arrays["coupling_coulomb"][j, k])
+        draft.arrays["coupling_viscous"][j, k] = draft.scale[j] * self.viscous
+        draft.arrays["coupling_coulomb"][j, k] = draft.scale[j] * self.coulomb

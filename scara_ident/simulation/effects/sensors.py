@@ -1,0 +1,125 @@
+"""What is wrong with the measurement rather than with the arm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from scara_ident.errors import UsageError
+from scara_ident.simulation.effects.effect import BY_ARM, Effect, vacant
+
+if TYPE_CHECKING:
+    from scara_ident.simulation.arm import VirtualArm
+    from scara_ident.simulation.plant import PlantDraft
+
+
+@dataclass(frozen=True)
+class TimeDelay(Effect):
+    """Effort that is recorded later than position: ``recorded(t) = u(t - delay)``; of the whole arm or of a joint."""
+
+    name: ClassVar[str] = "time_delay"
+    equation: ClassVar[str] = "recorded(t) = u(t - delay)"
+    units: ClassVar[dict[str, str]] = {"delay": "s"}
+    whole_arm = "may be"
+    delay: float = 0.004
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set the delay of one joint or of all."""
+        rows = slice(None) if self.joint is None else slice(self.place(arm), self.place(arm) + 1)
+        vacant(self, float(np.abs(draft.delay[rows]).max()))
+        draft.delay[rows] = self.delay
+
+
+@dataclass(frozen=True)
+class TorqueSensorNonlinearity(Effect):
+    """A torque that is recorded as ``u + cubic u^3``."""
+
+    name: ClassVar[str] = "torque_sensor_nonlinearity"
+    equation: ClassVar[str] = "recorded = u + cubic u^3"
+    units: ClassVar[dict[str, str]] = {"cubic": "1/(N m)^2"}
+    cubic: float = BY_ARM
+
+    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+        """Give a tenth at the usual torque."""
+        return {"cubic": float(0.1 / arm.torque_scale[joint] ** 2)}
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set the cubic."""
+        j = self.place(arm)
+        vacant(self, draft.cubic[j])
+        draft.cubic[j] = self.cubic
+
+
+@dataclass(frozen=True)
+class TorqueGainMismatch(Effect):
+    """A torque scale that is ``ratio`` times the first joint's."""
+
+    name: ClassVar[str] = "torque_gain_mismatch"
+    equation: ClassVar[str] = "recorded = ratio u"
+    units: ClassVar[dict[str, str]] = {"ratio": "1"}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"ratio": (1e-6, np.inf)}
+    ratio: float = 1.1
+
+    def first_choice(self, arm: VirtualArm) -> str:
+        """Take the second joint: the first is what the others are compared with."""
+        return arm.robot.joints[min(1, arm.robot.n - 1)]
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set the gain."""
+        if self.joint == arm.robot.joints[0]:
+            raise UsageError(
+                f"{self.name}: the ratio is to the first joint's scale; name a joint other than {self.joint}"
+            )
+        j = self.place(arm)
+        vacant(self, draft.gain[j], 1.0)
+        draft.gain[j] = self.ratio
+
+
+@dataclass(frozen=True)
+class OffsetDrift(Effect):
+    """A torque offset that grows in time: ``rate t``."""
+
+    name: ClassVar[str] = "offset_drift"
+    equation: ClassVar[str] = "recorded = u + rate t"
+    units: ClassVar[dict[str, str]] = {"rate": "N m/s"}
+    rate: float = BY_ARM
+
+    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+        """Give a tenth of the usual torque in 10 s."""
+        return {"rate": float(0.01 * arm.torque_scale[joint])}
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set the rate."""
+        j = self.place(arm)
+        vacant(self, draft.drift[j])
+        draft.drift[j] = self.rate
+
+
+@dataclass(frozen=True)
+class EncoderEccentricity(Effect):
+    """An encoder that errs once (``order`` times) per motor turn: ``measured = q + amplitude sin(order N q + phase)``.
+
+    The controller sees the measured position too.
+    """
+
+    name: ClassVar[str] = "encoder_eccentricity"
+    equation: ClassVar[str] = "measured = q + amplitude sin(order N q + phase)"
+    units: ClassVar[dict[str, str]] = {"amplitude": "rad", "order": "1 / motor turn", "phase": "rad"}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"amplitude": (0.0, np.inf), "order": (0.0, np.inf)}
+    amplitude: float = BY_ARM
+    order: float = 1.0
+    phase: float = 0.2
+
+    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+        """Give three thousandths of a motor turn's radian."""
+        return {"amplitude": float(0.003 / abs(arm.robot.reduction[joint]))}
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set the sensor's error."""
+        j = self.place(arm)
+        vacant(self, draft.sensors["eccentricity"][j])
+        draft.sensors["eccentricity"][j] = self.amplitude
+        draft.sensors["eccentricity_order"][j] = self.order * draft.reduction[j]
+        draft.sensors["eccentricity_phase"][j] = self.phase

@@ -1,0 +1,365 @@
+"""Run the virtual arm along a motion and record it as a real one would be."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
+from scara_ident.recording.recording import Recording
+from scara_ident.simulation.arm import VirtualArm
+from scara_ident.simulation.effects import Effect
+from scara_ident.simulation.plant import PlantDraft
+from scara_ident.simulation.reference import ReferenceMotion
+
+Array = NDArray[np.float64]
+
+# Integration steps per controller period: on the SCARA03 the energy then drifts by 4e-15 in 10 s, and friction that
+# depends on speed, spring and ripple effects are resolved with a margin.
+SUBSTEPS = 4
+# Steps of this share of the fastest natural period's radian keep the Runge-Kutta step accurate and stable.
+STIFF_STEP = 0.4
+MOST_SUBSTEPS = 400
+
+
+@dataclass(frozen=True, eq=False)
+class TrueMotion:
+    """What the arm really did, at the recording's times; every array of shape (n, N), the robot's order.
+
+    Attributes
+    ----------
+    position, velocity, acceleration : ndarray
+        Of the drives, seen through the gears; without elasticity also of the links.
+    link_position, link_velocity, link_acceleration : ndarray
+        Of the links.
+    effort : ndarray
+        Torque of the drive held from this sample to the next, N m on the effort side. With the acceleration at this
+        sample it satisfies the equations of motion exactly.
+    load : ndarray
+        Torque through the gear, without the rotor's own inertia, at the joint.
+    direction : ndarray
+        What dry friction is multiplied with: sign of the velocity, 0 where the joint sticks, or the presliding state.
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    link_position: Array
+    link_velocity: Array
+    link_acceleration: Array
+    effort: Array
+    load: Array
+    direction: Array
+
+
+@dataclass(frozen=True, eq=False)
+class SimulationResult:
+    """A recording and what was behind it.
+
+    Attributes
+    ----------
+    arm : VirtualArm
+    effects : tuple of Effect
+        With all their sizes.
+    motion : ReferenceMotion
+        What the arm was asked to follow, at the recording's times.
+    recording : Recording
+    true : TrueMotion
+    seed, repetition : int
+    rate : float
+        Of controller and recording, Hz.
+    substeps : int
+        Integration steps per sample.
+    stops : int
+        How often a joint came to a stop between the steps.
+    """
+
+    arm: VirtualArm
+    effects: tuple[Effect, ...]
+    motion: ReferenceMotion
+    recording: Recording
+    true: TrueMotion
+    seed: int
+    repetition: int
+    rate: float
+    substeps: int
+    stops: int
+
+
+def simulate(
+    arm: VirtualArm,
+    motion: ReferenceMotion,
+    *,
+    effects: Sequence[Effect] = (),
+    seed: int = 0,
+    repetition: int = 1,
+    rate: float = 1000.0,
+    substeps: int | None = None,
+    record_velocity: bool = False,
+) -> SimulationResult:
+    """Let the virtual arm follow a motion in closed loop.
+
+    The arm starts on the reference, at its speed, with the integral at the torque that this takes. Every sample the
+    encoder is read, the PID computes a torque and the drive holds it until the next sample. The recorded effort is
+    the mean over one period centred on the sample, so that it does not lag position, plus white noise.
+
+    Parameters
+    ----------
+    arm : VirtualArm
+    motion : ReferenceMotion
+        Interpolated where its samples are not those of the controller.
+    effects : sequence of Effect
+        Sizes that were left open are taken from the arm.
+    seed : int
+        Of noise and encoder zero; the same seed and repetition give the same recording.
+    repetition : int
+        Number of the run; every one has its own noise.
+    rate : float
+        Samples per second of controller and recording.
+    substeps : int, optional
+        Integration steps per sample; by default 4, more where an elastic joint needs them.
+    record_velocity : bool
+        Whether the recording has the velocity that the controller saw.
+
+    Returns
+    -------
+    SimulationResult
+
+    Raises
+    ------
+    UsageError
+        If the motion is not of this arm's joints, or an effect does not fit.
+    ScaraIdentError
+        If the controller loses the arm.
+    """
+    resolved, draft = _prepare(arm, effects)
+    wanted = _at_rate(arm, motion, rate)
+    back = np.argsort(arm.robot.order)
+    # The name takes part, so that no two trajectories share their noise.
+    random = np.random.default_rng([seed, repetition, zlib.crc32(motion.name.encode())])
+    draft.sensors["shift"] = random.uniform(size=arm.robot.n)[back]
+    start = _torque_at_start(arm, wanted)
+    feed = np.zeros((len(wanted.time), arm.robot.n))
+    if arm.controller.feed_forward:
+        feed = _nominal_torque(arm, wanted)[back].T
+        start = np.zeros(arm.robot.n)
+    position, velocity = wanted.position[back], wanted.velocity[back]
+    steps = _substeps(arm, draft, rate) if substeps is None else substeps
+    measured, seen, true, stops = _run(
+        arm, draft, rate, steps, np.stack([position.T, velocity.T]), feed, start[back],
+        position[:, 0], velocity[:, 0], f"{motion.name} on {arm.robot.name}",
+    )  # fmt: skip
+    noise = random.normal(size=(arm.robot.n, len(wanted.time)))
+    effort = _recorded_effort(arm, draft, true, 1.0 / rate) + arm.torque_noise[:, None] * noise
+    recording = Recording(
+        name=f"{motion.name}_{repetition}",
+        trajectory=motion.name,
+        repetition=repetition,
+        joints=arm.robot.joints,
+        time=wanted.time,
+        position=measured,
+        effort=effort,
+        velocity=seen if record_velocity else None,
+    )
+    return SimulationResult(arm, resolved, wanted, recording, true, seed, repetition, rate, steps, stops)
+
+
+def free_motion(
+    arm: VirtualArm,
+    position: Array,
+    velocity: Array,
+    duration: float,
+    *,
+    torque: Array | None = None,
+    effects: Sequence[Effect] = (),
+    rate: float = 1000.0,
+    substeps: int | None = None,
+) -> tuple[Array, TrueMotion]:
+    """Let the arm move without a controller.
+
+    Parameters
+    ----------
+    arm : VirtualArm
+    position, velocity : ndarray, shape (n,)
+        At the start, of drives and links.
+    duration : float
+        s.
+    torque : ndarray, shape (n,) or (n, N), optional
+        Of the drives, N m on the effort side; without it none.
+    effects, rate, substeps
+        See `simulate`.
+
+    Returns
+    -------
+    time : ndarray, shape (N,)
+    motion : TrueMotion
+    """
+    _, draft = _prepare(arm, effects)
+    n, samples = arm.robot.n, round(duration * rate) + 1
+    given = np.zeros((n, 1)) if torque is None else np.asarray(torque, dtype=float).reshape(n, -1)
+    back = np.argsort(arm.robot.order)
+    feed = np.broadcast_to(arm.scale[:, None] * given, (n, samples))[back].T
+    steps = _substeps(arm, draft, rate) if substeps is None else substeps
+    _, _, true, _ = _run(
+        arm, draft, rate, steps, np.zeros((2, 1, n)), feed, np.zeros(n),
+        np.asarray(position, dtype=float)[back], np.asarray(velocity, dtype=float)[back],
+        f"{arm.robot.name} without a controller", controlled=False,
+    )  # fmt: skip
+    return np.arange(samples) / rate, true
+
+
+def _prepare(arm: VirtualArm, effects: Sequence[Effect]) -> tuple[tuple[Effect, ...], PlantDraft]:
+    resolved = tuple(effect.resolve(arm) for effect in effects)
+    draft = arm.draft()
+    for effect in resolved:
+        effect.apply(arm, draft)
+    return resolved, draft
+
+
+def _at_rate(arm: VirtualArm, motion: ReferenceMotion, rate: float) -> ReferenceMotion:
+    if motion.joints != arm.robot.joints:
+        raise UsageError(f"{motion.name}: moves {', '.join(motion.joints)}, the arm has {', '.join(arm.robot.joints)}")
+    if not rate > 0.0:
+        raise UsageError(f"rate is {rate:g} Hz; expected a positive number")
+    samples = int(np.floor(motion.duration * rate * (1.0 + 1e-12) + 1e-9)) + 1
+    if samples < 2:
+        raise RecordingError(f"{motion.name}: lasts {motion.duration:g} s, less than a sample at {rate:g} Hz")
+    moved = motion.at(motion.time[0] + np.arange(samples) / rate)
+    return ReferenceMotion(
+        motion.name, motion.joints, np.arange(samples) / rate, moved.position, moved.velocity, moved.acceleration
+    )
+
+
+def _run(
+    arm: VirtualArm,
+    draft: PlantDraft,
+    rate: float,
+    substeps: int,
+    reference: Array,
+    feed: Array,
+    start: Array,
+    position: Array,
+    velocity: Array,
+    what: str,
+    controlled: bool = True,
+) -> tuple[Array, Array, TrueMotion, int]:
+    from scara_ident.simulation.loop import track
+
+    plant = draft.plant()
+    link = position - _stretch(draft, start)
+    trace, stops = track(
+        plant, draft.sensing(), arm.controller.gains(rate, arm.robot.order), period=1.0 / rate, substeps=substeps,
+        reference=reference, feed=feed, start=start, initial=(link, velocity, position, velocity),
+        controlled=controlled,
+    )  # fmt: skip
+    if stops < 0:
+        raise ScaraIdentError(
+            f"{what}: the arm got out of control at {(-1 - stops) / rate:.3f} s; lower the gains or use more substeps"
+        )
+    order = arm.robot.order
+
+    def rows(values: Array) -> Array:
+        return np.ascontiguousarray(values.T[order])
+
+    true = TrueMotion(
+        position=rows(trace.theta),
+        velocity=rows(trace.omega),
+        acceleration=rows(trace.alpha),
+        link_position=rows(trace.q),
+        link_velocity=rows(trace.v),
+        link_acceleration=rows(trace.a),
+        effort=rows(trace.drive) / arm.scale[:, None],
+        load=rows(trace.load),
+        direction=rows(trace.direction),
+    )
+    return rows(trace.measured), rows(trace.velocity), true, stops
+
+
+def _stretch(draft: PlantDraft, torque: Array) -> Array:
+    """Wind-up of elastic joints under the torque at the start, shape (n,)."""
+    elastic = draft.arrays["elastic"] > 0.0
+    wound = np.divide(torque, draft.arrays["stiffness"], out=np.zeros(draft.n), where=elastic)
+    return np.asarray(np.where(elastic, wound + 0.5 * draft.arrays["width"] * np.sign(torque), 0.0))
+
+
+def _torque_at_start(arm: VirtualArm, motion: ReferenceMotion) -> Array:
+    """Torque of the arm without effects at the first sample, at the joint; at rest it is gravity's alone."""
+    v = motion.velocity[:, 0]
+    a = np.where(v != 0.0, motion.acceleration[:, 0], 0.0)
+    return _inverse_dynamics(arm, arm.bodies, motion.position[:, :1], v[:, None], a[:, None])[:, 0]
+
+
+def _nominal_torque(arm: VirtualArm, motion: ReferenceMotion) -> Array:
+    nominal = arm.robot.standard_parameters()[: 10 * arm.robot.n].reshape(-1, 10)
+    return _inverse_dynamics(arm, nominal, motion.position, motion.velocity, motion.acceleration)
+
+
+def _inverse_dynamics(arm: VirtualArm, bodies: Array, q: Array, v: Array, a: Array) -> Array:
+    """Torque at the joints of bodies, rotors, friction and offset, shape (n, N)."""
+    from scara_ident.simulation.spatial import configuration, with_bodies
+
+    robot = arm.robot
+    back = np.argsort(robot.order)
+    model = with_bodies(robot.model, bodies[back])
+    data = model.createData()
+    torque = np.empty_like(q)
+    for k in range(q.shape[1]):
+        full = configuration(model, q[back, k])
+        torque[:, k] = pin.rnea(model, data, full, v[back, k], a[back, k])[robot.order]
+    size = np.abs(arm.scale)[:, None]
+    a0, a1, a2, a3 = (arm.friction[:, i, None] for i in range(4))
+    sign = np.sign(v)
+    torque += arm.armature[:, None] * a + size * (a0 * sign + a1 * v + a2 * sign * v * v + a3 * v**3)
+    return np.asarray(torque + (arm.scale * arm.torque_offset)[:, None])
+
+
+def _substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
+    """Choose as many steps per sample as the stiffest elastic joint or presliding friction needs."""
+    arrays = draft.arrays
+    link = arm.link_inertia()[np.argsort(arm.robot.order)]
+    rotor = arrays["armature"]
+    stiffness = np.where(arrays["elastic"] > 0.0, arrays["stiffness"], 0.0)
+    # Inertial coupling makes a link lighter than its diagonal entry; 4 covers the arms at hand.
+    square = np.divide(stiffness, rotor, out=np.zeros(draft.n), where=stiffness > 0.0) + 4.0 * stiffness / link
+    dry = arrays["friction"][:, 0] + arrays["stribeck_amplitude"]
+    sliding = arrays["presliding"]
+    square += np.divide(4.0 * dry, sliding * (link + rotor), out=np.zeros(draft.n), where=sliding > 0.0)
+    needed = int(np.ceil(float(np.sqrt(square.max())) / (rate * STIFF_STEP)))
+    if needed > MOST_SUBSTEPS:
+        joint = arm.robot.joints[int(np.flatnonzero(arm.robot.order == int(np.argmax(square)))[0])]
+        raise UsageError(
+            f"{joint}: so stiff that {needed} steps per sample would be needed (at most {MOST_SUBSTEPS}); "
+            "lower its stiffness or raise its presliding distance"
+        )
+    return max(SUBSTEPS, needed)
+
+
+def _recorded_effort(arm: VirtualArm, draft: PlantDraft, true: TrueMotion, period: float) -> Array:
+    """Torque as its sensor gives it, without noise: the mean over a period centred on each sample, shape (n, N)."""
+    order = arm.robot.order
+    n, samples = true.effort.shape
+    ticks = np.arange(samples + 1.0)
+    recorded = np.empty((n, samples))
+    for i in range(n):
+        u = true.effort[i]
+        row = order[i]
+        # The torque is constant between ticks, so its integral is linear there and the mean is exact.
+        integral = np.concatenate([[0.0], np.cumsum(u)])
+        middle = ticks[:-1] - draft.delay[row] / period
+        ends = []
+        for edge in (middle - 0.5, middle + 0.5):
+            inside = np.interp(edge, ticks, integral)
+            inside += np.minimum(edge, 0.0) * u[0] + np.maximum(edge - samples, 0.0) * u[-1]
+            ends.append(inside)
+        u = ends[1] - ends[0]
+        for joint, per_turn, amplitude, phase in draft.pickup:
+            if joint == row:
+                u = u + amplitude * np.sin(per_turn * true.position[i] + phase)
+        u = u + draft.cubic[row] * u**3
+        recorded[i] = draft.gain[row] * u + draft.drift[row] * ticks[:-1] * period
+    return recorded

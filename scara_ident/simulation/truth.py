@@ -1,0 +1,118 @@
+"""What a simulated arm really was, as JSON beside its recording."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scara_ident.errors import RecordingError
+from scara_ident.model.model import build_model
+from scara_ident.recording.recording import write_recording
+from scara_ident.simulation.arm import VirtualArm
+from scara_ident.simulation.effects import Effect
+from scara_ident.simulation.simulate import SimulationResult
+
+
+def truth(arm: VirtualArm, effects: Sequence[Effect] = ()) -> dict[str, Any]:
+    """Describe an arm and its effects.
+
+    Parameters
+    ----------
+    arm : VirtualArm
+    effects : sequence of Effect
+        Sizes that were left open are taken from the arm.
+
+    Returns
+    -------
+    dict
+        ``parameters`` has the form and names of ``identification.json`` for the complete model, ``effects`` those of
+        ``diagnosis.json``; ``standard_parameters`` are the bodies', ``encoder_resolution`` is at the joint.
+    """
+    robot = arm.robot
+    model = build_model(robot, "complete")
+    values = _complete_parameters(arm)
+    return {
+        "robot": robot.name,
+        "effort_side": robot.effort_side,
+        "joints": list(robot.joints),
+        "reduction": robot.reduction.tolist(),
+        "parameters": [
+            {
+                "name": column.name,
+                "joint": column.joint,
+                "value": values[place],
+                "unit": column.unit,
+                "meaning": column.meaning,
+            }
+            for place, column in enumerate(model.columns)
+        ],
+        "standard_parameters": {
+            name: row.tolist() for name, row in zip(robot.links, np.asarray(arm.bodies), strict=True)
+        },
+        "rotor_inertia": arm.rotor_inertia.tolist(),
+        "friction": {name: row.tolist() for name, row in zip(robot.joints, arm.friction, strict=True)},
+        "torque_offset": arm.torque_offset.tolist(),
+        "torque_noise": arm.torque_noise.tolist(),
+        "encoder_resolution": arm.encoder_resolution.tolist(),
+        "controller": {
+            "proportional": arm.controller.proportional.tolist(),
+            "integral": arm.controller.integral.tolist(),
+            "derivative": arm.controller.derivative.tolist(),
+            "velocity_cutoff": arm.controller.cutoff,
+            "velocity_damping": arm.controller.damping,
+            "feed_forward": arm.controller.feed_forward,
+        },
+        "tool": arm.tool.tolist(),
+        "effects": [effect.resolve(arm).as_dict() for effect in effects],
+    }
+
+
+def write_simulation(result: SimulationResult, folder: Path | str) -> Path:
+    """Write a simulated recording and what was behind it.
+
+    Parameters
+    ----------
+    result : SimulationResult
+    folder : path
+        Made if it is not there. ``<trajectory>_<repetition>.parquet`` is the recording, with efforts divided by the
+        robot's gains; ``<trajectory>_<repetition>.truth.json`` is beside it.
+
+    Returns
+    -------
+    Path
+        Of the recording.
+
+    Raises
+    ------
+    RecordingError
+        If the folder cannot be written to.
+    """
+    folder = Path(folder)
+    path = folder / f"{result.recording.name}.parquet"
+    content = truth(result.arm, result.effects) | {
+        "recording": path.name,
+        "seed": result.seed,
+        "repetition": result.repetition,
+        "rate": result.rate,
+        "substeps": result.substeps,
+    }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_recording(result.recording, path, effort_gain=result.arm.robot.effort_gain)
+        path.with_suffix(".truth.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"{folder}: cannot be written to: {error.strerror}; name another folder") from None
+    return path
+
+
+def _complete_parameters(arm: VirtualArm) -> list[float]:
+    """Values of the complete model's columns: base parameters, friction joint by joint, offsets."""
+    model = build_model(arm.robot, "complete")
+    body = model.rigid_body
+    standard = np.concatenate([arm.bodies.ravel(), arm.armature])
+    base = body.base.grouping[body.kept] @ standard
+    return [*base.tolist(), *arm.friction.ravel().tolist(), *arm.torque_offset.tolist()]

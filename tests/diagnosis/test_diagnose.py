@@ -1,0 +1,175 @@
+"""The whole diagnosis on short recordings of the virtual SCARA03."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from scara_ident.diagnosis import diagnose
+from scara_ident.diagnosis.model_selection import joint_rms
+from scara_ident.effects import CATALOGUE, Member, Parameter
+from scara_ident.effects.friction import AsymmetricFriction, Stribeck
+from scara_ident.effects.measurement import TimeDelay, shifted
+from scara_ident.effects.periodic import TorqueRipple
+from scara_ident.effects.position import Spring
+from scara_ident.errors import UsageError
+from scara_ident.model.terms import Column
+from scara_ident.robot.robot import load_robot
+from tests.diagnosis.made import BANDS, RATE, complete, exact_runs, held_out_run, virtual_runs, with_torque
+
+ROBOT = load_robot()
+DELAYS = (TimeDelay(), Spring(), Stribeck(), AsymmetricFriction())
+
+
+@dataclass(frozen=True)
+class Lobes:
+    """A user's own effect: two lobes per turn of the joint."""
+
+    name = "lobes"
+    nonlinear = ()
+
+    def members(self, scene):
+        return tuple(Member(j) for j in range(scene.robot.n))
+
+    def columns(self, scene, member):
+        return (Column("size", scene.robot.joints[member.joint], "N m", "lobes", True),)
+
+    def regressor(self, signals, member):
+        return signals.row(member.joint, [np.sin(2.0 * signals.motion.q[member.joint])])
+
+    def inadmissible(self, scene, member, value, std):
+        return None
+
+    def parameters(self, scene, member, value, covariance):
+        return {"size": Parameter(float(value[0]), float(np.sqrt(covariance[0, 0])), "N m")}
+
+    def description(self, scene, member):
+        return "two lobes per turn"
+
+
+def test_a_clean_set_is_complete():
+    result = diagnose(ROBOT, "complete", virtual_runs())
+    assert (result.verdict, result.effects, result.unexplained) == ("complete", (), None)
+    assert result.after.value == pytest.approx(result.before.value)
+    assert [fit.joint for fit in result.fit_after] == ["joint1", "joint2"]
+
+
+def test_a_clean_formula_is_complete():
+    result = diagnose(ROBOT, "complete", exact_runs())
+    assert (result.verdict, result.effects, result.unexplained) == ("complete", (), None)
+
+
+def test_reversals_of_a_clean_arm_are_not_taken_for_ripple():
+    runs = virtual_runs(seconds=(6.0, 7.0))
+    assert diagnose(ROBOT, "complete", runs, bands=BANDS, catalogue=(TorqueRipple(),)).verdict == "complete"
+
+
+@pytest.fixture(scope="module")
+def spring():
+    return diagnose(ROBOT, "complete", virtual_runs("spring:joint1"), [held_out_run("spring:joint1")], bands=BANDS)
+
+
+def test_a_spring_is_found_with_its_stiffness_and_lowers_the_error_held_out(spring):
+    (effect,) = spring.effects
+    assert (spring.verdict, effect.effect, effect.joint) == ("explained", "spring", "joint1")
+    told = effect.parameters["stiffness"]
+    assert told.value == pytest.approx(0.0512, rel=0.05)
+    assert effect.p_value < 1e-6
+    assert effect.votes == (2, 2)
+    assert effect.before["joint1"] > 2.0 * effect.after["joint1"]
+    old = joint_rms(spring.before.value, spring.validation_before)
+    new = joint_rms(spring.after.value, spring.validation_after)
+    assert new[0] < 0.6 * old[0]
+    assert new[1] == pytest.approx(old[1], rel=0.2)
+
+
+def test_lack_of_fit_is_there_before_and_gone_after(spring):
+    assert spring.fit_before[0].missing > 3.0 * spring.fit_before[0].noise
+    assert spring.fit_after[0].missing < spring.fit_after[0].noise
+
+
+def test_recordings_held_out_take_no_part(spring):
+    other = held_out_run("spring:joint1")
+    wild = replace(other, name="W_1", trajectory="W", effort=3.0 * other.effort + 1.0)
+    result = diagnose(ROBOT, "complete", virtual_runs("spring:joint1"), [wild], bands=BANDS)
+    assert_array_equal(result.after.value, spring.after.value)
+    assert [effect.parameters for effect in result.effects] == [effect.parameters for effect in spring.effects]
+    assert (result.verdict, result.search.bands) == (spring.verdict, spring.search.bands)
+    assert joint_rms(result.after.value, result.validation_after) != joint_rms(
+        spring.after.value, spring.validation_after
+    )
+
+
+def test_the_band_is_not_chosen_on_recordings_held_out():
+    train = virtual_runs()
+    wild = replace(train[0], name="W_1", trajectory="W", effort=train[0].effort[:, ::-1].copy())
+    alone = diagnose(ROBOT, "complete", train, catalogue=())
+    beside = diagnose(ROBOT, "complete", train, [wild], catalogue=())
+    assert alone.search.bands == beside.search.bands
+
+
+def test_a_recording_cannot_be_fitted_and_held_out():
+    with pytest.raises(UsageError, match="held out"):
+        diagnose(ROBOT, "complete", exact_runs(), exact_runs()[:1], bands=BANDS)
+
+
+def test_a_users_own_effect_is_found_beside_the_catalogue():
+    runs = with_torque(exact_runs(), 1, lambda motion: 0.03 * np.sin(2.0 * motion.q[1]))
+    result = diagnose(ROBOT, "complete", runs, bands=BANDS, catalogue=(*CATALOGUE, Lobes()))
+    (effect,) = result.effects
+    assert (effect.effect, effect.joint, effect.description) == ("lobes", "joint2", "two lobes per turn")
+    size = effect.parameters["size"]
+    assert abs(size.value - 0.03) < 4.0 * size.std
+    assert result.verdict == "explained"
+
+
+def test_what_no_effect_of_the_catalogue_explains_is_said_with_joint_signals_and_size():
+    runs = with_torque(exact_runs(), 1, lambda motion: 0.03 * np.sin(5.0 * motion.q[1]))
+    result = diagnose(ROBOT, "complete", runs, bands=BANDS, catalogue=())
+    assert (result.verdict, result.effects) == ("unexplained", ())
+    assert result.unexplained.joint == "joint2"
+    assert result.unexplained.signals == ("position of joint2",)
+    assert result.unexplained.rms == pytest.approx(0.03 / np.sqrt(2.0), rel=0.2)
+
+
+def test_a_remainder_is_seen_by_repetition_where_no_signal_shows_it():
+    rng = np.random.default_rng(0)
+    shape = np.cumsum(rng.standard_normal((2, 4000)), axis=1)
+    hidden = {name: 0.03 * np.sin(0.1 * shape[k]) for k, name in enumerate("AB")}
+    runs = [
+        replace(run, effort=run.effort + np.array([[1.0], [0.0]]) * hidden[run.trajectory][: run.effort.shape[1]])
+        for run in exact_runs()
+    ]
+    result = diagnose(ROBOT, "complete", runs, bands=BANDS, catalogue=())
+    assert result.verdict == "unexplained"
+    assert result.unexplained.joint == "joint1"
+
+
+def test_less_than_a_sample_of_delay_is_a_note_and_not_an_effect():
+    late = [shifted(run, -0.4 / RATE) for run in exact_runs()]
+    result = diagnose(ROBOT, "complete", late, bands=BANDS, catalogue=DELAYS)
+    assert result.effects == ()
+    assert result.verdict == "complete"
+    assert any("less than one sample" in note for note in result.notes)
+    assert result.search.delay[0] == pytest.approx(0.4 / RATE, abs=2e-4)
+
+
+def test_a_longer_delay_is_an_effect_and_is_corrected_in_what_is_held_out():
+    late = "time_delay:delay=0.005"
+    result = diagnose(ROBOT, "complete", virtual_runs(late), [held_out_run(late)], bands=BANDS, catalogue=DELAYS)
+    (effect,) = result.effects
+    assert (effect.effect, effect.joint) == ("time_delay", None)
+    assert effect.parameters["delay"].value == pytest.approx(0.005, abs=1e-3)
+    old = joint_rms(result.before.value, result.validation_before)
+    assert joint_rms(result.after.value, result.validation_after)[0] < 0.8 * old[0]
+
+
+def test_a_model_can_be_given_and_progress_is_told():
+    steps: list[str] = []
+    result = diagnose(ROBOT, complete(), exact_runs(), bands=BANDS, catalogue=(), progress=steps.append)
+    assert result.before.model.name == "complete"
+    assert steps[-1] == "testing what is left"
+    assert all(steps)

@@ -1,0 +1,100 @@
+"""Channels that are not what the mapping says: opposite signs, exchanged joints, and none of it where all is well."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis import diagnose
+from scara_ident.errors import RecordingError
+from scara_ident.identification.channel_check import mapping_faults
+from scara_ident.identification.identify import identify
+from scara_ident.model.model import build_model
+from scara_ident.paper import OJD, OJK
+from scara_ident.recording.recording import Recording
+from scara_ident.simulation import sampled, simulate, virtual_arm
+
+BANDS = (10.0, 10.0)
+
+
+@pytest.fixture(scope="module")
+def recordings() -> tuple[Recording, ...]:
+    arm = virtual_arm()
+    return tuple(
+        simulate(arm, sampled(name, arm.robot, law.motion, 12.0), seed=4, rate=500.0).recording
+        for name, law in (("OJD", OJD), ("OJK", OJK))
+    )
+
+
+def turned(recording: Recording, *, effort: tuple[int, ...] = (), position: tuple[int, ...] = ()) -> Recording:
+    assert recording.effort is not None
+    force, angle = recording.effort.copy(), recording.position.copy()
+    force[list(effort)] *= -1.0
+    angle[list(position)] *= -1.0
+    return replace(recording, effort=force, position=angle, velocity=None, acceleration=None)
+
+
+def exchanged(recording: Recording, *signals: str) -> Recording:
+    new = {signal: getattr(recording, signal)[::-1].copy() for signal in signals}
+    return replace(recording, **new)
+
+
+def found(recordings: list[Recording]) -> list[tuple[str, tuple[str, ...], bool]]:
+    faults = mapping_faults(build_model(virtual_arm().robot, "complete"), recordings, BANDS)
+    return [(fault.signal, fault.joints, fault.exchanged) for fault in faults]
+
+
+def test_nothing_is_said_of_channels_that_are_right(recordings: tuple[Recording, ...]) -> None:
+    assert found(list(recordings)) == []
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_an_effort_of_opposite_sign(recordings: tuple[Recording, ...], joint: int) -> None:
+    wrong = [turned(item, effort=(joint,)) for item in recordings]
+    assert found(wrong) == [("effort", (f"joint{joint + 1}",), False)]
+
+
+def test_a_position_of_opposite_sign(recordings: tuple[Recording, ...]) -> None:
+    assert found([turned(item, position=(1,)) for item in recordings]) == [("position", ("joint2",), False)]
+
+
+def test_an_axis_of_opposite_sign(recordings: tuple[Recording, ...]) -> None:
+    # To turn joint 1 round or joint 2 is the same for an arm that may be seen in a mirror.
+    faults = found([turned(item, effort=(1,), position=(1,)) for item in recordings])
+    assert [(signal, swap) for signal, _, swap in faults] == [("effort and position", False)]
+
+
+def test_all_efforts_of_opposite_sign(recordings: tuple[Recording, ...]) -> None:
+    assert found([turned(item, effort=(0, 1)) for item in recordings]) == [("effort", ("joint1", "joint2"), False)]
+
+
+@pytest.mark.parametrize("signals", [("effort",), ("position",), ("effort", "position")])
+def test_exchanged_joints(recordings: tuple[Recording, ...], signals: tuple[str, ...]) -> None:
+    faults = found([exchanged(item, *signals) for item in recordings])
+    assert faults == [(" and ".join(signals), ("joint1", "joint2"), True)]
+
+
+def test_two_faults_at_once(recordings: tuple[Recording, ...]) -> None:
+    faults = found([turned(exchanged(item, "effort"), effort=(0,)) for item in recordings])
+    assert len(faults) == 2
+    assert ("effort", ("joint1", "joint2"), True) in faults
+
+
+def test_diagnose_refuses_and_identify_says_it(recordings: tuple[Recording, ...]) -> None:
+    wrong = [turned(item, effort=(1,)) for item in recordings]
+    robot = virtual_arm().robot
+    with pytest.raises(RecordingError, match=r"negate effort_gain of joint2 in robot\.yaml") as caught:
+        diagnose(robot, "complete", wrong)
+    assert "\n" not in str(caught.value)
+    notes = identify(robot, wrong).notes
+    assert any("opposite sign" in note for note in notes)
+
+
+def test_the_share_left_is_what_it_says(recordings: tuple[Recording, ...]) -> None:
+    model = build_model(virtual_arm().robot, "complete")
+    (fault,) = mapping_faults(model, [exchanged(item, "effort") for item in recordings], BANDS)
+    assert fault.mended < 0.05 < 0.3 < fault.error
+    assert f"{100 * fault.mended:.2g} %" in str(fault)
+    assert np.isfinite(fault.error)

@@ -1,0 +1,458 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import hypothesis.strategies as st
+import numpy as np
+import polars as pl
+import pytest
+from hypothesis import given, settings
+from hypothesis.extra.numpy import arrays
+
+from scara_ident.errors import RecordingError, UsageError
+from scara_ident.recording.recording import (
+    Recording,
+    read_recording,
+    read_recordings,
+    recording_paths,
+    split_name,
+    write_recording,
+)
+from scara_ident.robot.robot import Robot, load_robot
+from tests.made_recordings import columns, save
+from tests.shared import shared_path
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot()
+
+
+def refusal(path: Path, robot: Robot) -> str:
+    with pytest.raises(RecordingError) as caught:
+        read_recording(path, robot)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert path.name in message
+    return message
+
+
+# names
+
+
+@pytest.mark.parametrize(
+    ("stem", "trajectory", "repetition"),
+    [
+        ("OJD_1", "OJD", 1),
+        ("OJD_12", "OJD", 12),
+        ("OJD", "OJD", 1),
+        ("ident_50s_12harm", "ident_50s_12harm", 1),
+        ("A0_0815_03", "A0_0815", 3),
+        ("OJD_", "OJD_", 1),
+        ("_7", "_7", 1),
+        ("7", "7", 1),
+        ("OJD_1b", "OJD_1b", 1),
+        ("OJD_-1", "OJD_-1", 1),
+    ],
+)
+def test_a_stem_is_a_trajectory_and_a_repetition(stem, trajectory, repetition):
+    assert split_name(stem) == (trajectory, repetition)
+
+
+@settings(deadline=None, max_examples=50)
+@given(trajectory=st.text(min_size=1), repetition=st.integers(0, 10**9))
+def test_split_name_undoes_the_contract(trajectory, repetition):
+    assert split_name(f"{trajectory}_{repetition}") == (trajectory, repetition)
+
+
+# reading
+
+
+def test_rows_stand_in_the_robots_order_whatever_the_files(robot, tmp_path):
+    made = columns()
+    backwards = {name: made[name] for name in reversed(made)} | {
+        "note": np.zeros(4000),
+        "joint3.position": np.ones(4000),
+    }
+    recording = read_recording(save(tmp_path / "OJD_2.parquet", backwards), robot)
+    assert (recording.name, recording.trajectory, recording.repetition) == ("OJD_2", "OJD", 2)
+    assert recording.joints == ("joint1", "joint2")
+    assert recording.path == tmp_path / "OJD_2.parquet"
+    assert recording.rate == pytest.approx(1000)
+    np.testing.assert_array_equal(recording.position, [made["joint1.position"], made["joint2.position"]])
+    swapped = replace(
+        robot,
+        joints=("joint2", "joint1"),
+        lower=robot.lower[::-1],
+        upper=robot.upper[::-1],
+    )
+    recording = read_recording(tmp_path / "OJD_2.parquet", swapped)
+    np.testing.assert_array_equal(recording.effort, [made["joint2.effort"], made["joint1.effort"]])
+
+
+def test_gains_make_torque_of_recorded_effort(robot, tmp_path):
+    made = columns()
+    gained = replace(robot, effort_gain=np.array([14.87, -0.5]))
+    recording = read_recording(save(tmp_path / "a.parquet", made), gained)
+    np.testing.assert_allclose(recording.effort, [14.87 * made["joint1.effort"], -0.5 * made["joint2.effort"]])
+    np.testing.assert_allclose(
+        read_recording(tmp_path / "a.parquet", gained, need_effort=False).effort, recording.effort
+    )
+
+
+def test_optional_columns_are_read_where_every_joint_has_them(robot, tmp_path):
+    made = columns()
+    for signal in ("velocity", "temperature"):
+        made |= {f"{joint}.{signal}": np.arange(4000.0) + k for k, joint in enumerate(("joint1", "joint2"))}
+    made["joint2.acceleration"] = np.ones(4000)
+    recording = read_recording(save(tmp_path / "a.parquet", made), robot)
+    np.testing.assert_array_equal(recording.velocity[1], np.arange(4000.0) + 1)
+    assert recording.temperature.shape == (2, 4000)
+    assert recording.acceleration is None
+    assert [finding.kind for finding in recording.findings] == ["missing_column"]
+    assert "joint1.acceleration" in recording.findings[0].message
+
+
+def test_single_precision_and_whole_numbers_become_double(robot, tmp_path):
+    made = {name: values.astype(np.float32) for name, values in columns().items()}
+    made["joint1.temperature"] = made["joint2.temperature"] = np.full(4000, 31, dtype=np.int16)
+    recording = read_recording(save(tmp_path / "a.parquet", made), robot)
+    for values in (recording.time, recording.position, recording.effort, recording.temperature):
+        assert values.dtype == np.float64
+        assert values.flags.c_contiguous
+        assert values.flags.writeable
+
+
+def test_a_missing_joint_is_refused_with_those_there_are_and_a_near_name(robot, tmp_path):
+    made = {name.replace("joint2", "Joint_2"): values for name, values in columns().items()}
+    message = refusal(save(tmp_path / "a.parquet", made), robot)
+    assert "no column 'joint2.position' (and 1 more)" in message
+    assert "is it 'Joint_2.position'?" in message
+    assert "joint1.position, Joint_2.position" in message
+
+
+def test_missing_time_and_effort_are_refused(robot, tmp_path):
+    made = columns()
+    made["Time"] = made.pop("time")
+    message = refusal(save(tmp_path / "a.parquet", made), robot)
+    assert "no column 'time'" in message
+    assert "is it 'Time'?" in message
+    made = columns()
+    del made["joint1.effort"], made["joint2.effort"]
+    assert "its effort columns: none" in refusal(save(tmp_path / "a.parquet", made), robot)
+    assert read_recording(tmp_path / "a.parquet", robot, need_effort=False).effort is None
+
+
+def test_an_effort_of_one_joint_only_is_left_out_where_none_is_needed(robot, tmp_path):
+    made = columns()
+    del made["joint1.effort"]
+    recording = read_recording(save(tmp_path / "a.parquet", made), robot, need_effort=False)
+    assert recording.effort is None
+    assert [finding.kind for finding in recording.findings] == ["missing_column"]
+
+
+def test_files_that_are_no_recordings_are_refused_in_a_line(robot, tmp_path):
+    whole = save(tmp_path / "whole.parquet", columns()).read_bytes()
+    made = {
+        "empty.parquet": (b"", "empty"),
+        "empty.csv": (b"", "empty"),
+        "blank.csv": (b"\n\n", "no column 'time'"),
+        "text.parquet": (b"this is no parquet file at all", "not a whole parquet file"),
+        "cut.parquet": (whole[: len(whole) // 2], "not a whole parquet file"),
+        "header.csv": (b"time,joint1.position,joint2.position,joint1.effort,joint2.effort\n", "0 usable samples"),
+        "numbers.csv": (b"0.0,1.0,2.0,0.1,0.2\n0.1,1.0,2.0,0.1,0.2\n", "first line holds numbers"),
+        "latin.csv": ("time,größe\n0,1\n".encode("latin-1"), "UTF-8"),
+        "log.xlsx": (b"PK", "suffix '.xlsx'"),
+        "log": (b"PK", "suffix ''"),
+        "twice.csv": (b"time,joint1.position,joint1.position\n0,1,1\n", "'joint1.position' stands in the header twice"),
+    }
+    for name, (content, expected) in made.items():
+        path = tmp_path / name
+        path.write_bytes(content)
+        assert expected in refusal(path, robot), name
+    assert "no such file" in refusal(tmp_path / "absent.parquet", robot)
+    (tmp_path / "folder.parquet").mkdir()
+    assert "is a directory" in refusal(tmp_path / "folder.parquet", robot)
+
+
+def test_damage_anywhere_in_a_parquet_file_never_ends_in_another_exception(robot, tmp_path):
+    whole = save(tmp_path / "whole.parquet", columns(300)).read_bytes()
+    random = np.random.default_rng(0)
+    path = tmp_path / "damaged.parquet"
+    refused = 0
+    for start in random.integers(4, len(whole) - 8, 40).tolist():
+        damaged = bytearray(whole)
+        damaged[start : start + 8] = random.bytes(8)
+        path.write_bytes(damaged)
+        try:
+            read_recording(path, robot)
+        except RecordingError as error:
+            refused += 1
+            assert "\n" not in str(error)
+    assert refused > 0
+
+
+def test_a_file_without_permission_is_refused(robot, tmp_path, monkeypatch):
+    path = save(tmp_path / "a.parquet", columns())
+
+    def denied(*_args: object, **_options: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", denied)
+    assert "permission denied" in refusal(path, robot)
+
+
+def test_dates_and_texts_in_a_parquet_file_are_refused(robot, tmp_path):
+    frame = pl.DataFrame(columns())
+    path = tmp_path / "a.parquet"
+    frame.with_columns((pl.col("time") * 1e6).cast(pl.Datetime("us"))).write_parquet(path)
+    message = refusal(path, robot)
+    assert "'time' holds Datetime" in message
+    assert "seconds" in message
+    frame.with_columns(
+        pl.when(pl.int_range(pl.len()) == 41)
+        .then(pl.lit("off"))
+        .otherwise(pl.col("joint1.effort").cast(pl.String))
+        .alias("joint1.effort")
+    ).write_parquet(path)
+    assert "'joint1.effort', row 42: 'off' is not a number" in refusal(path, robot)
+
+
+# comma-separated values
+
+
+def csv_lines(samples: int = 200) -> list[str]:
+    made = columns(samples)
+    return [",".join(made)] + [",".join(f"{v:.17g}" for v in row) for row in zip(*made.values(), strict=True)]
+
+
+def write_text(path: Path, lines: list[str], end: str = "\n", encoding: str = "utf-8") -> Path:
+    path.write_bytes((end.join(lines) + end).encode(encoding))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("change", "end", "encoding"),
+    [
+        (lambda line: line, "\n", "utf-8"),
+        (lambda line: line, "\r\n", "utf-8-sig"),
+        (lambda line: line.replace(",", ", "), "\n", "utf-8"),
+        (lambda line: line.replace(",", "\t"), "\n", "utf-8"),
+        (lambda line: line.replace(",", ";"), "\n", "utf-8"),
+        (lambda line: ",".join(f'"{word}"' for word in line.split(",")), "\n", "utf-8"),
+    ],
+)
+def test_the_dialects_of_csv_read_alike(robot, tmp_path, change, end, encoding):
+    path = write_text(tmp_path / "a.csv", [change(line) for line in csv_lines()], end, encoding)
+    recording = read_recording(path, robot)
+    made = columns(200)
+    np.testing.assert_array_equal(recording.time, made["time"])
+    np.testing.assert_array_equal(recording.effort[1], made["joint2.effort"])
+    assert recording.findings == ()
+
+
+def test_a_decimal_comma_is_read_behind_semicolons(robot, tmp_path):
+    head, *body = csv_lines()
+    lines = [head.replace(",", ";"), *(line.replace(",", ";").replace(".", ",") for line in body)]
+    recording = read_recording(write_text(tmp_path / "a.csv", lines), robot)
+    np.testing.assert_array_equal(recording.position[0], columns(200)["joint1.position"])
+
+
+def test_a_text_in_a_number_column_is_refused_by_row_and_value(robot, tmp_path):
+    lines = csv_lines()
+    lines[31] = "0.030,oops,0.1,0.1,0.1"
+    lines[40] = "0.039,oops,0.1,0.1,0.1"
+    message = refusal(write_text(tmp_path / "a.csv", lines), robot)
+    assert "column 'joint1.position', row 31: 'oops' is not a number (and 1 more)" in message
+
+
+def test_a_text_in_a_column_that_is_not_needed_is_no_matter(robot, tmp_path):
+    lines = csv_lines()
+    lines = [f"{lines[0]},note", *(f"{line},running" for line in lines[1:])]
+    assert read_recording(write_text(tmp_path / "a.csv", lines), robot).findings == ()
+
+
+def test_empty_values_and_words_for_them_count_as_missing(robot, tmp_path):
+    lines = csv_lines()
+    lines[11] = lines[11].rpartition(",")[0] + ","
+    lines[21] = lines[21].rpartition(",")[0] + ",NA"
+    lines[31] = lines[31].rpartition(",")[0] + ",nan"
+    recording = read_recording(write_text(tmp_path / "a.csv", lines), robot)
+    assert [(finding.kind, finding.count) for finding in recording.findings] == [("nan", 3)]
+    assert "joint2.effort" in recording.findings[0].message
+    assert "first in row 11" in recording.findings[0].message
+
+
+def test_a_last_line_cut_short_is_left_out_and_a_line_too_long_refused(robot, tmp_path):
+    lines = csv_lines()
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(lines) + "\n0.2,1.5")
+    recording = read_recording(path, robot)
+    assert len(recording.time) == 200
+    assert "row 201" in recording.findings[0].message
+    lines[50] += ",1.0"
+    assert "row 50 has 6 values for 5 columns" in refusal(write_text(path, lines), robot)
+
+
+# gathering
+
+
+def test_words_are_files_folders_and_globs_in_order_of_appearance_and_once(tmp_path, monkeypatch):
+    made = columns(60)
+    for name in ("OJD_10.parquet", "OJD_2.parquet", "OJD_1.csv", "CI_1.parquet"):
+        save(tmp_path / name, made)
+    (tmp_path / "robot.yaml").write_text("urdf: a.urdf\n")
+    (tmp_path / ".OJD_3.parquet.77.partial").write_text("")
+    (tmp_path / "deeper").mkdir()
+    save(tmp_path / "deeper" / "F_1.parquet", made)
+    monkeypatch.chdir(tmp_path)
+
+    def names(*words: str | Path) -> list[str]:
+        return [path.stem for path in recording_paths(words)]
+
+    assert names(".") == ["CI_1", "OJD_1", "OJD_2", "OJD_10"]
+    assert names("OJD_*") == ["OJD_1", "OJD_2", "OJD_10"]
+    assert names("*") == ["deeper", "CI_1", "OJD_1", "OJD_2", "OJD_10"] or set(names("*")) == {
+        "CI_1",
+        "OJD_1",
+        "OJD_2",
+        "OJD_10",
+        "F_1",
+    }
+    assert names("OJD_10.parquet", ".", "OJD_*.parquet", tmp_path / "deeper") == [
+        "OJD_10",
+        "CI_1",
+        "OJD_1",
+        "OJD_2",
+        "F_1",
+    ]
+    assert names("**/F_1.parquet") == ["F_1"]
+    assert names() == []
+
+
+def test_a_file_with_the_signs_of_a_glob_in_its_name_is_that_file(robot, tmp_path):
+    save(tmp_path / "run[1]_1.parquet", columns(60))
+    save(tmp_path / "run1_1.parquet", columns(70))
+    (found,) = read_recordings([tmp_path / "run[1]_1.parquet"], robot)
+    assert len(found.time) == 60
+    text = tmp_path / "run[2]_1.csv"
+    write_text(text, csv_lines(80))
+    assert len(read_recording(text, robot).time) == 80
+
+
+def test_words_that_name_nothing_are_bad_usage_and_places_without_recordings_an_error(tmp_path):
+    with pytest.raises(UsageError, match=r"absent\.parquet"):
+        recording_paths([tmp_path / "absent.parquet"])
+    with pytest.raises(UsageError, match="no file matches"):
+        recording_paths([str(tmp_path / "*.parquet")])
+    (tmp_path / "robot.yaml").write_text("")
+    with pytest.raises(RecordingError, match=r"no \.parquet or \.csv file in this folder"):
+        recording_paths([tmp_path])
+    with pytest.raises(RecordingError, match=r"no \.parquet or \.csv file"):
+        recording_paths([str(tmp_path / "*")])
+
+
+def test_two_files_of_one_name_are_refused_by_both_names(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        save(tmp_path / name / "OJD_1.parquet", columns(60))
+    with pytest.raises(RecordingError) as caught:
+        recording_paths([tmp_path / "a", tmp_path / "b"])
+    assert str(tmp_path / "a" / "OJD_1.parquet") in str(caught.value)
+    assert str(tmp_path / "b" / "OJD_1.parquet") in str(caught.value)
+
+
+# writing
+
+SIGNAL = arrays(np.float64, (2, 60), elements=st.floats(-2.0, 2.0, width=64))
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    suffix=st.sampled_from([".parquet", ".csv"]),
+    effort=SIGNAL,
+    velocity=st.none() | SIGNAL,
+    start=st.floats(-1e4, 1e9),
+    gain=arrays(np.float64, 2, elements=st.sampled_from([1.0, -2.0, 14.87, 1e-3])),
+)
+def test_what_is_written_reads_back(robot, tmp_path_factory, suffix, effort, velocity, start, gain):
+    made = columns(60, 0.03)
+    noise = np.random.default_rng(0).standard_normal((2, 60))
+    recording = Recording(
+        name="OJD_3",
+        trajectory="OJD",
+        repetition=3,
+        joints=robot.joints,
+        time=start + made["time"],
+        position=np.array([made["joint1.position"], made["joint2.position"]]),
+        effort=effort + 1e-3 * noise,
+        velocity=velocity,
+        temperature=np.full((2, 60), 30.1),
+    )
+    path = tmp_path_factory.mktemp("written") / f"OJD_3{suffix}"
+    write_recording(recording, path, effort_gain=gain)
+    back = read_recording(path, replace(robot, effort_gain=gain))
+    assert (back.name, back.trajectory, back.repetition, back.joints) == ("OJD_3", "OJD", 3, robot.joints)
+    for signal in ("time", "position", "velocity", "acceleration", "temperature"):
+        np.testing.assert_array_equal(getattr(back, signal), getattr(recording, signal))
+    np.testing.assert_allclose(back.effort, recording.effort, rtol=1e-15 * 4)
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(robot, tmp_path, monkeypatch):
+    path = tmp_path / "OJD_1.parquet"
+    recording = read_recording(save(path, columns()), robot)
+    before = path.read_bytes()
+
+    def full(_self: object, file: object, **_options: object) -> None:
+        file.write(b"half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(pl.DataFrame, "write_parquet", full)
+    with pytest.raises(RecordingError, match="no space left on device"):
+        write_recording(recording, path)
+    assert path.read_bytes() == before
+    assert os.listdir(tmp_path) == ["OJD_1.parquet"]
+
+
+def test_writing_replaces_a_file_and_refuses_odd_places(robot, tmp_path):
+    path = tmp_path / "OJD_1.parquet"
+    recording = read_recording(save(path, columns()), robot)
+    write_recording(recording, path)
+    np.testing.assert_array_equal(read_recording(path, robot).effort, recording.effort)
+    with pytest.raises(RecordingError, match="suffix"):
+        write_recording(recording, tmp_path / "OJD_1.xlsx")
+    with pytest.raises(RecordingError, match="cannot be written"):
+        write_recording(recording, tmp_path / "absent" / "OJD_1.parquet")
+
+
+def test_a_recording_checks_its_own_shapes():
+    time = np.linspace(0.0, 1.0, 11)
+    with pytest.raises(RecordingError, match="position has shape"):
+        Recording("a", "a", 1, ("joint1",), time, np.zeros((2, 11)))
+    with pytest.raises(RecordingError, match="effort has shape"):
+        Recording("a", "a", 1, ("joint1",), time, np.zeros((1, 11)), np.zeros((1, 10)))
+    with pytest.raises(RecordingError, match="strictly increasing"):
+        Recording("a", "a", 1, ("joint1",), time[::-1], np.zeros((1, 11)))
+
+
+def test_importing_the_reader_loads_no_heavy_library():
+    heavy = "{'polars', 'pandas', 'pyarrow', 'pinocchio', 'scipy'}"
+    code = f"import sys, scara_ident.recording.recording; print({heavy} & set(sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path(__file__).parents[2]
+    )
+    assert done.stdout.strip() == "set()"
+
+
+def test_measured_currents_become_torques():
+    arm = load_robot(shared_path("data", "ur10e", "robot.yaml"))
+    path = shared_path("data", "ur10e", "ident_50s_12harm.parquet")
+    recording = read_recording(path, arm)
+    currents = pl.read_parquet(path, columns=[f"{joint}.effort" for joint in arm.joints])
+    for joint, row, gain in zip(arm.joints, recording.effort, (14.87, 13.26, 11.13, 10.62, 11.03, 11.47), strict=True):
+        np.testing.assert_allclose(row, gain * currents[f"{joint}.effort"].to_numpy().astype(float))
+    assert recording.velocity.shape == recording.position.shape == (6, len(recording.time))

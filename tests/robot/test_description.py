@@ -1,0 +1,115 @@
+"""Every bad robot.yaml gives one line that names the file and the key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scara_ident.errors import RobotError
+from scara_ident.robot.description import read_description
+
+
+def described(folder: Path, text: str) -> Path:
+    path = folder / "robot.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(RobotError) as caught:
+        read_description(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith(str(path))
+    assert len(message) < 400
+    return message.removeprefix(str(path))
+
+
+def test_a_full_description_is_read(tmp_path: Path):
+    text = (
+        "urdf: sub/arm.urdf\neffort_side: motor\njoints:\n  joint1: {reduction: -100}\n"
+        "  joint2: {effort_gain: 2.5, rotor_inertia: 1e-3}\n  joint4:\n"
+        "locked: {joint3: 0.25}\ngravity: [0, 0, -1.62]\n"
+    )
+    found = read_description(described(tmp_path, text))
+    assert found.urdf == (tmp_path / "sub" / "arm.urdf").resolve()
+    assert found.effort_side == "motor"
+    assert found.joints is not None
+    assert list(found.joints) == ["joint1", "joint2", "joint4"]
+    assert found.joints["joint1"].reduction == -100.0
+    assert found.joints["joint2"].effort_gain == 2.5
+    # YAML 1.1 takes 1e-3 for a word; it is the number that was meant.
+    assert found.joints["joint2"].rotor_inertia == 1e-3
+    assert found.joints["joint4"] is None
+    assert found.locked == {"joint3": 0.25}
+    assert found.gravity == (0.0, 0.0, -1.62)
+
+
+def test_everything_but_the_urdf_is_optional(tmp_path: Path):
+    found = read_description(described(tmp_path, "urdf: arm.urdf\n"))
+    assert (found.effort_side, found.joints, found.locked, found.gravity) == (None, None, {}, None)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "expected"),
+    [
+        ("urdf: a.urdf\ngravitty: [0, 0, -9.81]\n", "gravitty", "gravity"),
+        ("urdf: a.urdf\njoints: {j1: {reductoin: 100}}\n", "joints.j1.reductoin", "reduction"),
+        ("urdf: a.urdf\njoints: {j1: {reduction: 0}}\n", "joints.j1.reduction", "other than 0"),
+        ("urdf: a.urdf\njoints: {j1: {effort_gain: 0.0}}\n", "joints.j1.effort_gain", "other than 0"),
+        ("urdf: a.urdf\njoints: {j1: {reduction: many}}\n", "joints.j1.reduction", "number"),
+        ("urdf: a.urdf\njoints: {j1: {reduction: yes}}\n", "joints.j1.reduction", "number"),
+        ("urdf: a.urdf\njoints: {j1: {reduction: .inf}}\n", "joints.j1.reduction", "finite"),
+        ("urdf: a.urdf\njoints: {j1: {effort_gain: .nan}}\n", "joints.j1.effort_gain", "finite"),
+        ("urdf: a.urdf\njoints: {j1: {rotor_inertia: -1}}\n", "joints.j1.rotor_inertia", "greater than or equal to 0"),
+        ("urdf: a.urdf\njoints: {j1: 100}\n", "joints.j1", "100"),
+        ("urdf: a.urdf\njoints: [j1, j2]\n", "joints", "dictionary"),
+        ("urdf: a.urdf\nlocked: {j3: .nan}\n", "locked.j3", "finite"),
+        ("urdf: a.urdf\nlocked: {j3: low}\n", "locked.j3", "number"),
+        ("urdf: a.urdf\ngravity: 9.81\n", "gravity", "tuple"),
+        ("urdf: a.urdf\ngravity: [0, 0]\n", "gravity.2", "missing"),
+        ("urdf: a.urdf\ngravity: [0, 0, -9.81, 0]\n", "gravity", "at most 3"),
+        ("urdf: a.urdf\ngravity: [0, 0, .inf]\n", "gravity.2", "finite"),
+        ("urdf: a.urdf\neffort_side: motors\n", "effort_side", "'motor' or 'joint'"),
+        ("effort_side: motor\n", "urdf", "missing"),
+        ("urdf: [a, b]\n", "urdf", "path"),
+    ],
+)
+def test_a_bad_key_is_named_with_what_was_expected(tmp_path: Path, text: str, key: str, expected: str):
+    message = refusal(described(tmp_path, text))
+    assert message.startswith(f": {key}:")
+    assert expected in message
+
+
+@pytest.mark.parametrize("text", ["- urdf: a.urdf\n", "just words\n", "", "42\n"])
+def test_what_is_no_mapping_is_refused(tmp_path: Path, text: str):
+    assert "expected a mapping with the key urdf" in refusal(described(tmp_path, text))
+
+
+def test_keys_that_are_no_words_are_refused(tmp_path: Path):
+    refusal(described(tmp_path, "urdf: a.urdf\n1: 2\n"))
+    assert ": joints.1" in refusal(described(tmp_path, "urdf: a.urdf\njoints: {1: {}}\n"))
+
+
+def test_a_fault_of_syntax_is_named_with_its_line(tmp_path: Path):
+    message = refusal(described(tmp_path, "urdf: a.urdf\njoints: {j1: {reduction: 100}\n"))
+    assert message.startswith(", line ")
+    assert "not YAML" in message
+
+
+def test_yaml_tags_run_no_code(tmp_path: Path):
+    assert "not YAML" in refusal(described(tmp_path, "urdf: !!python/object/apply:os.getcwd []\n"))
+
+
+def test_files_that_are_no_text_are_refused(tmp_path: Path):
+    path = tmp_path / "robot.yaml"
+    path.write_bytes(bytes(range(256)))
+    assert "not a text file" in refusal(path)
+    path.write_bytes(b"urdf: a\x00\x01b\n")
+    assert "not YAML" in refusal(path)
+
+
+def test_a_folder_and_a_missing_file_are_refused(tmp_path: Path):
+    assert "is a folder" in refusal(tmp_path)
+    assert "no such robot description" in refusal(tmp_path / "robot.yaml")
