@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scara_ident.diagnosis.candidate_tests import ABSORBED, WEAK, Examination
+from scara_ident.diagnosis.candidate_tests import WEAK, Examination
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.effects import Scene
-from scara_ident.effects.measurement import within_sampling
+from scara_ident.effects.spanned import ABSORBED
 
 # Probability of letting any effect in when nothing is missing, over all candidates tried.
 FAMILY_ERROR = 0.01
@@ -75,12 +75,11 @@ def _objection(candidate: Candidate, examination: Examination, scene: Scene, tri
     unphysical = candidate.effect.inadmissible(after, candidate.member, examination.value, std)
     if unphysical is not None:
         return unphysical
-    if (
-        candidate.effect.name == "time_delay"
-        and candidate.member.joint is not None
-        and within_sampling(float(examination.value[0]), scene.rate)
-    ):
-        return "less than one sample: the place of a sample within its period"
+    # What is corrected in the data is worth correcting however small.
+    if not candidate.effect.corrects_data(candidate.member):
+        negligible = candidate.effect.negligible(scene, candidate.member, examination.value)
+        if negligible is not None:
+            return negligible
     if gain < LEAST_GAIN:
         return f"below the detection limit: removes {max(gain, 0.0):.1%} of the squared residual, {LEAST_GAIN:.0%} is asked"
     helps, voting = examination.votes

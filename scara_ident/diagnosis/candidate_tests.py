@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.table import Table
+from scara_ident.effects.spanned import ABSORBED
 
 Array = NDArray[np.float64]
 
 # A candidate of which less than this share lies outside the model cannot be told from it.
-ABSORBED = 1e-6
 WEAK = 5e-4
 # A fold that excites a candidate with less than this share of the mean over folds abstains.
 ABSTAIN = 0.05

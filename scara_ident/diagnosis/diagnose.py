@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.confounding import Confounder, confounders
 from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
@@ -17,7 +18,6 @@ from scara_ident.diagnosis.screening import Dependence
 from scara_ident.diagnosis.search import Search, is_delay
 from scara_ident.effects import CATALOGUE, Effect, Parameter
 from scara_ident.effects.aliases import Alias, aliases
-from scara_ident.effects.measurement import shifted, within_sampling
 from scara_ident.errors import RecordingError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.bands import choose_bands
@@ -165,15 +165,12 @@ def diagnose(
     task = Task(base, tuple(recordings), tuple(catalogue), progress)
     outcome = outcome_of(task, bands, free=not given)
     found, after = outcome.search, outcome.after
-    delay = found.delay[0] if found.delay else 0.0
-    held_out = tuple(shifted(recording, delay) for recording in validation) if delay else tuple(validation)
+    held_out = corrected(found, validation)
     effects = _effects(found, after)
     notes += outcome.demoted
-    if found.delay is not None and not _is_effect(found):
-        notes.append(
-            f"effort and position are {found.delay[0] * 1e3:+.2g} ms apart, less than one sample, as when a sample is "
-            "held to the next; corrected in the data, not counted as an effect"
-        )
+    negligible = _negligible(found)
+    if negligible is not None:
+        notes.append(f"{negligible}; corrected in the data, not counted as an effect")
     verdict: Verdict = "unexplained" if outcome.unexplained else ("explained" if effects else "complete")
     return Diagnosis(
         verdict,
@@ -208,10 +205,13 @@ def _effects(found: Search, after: Estimate) -> list[FoundEffect]:
         candidate = decision.candidate
         now = joint_rms(step.estimate.value, step.evidence)
         if is_delay(candidate) and found.delay is not None:
-            if not _is_effect(found):
+            if _negligible(found) is not None:
                 before = now
                 continue
-            values: Mapping[str, Parameter] = {"delay": Parameter(found.delay[0], found.delay[1], "s")}
+            value, std = found.delay
+            values: Mapping[str, Parameter] = candidate.effect.parameters(
+                scene, candidate.member, np.array([value]), np.array([[std**2]])
+            )
             confounded: tuple[Confounder, ...] = ()
         else:
             place = labels.index(decision.label)
@@ -235,6 +235,23 @@ def _effects(found: Search, after: Estimate) -> list[FoundEffect]:
     return results
 
 
-def _is_effect(found: Search) -> bool:
-    """Whether a delay is more than the place of a sample within its period."""
-    return found.delay is not None and not within_sampling(found.delay[0], found.scene.rate)
+def corrected(found: Search, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    """Return recordings with what the search corrected in the data taken out of them."""
+    candidate = _correction(found)
+    if candidate is None or found.delay is None:
+        return tuple(recordings)
+    value = np.array([found.delay[0]])
+    return tuple(candidate.effect.corrected(recording, candidate.member, value) for recording in recordings)
+
+
+def _correction(found: Search) -> Candidate | None:
+    candidates = (step.decision.candidate for step in found.steps)
+    return next((candidate for candidate in candidates if is_delay(candidate)), None)
+
+
+def _negligible(found: Search) -> str | None:
+    """Say why what was corrected in the data is no effect to speak of."""
+    candidate = _correction(found)
+    if candidate is None or found.delay is None:
+        return None
+    return candidate.effect.negligible(found.scene, candidate.member, np.array([found.delay[0]]))

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.effects import Effect, Member, Scene
-from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
+from scara_ident.effects import Effect, Scene, SpectralLine
 from scara_ident.effects.spectra import (
     NEIGHBOURS_IN_TIME,
     Line,
@@ -58,8 +57,8 @@ def line_candidates(
     catalogue : sequence of Effect
         Only families that are in it are offered.
     """
-    families = {type(effect) for effect in catalogue}
-    if not families & {TorqueRipple, EncoderEccentricity, Vibration}:
+    seeded = [effect for effect in catalogue if effect.seeded_by is not None]
+    if not seeded:
         return []
     found: list[Candidate] = []
     parts = [_residuals(model, value, recording, bands) for recording in recordings]
@@ -72,20 +71,15 @@ def line_candidates(
         band = bands[j]
         white = whitened(residuals, rate, highest=band)
         order = _strongest_order(white, [turns[j] for _, turns, _ in pieces])
-        if order is not None:
-            found += [
-                Candidate(family, Member(j, (order,)))
-                for family in catalogue
-                if isinstance(family, (TorqueRipple, EncoderEccentricity))
-            ]
         frequency = _strongest_frequency(white, rate, band or 0.4 * rate)
-        if frequency is not None:
-            found += [
-                Candidate(family, member)
-                for family in catalogue
-                if isinstance(family, Vibration)
-                for member in family.at(scene, j, frequency)
-            ]
+        strongest = [] if order is None else [SpectralLine("order", order)]
+        strongest += [] if frequency is None else [SpectralLine("frequency", frequency)]
+        found += [
+            Candidate(effect, member)
+            for line in strongest
+            for effect in seeded
+            for member in effect.seeds(scene, j, line)
+        ]
     return found
 
 

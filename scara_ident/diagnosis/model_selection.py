@@ -12,7 +12,6 @@ from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
 from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, search
 from scara_ident.effects import Effect
-from scara_ident.effects.effect import Resonant
 from scara_ident.estimation import Estimate, JointError
 from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.estimate import joint_error
@@ -171,11 +170,8 @@ def _band(found: Outcome) -> float:
 
 def _resonances(found: Search) -> list[float]:
     """Return the resonance of every effect found that has one, Hz."""
-    return [
-        candidate.effect.resonance(candidate.member)
-        for candidate in found.chosen
-        if isinstance(candidate.effect, Resonant)
-    ]
+    found_at = (candidate.effect.resonance(candidate.member) for candidate in found.chosen)
+    return [frequency for frequency in found_at if frequency is not None]
 
 
 def _below_resonance(found: Outcome) -> bool:
@@ -184,7 +180,7 @@ def _below_resonance(found: Outcome) -> bool:
 
 def _narrowed(task: Task, wide: Outcome) -> Outcome:
     """Look for an effect with a resonance in bands that end below it, and keep what leaves nothing over."""
-    resonant = [effect for effect in task.catalogue if isinstance(effect, Resonant)]
+    resonant = [effect for effect in task.catalogue if effect.resonant]
     band = _band(wide)
     if not resonant or not np.isfinite(band):
         return wide

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.table import Table, tabulate_candidates
 from scara_ident.effects import Scene
-from scara_ident.effects.effect import Geared
 from scara_ident.recording.recording import Recording
 
 Array = NDArray[np.float64]
@@ -239,10 +238,8 @@ def _unknowns(scene: Scene, chosen: Sequence[Candidate]) -> tuple[Unknown, ...]:
         for owner, candidate in enumerate(chosen)
         for place, parameter in enumerate(candidate.effect.nonlinear)
     ]
-    joints = [
-        candidate.effect.geared_joint(candidate.member) for candidate in chosen if isinstance(candidate.effect, Geared)
-    ]
-    for joint in dict.fromkeys(joints):
+    joints = (candidate.effect.geared_joint(candidate.member) for candidate in chosen)
+    for joint in dict.fromkeys(joint for joint in joints if joint is not None):
         nominal = scene.nominal_armature(joint)
         if scene.told_armature(joint) is None and nominal > 0.0:
             found.append(

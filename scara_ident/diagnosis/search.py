@@ -15,8 +15,7 @@ from scara_ident.diagnosis.effect_parameters import parameters_beside
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
-from scara_ident.effects import CATALOGUE, Effect, Resolved, Scene
-from scara_ident.effects.measurement import shifted
+from scara_ident.effects import CATALOGUE, Effect, Scene
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.least_squares import wls
 from scara_ident.estimation.observations import Evidence, gather_all
@@ -36,9 +35,6 @@ TOLD = 2.5
 # Points on the line between neighbouring scan points, and rounds of narrowing.
 LINE_POINTS = 7
 LINE_ROUNDS = 4
-# A delay is corrected in the data until a further correction is below this, s.
-DELAY_STEP = 2e-5
-DELAY = "time_delay"
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +169,7 @@ def search(
             base = replace(base, torque=tabulate(model, data, bands).torque)
         else:
             chosen.append(winner.candidate)
-        done = not is_delay(winner.candidate) or abs(winner.examination.value[0]) < DELAY_STEP
+        done = not is_delay(winner.candidate) or winner.candidate.effect.settled(winner.examination.value)
         if done:
             left = [k for k, item in enumerate(candidates) if item.label(scene) != winner.label]
             candidates, places = [candidates[k] for k in left], tuple(places[k] for k in left)
@@ -236,8 +232,8 @@ class Beside:
 
 
 def is_delay(candidate: Candidate) -> bool:
-    """Whether a candidate is the delay of all joints, which is corrected in the data."""
-    return candidate.effect.name == DELAY and candidate.member.joint is None
+    """Whether a candidate is corrected in the data, as the delay of all joints is."""
+    return candidate.effect.corrects_data(candidate.member)
 
 
 def _scene(model: TorqueModel, value: Array, recordings: Sequence[Recording], bands: Sequence[float | None]) -> Scene:
@@ -327,9 +323,9 @@ def _spacing(scene: Scene, candidate: Candidate, k: int) -> float:
     A family that knows how far apart values must be to be told apart says so by ``resolution``.
     """
     parameter = candidate.effect.nonlinear[k]
-    if isinstance(candidate.effect, Resolved):
-        width = candidate.effect.resolution(scene, candidate.member)[k]
-        return width / candidate.member.nonlinear[k] if parameter.logarithmic else width
+    widths = candidate.effect.resolution(scene, candidate.member)
+    if widths is not None:
+        return widths[k] / candidate.member.nonlinear[k] if parameter.logarithmic else widths[k]
     grid = np.array(sorted({member.nonlinear[k] for member in candidate.effect.members(scene)}))
     if parameter.logarithmic:
         return float(np.min(np.diff(np.log(grid)))) if len(grid) > 1 else float(np.log(2.0))
@@ -343,7 +339,8 @@ def _correct_delay(
     step = float(decision.examination.value[0])
     std = float(np.sqrt(decision.examination.covariance[0, 0]))
     total = step + (delay[0] if delay else 0.0)
-    return tuple(shifted(recording, step) for recording in recordings), (total, std)
+    effect, member, value = decision.candidate.effect, decision.candidate.member, decision.examination.value
+    return tuple(effect.corrected(recording, member, value) for recording in recordings), (total, std)
 
 
 def _backward(

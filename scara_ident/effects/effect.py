@@ -1,145 +1,245 @@
 """What an effect is: a term of the torque equation that the base model may lack.
 
 A member of a family has fixed nonlinear parameters and is linear in its coefficients, so that all members of all
-families are columns of one regressor. A family knows which members to try, how the coefficients become physical
-parameters, and which of them no real arm can have.
+families are columns of one regressor. All that is particular to an effect is said by its family, a subclass of
+`Effect`; estimation, diagnosis and report ask it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from itertools import product
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.terms import Column
 from scara_ident.motion.motion import Motion
+from scara_ident.recording.recording import Recording
 
 Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class Parameter:
-    """A physical parameter of an effect: its value, standard deviation and unit."""
-
-    value: float
-    std: float
-    unit: str
+# Standard deviations by which a coefficient may lie beyond what a real arm can have.
+DOUBT = 2.0
+# Values of a nonlinear parameter that are tried where a family does not say which.
+SCAN_POINTS = 5
 
 
 @dataclass(frozen=True)
-class NonlinearParameter:
-    """A nonlinear parameter of an effect.
+class SpectralLine:
+    """A line of a joint's residual: so many periods per motor turn (``order``), or Hz (``frequency``)."""
+
+    kind: Literal["order", "frequency"]
+    position: float
+
+
+@dataclass(frozen=True)
+class View:
+    """The signal over which an effect shows itself in a figure.
+
+    Attributes
+    ----------
+    signal : str
+        A signal of the joint; ``reversal`` is the travel since its last reversal, ``order`` and ``frequency`` are
+        spectra, ``own`` is the torque of the effect itself.
+    along : bool
+        Whether torque is taken in the direction of motion.
+    distance : str or None
+        The physical parameter that says over which distance after a reversal the effect acts.
+    """
+
+    signal: Literal[
+        "own", "position", "velocity", "acceleration", "time", "torque", "torque rate", "load", "reversal", "order", "frequency"
+    ] = "own"  # fmt: skip
+    along: bool = False
+    distance: str | None = None
+
+
+OWN = View()
+"""An effect that is shown over nothing but its own torque."""
+
+
+@dataclass(frozen=True)
+class Effect(ABC):
+    """A family of terms with one physical cause.
+
+    A subclass gives at least ``name``, ``summary``, ``coefficients`` and `signal_columns`; it then acts on the torque
+    of one joint, has one member per moving joint and value of its nonlinear parameters, and its coefficients are its
+    physical parameters. Families without fields of their own are equal where they are of one class.
 
     Attributes
     ----------
     name : str
-        As in the table of effects.
-    unit : str
-    lower, upper : float
-        What a real arm can have; refinement stays within.
-    logarithmic : bool
-        Whether it is scanned and refined on a logarithmic scale.
+        In the table of effects; families of one cause may share it.
+    summary : str
+        What it is, in a few words for a person; may hold the words of `words`.
+    coefficients : tuple of Coefficient
+    nonlinear : tuple of NonlinearParameter
+    all_joints : bool
+        Whether the columns of a member with a joint act on the torque of all joints.
+    at_rest : bool
+        Whether a joint that does not move in the recordings can show it.
+    follows_estimate : bool
+        Whether the columns depend on the present estimate, ``scene.value`` or ``scene.armatures``.
+    resonant : bool
+        Whether the columns hold in a band that ends below a resonance; see `resonance`.
+    seeded_by : {"order", "frequency"} or None
+        The lines of a residual's spectrum that suggest a member; see `seeds`.
+    view : View
+        What a figure shows it over.
+    experiment : str
+        What to record to bring it out against the others.
+    not_simulated : str
+        Why the virtual arm does not have it; empty where ``scara_ident.simulation`` has an effect of its name.
     """
 
-    name: str
-    unit: str
-    lower: float
-    upper: float
-    logarithmic: bool = True
+    name: ClassVar[str]
+    summary: ClassVar[str]
+    coefficients: ClassVar[tuple[Coefficient, ...]] = ()
+    nonlinear: ClassVar[tuple[NonlinearParameter, ...]] = ()
+    all_joints: ClassVar[bool] = False
+    at_rest: ClassVar[bool] = False
+    follows_estimate: ClassVar[bool] = False
+    resonant: ClassVar[bool] = False
+    seeded_by: ClassVar[Literal["order", "frequency"] | None] = None
+    view: ClassVar[View] = OWN
+    experiment: ClassVar[str] = "record the same path at two speeds, in both directions, with and without a payload"
+    not_simulated: ClassVar[str] = ""
 
-
-@dataclass(frozen=True)
-class Member:
-    """One member of a family: a joint and values of the nonlinear parameters.
-
-    Attributes
-    ----------
-    joint : int or None
-        Place of the joint in ``robot.joints``; None where the effect belongs to no one joint.
-    nonlinear : tuple of float
-        One value per parameter of the family.
-    partner : int or None
-        A second joint, for effects of one joint on another.
-    """
-
-    joint: int | None
-    nonlinear: tuple[float, ...] = ()
-    partner: int | None = None
-
-
-class Effect(Protocol):
-    """A family of terms with one physical cause."""
-
-    @property
-    def name(self) -> str:
-        """Name in the table of effects."""
-        ...
-
-    @property
-    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
-        """Nonlinear parameters."""
-        ...
-
-    def members(self, scene: Scene) -> tuple[Member, ...]:
-        """Return the members worth trying on this robot and these recordings."""
-        ...
-
-    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
-        """Describe the k columns of a member."""
-        ...
+    @abstractmethod
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return the columns on the side of the recorded torque: (N,) on the member's joint, or (n, N) on all."""
 
     def regressor(self, signals: Signals, member: Member) -> Array:
         """Return the columns of a member, shape (n, k, N), on the side of the recorded torque."""
-        ...
+        columns = list(self.signal_columns(signals, member))
+        result = np.zeros((signals.scene.robot.n, len(columns), signals.motion.samples))
+        for k, column in enumerate(columns):
+            result[member.place if np.ndim(column) == 1 else slice(None), k] = column
+        return result
+
+    def fill(self, signals: Signals, member: Member, rows: Sequence[Array]) -> None:
+        """Write the columns into those of each joint: (k, N) where they act, (0, N) where they do not."""
+        own = self.rows(signals.scene, member)
+        for k, column in enumerate(self.signal_columns(signals, member)):
+            for joint in own:
+                rows[joint][k] = column if np.ndim(column) == 1 else column[joint]
+
+    def rows(self, scene: Scene, member: Member) -> list[int]:
+        """Return the places of the joints whose torque the columns act on."""
+        return list(range(scene.robot.n)) if self.all_joints or member.joint is None else [member.joint]
+
+    def joints(self, scene: Scene) -> list[int]:
+        """Return the places of the joints that can have it."""
+        return [j for j in range(scene.robot.n) if self.at_rest or (scene.speed[j] > 0.0 and scene.travel[j] > 0.0)]
+
+    def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
+        """Return the values of the nonlinear parameters that are tried on a joint."""
+        spaced = [np.geomspace if item.logarithmic else np.linspace for item in self.nonlinear]
+        grids = [
+            grid(item.lower, item.upper, SCAN_POINTS + 2)[1:-1]
+            for grid, item in zip(spaced, self.nonlinear, strict=True)
+        ]
+        return (tuple(float(x) for x in values) for values in product(*grids))
+
+    def members(self, scene: Scene) -> tuple[Member, ...]:
+        """Return the members worth trying on this robot and these recordings."""
+        return tuple(Member(j, values) for j in self.joints(scene) for values in self.scan(scene, j))
+
+    def words(self, scene: Scene, member: Member) -> dict[str, Any]:
+        """Return what `summary` and `coefficients` may name: joints, their units, nonlinear parameters."""
+        robot = scene.robot
+        found: dict[str, Any] = {"joint": "all joints"}
+        found |= {item.name: value for item, value in zip(self.nonlinear, member.nonlinear, strict=True)}
+        if member.joint is not None:
+            unit = robot.torque_unit(member.joint)
+            found |= {
+                "joint": robot.joints[member.joint],
+                "torque": unit,
+                "position": robot.position_unit(member.joint),
+            }
+            if member.partner is not None:
+                found["partner"] = robot.joints[member.partner]
+        return found
+
+    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
+        """Describe the k columns of a member."""
+        words = self.words(scene, member)
+        joint = None if member.joint is None else scene.robot.joints[member.joint]
+        return tuple(
+            Column(item.name, joint, item.unit.format(**words), item.meaning.format(**words), bool(item.positive))
+            for item in self.coefficients
+        )
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say why coefficients cannot be those of a real arm; None where they can.
 
         A coefficient within two standard deviations of what is possible is possible.
         """
-        ...
+        wrong = (
+            item.positive
+            for item, x, spread in zip(self.coefficients, value, std, strict=False)
+            if item.positive and x < -DOUBT * spread
+        )
+        return next(wrong, None)
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Turn coefficients (k,) and their covariance (k, k) into the effect's physical parameters.
 
         The nonlinear parameters are added by the caller, who knows how sure they are.
         """
-        ...
+        return {
+            column.name: Parameter(float(value[k]), deviation(covariance, k), column.unit)
+            for k, column in enumerate(self.columns(scene, member))
+        }
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say in a few words what the effect is, for a person."""
-        ...
+        return self.summary.format(**self.words(scene, member))
 
+    def resolution(self, scene: Scene, member: Member) -> tuple[float, ...] | None:
+        """Return, for every nonlinear parameter, how far apart two values must be to be told apart.
 
-@runtime_checkable
-class Resolved(Protocol):
-    """A family whose nonlinear parameters have narrow peaks, such as orders and frequencies."""
+        None where the spacing of the members tried says it.
+        """
+        return None
 
-    def resolution(self, scene: Scene, member: Member) -> tuple[float, ...]:
-        """Return, for every parameter, how far apart two values must be to be told apart."""
-        ...
+    def seeds(self, scene: Scene, joint: int, line: SpectralLine) -> tuple[Member, ...]:
+        """Return the members that a line of a joint's residual suggests."""
+        return (Member(joint, (line.position,)),) if line.kind == self.seeded_by else ()
 
+    def geared_joint(self, member: Member) -> int | None:
+        """Return the joint on the torque behind whose gear it depends, and so on the rotor's share of an inertia."""
+        return None
 
-@runtime_checkable
-class Geared(Protocol):
-    """A family that depends on the torque behind a gear, and so on how much of an inertia is the rotor's."""
+    def resonance(self, member: Member) -> float | None:
+        """Return the frequency, Hz, below which the band of the columns must end."""
+        return None
 
-    def geared_joint(self, member: Member) -> int:
-        """Return the place of the joint whose gear it is."""
-        ...
+    def corrects_data(self, member: Member) -> bool:
+        """Whether it is taken out of the recordings instead of becoming a term of the model."""
+        return False
 
+    def corrected(self, recording: Recording, member: Member, value: Array) -> Recording:
+        """Return a recording without the effect."""
+        return recording
 
-@runtime_checkable
-class Resonant(Protocol):
-    """A family whose columns hold in a band that ends below a resonance."""
+    def corrected_torque(self, torque: Array, rate: float, member: Member, value: Array) -> Array:
+        """Return uniform samples of torque, shape (n, N), without the effect."""
+        return torque
 
-    def resonance(self, member: Member) -> float:
-        """Return the frequency of the resonance, Hz."""
-        ...
+    def settled(self, value: Array) -> bool:
+        """Whether a further correction of the data is too small to be made."""
+        return True
+
+    def negligible(self, scene: Scene, member: Member, value: Array) -> str | None:
+        """Say why coefficients are too small to speak of, however sure; None where they are not."""
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,14 +275,15 @@ class EffectTerm:
 
     @property
     def pattern(self) -> NDArray[np.bool_]:
-        """Which joints the columns act on, shape (n, k): its own, or all where it has none."""
-        n, k = self.scene.robot.n, len(self.columns)
-        if self.member.joint is None:
-            return np.ones((n, k), dtype=bool)
-        pattern = np.zeros((n, k), dtype=bool)
-        pattern[getattr(self.effect, "rows", lambda member: [member.joint])(self.member)] = True
+        """Which joints the columns act on, shape (n, k)."""
+        pattern = np.zeros((self.scene.robot.n, len(self.columns)), dtype=bool)
+        pattern[self.effect.rows(self.scene, self.member)] = True
         return pattern
 
     def regressor(self, motion: Motion) -> Array:
         """Return the columns on a stretch of motion, shape (n, k, N)."""
         return self.effect.regressor(Signals(self.scene, motion), self.member)
+
+    def fill(self, motion: Motion, rows: Sequence[Array]) -> None:
+        """Write the columns into those of each joint: (k, N) where they act, (0, N) where they do not."""
+        self.effect.fill(Signals(self.scene, motion), self.member, rows)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
+from scara_ident.effects.effect import DOUBT, Effect, View
 from scara_ident.effects.links import lagging, link_inertia, shared, usual_link_inertia
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.model.terms import Column
 from scara_ident.motion.motion import differentiate
 
 Array = NDArray[np.float64]
@@ -33,74 +34,78 @@ LARGEST_WIDTH = 0.05
 
 
 @dataclass(frozen=True)
-class JointElasticity:
+class BehindGear(Effect):
+    """A link that does not follow its motor, which all joints feel."""
+
+    all_joints = True
+    at_rest = True
+    follows_estimate = True
+
+    def geared_joint(self, member: Member) -> int:
+        """Return its joint."""
+        return member.place
+
+    def inertia(self, signals: Signals, member: Member) -> tuple[Array, float]:
+        """Return the inertia of the link, away from zero, shape (N,), and its usual value; zeros where misjudged."""
+        usual = usual_link_inertia(signals.scene, member.place)
+        if not usual > 0.0:
+            return np.zeros(signals.motion.samples), 0.0
+        return np.maximum(link_inertia(signals, member.place), 0.1 * usual), usual
+
+
+@dataclass(frozen=True)
+class JointElasticity(BehindGear):
     """An elastic gear with the encoder on the motor: the link lags by x.
 
     The link swings in the gear, ``M_jj x'' + d x' + k x = tau_j`` with the torque tau_j that a rigid gear would pass
     on, and its lag changes the torques of all joints, ``-M x''`` first (Spong 1987). Well below the frequency of that
-    swinging, x is ``tau_j / k``. The frequency is the nonlinear parameter, which matters where it is not far above the
-    band; the coefficient is ``1/stiffness`` whatever it is. A base that yields about the first joint's axis does the
-    same to the torques.
+    swinging, x is ``tau_j / k``. The frequency, at which the link swings while its motor is held, is the nonlinear
+    parameter, which matters where it is not far above the band; the coefficient is ``1/stiffness`` whatever it is. A
+    base that yields about the first joint's axis does the same to the torques.
     """
 
-    @property
-    def name(self) -> str:
-        """Name in the table of effects."""
-        return "joint_elasticity"
+    name = "joint_elasticity"
+    summary = "an elastic gear"
+    coefficients = (Coefficient("compliance", "{compliance}", "compliance of the gear of {joint}"),)
+    nonlinear = (
+        NonlinearParameter("frequency", "Hz", LOWEST_FREQUENCY, HIGHEST_FREQUENCY),
+        NonlinearParameter("_damping_ratio", "1", LEAST_DAMPING, MOST_DAMPING),
+    )
+    resonant = True
+    view = View("acceleration")
+    experiment = "excite above 5 Hz with short steps, and look for a resonance that stays at its frequency"
 
-    @property
-    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
-        """The frequency at which the link swings while its motor is held, and the damping ratio of that, not reported."""
-        return (
-            NonlinearParameter("frequency", "Hz", LOWEST_FREQUENCY, HIGHEST_FREQUENCY),
-            NonlinearParameter("_damping_ratio", "1", LEAST_DAMPING, MOST_DAMPING),
-        )
+    def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
+        """Return frequencies from below the band to far above it."""
+        frequencies = (float(np.clip(x * scene.band, LOWEST_FREQUENCY, HIGHEST_FREQUENCY)) for x in FREQUENCIES)
+        return ((frequency, DAMPING) for frequency in dict.fromkeys(frequencies))
 
-    def members(self, scene: Scene) -> tuple[Member, ...]:
-        """Frequencies from below the band to far above it, per joint."""
-        frequencies = dict.fromkeys(
-            float(np.clip(share * scene.band, LOWEST_FREQUENCY, HIGHEST_FREQUENCY)) for share in FREQUENCIES
-        )
-        return tuple(Member(j, (f, DAMPING)) for j in range(scene.robot.n) for f in frequencies)
+    def words(self, scene: Scene, member: Member) -> dict[str, Any]:
+        """Add the unit of the compliance, at the joint."""
+        unit = "m/N" if scene.robot.prismatic[member.place] else "rad/(N m)"
+        return super().words(scene, member) | {"compliance": unit}
 
-    def rows(self, member: Member) -> slice:
-        """Return that all joints feel it."""
-        return slice(None)
-
-    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
-        """One column: the compliance."""
-        j = member.joint or 0
-        joint, unit = scene.robot.joints[j], "m/N" if scene.robot.prismatic[j] else "rad/(N m)"
-        return (Column("compliance", joint, unit, f"compliance of the gear of {joint}"),)
-
-    def regressor(self, signals: Signals, member: Member) -> Array:
-        """Return the change of torque per compliance, shape (n, 1, N)."""
-        j = member.joint or 0
-        usual = usual_link_inertia(signals.scene, j)
-        if not usual > 0.0:
-            return np.zeros((signals.scene.robot.n, 1, signals.motion.samples))
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return the change of torque per compliance."""
+        j = member.place
+        inertia, usual = self.inertia(signals, member)
+        if usual == 0.0:
+            return [np.zeros_like(signals.motion.q)]
         load = _differentiated(signals, _load(signals, j), LOAD_BAND)[0]
-        inertia = np.maximum(link_inertia(signals, j), 0.1 * usual)
         stiffness = (2.0 * np.pi * member.nonlinear[0]) ** 2 * usual
-        lag = swing(
-            load, inertia, stiffness, 2.0 * member.nonlinear[1] * np.sqrt(stiffness * usual), 1.0 / signals.motion.rate
-        )
-        return stiffness * lagging(signals, j, lag)[:, None]
-
-    def geared_joint(self, member: Member) -> int:
-        """Return the joint whose gear it is."""
-        return member.joint or 0
+        damping = 2.0 * member.nonlinear[1] * np.sqrt(stiffness * usual)
+        return [stiffness * lagging(signals, j, swing(load, inertia, stiffness, damping, 1.0 / signals.motion.rate))]
 
     def resonance(self, member: Member) -> float:
         """Return the frequency of the link against its held motor, Hz."""
         return member.nonlinear[0]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """A spring pulls back, and swings at the frequency that its stiffness gives."""
-        if value[0] < -2.0 * std[0]:
+        """Say so where a spring does not pull back, or would swing slower than is seen."""
+        if value[0] < -DOUBT * std[0]:
             return "its stiffness would be negative"
-        usual = usual_link_inertia(scene, member.joint or 0)
-        least = value[0] - 2.0 * std[0]
+        usual = usual_link_inertia(scene, member.place)
+        least = value[0] - DOUBT * std[0]
         if usual > 0.0 and least > 0.0:
             frequency = float(1.0 / np.sqrt(least * usual) / (2.0 * np.pi))
             if 2.0 * frequency < min(member.nonlinear[0], scene.band):
@@ -110,16 +115,14 @@ class JointElasticity:
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return the stiffness, 1 over the coefficient."""
         compliance = float(value[0])
-        unit = "N/m" if scene.robot.prismatic[member.joint or 0] else "N m/rad"
+        unit = "N/m" if scene.robot.prismatic[member.place] else "N m/rad"
         if compliance == 0.0:
             return {"stiffness": Parameter(np.inf, np.inf, unit)}
-        return {"stiffness": Parameter(1.0 / compliance, float(np.sqrt(covariance[0, 0])) / compliance**2, unit)}
+        return {"stiffness": Parameter(1.0 / compliance, deviation(covariance) / compliance**2, unit)}
 
     def description(self, scene: Scene, member: Member) -> str:
-        """Say what it is."""
-        if member.joint == 0:
-            return "an elastic gear, or a base that yields about the same axis"
-        return "an elastic gear"
+        """Say what else it may be on the first joint."""
+        return self.summary + (", or a base that yields about the same axis" if member.joint == 0 else "")
 
 
 def swing(torque: Array, inertia: Array, stiffness: float, damping: float, step: float) -> tuple[Array, Array, Array]:
@@ -159,7 +162,7 @@ def swing(torque: Array, inertia: Array, stiffness: float, damping: float, step:
 
 
 @dataclass(frozen=True)
-class Backlash:
+class Backlash(BehindGear):
     """Clearance between motor and link: ``q_link = q - width s(t)``, where s is one half on either flank.
 
     When the torque through the gear changes its sign the link loses contact and flies freely, motor and link drifting
@@ -168,64 +171,33 @@ class Backlash:
     coefficient is the width itself. It lives where the torque reverses, not where the speed does.
     """
 
-    @property
-    def name(self) -> str:
-        """Name in the table of effects."""
-        return "backlash"
+    name = "backlash"
+    summary = "clearance in the gear"
+    coefficients = (
+        Coefficient("width", "{position}", "clearance in the gear of {joint}", "the clearance would be negative"),
+    )
+    nonlinear = (NonlinearParameter("crossing_width", "rad", 1e-5, LARGEST_WIDTH),)
+    view = View("reversal", along=True, distance="width")
+    experiment = "reverse under little load, and look for the angle within which no torque is needed"
 
-    @property
-    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
-        """The width that times the crossing."""
-        return (NonlinearParameter("crossing_width", "rad", 1e-5, LARGEST_WIDTH),)
+    def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
+        """Return three widths."""
+        return ((width,) for width in WIDTHS)
 
-    def members(self, scene: Scene) -> tuple[Member, ...]:
-        """Three widths per joint."""
-        return tuple(Member(j, (width,)) for j in range(scene.robot.n) for width in WIDTHS)
-
-    def rows(self, member: Member) -> slice:
-        """Return that all joints feel it."""
-        return slice(None)
-
-    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
-        """One column: the width."""
-        j = member.joint or 0
-        joint = scene.robot.joints[j]
-        return (Column("width", joint, _length(scene, member), f"clearance in the gear of {joint}", True),)
-
-    def regressor(self, signals: Signals, member: Member) -> Array:
-        """Return the change of torque per width, shape (n, 1, N)."""
-        j = member.joint or 0
-        load, inertia = _load(signals, j), link_inertia(signals, j)
-        usual = usual_link_inertia(signals.scene, j)
-        if not usual > 0.0:
-            return np.zeros((signals.scene.robot.n, 1, signals.motion.samples))
-        drift = load / np.maximum(inertia, 0.1 * usual)
-        place = flank(drift, member.nonlinear[0], 1.0 / signals.motion.rate)
-        return lagging(signals, j, _differentiated(signals, place, LAG_BAND))[:, None]
-
-    def geared_joint(self, member: Member) -> int:
-        """Return the joint whose gear it is."""
-        return member.joint or 0
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return the change of torque per width."""
+        j = member.place
+        inertia, usual = self.inertia(signals, member)
+        if usual == 0.0:
+            return [np.zeros_like(signals.motion.q)]
+        place = flank(_load(signals, j) / inertia, member.nonlinear[0], 1.0 / signals.motion.rate)
+        return [lagging(signals, j, _differentiated(signals, place, LAG_BAND))]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """A clearance is open, and small."""
-        if value[0] < -2.0 * std[0]:
-            return "the clearance would be negative"
-        if value[0] > LARGEST_WIDTH + 2.0 * std[0]:
-            return f"a clearance of {value[0]:.2g} {_length(scene, member)} would rattle by hand"
-        return None
-
-    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
-        """Return the width."""
-        return {"width": Parameter(float(value[0]), float(np.sqrt(covariance[0, 0])), _length(scene, member))}
-
-    def description(self, scene: Scene, member: Member) -> str:
-        """Say what it is."""
-        return "clearance in the gear"
-
-
-def _length(scene: Scene, member: Member) -> str:
-    return "m" if scene.robot.prismatic[member.joint or 0] else "rad"
+        """Say so where a clearance is not open, or not small."""
+        if value[0] > LARGEST_WIDTH + DOUBT * std[0]:
+            return f"a clearance of {value[0]:.2g} {scene.robot.position_unit(member.place)} would rattle by hand"
+        return super().inadmissible(scene, member, value, std)
 
 
 def _load(signals: Signals, joint: int) -> Array:

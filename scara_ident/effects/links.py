@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
 from scara_ident.motion.motion import Motion
+from scara_ident.robot.kinematics import place_of, tool_frame
 from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -110,12 +111,10 @@ class Tool:
 @lru_cache(maxsize=8)
 def tool_of(robot: Robot) -> Tool:
     """Return the tool of a robot: of the frames that its last joint carries, the one farthest from that joint."""
-    last = robot.model.njoints - 1
-    points = [np.array(frame.placement.translation) for frame in robot.model.frames if frame.parentJoint == last]
-    point = max(points, key=lambda place: float(np.linalg.norm(place)), default=np.zeros(3))
-    velocity = robot.model.joints[last].idx_v
-    joint = int(np.flatnonzero(robot.order == velocity)[0])
-    return Tool(joint, point, build_kernel(robot.model, range(10 * (last - 1), 10 * last)))
+    frame = tool_frame(robot)
+    body = 10 * (int(frame.parentJoint) - 1)
+    point = np.array(frame.placement.translation)
+    return Tool(place_of(robot, int(frame.parentJoint)), point, build_kernel(robot.model, range(body, body + 10)))
 
 
 def point_mass(point: Array) -> Array:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
+from scara_ident.effects.effect import DOUBT, Effect, View
+from scara_ident.effects.parameters import Coefficient, Member, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.model.terms import Column
 from scara_ident.motion.motion import UNIFORM_TOLERANCE, differentiate
 from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.recording import Recording
@@ -27,10 +28,12 @@ LONGEST_DELAY_SAMPLES = 5.0
 LARGEST_MISMATCH = 0.5
 # Torque that is held from one sample to the next, or averaged over one, is up to this many samples off its time stamp.
 SAMPLING = 1.0
+# Data are corrected until a further delay is below this, s.
+DELAY_STEP = 2e-5
 
 
 @dataclass(frozen=True)
-class TorqueSensorNonlinearity:
+class TorqueSensorNonlinearity(Effect):
     """A torque channel that is not straight: ``recorded = u + cubic u^3``.
 
     Above zero for a motor that saturates, so that its current says more than its torque; below zero for a channel
@@ -38,164 +41,159 @@ class TorqueSensorNonlinearity:
     the model fitted together with it.
     """
 
-    @property
-    def name(self) -> str:
-        """Name in the table of effects."""
-        return "torque_sensor_nonlinearity"
+    name = "torque_sensor_nonlinearity"
+    summary = "a torque measurement, or torque constant, that depends on the torque"
+    coefficients = (Coefficient("cubic", "1/{square}", "cube of the torque in what {joint} records"),)
+    at_rest = True
+    follows_estimate = True
+    view = View("torque")
+    experiment = "hold a known load at several torques, or repeat with a payload at the same speed"
 
-    @property
-    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
-        """It has no nonlinear parameter."""
-        return ()
+    def words(self, scene: Scene, member: Member) -> dict[str, Any]:
+        """Add the unit of the torque's square."""
+        unit = scene.robot.torque_unit(member.place)
+        return super().words(scene, member) | {"square": f"({unit})^2" if " " in unit else f"{unit}^2"}
 
-    def members(self, scene: Scene) -> tuple[Member, ...]:
-        """One per joint."""
-        return tuple(Member(j) for j in range(scene.robot.n))
-
-    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
-        """One column: the cubic coefficient."""
-        joint = scene.robot.joints[member.joint or 0]
-        return (Column("cubic", joint, _per_square(scene, member), f"cube of the torque in what {joint} records"),)
-
-    def regressor(self, signals: Signals, member: Member) -> Array:
-        """Return the cube of the predicted torque, shape (n, 1, N)."""
-        j = member.joint or 0
-        return signals.row(j, [signals.predicted[j] ** 3])
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return the cube of the predicted torque."""
+        return [signals.predicted[member.place] ** 3]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """What is recorded grows with the torque, up to the torque limit."""
-        limit = float(scene.robot.torque_limit[member.joint or 0])
-        if np.isfinite(limit) and value[0] + 2.0 * std[0] < -1.0 / limit**2:
+        """Say so where what is recorded does not grow with the torque, up to the torque limit."""
+        limit = float(scene.robot.torque_limit[member.place])
+        if np.isfinite(limit) and value[0] + DOUBT * std[0] < -1.0 / limit**2:
             return "the recorded torque would change sign below the torque limit"
         return None
 
-    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
-        """Return the cubic coefficient."""
-        return {"cubic": Parameter(float(value[0]), _std(covariance), _per_square(scene, member))}
-
-    def description(self, scene: Scene, member: Member) -> str:
-        """Say what it is."""
-        return "a torque measurement, or torque constant, that depends on the torque"
-
 
 @dataclass(frozen=True)
-class TorqueGainMismatch:
+class TorqueGainMismatch(Effect):
     """A torque scale that differs from the first joint's: ``recorded = ratio u``.
 
     A scale that is wrong for all joints alike goes into all parameters; what the first joint's torque says of the
     parameters that it shares with this one tells the ratio, weakly.
     """
 
-    @property
-    def name(self) -> str:
-        """Name in the table of effects."""
-        return "torque_gain_mismatch"
+    name = "torque_gain_mismatch"
+    summary = "a torque scale that differs from the first joint's"
+    coefficients = (Coefficient("ratio_less_one", "1", "torque scale of {joint} over the first joint's, less 1"),)
+    follows_estimate = True
+    view = View("torque")
+    experiment = "repeat with a known payload: it gives both joints the same scale"
 
-    @property
-    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
-        """It has no nonlinear parameter."""
-        return ()
+    def joints(self, scene: Scene) -> list[int]:
+        """Return the joints after the first."""
+        return list(range(1, scene.robot.n))
 
-    def members(self, scene: Scene) -> tuple[Member, ...]:
-        """One per joint after the first."""
-        return tuple(Member(j) for j in range(1, scene.robot.n))
-
-    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
-        """One column: how much the ratio differs from 1."""
-        joint = scene.robot.joints[member.joint or 0]
-        return (Column("ratio_less_one", joint, "1", f"torque scale of {joint} over the first joint's, less 1"),)
-
-    def regressor(self, signals: Signals, member: Member) -> Array:
-        """Return the predicted torque, shape (n, 1, N)."""
-        j = member.joint or 0
-        return signals.row(j, [signals.predicted[j]])
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return the predicted torque."""
+        return [signals.predicted[member.place]]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Torque constants of one arm are not that far apart."""
-        if abs(value[0]) > LARGEST_MISMATCH + 2.0 * std[0]:
+        """Say so where torque constants of one arm are too far apart."""
+        if abs(value[0]) > LARGEST_MISMATCH + DOUBT * std[0]:
             return f"a torque scale that differs by {value[0]:+.0%} from the first joint's is no mismatch"
         return None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return the ratio."""
-        return {"ratio": Parameter(1.0 + float(value[0]), _std(covariance), "1")}
-
-    def description(self, scene: Scene, member: Member) -> str:
-        """Say what it is."""
-        return "a torque scale that differs from the first joint's"
+        return {"ratio": Parameter(1.0 + float(value[0]), deviation(covariance), "1")}
 
 
 @dataclass(frozen=True)
-class TimeDelay:
+class TimeDelay(Effect):
     """Effort that is recorded later than position: ``recorded(t) = u(t - delay)``, of all joints or of one.
 
     To first order ``recorded = u - delay du/dt``. Terms of even order are out of phase with it, so that what is left
-    is ``delay^3/6``; shifting the data by what was found and looking again removes that too (see `shifted`).
+    is ``delay^3/6``; shifting the data by what was found and looking again removes that too, which is done for the
+    delay of all joints. A delay of no more than a sample is a matter of how samples are taken, to correct but not to
+    name.
     """
 
-    @property
-    def name(self) -> str:
-        """Name in the table of effects."""
-        return "time_delay"
-
-    @property
-    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
-        """It has no nonlinear parameter."""
-        return ()
+    name = "time_delay"
+    summary = "effort that is recorded later than position"
+    coefficients = (Coefficient("delay", "s", "delay of the effort of {joint} behind position"),)
+    follows_estimate = True
+    view = View("torque rate")
+    experiment = "run the same path at two speeds: a delay's error grows with the third power of speed"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
-        """One for all joints together, then one per joint."""
+        """Return one for all joints together, then one per joint."""
         n = scene.robot.n
         return (Member(None), *(Member(j) for j in range(n) if n > 1))
 
-    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
-        """One column: the delay."""
-        joint = None if member.joint is None else scene.robot.joints[member.joint]
-        return (Column("delay", joint, "s", f"delay of the effort of {joint or 'all joints'} behind position"),)
-
-    def regressor(self, signals: Signals, member: Member) -> Array:
-        """Return ``-du/dt`` of the predicted torque, shape (n, 1, N)."""
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return ``-du/dt`` of the predicted torque."""
         rows = slice(None) if member.joint is None else slice(member.joint, member.joint + 1)
         rate, band = signals.motion.rate, DERIVATIVE_BAND * signals.scene.band
-        cut = band if band < 0.45 * rate else None
-        result = np.zeros((signals.scene.robot.n, 1, signals.motion.samples))
-        result[rows, 0] = -differentiate(signals.predicted[rows], rate, cut)[1]
-        return result
+        change = -differentiate(signals.predicted[rows], rate, band if band < 0.45 * rate else None)[1]
+        return [change if member.joint is None else change[0]]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """No loop is that late."""
+        """Say so where no loop is that late."""
         longest = max(LONGEST_DELAY, LONGEST_DELAY_SAMPLES / scene.rate)
-        if abs(value[0]) > longest + 2.0 * std[0]:
+        if abs(value[0]) > longest + DOUBT * std[0]:
             return f"a delay of {value[0]:.3g} s is longer than any measurement's"
         return None
 
-    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
-        """Return the delay."""
-        return {"delay": Parameter(float(value[0]), _std(covariance), "s")}
+    def corrects_data(self, member: Member) -> bool:
+        """Return whether it is that of all joints."""
+        return member.joint is None
 
-    def description(self, scene: Scene, member: Member) -> str:
-        """Say what it is."""
-        return "effort that is recorded later than position"
+    def corrected(self, recording: Recording, member: Member, value: Array) -> Recording:
+        """Return a recording whose effort is moved back."""
+        return shifted(recording, float(value[0]), None if member.joint is None else [member.joint])
+
+    def corrected_torque(self, torque: Array, rate: float, member: Member, value: Array) -> Array:
+        """Return uniform samples of torque, shape (n, N), moved back."""
+        rows = slice(None) if member.joint is None else slice(member.joint, member.joint + 1)
+        result = torque.copy()
+        result[rows] = shifted_signal(torque[rows], rate, float(value[0]))
+        return result
+
+    def settled(self, value: Array) -> bool:
+        """Whether the delay is below `DELAY_STEP`."""
+        return abs(float(value[0])) < DELAY_STEP
+
+    def negligible(self, scene: Scene, member: Member, value: Array) -> str | None:
+        """Say so where it is no longer than a sample."""
+        if abs(float(value[0])) * scene.rate > SAMPLING:
+            return None
+        if member.joint is not None:
+            return "less than one sample: the place of a sample within its period"
+        return (
+            f"effort and position are {float(value[0]) * 1e3:+.2g} ms apart, less than one sample, as when a sample is "
+            "held to the next"
+        )
 
 
-def within_sampling(delay: float, rate: float) -> bool:
-    """Return whether a delay is no longer than a sample: a matter of how samples are taken, to correct but not to name.
+def shifted_signal(torque: Array, rate: float, delay: float) -> Array:
+    """Return a uniform signal moved back by a delay: at t what it was at t + delay.
+
+    The signal is shifted in the frequency domain, after odd reflection at its ends, and so loses nothing at any
+    frequency.
 
     Parameters
     ----------
-    delay : float
-        s.
+    torque : ndarray, shape (k, N)
+        N at least 4.
     rate : float
         Samples per second.
+    delay : float
+        s, positive where the signal is late.
+
+    Returns
+    -------
+    ndarray, shape (k, N)
     """
-    return abs(delay) * rate <= SAMPLING
+    return _advanced(torque, delay * rate)
 
 
 def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = None) -> Recording:
     """Return a recording whose effort is moved back by a delay: the effort at t is that recorded at t + delay.
 
-    Uniform stretches are shifted in the frequency domain, after odd reflection at their ends, and so lose nothing at
-    any frequency; jittered ones are interpolated by a cubic spline. Nothing is moved across gaps.
+    Uniform stretches are moved by `shifted_signal`; jittered ones are interpolated by a cubic spline. Nothing is moved
+    across gaps.
 
     Parameters
     ----------
@@ -249,12 +247,3 @@ def _advanced(signal: Array, steps: float) -> Array:
         phase[-1] = phase[-1].real
     moved = np.fft.irfft(spectrum * phase, length, axis=1) + ramp + slope * steps
     return np.asarray(moved[:, reach : reach + count])
-
-
-def _std(covariance: Array) -> float:
-    return float(np.sqrt(covariance[0, 0]))
-
-
-def _per_square(scene: Scene, member: Member) -> str:
-    unit = scene.robot.torque_unit(member.joint or 0)
-    return f"1/({unit})^2" if " " in unit else f"1/{unit}^2"

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
-from scara_ident.effects.friction import amplitude_and_phase, friction_slope, moving
+from scara_ident.effects.effect import DOUBT, SpectralLine, View
+from scara_ident.effects.friction import friction_slope
 from scara_ident.effects.links import rigid_torque, shared
+from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
+from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine
 from scara_ident.model.terms import Column
 
 Array = NDArray[np.float64]
@@ -33,69 +36,53 @@ LARGEST_ECCENTRICITY = 0.1
 
 
 @dataclass(frozen=True)
-class TorqueRipple:
+class PerMotorTurn(Sinusoid):
+    """What repeats with the motor's angle, ``order`` times per turn."""
+
+    nonlinear = (NonlinearParameter("order", "1 / motor turn", 0.05, 1000.0, False),)
+    seeded_by = "order"
+    view = View("order")
+    orders: ClassVar[tuple[float, ...]] = ORDERS
+
+    def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
+        """Return the orders with enough periods in the travel that lie within the band while the joint is slow."""
+        turns_per_second = abs(float(scene.robot.reduction[joint])) * float(scene.speed[joint]) / (2.0 * np.pi)
+        least = LEAST_PERIODS * _order_resolution(scene, joint)
+        return ((x,) for x in self.orders if x >= least and SLOW_SHARE * x * turns_per_second <= scene.band)
+
+    def resolution(self, scene: Scene, member: Member) -> tuple[float, ...]:
+        """Return one over the motor turns covered."""
+        return (_order_resolution(scene, member.place),)
+
+
+@dataclass(frozen=True)
+class TorqueRipple(PerMotorTurn):
     """A torque periodic in the motor's angle: ``u = amplitude sin(order theta_m + phase)``, theta_m = N q.
 
     N has the gear's sign, and q is zero where the joint's position is. The phase is one for all recordings, as with
     an encoder that knows its place in the turn.
     """
 
-    @property
-    def name(self) -> str:
-        """Name in the table of effects."""
-        return "torque_ripple"
+    name = "torque_ripple"
+    summary = "a torque ripple of {order:.4g} periods per motor turn"
+    coefficients = sine_and_cosine("ripple_{part}", "{part} of {order:g} times the motor's angle of {joint}")
+    experiment = "move slowly at constant speed over several motor turns and record at a high rate"
 
-    @property
-    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
-        """Periods per motor turn."""
-        return (NonlinearParameter("order", "1 / motor turn", 0.05, 1000.0, False),)
-
-    def members(self, scene: Scene) -> tuple[Member, ...]:
-        """Every joint at the orders of gears and motors, as far as they can be seen."""
-        return tuple(Member(j, (order,)) for j in moving(scene) for order in ORDERS if _visible(scene, j, order))
-
-    def resolution(self, scene: Scene, member: Member) -> tuple[float, ...]:
-        """Return how far apart two orders must be to be told apart: one over the motor turns covered."""
-        return (_order_resolution(scene, member.joint or 0),)
-
-    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
-        """Two columns, sine and cosine."""
-        j = member.joint or 0
-        joint, unit = scene.robot.joints[j], scene.robot.torque_unit(j)
-        return tuple(
-            Column(
-                f"ripple_{part}", joint, unit, f"{part} of {member.nonlinear[0]:g} times the motor's angle of {joint}"
-            )
-            for part in ("sine", "cosine")
-        )
-
-    def regressor(self, signals: Signals, member: Member) -> Array:
-        """Return sine and cosine of the order times the motor's angle, shape (n, 2, N)."""
-        j, order = member.joint or 0, member.nonlinear[0]
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return sine and cosine of the order times the motor's angle."""
+        j, order = member.place, member.nonlinear[0]
         angle = order * signals.motor_turns[j]
         seen = _seen(signals, j, order)
-        return signals.row(j, [seen * np.sin(angle), seen * np.cos(angle)])
+        return [seen * np.sin(angle), seen * np.cos(angle)]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Any amplitude within the torque limit is possible."""
-        limit = float(scene.robot.torque_limit[member.joint or 0])
-        if float(np.hypot(*value)) - 2.0 * float(np.max(std)) > limit:
-            return "the ripple would be larger than the torque limit"
-        return None
-
-    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
-        """Return amplitude and phase."""
-        amplitude, phase = amplitude_and_phase(value, covariance)
-        unit = scene.robot.torque_unit(member.joint or 0)
-        return {"amplitude": Parameter(*amplitude, unit), "phase": Parameter(*phase, "rad")}
-
-    def description(self, scene: Scene, member: Member) -> str:
-        """Say what it is."""
-        return f"a torque ripple of {member.nonlinear[0]:.4g} periods per motor turn"
+        """Say so where it leaves the torque limit behind."""
+        limit = float(scene.robot.torque_limit[member.place])
+        return "the ripple would be larger than the torque limit" if least_amplitude(value, std) > limit else None
 
 
 @dataclass(frozen=True)
-class EncoderEccentricity:
+class EncoderEccentricity(PerMotorTurn):
     """An encoder that errs periodically with the motor: it reads ``q + e``, ``e = amplitude sin(order theta_m + phase)``.
 
     The arm's torque is that of ``q - e`` with its derivatives. To first order in e it differs by
@@ -106,42 +93,19 @@ class EncoderEccentricity:
     the joint's acceleration acts on feel it.
     """
 
-    @property
-    def name(self) -> str:
-        """Name in the table of effects."""
-        return "encoder_eccentricity"
+    name = "encoder_eccentricity"
+    summary = "an encoder that errs {order:.4g} times per motor turn"
+    coefficients = sine_and_cosine(
+        "encoder_{part}", "{part} of the error of {joint}'s encoder over the motor's turn", "{position}"
+    )
+    all_joints = True
+    follows_estimate = True
+    experiment = "run at two constant speeds: an error of the encoder grows with the square of speed, ripple does not"
+    orders = ENCODER_ORDERS
 
-    @property
-    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
-        """Periods per motor turn."""
-        return (NonlinearParameter("order", "1 / motor turn", 0.05, 1000.0, False),)
-
-    def members(self, scene: Scene) -> tuple[Member, ...]:
-        """Every joint at one and two periods per motor turn, as far as they can be seen."""
-        return tuple(
-            Member(j, (order,)) for j in moving(scene) for order in ENCODER_ORDERS if _visible(scene, j, order)
-        )
-
-    def resolution(self, scene: Scene, member: Member) -> tuple[float, ...]:
-        """Return how far apart two orders must be to be told apart: one over the motor turns covered."""
-        return (_order_resolution(scene, member.joint or 0),)
-
-    def rows(self, member: Member) -> slice:
-        """Return that all joints feel it."""
-        return slice(None)
-
-    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
-        """Two columns, sine and cosine of the error."""
-        j = member.joint or 0
-        joint, unit = scene.robot.joints[j], _length(scene, member)
-        return tuple(
-            Column(f"encoder_{part}", joint, unit, f"{part} of the error of {joint}'s encoder over the motor's turn")
-            for part in ("sine", "cosine")
-        )
-
-    def regressor(self, signals: Signals, member: Member) -> Array:
-        """Return the change of torque per amplitude of sine and of cosine, shape (n, 2, N)."""
-        j, order = member.joint or 0, member.nonlinear[0]
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return the change of torque per amplitude of sine and of cosine."""
+        j, order = member.place, member.nonlinear[0]
         motion = signals.motion
         per_turn = order * signals.scene.robot.reduction[j]
         angle = per_turn * motion.q[j]
@@ -152,27 +116,17 @@ class EncoderEccentricity:
         seen = _seen(signals, j, order)
         of_sine: Array = by_q * sine + by_v * (speed * cosine) + by_a * (push * cosine - square * sine)
         of_cosine: Array = by_q * cosine - by_v * (speed * sine) - by_a * (push * sine + square * cosine)
-        return np.asarray(-np.stack([seen * of_sine, seen * of_cosine], axis=1))
+        return [-(seen * of_sine), -(seen * of_cosine)]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """No encoder errs by much of a turn."""
-        at_motor = abs(float(scene.robot.reduction[member.joint or 0])) * max(member.nonlinear[0], 1.0)
-        if at_motor * (float(np.hypot(*value)) - 2.0 * float(np.max(std))) > LARGEST_ECCENTRICITY:
-            return "no encoder errs by that much"
-        return None
-
-    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
-        """Return amplitude and phase."""
-        amplitude, phase = amplitude_and_phase(value, covariance)
-        return {"amplitude": Parameter(*amplitude, _length(scene, member)), "phase": Parameter(*phase, "rad")}
-
-    def description(self, scene: Scene, member: Member) -> str:
-        """Say what it is."""
-        return f"an encoder that errs {member.nonlinear[0]:.4g} times per motor turn"
+        """Say so where an encoder would err by much of a turn."""
+        at_motor = abs(float(scene.robot.reduction[member.place])) * max(member.nonlinear[0], 1.0)
+        too_much = at_motor * least_amplitude(value, std) > LARGEST_ECCENTRICITY
+        return "no encoder errs by that much" if too_much else None
 
 
 @dataclass(frozen=True)
-class Vibration:
+class Vibration(Sinusoid):
     """A torque periodic in time, whatever the arm does: ``u = amplitude sin(2 pi frequency t + phase)``.
 
     t counts from the start of each recording, and the phase is one for all recordings: that holds for what starts
@@ -182,7 +136,7 @@ class Vibration:
     amplitude is the rms over the recordings. `frequency_spectrum` sums power over recordings and so finds both.
 
     There is no grid of frequencies: lines are as narrow as the recordings are long, and come from the spectrum of the
-    residual (see `at`).
+    residual.
 
     Attributes
     ----------
@@ -191,93 +145,70 @@ class Vibration:
 
     free_phase: bool = False
 
-    @property
-    def name(self) -> str:
-        """Name in the table of effects."""
-        return "vibration"
+    name = "vibration"
+    summary = "a vibration of {frequency:.4g} Hz"
+    coefficients = sine_and_cosine("vibration_{part}", "{part} of {frequency:g} Hz on {joint}")
+    nonlinear = (NonlinearParameter("frequency", "Hz", 0.05, 1000.0, False),)
+    seeded_by = "frequency"
+    view = View("frequency")
+    experiment = "record at rest with the drives on: what is periodic then does not come from the motion"
 
-    @property
-    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
-        """The frequency."""
-        return (NonlinearParameter("frequency", "Hz", 0.05, 1000.0, False),)
-
-    def members(self, scene: Scene) -> tuple[Member, ...]:
-        """Return none: see `at`."""
+    def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
+        """Return none: lines of the residual suggest them."""
         return ()
 
-    def at(self, scene: Scene, joint: int, frequency: float) -> tuple[Member, ...]:
-        """Return the member of a joint at a frequency, none where the band or the recordings cannot show it."""
-        seen = LEAST_PERIODS / scene.duration <= frequency <= FASTEST * scene.rate
-        return (Member(joint, (frequency,)),) if seen else ()
+    def seeds(self, scene: Scene, joint: int, line: SpectralLine) -> tuple[Member, ...]:
+        """Return the member at a frequency that the band and the recordings can show."""
+        seen = LEAST_PERIODS / scene.duration <= line.position <= FASTEST * scene.rate
+        return super().seeds(scene, joint, line) if seen else ()
 
     def resolution(self, scene: Scene, member: Member) -> tuple[float, ...]:
-        """Return how far apart two frequencies must be to be told apart: one over the duration."""
+        """Return one over the duration."""
         return (1.0 / scene.duration,)
 
     def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
-        """Return sine and cosine, or those of every recording."""
-        j = member.joint or 0
-        joint, unit = scene.robot.joints[j], scene.robot.torque_unit(j)
-        what = f"of {member.nonlinear[0]:g} Hz on {joint}"
+        """Describe sine and cosine, or those of every recording."""
+        pair = super().columns(scene, member)
         if not self.free_phase:
-            return tuple(Column(f"vibration_{part}", joint, unit, f"{part} {what}") for part in ("sine", "cosine"))
+            return pair
         return tuple(
-            Column(f"vibration_{part}_{name}", joint, unit, f"{part} {what} in {name}")
+            Column(f"{part.name}_{name}", part.joint, part.unit, f"{part.meaning} in {name}")
             for name in scene.start
-            for part in ("sine", "cosine")
+            for part in pair
         )
 
-    def regressor(self, signals: Signals, member: Member) -> Array:
-        """Return sine and cosine of time, shape (n, k, N)."""
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return sine and cosine of time; those of every recording are zero in the others."""
         angle = 2.0 * np.pi * member.nonlinear[0] * signals.time
         pair = [np.sin(angle), np.cos(angle)]
         if not self.free_phase:
-            return signals.row(member.joint or 0, pair)
-        names = list(signals.scene.start)
-        result = np.zeros((signals.scene.robot.n, 2 * len(names), signals.motion.samples))
-        if signals.motion.name in names:
-            place = 2 * names.index(signals.motion.name)
-            result[member.joint or 0, place : place + 2] = pair
-        return result
+            return pair
+        nothing = np.zeros_like(angle)
+        return [part if name == signals.motion.name else nothing for name in signals.scene.start for part in pair]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Any amplitude within the torque limit is possible."""
-        limit = float(scene.robot.torque_limit[member.joint or 0])
-        if self._amplitude(value) - 2.0 * float(np.max(std)) > limit:
-            return "the vibration would be larger than the torque limit"
-        return None
+        """Say so where it leaves the torque limit behind."""
+        limit = float(scene.robot.torque_limit[member.place])
+        least = _rms_amplitude(value) - DOUBT * float(np.max(std))
+        return "the vibration would be larger than the torque limit" if least > limit else None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return amplitude, and phase where there is one."""
-        unit = scene.robot.torque_unit(member.joint or 0)
         if not self.free_phase:
-            amplitude, phase = amplitude_and_phase(value, covariance)
-            return {"amplitude": Parameter(*amplitude, unit), "phase": Parameter(*phase, "rad")}
-        size = self._amplitude(value)
+            return super().parameters(scene, member, value, covariance)
+        size = _rms_amplitude(value)
         slope = value / (size * 0.5 * len(value)) if size > 0.0 else np.zeros_like(value)
         variance = float(slope @ covariance @ slope)
+        unit = scene.robot.torque_unit(member.place)
         return {"amplitude": Parameter(size, float(np.sqrt(max(variance, 0.0))), unit)}
 
-    def description(self, scene: Scene, member: Member) -> str:
-        """Say what it is."""
-        return f"a vibration of {member.nonlinear[0]:.4g} Hz"
 
-    def _amplitude(self, value: Array) -> float:
-        return float(np.sqrt(np.sum(value**2) / (0.5 * len(value))))
-
-
-def _length(scene: Scene, member: Member) -> str:
-    return "m" if scene.robot.prismatic[member.joint or 0] else "rad"
+def _rms_amplitude(value: Array) -> float:
+    return float(np.sqrt(np.sum(value**2) / (0.5 * len(value))))
 
 
 def _order_resolution(scene: Scene, joint: int) -> float:
     return float(2.0 * np.pi / (abs(scene.robot.reduction[joint]) * scene.travel[joint]))
-
-
-def _visible(scene: Scene, joint: int, order: float) -> bool:
-    """Whether a line has enough periods in the travel and lies within the band while the joint is slow."""
-    slow = SLOW_SHARE * order * abs(float(scene.robot.reduction[joint])) * float(scene.speed[joint]) / (2.0 * np.pi)
-    return order >= LEAST_PERIODS * _order_resolution(scene, joint) and slow <= scene.band
 
 
 def _seen(signals: Signals, joint: int, order: float) -> NDArray[np.bool_]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
-from scara_ident.effects.friction import deviation, friction_of, moving
+from scara_ident.effects.effect import DOUBT, Effect, View
+from scara_ident.effects.friction import friction_of
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.model.terms import Column
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ LEAST_REVERSAL = 0.02
 
 
 @dataclass(frozen=True)
-class Presliding:
+class Presliding(Effect):
     """Coulomb friction that follows a state z instead of sign(v) (Dahl 1968).
 
     ``dz/dq = (1 - z sign(v))/presliding_distance``. The base model keeps ``a0 sign(v)``; the column is ``z - sign(v)``
@@ -36,60 +36,47 @@ class Presliding:
     forgotten over a few distances.
     """
 
-    @property
-    def name(self) -> str:
-        """Name in the table of effects."""
-        return "presliding"
+    name = "presliding"
+    summary = "Coulomb friction that builds up over a distance after a reversal (presliding)"
+    coefficients = (
+        Coefficient(
+            "presliding", "{torque}", "Coulomb friction of {joint} that builds up over a distance",
+            "friction would be largest just after a reversal",
+        ),
+    )  # fmt: skip
+    nonlinear = (NonlinearParameter("presliding_distance", "rad", 1e-5, 0.3),)
+    view = View("reversal", along=True, distance="presliding_distance")
+    experiment = "reverse often with small amplitude at two speeds: its memory is in angle, a delay's is in time"
 
-    @property
-    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
-        """The distance over which friction builds up."""
-        return (NonlinearParameter("presliding_distance", "rad", 1e-5, 0.3),)
+    def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
+        """Return distances that the joint's travel holds many times."""
+        scale = METRES_PER_RADIAN if scene.robot.prismatic[joint] else 1.0
+        return ((scale * x,) for x in DISTANCES if scale * x <= LONGEST_SHARE * scene.travel[joint])
 
-    def members(self, scene: Scene) -> tuple[Member, ...]:
-        """Every joint, at distances that its travel holds many times."""
-        return tuple(
-            Member(j, (distance,))
-            for j in moving(scene)
-            for distance in (scale * x for x in DISTANCES for scale in [_scale(scene, j)])
-            if distance <= LONGEST_SHARE * scene.travel[j]
-        )
-
-    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
-        """One column: the dry friction that follows the state."""
-        j = member.joint or 0
-        joint = scene.robot.joints[j]
-        meaning = f"Coulomb friction of {joint} that builds up over a distance"
-        return (Column("presliding", joint, scene.robot.torque_unit(j), meaning, True),)
-
-    def regressor(self, signals: Signals, member: Member) -> Array:
-        """Return ``z - sign(v)`` in the drive's direction, shape (n, 1, N)."""
-        j = member.joint or 0
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return ``z - sign(v)`` in the drive's direction."""
+        j = member.place
         z = dahl_state(signals.motion.q[j], member.nonlinear[0])
-        return signals.row(j, [signals.scene.robot.drive_sign[j] * z - signals.sign[j]])
+        return [signals.scene.robot.drive_sign[j] * z - signals.sign[j]]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """What builds up is what then slides."""
-        j = member.joint or 0
-        if value[0] < -2.0 * std[0]:
-            return "friction would be largest just after a reversal"
-        if member.nonlinear[0] > LONGEST_SHARE * scene.travel[j]:
+        """Say so where what builds up is not what then slides."""
+        wrong = super().inadmissible(scene, member, value, std)
+        if wrong is not None:
+            return wrong
+        if member.nonlinear[0] > LONGEST_SHARE * scene.travel[member.place]:
             return "over so long a way it is a spring, not friction"
-        coulomb = friction_of(scene, j).get(0)
-        if coulomb is not None and value[0] + 2.0 * std[0] < LEAST_OF_COULOMB * max(coulomb, 0.0):
+        coulomb = friction_of(scene, member.place).get(0)
+        if coulomb is not None and value[0] + DOUBT * std[0] < LEAST_OF_COULOMB * max(coulomb, 0.0):
             return "only a small part of the Coulomb friction would build up over a distance; all of it does"
-        if coulomb is not None and value[0] - 2.0 * std[0] > MOST_OF_COULOMB * max(coulomb, 0.0):
+        if coulomb is not None and value[0] - DOUBT * std[0] > MOST_OF_COULOMB * max(coulomb, 0.0):
             return f"it would be more than {MOST_OF_COULOMB:g} times the Coulomb friction"
         return None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return the friction that follows the state; the distance is a nonlinear parameter."""
-        unit = scene.robot.torque_unit(member.joint or 0)
+        unit = scene.robot.torque_unit(member.place)
         return {"amplitude": Parameter(float(value[0]), deviation(covariance), unit)}
-
-    def description(self, scene: Scene, member: Member) -> str:
-        """Say what it is."""
-        return "Coulomb friction that builds up over a distance after a reversal (presliding)"
 
 
 def dahl_state(q: Array, distance: float, start: float = 0.0) -> Array:
@@ -161,7 +148,3 @@ def turning_points(q: Array, least: float) -> NDArray[np.intp]:
     if kept[-1] != len(q) - 1:
         kept.append(len(q) - 1)
     return np.array(kept, dtype=np.intp)
-
-
-def _scale(scene: Scene, joint: int) -> float:
-    return METRES_PER_RADIAN if scene.robot.prismatic[joint] else 1.0

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import Member, NonlinearParameter, Parameter
+from scara_ident.effects.effect import DOUBT, Effect, View
 from scara_ident.effects.links import first_moments, gravity_columns, shared
+from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
+from scara_ident.effects.spanned import rows_by_sample
 from scara_ident.model.terms import Column, RigidBody
 from scara_ident.robot.robot import Robot
 
@@ -72,7 +74,7 @@ def _gravity(term: RigidBody) -> _Gravity:
     rng = np.random.default_rng(0)
     reach = np.where(robot.prismatic, 1.0, np.pi)[:, None]
     q = reach * rng.uniform(-1.0, 1.0, (robot.n, max(30, 10 * robot.n)))
-    columns = [gravity_columns(robot, axis, q).transpose(0, 2, 1).reshape(-1, len(kept)) for axis in range(2)]
+    columns = [rows_by_sample(gravity_columns(robot, axis, q)) for axis in range(2)]
     largest = max(float(np.max(np.linalg.norm(part, axis=0))) for part in columns) or 1.0
     axes = tuple(axis for axis in range(2) if np.linalg.norm(columns[axis] @ known) > NOTHING * largest)
     new = np.hstack([part @ rest for part in columns])
@@ -122,7 +124,18 @@ def _parts(signals: Signals) -> Array:
 
 
 @dataclass(frozen=True)
-class BaseTilt:
+class _Tilt(Effect):
+    """What both ways to tell a tilt share."""
+
+    name = "base_tilt"
+    summary = "a base that is not level"
+    follows_estimate = True
+    view = View("position")
+    experiment = "hold still, or creep, at positions over more than half a turn: a tilt follows the angle's sine, a spring the angle"
+
+
+@dataclass(frozen=True)
+class BaseTilt(_Tilt):
     """Gravity's components -g tilt_x and -g tilt_y along the base's x and y axes.
 
     What they do to parameters that the model estimates anyway tells the tilt. On an arm with vertical axes they also
@@ -131,16 +144,6 @@ class BaseTilt:
     say, they take part in the estimate of the tilt; a position torque of one joint, such as a spring, gives a tilt of
     zero beside such coefficients.
     """
-
-    @property
-    def name(self) -> str:
-        """Name in the table of effects."""
-        return "base_tilt"
-
-    @property
-    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
-        """It has no nonlinear parameter."""
-        return ()
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """One, where the model's parameters feel gravity from the side."""
@@ -157,11 +160,10 @@ class BaseTilt:
         )
         return (*tilts, *entering)
 
-    def regressor(self, signals: Signals, member: Member) -> Array:
-        """Return the torques of known parameters under sideways gravity and those of new ones, shape (n, k, N)."""
-        axes = _gravity(signals.scene.model.rigid_body).known_axes
-        parts = _parts(signals)
-        return np.concatenate([parts[:, list(axes)], parts[:, 4:]], axis=1)
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return the torques of known parameters under sideways gravity and those of new ones."""
+        parts = np.moveaxis(_parts(signals), 1, 0)
+        return [*parts[list(_gravity(signals.scene.model.rigid_body).known_axes)], *parts[4:]]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """The base is nearly level, and parameters that are known show what new ones show."""
@@ -170,7 +172,7 @@ class BaseTilt:
         steep = _too_steep(value[:count], std[:count])
         if steep is not None or not gravity.entering_axes:
             return steep
-        if np.all(np.abs(value[:count]) < 2.0 * std[:count]):
+        if np.all(np.abs(value[:count]) < DOUBT * std[:count]):
             return "only one joint shows it, as a spring would; what else gravity must do is missing"
         return None
 
@@ -186,28 +188,16 @@ class BaseTilt:
             for k, axis in enumerate(gravity.known_axes)
         }
 
-    def description(self, scene: Scene, member: Member) -> str:
-        """Say what it is."""
-        return "a base that is not level"
-
 
 @dataclass(frozen=True)
-class NominalBaseTilt:
+class NominalBaseTilt(_Tilt):
     """The same with the URDF's first moments, but for one factor, for those that a level base does not show.
 
     Two columns say what `BaseTilt` says with more, so that a smaller tilt is found, and found on all joints at once;
     a spring on one joint has no such company. It offers nothing where no new parameter enters.
     """
 
-    @property
-    def name(self) -> str:
-        """Name in the table of effects."""
-        return "base_tilt"
-
-    @property
-    def nonlinear(self) -> tuple[NonlinearParameter, ...]:
-        """The factor on the nominal first moments."""
-        return (NonlinearParameter("moment_factor", "1", 1.0 / MOMENT_FACTOR, MOMENT_FACTOR),)
+    nonlinear = (NonlinearParameter("moment_factor", "1", 1.0 / MOMENT_FACTOR, MOMENT_FACTOR),)
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return five factors; one where nothing else is known of gravity and factor and tilt are one."""
@@ -222,28 +212,16 @@ class NominalBaseTilt:
         """Tilt about each axis."""
         return tuple(_tilt_column(axis) for axis in self._axes(scene))
 
-    def regressor(self, signals: Signals, member: Member) -> Array:
-        """Return the torque under sideways gravity, shape (n, k, N)."""
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return the torque under sideways gravity."""
         gravity = _gravity(signals.scene.model.rigid_body)
         factor = member.nonlinear[0] if gravity.known_axes else 1.0
-        parts = _parts(signals)
-        axes = np.array(self._axes(signals.scene))
-        return np.asarray(parts[:, axes] + factor * parts[:, 2 + axes])
+        parts = np.moveaxis(_parts(signals), 1, 0)
+        return [parts[axis] + factor * parts[2 + axis] for axis in self._axes(signals.scene)]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """The base is nearly level."""
         return _too_steep(value, std)
-
-    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
-        """Return the tilt."""
-        return {
-            f"tilt_{AXES[axis]}": Parameter(float(value[k]), float(np.sqrt(covariance[k, k])), "rad")
-            for k, axis in enumerate(self._axes(scene))
-        }
-
-    def description(self, scene: Scene, member: Member) -> str:
-        """Say what it is."""
-        return "a base that is not level"
 
     def _axes(self, scene: Scene) -> list[int]:
         gravity = _gravity(scene.model.rigid_body)
@@ -265,7 +243,7 @@ def _moment_unit(robot: Robot, moments: Array) -> str:
 
 
 def _too_steep(tilt: Array, std: Array) -> str | None:
-    if np.any(np.abs(tilt) > LARGEST_TILT + 2.0 * std):
+    if np.any(np.abs(tilt) > LARGEST_TILT + DOUBT * std):
         return f"a base that leans by {float(np.max(np.abs(tilt))):.2g} rad would be seen by eye"
     return None
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
-from scara_ident.errors import RobotError
 from scara_ident.model.regressor.recursion import JointGeometry, joint_geometry
+from scara_ident.robot.kinematics import place_of, tool_frame
 from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -74,25 +73,13 @@ def tool_of(robot: Robot, frame: str | None = None) -> Tool:
     RobotError
         If the URDF has no such frame, or no joint moves it.
     """
-    model = robot.model
-    if frame is None:
-        last = model.njoints - 1
-        candidates = [f for f in model.frames if f.parentJoint == last and f.type == pin.FrameType.BODY]
-        found = max(candidates, key=lambda f: float(np.linalg.norm(f.placement.translation)))
-    else:
-        names = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
-        if frame not in names:
-            raise RobotError(f"{robot.urdf}: no link {frame!r} for the tool; it has {', '.join(names)}")
-        found = model.frames[model.getFrameId(frame, pin.FrameType.BODY)]
-        if found.parentJoint == 0:
-            raise RobotError(f"{robot.urdf}: no identified joint moves {frame!r}; name a link that moves")
-    geometry = joint_geometry(model)
-    place = {int(velocity): joint for joint, velocity in enumerate(robot.order)}
+    found = tool_frame(robot, frame)
+    geometry = joint_geometry(robot.model)
     chain = []
     index = int(found.parentJoint)
     while index > 0:
         joint = geometry[index - 1]
-        chain.append((place[joint.velocity_index], joint))
+        chain.append((place_of(robot, index), joint))
         index = joint.parent
     return Tool(found.name, tuple(reversed(chain)), np.array(found.placement.translation), robot.n)
 

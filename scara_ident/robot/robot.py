@@ -107,6 +107,10 @@ class Robot:
         """Return the unit of the recorded torque of a joint after ``effort_gain``."""
         return "N" if self.prismatic[joint] and self.effort_side == "joint" else "N m"
 
+    def position_unit(self, joint: int) -> str:
+        """Return the unit of a joint's position."""
+        return "m" if self.prismatic[joint] else "rad"
+
     def standard_parameters(self) -> NDArray[np.float64]:
         """Return the nominal standard parameters of the URDF, shape (11 n,).
 

@@ -9,15 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.diagnose import Diagnosis, FoundEffect
-from scara_ident.diagnosis.search import DELAY
+from scara_ident.diagnosis.search import is_delay
+from scara_ident.effects.effect import OWN, View
 from scara_ident.estimation import Estimate
 from scara_ident.recording.recording import Recording
 from scara_ident.report.html.traces import Trace, traces
 
 Array = NDArray[np.float64]
-
-# The parameter of an effect that says over which distance after a reversal it acts.
-DISTANCES = {"presliding": "presliding_distance", "backlash": "width"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +33,10 @@ class Chapter:
     bands : sequence of float or None
     own_joint : str or None
         The joint that the effect belongs to; None where it belongs to no one joint.
+    view : View
+        What the effect is shown over.
+    corrected : bool
+        Whether it was corrected in the data, which changes no prediction.
     distance : float or None
         Over which the effect acts after a reversal, rad or m.
     """
@@ -46,15 +48,17 @@ class Chapter:
     after: Sequence[Trace]
     bands: Sequence[float | None]
     own_joint: str | None = None
+    view: View = OWN
+    corrected: bool = False
     distance: float | None = None
 
     @property
     def added(self) -> list[Array] | None:
         """What the effect adds to the prediction, net of what the other parameters give back, (N,) per part.
 
-        None for an effect that was corrected in the data, which changes no prediction.
+        None for an effect that was corrected in the data.
         """
-        if self.effect == DELAY:
+        if self.corrected:
             return None
         return [
             after.predicted[self.joint] - before.predicted[self.joint]
@@ -90,14 +94,14 @@ def chapters(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> list[tupl
     found: list[tuple[FoundEffect, Chapter]] = []
     for step in search.steps:
         candidate = step.decision.candidate
-        name, joint = candidate.effect.name, candidate.joint(search.scene)
-        if name == DELAY and joint is None:
+        name, joint, view = candidate.effect.name, candidate.joint(search.scene), candidate.effect.view
+        if is_delay(candidate):
             corrected = search.recordings
         after = _all_traces(step.estimate, corrected, search.bands)
         effect = diagnosis.effects[len(found)] if len(found) < len(diagnosis.effects) else None
         # Otherwise a correction too small to be called an effect.
         if effect is not None and (effect.effect, effect.joint) == (name, joint):
-            acts = effect.parameters.get(DISTANCES.get(name, ""))
+            acts = effect.parameters.get(view.distance or "")
             chapter = Chapter(
                 len(found) + 1,
                 name,
@@ -106,6 +110,8 @@ def chapters(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> list[tupl
                 after,
                 search.bands,
                 joint,
+                view,
+                is_delay(candidate),
                 None if acts is None else acts.value,
             )
             found.append((effect, chapter))

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from scara_ident.diagnosis.diagnose import Diagnosis, FoundEffect
+from scara_ident.diagnosis.diagnose import Diagnosis, FoundEffect, corrected
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
-from scara_ident.effects.measurement import shifted
 from scara_ident.recording.recording import Recording
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.html.candidates import candidate_blocks
@@ -71,8 +70,7 @@ def diagnosis_page(diagnosis: Diagnosis, recordings: Sequence[Recording], valida
     """Assemble the report of a diagnosis."""
     content = diagnosis_dict(diagnosis)
     robot, bands = diagnosis.robot, diagnosis.search.bands
-    delay = diagnosis.search.delay[0] if diagnosis.search.delay else 0.0
-    held_out = tuple(shifted(recording, delay) for recording in validation) if delay else tuple(validation)
+    held_out = corrected(diagnosis.search, validation)
     story = _story_blocks(diagnosis, content, recordings)
     kept, fitted = (
         [traces(diagnosis.after.model, diagnosis.after.value, recording, bands) for recording in group]

@@ -7,32 +7,8 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import FAMILY_ERROR, Decision
 from scara_ident.diagnosis.candidate_tests import WEAK
 from scara_ident.diagnosis.diagnose import Diagnosis
-from scara_ident.diagnosis.search import DELAY
-from scara_ident.effects.measurement import within_sampling
 from scara_ident.report.diagnosis import best_by_label
 
-# What brings each effect out against the others.
-EXPERIMENTS = {
-    "transmission_loss": "accelerate hard at low speed, then the same path with a known payload: a gear's loss grows with the load, friction does not",
-    "stribeck": "run at eight or more constant speeds, spaced by a constant factor down to creeping",
-    "asymmetric_friction": "run the same path in both directions at several constant speeds",
-    "presliding": "reverse often with small amplitude at two speeds: its memory is in angle, a delay's is in time",
-    "warm_up": "run the same trajectory cold and again after half an hour of motion, with the time of day recorded",
-    "torque_ripple": "move slowly at constant speed over several motor turns and record at a high rate",
-    "position_dependent_friction": "run over the whole stroke at constant speed in both directions: half the difference is friction",
-    "spring": "hold still, or creep, at positions over the whole range: a spring grows with the angle, a tilt follows its sine",
-    "base_tilt": "hold still, or creep, at positions over more than half a turn: a tilt follows the angle's sine, a spring the angle",
-    "payload_change": "repeat the run with the payload fastened, and once without it",
-    "time_delay": "run the same path at two speeds: a delay's error grows with the third power of speed",
-    "torque_sensor_nonlinearity": "hold a known load at several torques, or repeat with a payload at the same speed",
-    "torque_gain_mismatch": "repeat with a known payload: it gives both joints the same scale",
-    "joint_elasticity": "excite above 5 Hz with short steps, and look for a resonance that stays at its frequency",
-    "backlash": "reverse under little load, and look for the angle within which no torque is needed",
-    "encoder_eccentricity": "run at two constant speeds: an error of the encoder grows with the square of speed, ripple does not",
-    "friction_coupling": "move the other joint alone while this one holds still",
-    "offset_drift": "hold still for the length of a run, at its beginning and at its end",
-    "vibration": "record at rest with the drives on: what is periodic then does not come from the motion",
-}  # fmt: skip
 # Candidates of which more could be said with other recordings, at the most.
 MOST = 4
 MOST_LABELS = 3
@@ -40,6 +16,9 @@ MOST_LABELS = 3
 
 def next_experiments(diagnosis: Diagnosis) -> list[str]:
     """Return in words what to record next, the most useful first."""
+    search = diagnosis.search
+    decisions_taken = (*search.decisions, *(step.decision for step in search.steps))
+    experiment = {item.candidate.effect.name: item.candidate.effect.experiment for item in decisions_taken}
     found = []
     if diagnosis.unexplained is not None:
         remainder = diagnosis.unexplained
@@ -54,7 +33,7 @@ def next_experiments(diagnosis: Diagnosis) -> list[str]:
     for effect in diagnosis.effects:
         if effect.confounded_with:
             others = ", ".join(dict.fromkeys(confounder.label for confounder in effect.confounded_with))
-            found.append(f"To tell {_label(effect.effect, effect.joint)} from {others}: {_experiment(effect.effect)}.")
+            found.append(f"To tell {_label(effect.effect, effect.joint)} from {others}: {experiment[effect.effect]}.")
     if not diagnosis.fit_after:
         found.append("To know the noise floor: record every trajectory at least twice.")
     if not diagnosis.validation_before:
@@ -74,7 +53,7 @@ def next_experiments(diagnosis: Diagnosis) -> list[str]:
     for effect in diagnosis.effects:
         if effect.effect not in told:
             confirm.setdefault(effect.effect, []).append(_label(effect.effect, effect.joint))
-    found += [f"To confirm {' and '.join(labels)}: {_experiment(name)}." for name, labels in confirm.items()]
+    found += [f"To confirm {' and '.join(labels)}: {experiment[name]}." for name, labels in confirm.items()]
     for words, decisions in (
         ("To judge {}, significant but not accepted ({})", faint),
         ("To see {} at all, which these recordings cannot show", hidden),
@@ -86,15 +65,14 @@ def next_experiments(diagnosis: Diagnosis) -> list[str]:
         for name, members in list(by_effect.items())[:MOST]:
             labels = " and ".join(member.label for member in members[:MOST_LABELS])
             labels += f" and {len(members) - MOST_LABELS} more" if len(members) > MOST_LABELS else ""
-            found.append(f"{words.format(labels, members[0].why)}: {_experiment(name)}.")
+            found.append(f"{words.format(labels, members[0].why)}: {experiment[name]}.")
     return found
 
 
 def _significant(decision: Decision, diagnosis: Diagnosis) -> bool:
-    # What lies within a sample's period is how the recordings were made; no motion of the arm tells more of it.
-    name, joint = decision.candidate.effect.name, decision.candidate.member.joint
-    scene = diagnosis.search.scene
-    if name == DELAY and joint is not None and within_sampling(float(decision.examination.value[0]), scene.rate):
+    # Of what is negligible, such as a delay within a sample's period, no motion of the arm tells more.
+    effect, member, scene = decision.candidate.effect, decision.candidate.member, diagnosis.search.scene
+    if not effect.corrects_data(member) and effect.negligible(scene, member, decision.examination.value) is not None:
         return False
     return decision.examination.p_value * diagnosis.search.tried < FAMILY_ERROR
 
@@ -108,7 +86,3 @@ def _possible(decision: Decision, diagnosis: Diagnosis) -> bool:
 
 def _label(effect: str, joint: str | None) -> str:
     return effect if joint is None else f"{effect} of {joint}"
-
-
-def _experiment(effect: str) -> str:
-    return EXPERIMENTS.get(effect, "record the same path at two speeds, in both directions, with and without a payload")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +19,7 @@ from scara_ident.robot.robot import Robot
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class View:
-    """The signal over which an effect shows itself, and whether the residual is taken in the direction of motion."""
-
-    label: str
-    signal: Callable[[Robot, Trace, int], Array]
-    along: bool = False
-
-
-def _since_reversal(robot: Robot, trace: Trace, j: int) -> Array:
+def _since_reversal(trace: Trace, j: int) -> Array:
     turns = np.flatnonzero(np.diff(np.sign(trace.motion.v[j]))) + 1
     last = np.zeros(trace.motion.samples, dtype=int)
     last[turns] = turns
@@ -37,29 +27,20 @@ def _since_reversal(robot: Robot, trace: Trace, j: int) -> Array:
     return np.asarray(np.abs(q - q[np.maximum.accumulate(last)]))
 
 
-POSITION = View("position", lambda robot, trace, j: trace.motion.q[j])
-VELOCITY = View("velocity", lambda robot, trace, j: trace.motion.v[j])
-TIME = View("time since the start [s]", lambda robot, trace, j: trace.time)
-TORQUE = View("predicted torque", lambda robot, trace, j: trace.predicted[j])
-REVERSAL = View("travel since the last reversal", _since_reversal, along=True)
-VIEWS = {
-    "spring": POSITION,
-    "base_tilt": POSITION,
-    "position_dependent_friction": View("position", POSITION.signal, along=True),
-    "stribeck": VELOCITY,
-    "asymmetric_friction": VELOCITY,
-    "warm_up": View("time since the start [s]", TIME.signal, along=True),
-    "offset_drift": TIME,
-    "payload_change": TIME,
-    "torque_sensor_nonlinearity": TORQUE,
-    "torque_gain_mismatch": TORQUE,
-    "transmission_loss": View("size of the load", lambda robot, trace, j: np.abs(trace.load[j]), along=True),
-    "presliding": REVERSAL,
-    "backlash": REVERSAL,
-    "joint_elasticity": View("acceleration", lambda robot, trace, j: trace.motion.a[j]),
-    "time_delay": View(
-        "rate of the predicted torque", lambda robot, trace, j: np.gradient(trace.predicted[j]) * trace.motion.rate
+# Per signal of a view: its words, its unit, and what it is of a trace and a joint.
+SIGNALS: dict[str, tuple[str, str, Callable[[Trace, int], Array]]] = {
+    "position": ("position", "{position}", lambda trace, j: trace.motion.q[j]),
+    "velocity": ("velocity", "{position}/s", lambda trace, j: trace.motion.v[j]),
+    "acceleration": ("acceleration", "{position}/s²", lambda trace, j: trace.motion.a[j]),
+    "time": ("time since the start", "s", lambda trace, j: trace.time),
+    "torque": ("predicted torque", "{torque}", lambda trace, j: trace.predicted[j]),
+    "torque rate": (
+        "rate of the predicted torque",
+        "{torque}/s",
+        lambda trace, j: np.gradient(trace.predicted[j]) * trace.motion.rate,
     ),
+    "load": ("size of the load", "{torque}", lambda trace, j: np.abs(trace.load[j])),
+    "reversal": ("travel since the last reversal", "{position}", _since_reversal),
 }
 ADDED = "what it adds to the prediction"
 LEFT = "measured less the rest of the model"
@@ -68,8 +49,6 @@ LAW = "the effect as found"
 SHOWN_DISTANCES = 8.0
 # Samples after reversals that the figure holds at least, where the distance is short.
 LEAST_NEAR = 1000
-BY_ORDER = ("torque_ripple", "encoder_eccentricity")
-BY_FREQUENCY = ("vibration",)
 
 
 def chapter_group(robot: Robot, chapter: Chapter) -> Group:
@@ -107,23 +86,25 @@ def _squares(trace: Trace, j: int) -> float:
 
 def _telling(robot: Robot, chapter: Chapter) -> Figure | None:
     name, unit = f"effect-{chapter.number}-view", robot.torque_unit(chapter.joint)
-    if chapter.effect in BY_ORDER:
+    view, j = chapter.view, chapter.joint
+    if view.signal == "order":
         return _by_order(robot, chapter, name, unit)
-    if chapter.effect in BY_FREQUENCY:
+    if view.signal == "frequency":
         return _by_frequency(chapter, name, unit)
-    view = VIEWS.get(chapter.effect)
-    if view is None:
+    if view.signal not in SIGNALS:
+        # Over its own torque every effect is shown.
         return None
-    j = chapter.joint
-    plots = [[view.signal(robot, trace, j) for trace in traces] for traces in (chapter.before, chapter.after)]
-    plot = _means_plot(robot, chapter, plots[0], plots[1], _with_unit(robot, view, j), view)
+    label, signal_unit, signal = SIGNALS[view.signal]
+    before, after = ([signal(trace, j) for trace in traces] for traces in (chapter.before, chapter.after))
+    axis = f"{label} [{signal_unit.format(position=robot.position_unit(j), torque=unit)}]"
+    plot = _means_plot(robot, chapter, before, after, axis)
     words = "Means with two standard errors"
     if view.along:
         words += ", in the direction of motion"
     words += "."
     if chapter.own is not None:
         words += " Above: torque that the rest of the model leaves to the effect. Below: the residual; before the effect came in, other parameters had bent to stand for it."
-    return single(name, f"{robot.joints[j]} over {view.label.split(' [')[0]}", words, plot)
+    return single(name, f"{robot.joints[j]} over {label}", words, plot)
 
 
 def _own(robot: Robot, chapter: Chapter) -> Figure | None:
@@ -154,12 +135,11 @@ def _means_plot(
     x_before: Sequence[Array],
     x_after: Sequence[Array],
     label: str,
-    view: View,
 ) -> Plot:
-    j = chapter.joint
+    j, view = chapter.joint, chapter.view
     after = kept(chapter.after, x_after, j)
     limits = middle_range(after)
-    if view is REVERSAL:
+    if view.signal == "reversal":
         # Most of the way to the next reversal has nothing to tell.
         far = SHOWN_DISTANCES * chapter.distance if chapter.distance else 0.0
         enough = float(np.quantile(after, min(1.0, LEAST_NEAR / max(1, len(after)))))
@@ -174,7 +154,7 @@ def _means_plot(
         layers.append(Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, color))
         layers.append(Line(means.x, means.y, color, name, 1.8))
     added = chapter.added
-    law = _law(chapter, after, limits, view)
+    law = _law(chapter, after, limits)
     if added is not None:
         turned = [part * _direction(trace, j, view.along) for part, trace in zip(added, chapter.after, strict=True)]
         means = binned_means(after, kept(chapter.after, turned, j), limits, 30)
@@ -185,9 +165,9 @@ def _means_plot(
     return Plot(label, panels, limits)
 
 
-def _law(chapter: Chapter, x: Array, limits: tuple[float, float], view: View) -> list[Layer]:
+def _law(chapter: Chapter, x: Array, limits: tuple[float, float]) -> list[Layer]:
     """The effect's torque over its signal, and what measured torque leaves to it."""
-    j, own = chapter.joint, chapter.own
+    j, own, view = chapter.joint, chapter.own, chapter.view
     if own is None:
         return []
     layers: list[Layer] = []
@@ -205,21 +185,6 @@ def _law(chapter: Chapter, x: Array, limits: tuple[float, float], view: View) ->
 
 def _direction(trace: Trace, j: int, along: bool) -> Array | float:
     return np.sign(trace.motion.v[j]) if along else 1.0
-
-
-def _with_unit(robot: Robot, view: View, j: int) -> str:
-    length = "m" if robot.prismatic[j] else "rad"
-    torque = robot.torque_unit(j)
-    units = {
-        "position": length,
-        "velocity": f"{length}/s",
-        "acceleration": f"{length}/s²",
-        "predicted torque": torque,
-        "size of the load": torque,
-        "travel since the last reversal": length,
-        "rate of the predicted torque": f"{torque}/s",
-    }
-    return f"{view.label} [{units[view.label]}]" if view.label in units else view.label
 
 
 def _by_order(robot: Robot, chapter: Chapter, name: str, unit: str) -> Figure | None:

@@ -1,0 +1,99 @@
+"""What an effect is described by: its members, coefficients and parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A physical parameter of an effect: its value, standard deviation and unit."""
+
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class NonlinearParameter:
+    """A nonlinear parameter of an effect.
+
+    Attributes
+    ----------
+    name : str
+        As in the table of effects; with an underscore before it, it shapes the columns and is not reported.
+    unit : str
+    lower, upper : float
+        What a real arm can have; refinement stays within.
+    logarithmic : bool
+        Whether it is scanned and refined on a logarithmic scale.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    logarithmic: bool = True
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """One linear coefficient of an effect: what its column is called.
+
+    Attributes
+    ----------
+    name : str
+    unit, meaning : str
+        May hold the words of `Effect.words`: ``{joint}``, ``{torque}`` and ``{position}`` (its units), ``{partner}``,
+        and nonlinear parameters by name, such as ``{order:g}``.
+    positive : str
+        Why it cannot be negative on a real arm; empty where it can.
+    """
+
+    name: str
+    unit: str = "{torque}"
+    meaning: str = ""
+    positive: str = ""
+
+
+@dataclass(frozen=True)
+class Member:
+    """One member of a family: a joint and values of the nonlinear parameters.
+
+    Attributes
+    ----------
+    joint : int or None
+        Place of the joint in ``robot.joints``; None where the effect belongs to no one joint.
+    nonlinear : tuple of float
+        One value per parameter of the family.
+    partner : int or None
+        A second joint, for effects of one joint on another; of an effect without a joint the number of a group.
+    """
+
+    joint: int | None
+    nonlinear: tuple[float, ...] = ()
+    partner: int | None = None
+
+    @property
+    def place(self) -> int:
+        """Place of its joint; an error for a member that belongs to no one joint."""
+        if self.joint is None:
+            raise ValueError(f"{self} belongs to no one joint")
+        return self.joint
+
+    @property
+    def partner_place(self) -> int:
+        """Place of its partner; an error for a member without one."""
+        if self.partner is None:
+            raise ValueError(f"{self} has no partner")
+        return self.partner
+
+
+def deviation(covariance: Array, place: int = 0) -> float:
+    """Return the standard deviation of one coefficient."""
+    return float(np.sqrt(max(covariance[place, place], 0.0)))

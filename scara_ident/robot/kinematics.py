@@ -1,0 +1,55 @@
+"""How the joints of a robot hang together: which carries which, about which axis, and where the tool is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from scara_ident.errors import RobotError
+from scara_ident.robot.robot import Robot
+
+
+def place_of(robot: Robot, joint_id: int) -> int:
+    """Return the place in ``robot.joints`` of a joint of the Pinocchio model; -1 for the base."""
+    return int(np.flatnonzero(robot.order == joint_id - 1)[0]) if joint_id > 0 else -1
+
+
+def parent(robot: Robot, joint: int) -> int:
+    """Return the place of the joint that carries a joint; -1 for the base."""
+    return place_of(robot, int(robot.model.parents[int(robot.order[joint]) + 1]))
+
+
+def axis(robot: Robot, data: pin.Data, joint: int) -> NDArray[np.float64]:
+    """Return the axis of a revolute joint in the base frame, at the configuration last computed."""
+    joint_id = int(robot.order[joint]) + 1
+    subspace = robot.model.joints[joint_id].createData().S
+    direction = np.asarray(subspace).reshape(6, -1)[3:, 0]
+    return np.asarray(data.oMi[joint_id].rotation @ direction)
+
+
+def tool_frame(robot: Robot, link: str | None = None) -> pin.Frame:
+    """Return the frame of the tool.
+
+    Parameters
+    ----------
+    robot : Robot
+    link : str, optional
+        A link of the URDF; without it the one that is farthest out on the last joint.
+
+    Raises
+    ------
+    RobotError
+        If the URDF has no such link, or no identified joint moves it.
+    """
+    bodies = [frame for frame in robot.model.frames if frame.type == pin.FrameType.BODY]
+    if link is None:
+        last = [frame for frame in bodies if frame.parentJoint == robot.model.njoints - 1]
+        return max(last, key=lambda frame: float(np.linalg.norm(frame.placement.translation)))
+    found = next((frame for frame in bodies if frame.name == link), None)
+    if found is None:
+        names = ", ".join(frame.name for frame in bodies)
+        raise RobotError(f"{robot.urdf}: no link {link!r} for the tool; it has {names}")
+    if found.parentJoint == 0:
+        raise RobotError(f"{robot.urdf}: no identified joint moves {link!r}; name a link that moves")
+    return found
