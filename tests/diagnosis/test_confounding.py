@@ -8,10 +8,9 @@ import numpy as np
 
 from scara_ident.diagnosis.confounding import confounders
 from scara_ident.diagnosis.search import search
-from scara_ident.effects import Member
+from scara_ident.effects import Coefficient, Effect
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.position import Spring
-from scara_ident.model.terms import Column
 from tests.diagnosis.made import BANDS, complete, exact_runs, with_torque
 
 MIDDLE = 1.57
@@ -19,29 +18,18 @@ STIFFNESS = 0.3
 
 
 @dataclass(frozen=True)
-class Pendulum:
+class Pendulum(Effect):
     """What gravity does to a joint of a base that stands on edge: the sine of the angle where a spring has the angle."""
 
     name = "pendulum"
-    nonlinear = ()
+    summary = "pendulum"
+    coefficients = (Coefficient("moment", "N m", "moment of gravity", "it would push up"),)
 
-    def members(self, scene):
-        return (Member(0),)
+    def joints(self, scene):
+        return [0]
 
-    def columns(self, scene, member):
-        return (Column("moment", "joint1", "N m", "moment of gravity", True),)
-
-    def regressor(self, signals, member):
-        return signals.row(0, [np.sin(signals.motion.q[0] - MIDDLE)])
-
-    def inadmissible(self, scene, member, value, std):
-        return None
-
-    def parameters(self, scene, member, value, covariance):
-        return {}
-
-    def description(self, scene, member):
-        return "pendulum"
+    def signal_columns(self, signals, member):
+        return [np.sin(signals.motion.q[0] - MIDDLE)]
 
 
 def groups(size: float, added) -> dict[str, dict[str, float]]:

@@ -10,13 +10,12 @@ from numpy.testing import assert_array_equal
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.model_selection import joint_rms
-from scara_ident.effects import CATALOGUE, Member, Parameter
+from scara_ident.effects import CATALOGUE, Coefficient, Effect
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.position import Spring
 from scara_ident.errors import UsageError
-from scara_ident.model.terms import Column
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, RATE, complete, exact_runs, held_out_run, virtual_runs, with_torque
 
@@ -25,29 +24,15 @@ DELAYS = (TimeDelay(), Spring(), Stribeck(), AsymmetricFriction())
 
 
 @dataclass(frozen=True)
-class Lobes:
+class Lobes(Effect):
     """A user's own effect: two lobes per turn of the joint."""
 
     name = "lobes"
-    nonlinear = ()
+    summary = "two lobes per turn"
+    coefficients = (Coefficient("size", "N m", "lobes", "it would pull"),)
 
-    def members(self, scene):
-        return tuple(Member(j) for j in range(scene.robot.n))
-
-    def columns(self, scene, member):
-        return (Column("size", scene.robot.joints[member.joint], "N m", "lobes", True),)
-
-    def regressor(self, signals, member):
-        return signals.row(member.joint, [np.sin(2.0 * signals.motion.q[member.joint])])
-
-    def inadmissible(self, scene, member, value, std):
-        return None
-
-    def parameters(self, scene, member, value, covariance):
-        return {"size": Parameter(float(value[0]), float(np.sqrt(covariance[0, 0])), "N m")}
-
-    def description(self, scene, member):
-        return "two lobes per turn"
+    def signal_columns(self, signals, member):
+        return [np.sin(2.0 * signals.motion.q[member.place])]
 
 
 def test_a_clean_set_is_complete():

@@ -15,7 +15,6 @@ from scara_ident.effects.friction import (
     FrictionCoupling,
     PositionDependentFriction,
     Stribeck,
-    amplitude_and_phase,
     friction_of,
 )
 from scara_ident.model.model import build_model
@@ -134,17 +133,6 @@ def test_an_offset_is_no_drift_where_the_model_has_none():
     assert "offset" in (drift.inadmissible(scene, member, np.array([0.0, 0.1]), np.array([0.01, 0.01])) or "")
     assert drift.inadmissible(scene, member, np.array([0.1, 0.1]), np.array([0.01, 0.01])) is None
     assert len(EffectTerm(drift, member, scene_of(load_robot())).columns) == 1
-
-
-def test_amplitude_and_phase_have_the_deviations_of_a_sample():
-    rng = np.random.default_rng(0)
-    covariance = np.array([[4e-4, 1e-4], [1e-4, 2e-4]])
-    draws = rng.multivariate_normal([0.3, -0.4], covariance, 20000)
-    both = np.array([[part[0] for part in amplitude_and_phase(draw, covariance)] for draw in draws])
-    (amplitude, spread), (phase, turn) = amplitude_and_phase(np.array([0.3, -0.4]), covariance)
-    x = np.linspace(0.0, 6.0, 50)
-    assert amplitude * np.sin(x + phase) == pytest.approx(0.3 * np.sin(x) - 0.4 * np.cos(x))
-    assert [spread, turn] == pytest.approx(both.std(axis=0), rel=0.03)
 
 
 @pytest.mark.parametrize(

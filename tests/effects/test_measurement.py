@@ -13,7 +13,7 @@ from scara_ident.effects.measurement import (
     TorqueGainMismatch,
     TorqueSensorNonlinearity,
     shifted,
-    within_sampling,
+    shifted_signal,
 )
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import Recording
@@ -143,5 +143,24 @@ def test_shifting_copes_with_jitter_and_does_not_cross_gaps():
 
 
 def test_a_sample_more_or_less_is_how_torque_is_sampled():
-    assert within_sampling(-0.0007, 1000.0)
-    assert not within_sampling(0.0014, 1000.0)
+    scene = scene_of(load_robot(), rate=1000.0)
+    for member in (Member(0), Member(None)):
+        assert "less than one sample" in TimeDelay().negligible(scene, member, np.array([-0.0007]))
+        assert TimeDelay().negligible(scene, member, np.array([0.0014])) is None
+    assert "-0.7 ms" in TimeDelay().negligible(scene, Member(None), np.array([-0.0007]))
+    assert TorqueGainMismatch().negligible(scene, Member(1), np.array([1e-9])) is None
+
+
+@pytest.mark.parametrize("joint", [None, 1])
+def test_a_delay_is_taken_out_of_recordings_and_of_uniform_torque_alike(joint: int | None):
+    robot, time = load_robot(), np.arange(2000) / 1000.0
+    item = recording(robot, "t_1", time, np.zeros((2, 2000)), tones(time))
+    effect, member, value = TimeDelay(), Member(joint), np.array([0.0031])
+    assert effect.corrects_data(member) == (joint is None)
+    recorded = effect.corrected(item, member, value).effort
+    uniform = effect.corrected_torque(item.effort, 1000.0, member, value)
+    np.testing.assert_allclose(uniform, recorded, rtol=0.0, atol=1e-12)
+    assert np.array_equal(recorded[0], item.effort[0]) == (joint == 1)
+    np.testing.assert_array_equal(shifted_signal(item.effort[1:], 1000.0, 0.0031), uniform[1:])
+    assert not effect.settled(value)
+    assert effect.settled(np.array([1e-6]))

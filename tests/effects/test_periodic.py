@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scara_ident.effects import Member
+from scara_ident.effects import Member, SpectralLine
 from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
 from scara_ident.model.model import build_model
 from scara_ident.motion.motion import Motion
@@ -91,8 +91,11 @@ def test_members_are_those_that_can_be_seen():
     short = replace(scene, travel=np.array([0.03, 2.0]))
     assert {member.joint for member in EncoderEccentricity().members(short)} == {1}
     assert Vibration().members(scene) == ()
-    assert Vibration().at(scene, 1, 7.5) == (Member(1, (7.5,)),)
-    assert Vibration().at(scene, 1, 0.01) == ()
+    assert Vibration().seeds(scene, 1, SpectralLine("frequency", 7.5)) == (Member(1, (7.5,)),)
+    assert Vibration().seeds(scene, 1, SpectralLine("frequency", 0.01)) == ()
+    assert Vibration().seeds(scene, 1, SpectralLine("order", 7.5)) == ()
+    assert TorqueRipple().seeds(scene, 0, SpectralLine("order", 1.37)) == (Member(0, (1.37,)),)
+    assert TorqueRipple().seeds(scene, 0, SpectralLine("frequency", 1.37)) == ()
     assert TorqueRipple().resolution(scene, Member(0, (2.0,)))[0] == pytest.approx(2.0 * np.pi / 200.0)
 
 
