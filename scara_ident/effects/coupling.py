@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import DOUBT, Effect
+from scara_ident.effects.effect import Effect
 from scara_ident.effects.parameters import Coefficient, Member
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.spanned import Span, random_motion, rows_by_sample
@@ -22,7 +21,6 @@ Array = NDArray[np.float64]
 REACH = 2
 
 
-@dataclass(frozen=True)
 class InertiaCoupling(Effect):
     """Inertia that two joints turn together: torque of one proportional to the other's acceleration, both ways.
 
@@ -56,7 +54,6 @@ class InertiaCoupling(Effect):
         ]  # fmt: skip
 
 
-@dataclass(frozen=True)
 class DriveCoupling(Effect):
     """A drive that also carries a share of another joint's torque.
 
@@ -66,7 +63,12 @@ class DriveCoupling(Effect):
 
     name = "drive_coupling"
     summary = "a drive that carries a share of the torque of {partner}"
-    coefficients = (Coefficient("share", "1", "share of the torque of {partner} on {joint}, both at the joint"),)
+    coefficients = (
+        Coefficient(
+            "share", "1", "share of the torque of {partner} on {joint}, both at the joint",
+            largest=1.0, too_large="more than all of the other joint's torque would be shared",
+        ),
+    )  # fmt: skip
     follows_estimate = True
     not_simulated = "the virtual arm's motors drive one joint each"
 
@@ -80,11 +82,6 @@ class DriveCoupling(Effect):
         j, k = member.place, member.partner_place
         scale = signals.scene.robot.row_scale
         return [signals.predicted[k] * (scale[j] / scale[k])]
-
-    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Say so where a share is more than the whole."""
-        too_much = abs(value[0]) > 1.0 + DOUBT * std[0]
-        return "more than all of the other joint's torque would be shared" if too_much else None
 
 
 def _exchanged(scale: Array, a: Array, j: int, k: int) -> Array:

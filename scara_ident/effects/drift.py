@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,6 @@ MOST_WARM_UP = 3.0
 LEAST_DRIFT = 3.0
 
 
-@dataclass(frozen=True)
 class WarmUp(Effect):
     """Friction that is larger when a run starts: the steady friction times ``1 + share exp(-t/time_constant)``.
 
@@ -42,6 +40,7 @@ class WarmUp(Effect):
         Coefficient(
             "share", "1", "further friction of {joint} at the start of a run, as a share",
             "friction would be smaller when the run starts",
+            MOST_WARM_UP, f"friction would fall to less than a {1.0 + MOST_WARM_UP:.0f}th in the run",
         ),
     )  # fmt: skip
     nonlinear = (NonlinearParameter("time_constant", "s", 0.05, 1e5),)
@@ -63,17 +62,11 @@ class WarmUp(Effect):
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where friction rises, or falls by too much or too late."""
-        rises = super().inadmissible(scene, member, value, std)
-        if rises is not None:
-            return rises
-        if value[0] - DOUBT * std[0] > MOST_WARM_UP:
-            return f"friction would fall to less than a {1.0 + MOST_WARM_UP:.0f}th in the run"
-        if member.nonlinear[0] > LONGEST_WARM_UP * scene.duration:
-            return "the recordings are too short to see it end"
-        return None
+        late = member.nonlinear[0] > LONGEST_WARM_UP * scene.duration
+        wrong = super().inadmissible(scene, member, value, std)
+        return wrong or ("the recordings are too short to see it end" if late else None)
 
 
-@dataclass(frozen=True)
 class OffsetDrift(Effect):
     """A torque offset that grows in the run: ``u = rate t``, t from the start of each recording."""
 

@@ -70,7 +70,8 @@ class Effect(ABC):
 
     A subclass gives at least ``name``, ``summary``, ``coefficients`` and `signal_columns`; it then acts on the torque
     of one joint, has one member per moving joint and value of its nonlinear parameters, and its coefficients are its
-    physical parameters. Families without fields of their own are equal where they are of one class.
+    physical parameters. A family without fields of its own needs no decorator: one is as good
+    as another, and they are equal where they are of one class.
 
     Attributes
     ----------
@@ -181,12 +182,12 @@ class Effect(ABC):
 
         A coefficient within two standard deviations of what is possible is possible.
         """
-        wrong = (
-            item.positive
-            for item, x, spread in zip(self.coefficients, value, std, strict=False)
-            if item.positive and x < -DOUBT * spread
-        )
-        return next(wrong, None)
+        for item, x, spread in zip(self.coefficients, value, DOUBT * std, strict=False):
+            if item.positive and x < -spread:
+                return item.positive
+            if abs(x) > item.largest + spread:
+                return item.too_large.format(value=x, **self.words(scene, member))
+        return None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Turn coefficients (k,) and their covariance (k, k) into the effect's physical parameters.

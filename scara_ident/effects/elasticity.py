@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,7 +32,6 @@ WIDTHS = (3e-4, 1e-3, 3e-3)
 LARGEST_WIDTH = 0.05
 
 
-@dataclass(frozen=True)
 class BehindGear(Effect):
     """A link that does not follow its motor, which all joints feel."""
 
@@ -53,7 +51,6 @@ class BehindGear(Effect):
         return np.maximum(link_inertia(signals, member.place), 0.1 * usual), usual
 
 
-@dataclass(frozen=True)
 class JointElasticity(BehindGear):
     """An elastic gear with the encoder on the motor: the link lags by x.
 
@@ -161,7 +158,6 @@ def swing(torque: Array, inertia: Array, stiffness: float, damping: float, step:
     return x, first, (torque - damping * first - stiffness * x) / inertia
 
 
-@dataclass(frozen=True)
 class Backlash(BehindGear):
     """Clearance between motor and link: ``q_link = q - width s(t)``, where s is one half on either flank.
 
@@ -174,8 +170,11 @@ class Backlash(BehindGear):
     name = "backlash"
     summary = "clearance in the gear"
     coefficients = (
-        Coefficient("width", "{position}", "clearance in the gear of {joint}", "the clearance would be negative"),
-    )
+        Coefficient(
+            "width", "{position}", "clearance in the gear of {joint}", "the clearance would be negative",
+            LARGEST_WIDTH, "a clearance of {value:.2g} {position} would rattle by hand",
+        ),
+    )  # fmt: skip
     nonlinear = (NonlinearParameter("crossing_width", "rad", 1e-5, LARGEST_WIDTH),)
     view = View("reversal", along=True, distance="width")
     experiment = "reverse under little load, and look for the angle within which no torque is needed"
@@ -192,12 +191,6 @@ class Backlash(BehindGear):
             return [np.zeros_like(signals.motion.q)]
         place = flank(_load(signals, j) / inertia, member.nonlinear[0], 1.0 / signals.motion.rate)
         return [lagging(signals, j, _differentiated(signals, place, LAG_BAND))]
-
-    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Say so where a clearance is not open, or not small."""
-        if value[0] > LARGEST_WIDTH + DOUBT * std[0]:
-            return f"a clearance of {value[0]:.2g} {scene.robot.position_unit(member.place)} would rattle by hand"
-        return super().inadmissible(scene, member, value, std)
 
 
 def _load(signals: Signals, joint: int) -> Array:

@@ -56,7 +56,6 @@ def friction_slope(signals: Signals, joint: int) -> Array:
     return np.asarray(slope * signals.scene.robot.drive_sign[joint])
 
 
-@dataclass(frozen=True)
 class Stribeck(Effect):
     """More friction at low speed: ``u = amplitude sign(v) exp(-(v/velocity)^2)``.
 
@@ -97,7 +96,6 @@ class Stribeck(Effect):
         return None
 
 
-@dataclass(frozen=True)
 class AsymmetricFriction(Effect):
     """Viscous friction that differs by direction of the drive: ``u = viscous_difference/2 |v|``.
 
@@ -128,7 +126,6 @@ class AsymmetricFriction(Effect):
         return None
 
 
-@dataclass(frozen=True)
 class PositionDependentFriction(Sinusoid):
     """Coulomb friction that varies once per turn of the joint: a0 times ``1 + share sin(q + phase)``.
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import DOUBT, Effect, View
+from scara_ident.effects.effect import Effect, View
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter
 from scara_ident.effects.signals import Scene, Signals
 
@@ -18,7 +17,6 @@ Array = NDArray[np.float64]
 MOST_LOST = 0.75
 
 
-@dataclass(frozen=True)
 class TransmissionLoss(Effect):
     """A share of the transmitted torque is lost in the gear, against the motion.
 
@@ -35,6 +33,7 @@ class TransmissionLoss(Effect):
         Coefficient(
             "loss_coefficient", "1", "share of the transmitted torque lost in {joint}",
             "a gear cannot give energy: the lost share is negative",
+            MOST_LOST, "over three quarters of the torque would be lost",
         ),
     )  # fmt: skip
     nonlinear = (NonlinearParameter("_lost_share", "1", 0.005, MOST_LOST),)
@@ -56,9 +55,3 @@ class TransmissionLoss(Effect):
     def geared_joint(self, member: Member) -> int:
         """Return its joint."""
         return member.place
-
-    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Say so where a gear gives energy or passes on hardly any."""
-        if value[0] > MOST_LOST + DOUBT * std[0]:
-            return "over three quarters of the torque would be lost"
-        return super().inadmissible(scene, member, value, std)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -32,7 +32,6 @@ SAMPLING = 1.0
 DELAY_STEP = 2e-5
 
 
-@dataclass(frozen=True)
 class TorqueSensorNonlinearity(Effect):
     """A torque channel that is not straight: ``recorded = u + cubic u^3``.
 
@@ -66,7 +65,6 @@ class TorqueSensorNonlinearity(Effect):
         return None
 
 
-@dataclass(frozen=True)
 class TorqueGainMismatch(Effect):
     """A torque scale that differs from the first joint's: ``recorded = ratio u``.
 
@@ -76,7 +74,13 @@ class TorqueGainMismatch(Effect):
 
     name = "torque_gain_mismatch"
     summary = "a torque scale that differs from the first joint's"
-    coefficients = (Coefficient("ratio_less_one", "1", "torque scale of {joint} over the first joint's, less 1"),)
+    coefficients = (
+        Coefficient(
+            "ratio_less_one", "1", "torque scale of {joint} over the first joint's, less 1",
+            largest=LARGEST_MISMATCH,
+            too_large="a torque scale that differs by {value:+.0%} from the first joint's is no mismatch",
+        ),
+    )  # fmt: skip
     follows_estimate = True
     view = View("torque")
     experiment = "repeat with a known payload: it gives both joints the same scale"
@@ -89,18 +93,11 @@ class TorqueGainMismatch(Effect):
         """Return the predicted torque."""
         return [signals.predicted[member.place]]
 
-    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Say so where torque constants of one arm are too far apart."""
-        if abs(value[0]) > LARGEST_MISMATCH + DOUBT * std[0]:
-            return f"a torque scale that differs by {value[0]:+.0%} from the first joint's is no mismatch"
-        return None
-
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return the ratio."""
         return {"ratio": Parameter(1.0 + float(value[0]), deviation(covariance), "1")}
 
 
-@dataclass(frozen=True)
 class TimeDelay(Effect):
     """Effort that is recorded later than position: ``recorded(t) = u(t - delay)``, of all joints or of one.
 

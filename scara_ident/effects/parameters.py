@@ -53,12 +53,18 @@ class Coefficient:
         and nonlinear parameters by name, such as ``{order:g}``.
     positive : str
         Why it cannot be negative on a real arm; empty where it can.
+    largest : float
+        Size that it has at the most on a real arm.
+    too_large : str
+        What is wrong with a larger one; may hold ``{value}`` and the words.
     """
 
     name: str
     unit: str = "{torque}"
     meaning: str = ""
     positive: str = ""
+    largest: float = np.inf
+    too_large: str = ""
 
 
 @dataclass(frozen=True)

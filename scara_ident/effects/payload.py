@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -39,7 +38,6 @@ MOST_GROUPS = 24
 SHORTEST_ARM = 0.1
 
 
-@dataclass(frozen=True)
 class PayloadChange(Effect):
     """A mass at the tool point that is there from some time in the run on; negative where it was put down."""
 
@@ -63,7 +61,6 @@ class PayloadChange(Effect):
         return _too_heavy(scene, float(value[0]), float(std[0]))
 
 
-@dataclass(frozen=True)
 class FreePayloadChange(PayloadChange):
     """A body that the last link carries from some time in the run on, mounted anyhow.
 
@@ -114,7 +111,6 @@ class FreePayloadChange(PayloadChange):
         return dict(zip(names, found, strict=True))
 
 
-@dataclass(frozen=True)
 class PayloadOfRecordings(PayloadChange):
     """A mass at the tool point in some recordings and not in others.
 
@@ -147,7 +143,6 @@ class PayloadOfRecordings(PayloadChange):
         return _groups_of(tuple(ordered))
 
 
-@dataclass(frozen=True)
 class GravityCounterbalance(Sinusoid):
     """A spring or weight that balances a joint: ``u = a sin q + b cos q``.
 

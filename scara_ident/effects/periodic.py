@@ -35,7 +35,6 @@ SPEED_STEP = 1e-4
 LARGEST_ECCENTRICITY = 0.1
 
 
-@dataclass(frozen=True)
 class PerMotorTurn(Sinusoid):
     """What repeats with the motor's angle, ``order`` times per turn."""
 
@@ -55,7 +54,6 @@ class PerMotorTurn(Sinusoid):
         return (_order_resolution(scene, member.place),)
 
 
-@dataclass(frozen=True)
 class TorqueRipple(PerMotorTurn):
     """A torque periodic in the motor's angle: ``u = amplitude sin(order theta_m + phase)``, theta_m = N q.
 
@@ -81,7 +79,6 @@ class TorqueRipple(PerMotorTurn):
         return "the ripple would be larger than the torque limit" if least_amplitude(value, std) > limit else None
 
 
-@dataclass(frozen=True)
 class EncoderEccentricity(PerMotorTurn):
     """An encoder that errs periodically with the motor: it reads ``q + e``, ``e = amplitude sin(order theta_m + phase)``.
 

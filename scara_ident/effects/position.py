@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,6 @@ from scara_ident.model.terms.friction import Offset
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
 class Spring(Effect):
     """A cable or hose that pulls a joint to a rest position: ``u = k (q - q0)``.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,6 @@ MOST_OF_COULOMB = 1.5
 LEAST_REVERSAL = 0.02
 
 
-@dataclass(frozen=True)
 class Presliding(Effect):
     """Coulomb friction that follows a state z instead of sign(v) (Dahl 1968).
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -115,10 +115,3 @@ class Signals:
     def motor_turns(self) -> Array:
         """Motor angle in rad of each joint, N q, shape (n, N)."""
         return self.scene.robot.reduction[:, None] * self.motion.q
-
-    def row(self, joint: int, columns: Sequence[Array]) -> Array:
-        """Return columns that act on one joint, shape (n, k, N)."""
-        result = np.zeros((self.scene.robot.n, len(columns), self.motion.samples))
-        for k, column in enumerate(columns):
-            result[joint, k] = column
-        return result

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -46,7 +45,6 @@ def sine_and_cosine(name: str, meaning: str, unit: str = "{torque}") -> tuple[Co
     return sine, cosine
 
 
-@dataclass(frozen=True)
 class Sinusoid(Effect):
     """A family whose two coefficients are those of a sine and a cosine, reported as amplitude and phase."""
 

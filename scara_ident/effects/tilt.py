@@ -123,7 +123,6 @@ def _parts(signals: Signals) -> Array:
     return shared(signals, "tilt", make)
 
 
-@dataclass(frozen=True)
 class _Tilt(Effect):
     """What both ways to tell a tilt share."""
 
@@ -134,7 +133,6 @@ class _Tilt(Effect):
     experiment = "hold still, or creep, at positions over more than half a turn: a tilt follows the angle's sine, a spring the angle"
 
 
-@dataclass(frozen=True)
 class BaseTilt(_Tilt):
     """Gravity's components -g tilt_x and -g tilt_y along the base's x and y axes.
 
@@ -189,7 +187,6 @@ class BaseTilt(_Tilt):
         }
 
 
-@dataclass(frozen=True)
 class NominalBaseTilt(_Tilt):
     """The same with the URDF's first moments, but for one factor, for those that a level base does not show.
 
