@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from scara_ident.effects import Member, Signals
 from scara_ident.effects.elasticity import Backlash, JointElasticity, flank, swing
-from scara_ident.effects.links import lagging, link_inertia, usual_link_inertia
+from scara_ident.effects.links import lagging, usual_link_inertia
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
-from tests.arms import example_urdf, rnea
 from tests.effects.scenes import columns, fit, moving, scene_of, wandering
 
 
@@ -56,33 +54,6 @@ def test_a_push_too_short_to_cross_brings_the_link_back_to_its_flank():
     assert 0.45 < place[1000:1100].min() < 0.5
     assert np.all(place[1100:] == 0.5)
     assert np.all(flank(drift[::-1].copy() * -1.0, 1e-2, 1e-3)[:1900] == -0.5)
-
-
-@pytest.mark.parametrize("name", ["scara03", "ur5"])
-def test_a_lagging_link_loads_all_joints_as_pinocchio_says(name: str):
-    robot = load_robot() if name == "scara03" else load_robot(example_urdf("ur5_robot.urdf"))
-    scene, item = scene_of(robot), moving(robot, 1.0)
-    joint, w = 1, 30.0
-    lag = (1e-3 * np.sin(w * item.time), 1e-3 * w * np.cos(w * item.time), -1e-3 * w**2 * np.sin(w * item.time))
-    changed = lagging(Signals(scene, item), joint, lag)
-    size = 1e-3
-    ends = []
-    for side in (1.0, -1.0):
-        moved = [part.copy() for part in (item.q, item.v, item.a)]
-        for part, change in zip(moved, lag, strict=True):
-            part[joint] -= side * size * change
-        ends.append(rnea(robot, *moved))
-    expected = (ends[0] - ends[1]) / (2.0 * size) * robot.row_scale[:, None]
-    assert np.abs(changed - expected).max() < 1e-3 * np.abs(expected).max()
-
-
-def test_inertia_of_the_link_is_the_mass_matrix_without_the_rotor():
-    robot = load_robot()
-    scene, item = scene_of(robot), moving(robot, 0.1)
-    data = robot.model.createData()
-    expected = [pin.crba(robot.model, data, item.q[:, k])[0, 0] for k in range(item.samples)]
-    assert link_inertia(Signals(scene, item), 0) == pytest.approx(expected)
-    assert 2.0 < usual_link_inertia(scene, 0) < 4.0
 
 
 def test_far_below_its_frequency_the_column_is_minus_inertia_times_the_loads_second_derivative():

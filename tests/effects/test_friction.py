@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scara_ident.effects import Effect, EffectTerm, Member
+from scara_ident.effects import Effect, Member
 from scara_ident.effects.drift import OffsetDrift, WarmUp
 from scara_ident.effects.friction import (
     AsymmetricFriction,
@@ -124,15 +124,6 @@ def test_what_no_arm_can_have_is_refused(effect, member, possible, impossible):
         assert effect.inadmissible(scene, member, np.array(value), np.full(len(value), 10.0)) is None or (
             member.nonlinear and member.nonlinear[0] > 1.0
         )
-
-
-def test_an_offset_is_no_drift_where_the_model_has_none():
-    scene = scene_of(load_robot(), name="reduced")
-    drift, member = OffsetDrift(), Member(0)
-    assert len(EffectTerm(drift, member, scene).columns) == 2
-    assert "offset" in (drift.inadmissible(scene, member, np.array([0.0, 0.1]), np.array([0.01, 0.01])) or "")
-    assert drift.inadmissible(scene, member, np.array([0.1, 0.1]), np.array([0.01, 0.01])) is None
-    assert len(EffectTerm(drift, member, scene_of(load_robot())).columns) == 1
 
 
 @pytest.mark.parametrize(

@@ -28,12 +28,6 @@ def laden(robot: Robot, mass: float, point: np.ndarray) -> Robot:
     return replace(robot, model=model)
 
 
-def test_the_tool_of_the_scara_is_at_the_end_of_its_second_link():
-    tool = tool_of(load_robot())
-    assert tool.joint == 1
-    assert tool.point[:2] == pytest.approx([0.33, 0.0])
-
-
 @pytest.mark.parametrize("name", ["scara03", "ur5", "tree"])
 def test_the_column_is_the_torque_of_a_ball_at_the_tool(name: str, tmp_path: Path):
     robot = {

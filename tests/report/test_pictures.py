@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis import diagnose
+from scara_ident.effects import View
 from scara_ident.effects.position import Spring
 from scara_ident.motion.motion import Motion
 from scara_ident.report.diagnosis import diagnosis_markdown
@@ -83,7 +84,8 @@ def test_after_a_reversal_the_distance_over_which_the_effect_acts_is_shown():
     residual = np.random.default_rng(0).standard_normal((2, 20000))
     trace = _trace(residual, np.ones(residual.shape, dtype=bool))
     for distance in (0.02, 1e-6):
-        chapter = Chapter(1, "presliding", 0, [trace], [trace], BANDS, "joint1", distance)
+        view = View("reversal", along=True)
+        chapter = Chapter(1, "presliding", 0, [trace], [trace], BANDS, "joint1", view, distance=distance)
         plot = chapter_group(load_robot(), chapter).figures[0].variants[()]
         low, high = plot.limits
         assert low == 0.0

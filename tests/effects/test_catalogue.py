@@ -1,0 +1,78 @@
+"""The registry: what is built in, and what installed packages add."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scara_ident.effects import CATALOGUE, available_effects, effects_named
+from scara_ident.errors import UsageError
+
+SOURCE = """
+from scara_ident.effects import Coefficient, Effect
+
+class Cable(Effect):
+    name = "cable"
+    summary = "a cable"
+    coefficients = (Coefficient("size"),)
+
+    def signal_columns(self, signals, member):
+        return [signals.time]
+
+class Nameless(Cable):
+    name = ""
+
+cable = Cable()
+number = 3
+"""
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Put a package with one effect where Python finds it, as pip would."""
+
+    def put(value: str, package: str) -> None:
+        module = package.replace("-", "_")
+        (tmp_path / f"{module}.py").write_text(SOURCE)
+        info = tmp_path / f"{module}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(f"[scara_ident.effects]\ncable = {value}\n")
+        monkeypatch.syspath_prepend(str(tmp_path))
+        available_effects.cache_clear()
+
+    yield put
+    available_effects.cache_clear()
+
+
+def test_families_of_one_name_come_together():
+    assert available_effects()[: len(CATALOGUE)] == CATALOGUE
+    assert effects_named("spring") == tuple(effect for effect in CATALOGUE if effect.name == "spring")
+    assert len(effects_named("payload_change", "base_tilt")) == 5
+    with pytest.raises(UsageError, match="effect 'sprign': no such effect; did you mean spring"):
+        effects_named("spring", "sprign")
+
+
+@pytest.mark.parametrize("value", ["Cable", "cable"])
+def test_a_package_adds_its_effect(install, value: str):
+    install(f"package_of_{value}:{value}", f"package-of-{value}")
+    (own,) = effects_named("cable")
+    assert own.summary == "a cable"
+    assert available_effects() == (*CATALOGUE, own)
+
+
+@pytest.mark.parametrize(
+    ("package", "value", "said"),
+    [
+        ("of-nothing", "of_nothing:Missing", "AttributeError"),
+        ("of-nowhere", "nowhere_at_all:Cable", "ModuleNotFoundError"),
+        ("of-numbers", "of_numbers:number", "is no scara_ident.effects.Effect"),
+        ("of-nameless", "of_nameless:Nameless", "has no name"),
+    ],
+)
+def test_a_broken_package_is_named_in_one_line(install, package: str, value: str, said: str):
+    install(value, package)
+    with pytest.raises(UsageError, match=f"^package {package}: effect cable: .*{said}") as error:
+        available_effects()
+    assert "\n" not in str(error.value)

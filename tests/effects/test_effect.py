@@ -1,0 +1,138 @@
+"""The base class: what a short effect gets from it, and what every effect of the catalogue keeps to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.effects import (
+    CATALOGUE,
+    Coefficient,
+    Effect,
+    EffectTerm,
+    Member,
+    NonlinearParameter,
+    Signals,
+    SpectralLine,
+)
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import EFFECTS
+from tests.arms import example_urdf
+from tests.effects.scenes import columns, moving, scene_of
+from tests.simulation.made import tree
+
+EVERY = pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: type(effect).__name__)
+
+
+class Hook(Effect):
+    """As short as an effect can be."""
+
+    name = "hook"
+    summary = "a hook on {joint} that bends at {bend:g}"
+    coefficients = (Coefficient("size", "{torque}/{position}", "hook of {joint}", "it would push", 2.0, "{value:g} is a lot"),)  # fmt: skip
+    nonlinear = (NonlinearParameter("bend", "rad", 0.01, 100.0),)
+
+    def signal_columns(self, signals, member):
+        return [np.maximum(signals.motion.q[member.place] - member.nonlinear[0], 0.0)]
+
+
+def scene_of_ur5():
+    return scene_of(load_robot(example_urdf("ur5_robot.urdf")), start={"m": 0.0, "other_1": 5.0})
+
+
+def members(effect, scene):
+    line = SpectralLine(effect.seeded_by or "order", 3.0)
+    return effect.members(scene)[::5] or effect.seeds(scene, 0, line)
+
+
+def test_a_short_effect_acts_on_each_moving_joint_at_spaced_values():
+    scene = scene_of(load_robot())
+    tried = Hook().members(replace(scene, speed=np.array([0.0, 2.0])))
+    assert {member.joint for member in tried} == {1}
+    bends = [member.nonlinear[0] for member in tried]
+    assert bends == pytest.approx(10.0 ** np.array([-4 / 3, -2 / 3, 0.0, 2 / 3, 4 / 3]))
+    item = moving(scene.robot, 0.2)
+    found = columns(Hook(), scene, item, Member(1, (0.1,)))
+    assert np.array_equal(found[1, 0], np.maximum(item.q[1] - 0.1, 0.0))
+    assert np.any(found[1])
+
+
+def test_a_short_effect_is_described_in_the_words_of_its_joint(tmp_path):
+    scene, member = scene_of(tree(tmp_path)), Member(1, (0.1,))
+    (column,) = Hook().columns(scene, member)
+    assert scene.robot.prismatic[1]
+    unit = f"{scene.robot.torque_unit(1)}/m"
+    assert (column.name, column.joint, column.unit) == ("size", scene.robot.joints[1], unit)
+    assert column.meaning == f"hook of {scene.robot.joints[1]}"
+    assert column.nonnegative
+    assert Hook().description(scene, member) == f"a hook on {scene.robot.joints[1]} that bends at 0.1"
+    found = Hook().parameters(scene, member, np.array([0.7]), np.array([[0.04]]))["size"]
+    assert (found.value, found.std, found.unit) == (0.7, pytest.approx(0.2), unit)
+
+
+def test_limits_are_said_with_the_coefficient():
+    scene, member, std = scene_of(load_robot()), Member(0, (0.1,)), np.array([0.1])
+    assert Hook().inadmissible(scene, member, np.array([-0.21]), std) == "it would push"
+    assert Hook().inadmissible(scene, member, np.array([2.5]), std) == "2.5 is a lot"
+    assert [Hook().inadmissible(scene, member, np.array([x]), std) for x in (-0.19, 0.0, 2.19)] == [None] * 3
+
+
+def test_effects_are_equal_by_class():
+    assert Hook() == Hook()
+    assert len({*CATALOGUE, *(type(effect)() for effect in CATALOGUE)}) == len(CATALOGUE)
+
+
+@EVERY
+def test_every_member_has_words_columns_and_rows_that_agree(effect):
+    scene = scene_of_ur5()
+    item = moving(scene.robot, 0.1)
+    for member in members(effect, scene):
+        found = columns(effect, scene, item, member)
+        term = EffectTerm(effect, member, scene)
+        rows = [np.full((np.count_nonzero(row), item.samples), np.nan) for row in term.pattern]
+        term.fill(item, rows)
+        for dense, row, active in zip(found, rows, term.pattern, strict=True):
+            assert np.array_equal(dense[active], row)
+        assert "{" not in term.effect.description(scene, member) + repr(term.columns)
+        assert (member.joint is None) == (term.joint is None)
+        resolution = effect.resolution(scene, member)
+        assert resolution is None or len(resolution) == len(effect.nonlinear)
+        assert effect.geared_joint(member) in (None, member.joint)
+        assert (effect.resonance(member) is not None) == effect.resonant
+
+
+@EVERY
+def test_the_columns_follow_the_estimate_only_where_the_effect_says_so(effect):
+    scene = scene_of_ur5()
+    item = moving(scene.robot, 0.2)
+    moved = [
+        replace(scene, value=1.1 * scene.value + 0.01),
+        replace(scene, armatures={joint: 0.3 for joint in range(scene.robot.n)}),
+    ]
+    tried = members(effect, scene)
+    follows = any(
+        not np.array_equal(effect.regressor(Signals(scene, item), member), effect.regressor(Signals(other, item), member))
+        for member in tried
+        for other in moved
+    )  # fmt: skip
+    assert follows == (effect.follows_estimate and bool(tried))
+    assert tried or effect.name == "inertia_coupling"
+
+
+@EVERY
+def test_the_virtual_arm_has_it_or_it_says_why_not(effect):
+    assert (effect.name in EFFECTS) == (not effect.not_simulated)
+
+
+@EVERY
+def test_data_are_corrected_only_where_the_effect_says_so(effect):
+    scene = scene_of_ur5()
+    torque = np.ones((6, 8)) * np.arange(8.0)
+    for member in members(effect, scene):
+        if not effect.corrects_data(member) and effect.name != "time_delay":
+            value = np.ones(len(effect.columns(scene, member)))
+            assert effect.corrected_torque(torque, 100.0, member, value) is torque
+            assert effect.settled(value)
+            assert effect.negligible(scene, member, value) is None

@@ -1,0 +1,87 @@
+"""Rigid bodies under another gravity, payload or position, against Pinocchio."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from scara_ident.effects import Signals
+from scara_ident.effects.links import (
+    first_moments,
+    gravity_columns,
+    lagging,
+    link_inertia,
+    point_mass,
+    shared,
+    tool_of,
+    usual_link_inertia,
+)
+from scara_ident.robot.robot import load_robot
+from tests.arms import example_urdf, rnea
+from tests.effects.scenes import moving, scene_of
+
+
+def test_the_tool_of_the_scara_is_at_the_end_of_its_second_link():
+    tool = tool_of(load_robot())
+    assert tool.joint == 1
+    assert tool.point[:2] == pytest.approx([0.33, 0.0])
+
+
+@pytest.mark.parametrize("name", ["scara03", "ur5"])
+def test_a_lagging_link_loads_all_joints_as_pinocchio_says(name: str):
+    robot = load_robot() if name == "scara03" else load_robot(example_urdf("ur5_robot.urdf"))
+    scene, item = scene_of(robot), moving(robot, 1.0)
+    joint, w = 1, 30.0
+    lag = (1e-3 * np.sin(w * item.time), 1e-3 * w * np.cos(w * item.time), -1e-3 * w**2 * np.sin(w * item.time))
+    changed = lagging(Signals(scene, item), joint, lag)
+    size = 1e-3
+    ends = []
+    for side in (1.0, -1.0):
+        moved = [part.copy() for part in (item.q, item.v, item.a)]
+        for part, change in zip(moved, lag, strict=True):
+            part[joint] -= side * size * change
+        ends.append(rnea(robot, *moved))
+    expected = (ends[0] - ends[1]) / (2.0 * size) * robot.row_scale[:, None]
+    assert np.abs(changed - expected).max() < 1e-3 * np.abs(expected).max()
+
+
+def test_inertia_of_the_link_is_the_mass_matrix_without_the_rotor():
+    robot = load_robot()
+    scene, item = scene_of(robot), moving(robot, 0.1)
+    data = robot.model.createData()
+    expected = [pin.crba(robot.model, data, item.q[:, k])[0, 0] for k in range(item.samples)]
+    assert link_inertia(Signals(scene, item), 0) == pytest.approx(expected)
+    assert 2.0 < usual_link_inertia(scene, 0) < 4.0
+
+
+def test_gravity_from_the_side_is_that_of_pinocchio(tmp_path):
+    robot = load_robot(example_urdf("ur5_robot.urdf"))
+    item = moving(robot, 0.02)
+    rest = np.zeros_like(item.q)
+    moments = robot.standard_parameters()[first_moments(robot)]
+    for axis in range(2):
+        found = np.einsum("jkn,k->jn", gravity_columns(robot, axis, item.q), moments)
+        tilted = load_robot(example_urdf("ur5_robot.urdf"))
+        tilted.model.gravity.linear = -9.81 * np.eye(3)[axis]
+        expected = rnea(tilted, item.q, rest, rest) * robot.row_scale[:, None]
+        assert found == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_point_mass_has_the_parameters_of_pinocchio():
+    point = np.array([0.3, -0.2, 0.5])
+    assert point_mass(point) == pytest.approx(pin.Inertia(1.0, point, np.zeros((3, 3))).toDynamicParameters())
+
+
+def test_what_members_share_is_made_once_per_stretch():
+    scene, item = scene_of(load_robot()), moving(load_robot(), 0.02)
+    made = []
+
+    def make():
+        made.append(1)
+        return np.zeros(1)
+
+    one, two = Signals(scene, item), Signals(scene, item)
+    for signals in (one, one, two):
+        shared(signals, "key", make)
+    assert len(made) == 2

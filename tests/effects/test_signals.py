@@ -1,0 +1,52 @@
+"""Signals of a stretch of motion, and what a scene says of the rotors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.effects import Signals
+from scara_ident.robot.robot import load_robot
+from tests.arms import rnea
+from tests.effects.scenes import moving, scene_of
+
+
+def test_signs_are_those_of_the_drive_and_angles_those_of_the_motor():
+    robot = load_robot()
+    turned = replace(robot, reduction=robot.reduction * np.array([1.0, -1.0]))
+    item = moving(turned, 0.2)
+    signals = Signals(scene_of(turned), item)
+    assert np.array_equal(signals.sign[1], -np.sign(item.v[1]))
+    assert signals.motor_turns == pytest.approx(turned.reduction[:, None] * item.q)
+
+
+def test_time_begins_with_the_recording_or_with_the_stretch():
+    item = moving(load_robot(), 0.2)
+    late = replace(item, time=item.time + 5.0)
+    assert Signals(scene_of(load_robot(), start={"m": 3.0}), late).time[0] == 2.0
+    assert Signals(scene_of(load_robot(), start={"other": 3.0}), late).time[0] == 0.0
+
+
+def test_the_load_is_the_rigid_torque_without_the_own_rotor():
+    robot = load_robot()
+    scene, item = scene_of(robot), moving(robot, 0.2)
+    links = rnea(robot, item.q, item.v, item.a) * robot.row_scale[:, None]
+    signals = Signals(scene, item)
+    # The armature of joint 2 is a base parameter, that of joint 1 is nominal and hides in the first link.
+    assert signals.load(1) == pytest.approx(links[1], abs=1e-9)
+    assert signals.load(0) == pytest.approx(links[0], abs=1e-9)
+    friction = signals.predicted - signals.rigid
+    v = item.v
+    assert friction == pytest.approx(0.02 * (np.sign(v) * (1.0 + v**2) + v + v**3 + 1.0), abs=1e-12)
+
+
+def test_an_armature_is_what_the_model_tells_else_what_an_effect_told_else_nominal():
+    scene = scene_of(load_robot())
+    nominal = scene.robot.reduction**2 * scene.robot.rotor_inertia
+    assert scene.told_armature(0) is None
+    assert scene.armature(0) == pytest.approx(nominal[0])
+    assert replace(scene, armatures={0: 0.7, 1: 0.7}).armature(0) == 0.7
+    assert replace(scene, armatures={0: 0.7, 1: 0.7}).armature(1) == scene.told_armature(1)
+    assert scene.told_armature(1) == pytest.approx(nominal[1])

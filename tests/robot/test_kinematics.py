@@ -1,0 +1,54 @@
+"""How joints hang together, against Pinocchio's own words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from scara_ident.errors import RobotError
+from scara_ident.robot.kinematics import axis, parent, place_of, tool_frame
+from scara_ident.robot.robot import load_robot
+from tests.arms import example_urdf
+from tests.simulation.made import tree
+
+
+def test_every_joint_of_a_serial_arm_hangs_on_the_one_before_it():
+    robot = load_robot(example_urdf("ur5_robot.urdf"))
+    assert [parent(robot, j) for j in range(robot.n)] == [-1, 0, 1, 2, 3, 4]
+
+
+def test_parents_of_a_branched_arm_are_those_of_its_urdf(tmp_path: Path):
+    robot = tree(tmp_path)
+    for j, name in enumerate(robot.joints):
+        carrier = robot.model.parents[robot.model.getJointId(name)]
+        assert parent(robot, j) == (robot.joints.index(robot.model.names[carrier]) if carrier else -1)
+    assert place_of(robot, 0) == -1
+
+
+def test_axes_are_those_about_which_a_unit_speed_turns():
+    robot = load_robot(example_urdf("ur5_robot.urdf"))
+    q = np.linspace(-1.0, 1.0, robot.model.nq)
+    data = robot.model.createData()
+    for j in range(robot.n):
+        v = np.zeros(robot.model.nv)
+        v[robot.order[j]] = 1.0
+        pin.forwardKinematics(robot.model, data, q, v)
+        joint_id = int(robot.order[j]) + 1
+        assert axis(robot, data, j) == pytest.approx(data.oMi[joint_id].rotation @ data.v[joint_id].angular)
+
+
+def test_the_tool_is_the_farthest_link_or_the_one_named():
+    robot = load_robot()
+    assert tool_frame(robot).placement.translation[0] == pytest.approx(0.33)
+    assert tool_frame(robot, robot.links[0]).parentJoint == 1
+    with pytest.raises(RobotError, match="no link 'hand'"):
+        tool_frame(robot, "hand")
+
+
+def test_positions_have_the_unit_of_their_joint(tmp_path: Path):
+    robot = tree(tmp_path)
+    assert [robot.position_unit(j) for j in range(robot.n)] == ["m" if slides else "rad" for slides in robot.prismatic]
+    assert {"m", "rad"} == {robot.position_unit(j) for j in range(robot.n)}
