@@ -93,7 +93,7 @@ def test_the_tutorial_finds_what_it_hid(reader: Path) -> None:
     assert np.linalg.norm(identified) < 0.5 * np.linalg.norm(mine)
 
 
-def test_a_users_own_effect_takes_under_20_lines_and_is_found(reader: Path) -> None:
+def test_a_users_own_effect_takes_under_20_lines_and_is_found(reader: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = DOCS / "howto" / "my-own-effect.md"
     (own,) = (block for block in blocks(page) if "class CableFriction" in block.text)
     assert sum(bool(line.strip()) for line in own.text.splitlines()) < 20
@@ -101,6 +101,8 @@ def test_a_users_own_effect_takes_under_20_lines_and_is_found(reader: Path) -> N
     (effect,) = found.effects
     assert (found.verdict, effect.effect, effect.joint) == ("explained", "cable_friction", "joint1")
     assert effect.parameters["amplitude"].value == pytest.approx(0.06, rel=0.05)
+    # What the page prints is what it says it prints.
+    assert capsys.readouterr().out == "".join(block.text for block in blocks(page) if block.language == "text")
 
 
 def test_a_known_payload_gives_the_torque_constant(reader: Path) -> None:
