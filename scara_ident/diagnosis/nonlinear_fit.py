@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 ARMATURE_STD = 0.2
 # Step for the derivative by a nonlinear parameter, as a share of it.
 DERIVATIVE_STEP = 1e-3
-# A longer one for an armature: the flights of a backlash begin and end at samples, which a short step does not move.
+# A longer one for an armature: the flights in a clearance begin and end at samples, which a short step does not move.
 ARMATURE_STEP = 2e-2
 # Steps of Gauss and Newton, and by how many standard deviations the last one may still move something.
 ROUNDS = 6

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
+import scara_ident
 from scara_ident.effects import CATALOGUE, available_effects, effects_named
 from scara_ident.errors import UsageError
 
@@ -76,3 +78,22 @@ def test_a_broken_package_is_named_in_one_line(install, package: str, value: str
     with pytest.raises(UsageError, match=f"^package {package}: effect cable: .*{said}") as error:
         available_effects()
     assert "\n" not in str(error.value)
+
+
+def sources(*rooms: str):
+    package = Path(scara_ident.__file__).parent
+    return {file: file.read_text() for room in rooms for file in sorted((package / room).rglob("*.py"))}
+
+
+def test_report_and_diagnosis_name_no_effect_and_import_no_family():
+    names = re.compile(rf"\b({'|'.join(effect.name for effect in CATALOGUE)})\b")
+    families = {type(effect).__module__ for effect in CATALOGUE}
+    for file, text in sources("report", "diagnosis").items():
+        code = re.sub(r"#.*", "", text)
+        assert not names.search(code), f"{file}: {names.search(code)}"
+        assert not [module for module in families if f"{module} import" in code], file
+
+
+def test_no_joint_silently_becomes_the_first():
+    found = [file for file, text in sources("").items() if re.search(r"\b(joint|partner|place) or 0\b", text)]
+    assert found == []
