@@ -24,7 +24,7 @@ from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.observations import Evidence, gather_all
 from scara_ident.identification.channel_check import mapping_faults
 from scara_ident.identification.identify import check_held_out, data_notes
-from scara_ident.model.model import ModelName, TorqueModel, build_model
+from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 
@@ -113,7 +113,7 @@ class Diagnosis:
 
 def diagnose(
     robot: Robot,
-    model: ModelName | TorqueModel,
+    model: str | TorqueModel,
     recordings: Sequence[Recording],
     validation: Sequence[Recording] = (),
     *,
@@ -126,7 +126,7 @@ def diagnose(
     Parameters
     ----------
     robot : Robot
-    model : {"complete", "reduced", "basic"} or TorqueModel
+    model : str or TorqueModel
         The base model.
     recordings : sequence of Recording
         Every choice is made on these.
