@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from difflib import get_close_matches
 from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
@@ -34,6 +35,8 @@ class Registry(Generic[T]):
         Group of the entry points: ``"scara_ident.estimators"``.
     built_in : mapping of str to T or str
         The things, or where they are: ``"module"`` or ``"module:attribute"``.
+    made_of : callable, optional
+        Makes a thing of what a package names; raises `TypeError` where that is not possible.
 
     Examples
     --------
@@ -44,10 +47,17 @@ class Registry(Generic[T]):
     3.0
     """
 
-    def __init__(self, kind: str, group: str, built_in: Mapping[str, T | str]) -> None:
+    def __init__(
+        self,
+        kind: str,
+        group: str,
+        built_in: Mapping[str, T | str],
+        made_of: Callable[[Any], T] = lambda found: cast(T, found),
+    ) -> None:
         self.kind = kind
         self.group = group
         self._built_in = dict(built_in)
+        self._made_of = made_of
 
     def names(self) -> tuple[str, ...]:
         """List the names: built-in ones in their order, then those of packages, sorted."""
@@ -62,7 +72,9 @@ class Registry(Generic[T]):
             In one line that lists the names.
         """
         if name not in self._built_in and name not in self._installed:
-            raise UsageError(f"{self.kind} {name!r}: expected one of {', '.join(self.names())}")
+            near = get_close_matches(name, self.names(), n=1)
+            hint = f"did you mean {near[0]}? " if near else ""
+            raise UsageError(f"{self.kind} {name!r}: {hint}expected one of {', '.join(self.names())}")
         return name
 
     def get(self, name: str) -> T:
@@ -89,7 +101,7 @@ class Registry(Generic[T]):
         if len(points) > 1:
             raise ScaraIdentError(f"{self.kind} {name!r} is in {owners}; uninstall one of them")
         try:
-            return cast(T, points[0].load())
+            return self._made_of(points[0].load())
         except Exception as error:
             reason = " ".join(f"{type(error).__name__}: {error}".split())
             raise ScaraIdentError(

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
-
-import typer
-
 from scara_ident.cli.console import (
     JsonOption,
+    MethodOption,
+    ModelOption,
     OutputOption,
     RecordingArguments,
     RobotOption,
@@ -23,10 +21,8 @@ from scara_ident.cli.console import (
 def compare(
     recordings: RecordingArguments,
     robot: RobotOption = None,
-    model: Annotated[
-        Literal["complete", "reduced", "basic"], typer.Option(help="Terms of the torque equation.")
-    ] = "complete",
-    method: Annotated[Literal["ols", "wls", "rls", "consistent"], typer.Option(help="Estimator.")] = "ols",
+    model: ModelOption = "complete",
+    method: MethodOption = "ols",
     output: OutputOption = None,
     json: JsonOption = False,
     verbose: VerboseOption = False,

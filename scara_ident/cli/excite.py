@@ -7,14 +7,12 @@ from typing import Annotated, Literal
 
 import typer
 
-from scara_ident.cli.console import JsonOption, RobotOption, output_console, print_json, progress, table
+from scara_ident.cli.console import JsonOption, ModelOption, RobotOption, output_console, print_json, progress, table
 
 
 def excite(
     robot: RobotOption = None,
-    model: Annotated[
-        Literal["complete", "reduced", "basic"], typer.Option(help="Model whose parameters are to be told.")
-    ] = "complete",
+    model: ModelOption = "complete",
     criterion: Annotated[
         Literal["logdet", "cond"], typer.Option(help="ln det or the condition of the stacked regressor.")
     ] = "logdet",

@@ -7,7 +7,10 @@ from typing import Annotated, Literal
 import typer
 
 from scara_ident.cli.console import (
+    BandOption,
     JsonOption,
+    MethodOption,
+    ModelOption,
     OutputOption,
     RecordingArguments,
     RobotOption,
@@ -24,12 +27,8 @@ from scara_ident.cli.console import (
 def identify(
     recordings: RecordingArguments,
     robot: RobotOption = None,
-    model: Annotated[
-        Literal["complete", "reduced", "basic"], typer.Option(help="Terms of the torque equation.")
-    ] = "complete",
-    method: Annotated[
-        Literal["ols", "wls", "rls", "consistent"], typer.Option(help="Estimator; consistent: an arm that can exist.")
-    ] = "ols",
+    model: ModelOption = "complete",
+    method: MethodOption = "ols",
     friction: Annotated[
         Literal["dissipative", "lubricated", "free"],
         typer.Option(help="Friction of the method consistent: takes energy out; also grows and flattens; anything."),
@@ -37,10 +36,7 @@ def identify(
     validate: Annotated[
         list[str] | None, typer.Option("--validate", metavar="RECORDING", help="Recording held out; may be repeated.")
     ] = None,
-    band: Annotated[
-        float | None,
-        typer.Option("--band", metavar="HZ", min=1e-3, help="Low-pass for all joints; default: chosen from the data."),
-    ] = None,
+    band: BandOption = None,
     output: OutputOption = None,
     json: JsonOption = False,
     verbose: VerboseOption = False,

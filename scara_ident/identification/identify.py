@@ -134,7 +134,7 @@ def identify(
         bands = choice.bands
         notes += choice.notes
     else:
-        _check_bands(robot, bands, (*recordings, *validation))
+        check_bands(robot, bands, (*recordings, *validation))
     progress("absorbing the recordings")
     training = gather_all(equation, recordings, bands)
     held_out = gather_all(equation, validation, bands)
@@ -185,7 +185,13 @@ def known_information(model: TorqueModel, recordings: Sequence[Recording], rate:
     return merge(sampled)
 
 
-def _check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequence[Recording]) -> None:
+def check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequence[Recording]) -> None:
+    """Refuse bands that are not one for each joint, or no frequencies that the slowest recording carries.
+
+    Raises
+    ------
+    UsageError
+    """
     if len(bands) != robot.n:
         raise UsageError(f"bands: {len(bands)} given; expected one for each of {', '.join(robot.joints)}")
     for joint, band in zip(robot.joints, bands, strict=True):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from scara_ident.errors import RobotError
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
+from scara_ident.robot.examples import example_urdf, is_name
 from scara_ident.robot.signal_map import Channels, build_channels
 from scara_ident.robot.urdf_validation import urdf_fault
 
@@ -127,8 +128,8 @@ def load_robot(path: Path | str | None = None) -> Robot:
     Parameters
     ----------
     path : path, optional
-        A ``robot.yaml``, or a URDF whose movable joints are all to be identified with effort at the joints.
-        Without it the embedded SCARA03 is loaded.
+        A ``robot.yaml``, or a URDF whose movable joints are all to be identified with effort at the joints, or the
+        name of such a robot of example-robot-data, as ``"ur5"``. Without it the embedded SCARA03 is loaded.
 
     Returns
     -------
@@ -142,6 +143,8 @@ def load_robot(path: Path | str | None = None) -> Robot:
     if path is None:
         return build_robot(RobotDescription(urdf=embedded_urdf(), effort_side="motor"), embedded_urdf())
     source = Path(path)
+    if is_name(source):
+        source = example_urdf(source.name)
     if source.suffix.lower() in (".urdf", ".xml"):
         return build_robot(RobotDescription(urdf=source.resolve(), effort_side="joint"), source)
     return build_robot(read_description(source), source)

@@ -17,9 +17,7 @@ from scara_ident.robot.robot import Robot, load_robot
 from tests.export.arms import branched, random_motion
 
 
-def estimate_of(
-    robot: Robot, name: str, values: dict[str, float], undetermined: tuple[str, ...] = ()
-) -> Estimate:
+def estimate_of(robot: Robot, name: str, values: dict[str, float], undetermined: tuple[str, ...] = ()) -> Estimate:
     model = build_model(robot, name)
     p = len(model.names)
     value = np.array([values.get(key, 0.0) for key in model.names])
