@@ -28,10 +28,10 @@ def compare(
     verbose: VerboseOption = False,
 ) -> None:
     """Set every trajectory's parameters against every trajectory."""
+    from scara_ident.files import check_output, write_json, written_together
     from scara_ident.identification.compare import compare as run
     from scara_ident.recording.recording import read_recordings
     from scara_ident.report.comparison import comparison_dict
-    from scara_ident.report.files import check_output, write_json, written_together
     from scara_ident.robot.robot import load_robot
 
     check_output(output)

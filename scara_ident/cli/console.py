@@ -148,7 +148,7 @@ def table(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
 
 def print_json(content: dict[str, Any]) -> None:
     """Print a result as JSON for scripts; files are still written when nobody reads it."""
-    from scara_ident.report.files import json_text
+    from scara_ident.files import json_text
 
     try:
         typer.echo(json_text(content))

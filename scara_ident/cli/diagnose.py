@@ -56,9 +56,9 @@ def diagnose(
     """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
     from scara_ident.diagnosis import diagnose as run
     from scara_ident.effects import effects_named
+    from scara_ident.files import check_output, write_json, write_text, written_together
     from scara_ident.recording.recording import read_recordings
     from scara_ident.report.diagnosis import diagnosis_dict, diagnosis_markdown
-    from scara_ident.report.files import check_output, write_json, write_text, written_together
     from scara_ident.robot.robot import load_robot
 
     check_output(output)

@@ -78,10 +78,10 @@ def excite(
     from scara_ident.excitation.design import SAMPLES, check_size
     from scara_ident.excitation.known import read_parameters
     from scara_ident.excitation.output import check_rate, file_names
+    from scara_ident.files import check_output, write_json, written_together
     from scara_ident.identification.identify import known_information
     from scara_ident.model.model import build_model
     from scara_ident.recording.recording import read_recordings
-    from scara_ident.report.files import check_output, write_json, written_together
     from scara_ident.report.html import excitation_report
     from scara_ident.robot.robot import load_robot
 
