@@ -14,27 +14,20 @@ from scara_ident.identification import ESTIMATORS
 from scara_ident.model import MODELS
 from scara_ident.recording.files import IMPORTERS
 from scara_ident.registry import Registry
+from tests.plugins.made import make_installed
 
 GROUP = "scara_ident.shapes"
-
-
-def install(place: Path, package: str, points: dict[str, str], code: str = "") -> None:
-    """Make a package as pip leaves it: a module and the metadata that names its entry points."""
-    (place / f"{package}.py").write_text(code)
-    info = place / f"{package}-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-    listed = "\n".join(f"{name} = {value}" for name, value in points.items())
-    (info / "entry_points.txt").write_text(f"[{GROUP}]\n{listed}\n")
 
 
 @pytest.fixture
 def shapes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Registry[float]:
     monkeypatch.syspath_prepend(tmp_path)
-    install(tmp_path, "stars", {"star": "stars:AREA", "round": "stars:AREA", "twin": "stars:AREA"}, "AREA = 5.0\n")
-    install(tmp_path, "twins", {"twin": "twins:AREA"}, "AREA = 2.0\n")
-    install(tmp_path, "broken", {"cracked": "broken:AREA"}, "import no_such_library\n")
-    install(tmp_path, "hollow", {"empty": "hollow:AREA"})
+    make_installed(
+        tmp_path, "stars", GROUP, {"star": "stars:AREA", "round": "stars:AREA", "twin": "stars:AREA"}, "AREA = 5.0\n"
+    )
+    make_installed(tmp_path, "twins", GROUP, {"twin": "twins:AREA"}, "AREA = 2.0\n")
+    make_installed(tmp_path, "broken", GROUP, {"cracked": "broken:AREA"}, "import no_such_library\n")
+    make_installed(tmp_path, "hollow", GROUP, {"empty": "hollow:AREA"})
     return Registry("shape", GROUP, {"round": 3.0, "number": "math:pi"})
 
 
