@@ -42,7 +42,10 @@ def test_what_a_package_adds_is_loaded_when_it_is_asked_for(shapes: Registry[flo
 
 
 def test_an_unknown_name_is_bad_usage_and_lists_the_others(shapes: Registry[float]):
-    with pytest.raises(UsageError, match=r"shape 'rond': expected one of round, number, cracked, empty, star, twin$"):
+    with pytest.raises(
+        UsageError,
+        match=r"shape 'rond': did you mean round\? expected one of round, number, cracked, empty, star, twin$",
+    ):
         shapes.get("rond")
 
 

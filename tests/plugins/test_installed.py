@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from scara_ident import Identification, Recording, identify, load_robot, write_recording
-from tests.diagnosis.made import BANDS, virtual_runs
+from tests.diagnosis.made import BANDS, exact_runs, virtual_runs, with_torque
 from tests.plugins.made import make_installed
 from tests.shared import ROOT
 
@@ -77,11 +77,34 @@ def test_its_method_is_a_choice_of_the_command_line(program: Program, tmp_path: 
     np.testing.assert_allclose([row["value"] for row in content["parameters"]], np.median(alone, axis=0), rtol=1e-9)
 
 
+def test_its_effect_is_found_and_shown_in_the_report(program: Program, tmp_path: Path):
+    runs = with_torque(exact_runs(), 1, lambda motion: 0.03 * np.sin(6.0 * motion.q[1]))
+    for run in runs:
+        write_recording(run, tmp_path / f"{run.name}.parquet")
+    options = ["--effects", "cogging,spring", "--band", "11", "--output", tmp_path / "out"]
+    done = program("diagnose", tmp_path, *options)
+    assert (done.returncode, done.stderr) == (0, "")
+    content = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    (effect,) = content["effects"]
+    assert (content["verdict"], effect["effect"], effect["joint"]) == ("explained", "cogging", "joint2")
+    assert {row["effect"] for row in content["candidates"]} <= {"cogging", "spring"}
+    found = effect["parameters"]
+    assert abs(found["periods"]["value"] - 6.0) < 4.0 * found["periods"]["std"]
+    assert abs(found["sine"]["value"] - 0.03) < 4.0 * found["sine"]["std"]
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "magnets pull joint2 to 6 positions per turn" in page
+    assert 'data-figure="effect-1-view"' in page
+    assert '"label":"joint2 over position"' in page
+
+
 def test_help_and_messages_list_what_it_adds(program: Program, tmp_path: Path):
     assert "ols, wls, rls, consistent, median" in " ".join(program("identify", "--help").stdout.split())
     unknown = program("compare", "x", "--method", "mean")
     assert unknown.returncode == 2
-    assert unknown.stderr == "scara-ident: method 'mean': expected one of ols, wls, rls, consistent, median\n"
+    assert (
+        unknown.stderr
+        == "scara-ident: method 'mean': did you mean median? expected one of ols, wls, rls, consistent, median\n"
+    )
     (tmp_path / "run.txt").write_text("0\n")
     assert ".bag or .lab file" in program("identify", tmp_path / "run.txt").stderr
 
