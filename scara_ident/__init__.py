@@ -1,11 +1,14 @@
-"""Identify the dynamic model of a robot arm from measured motion.
+"""Identify the dynamic model of a robot arm from measured motion, and find what the model lacks.
 
 The public names, loaded when they are used::
 
-    from scara_ident import identify, load_robot, read_recordings
+    from scara_ident import diagnose, export_urdf, identify, load_robot, read_recordings
 
     robot = load_robot("robot.yaml")
-    result = identify(robot, read_recordings(["logs/*.parquet"], robot))
+    recordings = read_recordings(["logs/*.parquet"], robot)
+    result = identify(robot, recordings, method="consistent")
+    export_urdf(result, "identified.urdf")
+    print(diagnose(robot, "complete", recordings).verdict)
 """
 
 from __future__ import annotations
@@ -14,50 +17,64 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scara_ident.errors import ScaraIdentError
-    from scara_ident.estimation import Estimate, ols, rls, wls
+    from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
+    from scara_ident.effects.effect import Effect
+    from scara_ident.errors import EstimationError, RecordingError, RobotError, ScaraIdentError, UsageError
+    from scara_ident.estimation.consistent.estimator import ConsistentEstimate, consistent
+    from scara_ident.estimation.consistent.options import ConsistentOptions
+    from scara_ident.estimation.estimate import Estimate
     from scara_ident.estimation.information import Information, merge
+    from scara_ident.estimation.least_squares import ols, wls
     from scara_ident.estimation.observations import Evidence, gather, gather_all
-    from scara_ident.identification.identify import Identification, identify
+    from scara_ident.estimation.recursive import rls
+    from scara_ident.excitation.design import Design, design_excitation
+    from scara_ident.excitation.output import write_trajectory
+    from scara_ident.export.robots import export_mjcf, export_urdf
+    from scara_ident.identification.compare import Comparison, compare
+    from scara_ident.identification.identify import Identification, identified_arm, identify
     from scara_ident.model.base_parameters import BaseParameters, check_base_parameters, find_base_parameters
     from scara_ident.model.model import TorqueModel, build_model
     from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
     from scara_ident.motion.motion import Motion, motion_of, stretches
     from scara_ident.recording.recording import Recording, read_recording, read_recordings, write_recording
     from scara_ident.robot.robot import Robot, load_robot
+    from scara_ident.simulation.arm import VirtualArm
+    from scara_ident.simulation.defaults import virtual_arm
+    from scara_ident.simulation.effects import parse_effect
+    from scara_ident.simulation.named import named_motion
+    from scara_ident.simulation.simulate import SimulationResult, simulate
 
 __version__ = "0.1.0"
 
-_HOMES = {
-    "BaseParameters": "model.base_parameters",
-    "find_base_parameters": "model.base_parameters",
-    "check_base_parameters": "model.base_parameters",
-    "ScaraIdentError": "errors",
-    "Estimate": "estimation",
-    "ols": "estimation",
-    "rls": "estimation",
-    "wls": "estimation",
-    "Evidence": "estimation.observations",
-    "gather": "estimation.observations",
-    "gather_all": "estimation.observations",
-    "Identification": "identification.identify",
-    "identify": "identification.identify",
-    "Information": "estimation.information",
-    "merge": "estimation.information",
-    "TorqueModel": "model.model",
-    "build_model": "model.model",
-    "Motion": "motion.motion",
-    "motion_of": "motion.motion",
-    "stretches": "motion.motion",
-    "Recording": "recording.recording",
-    "read_recording": "recording.recording",
-    "read_recordings": "recording.recording",
-    "write_recording": "recording.recording",
-    "RegressorKernel": "model.regressor.kernel",
-    "build_kernel": "model.regressor.kernel",
-    "Robot": "robot.robot",
-    "load_robot": "robot.robot",
+_NAMES = {
+    "errors": ("ScaraIdentError", "RecordingError", "RobotError", "UsageError", "EstimationError"),
+    "robot.robot": ("Robot", "load_robot"),
+    "recording.recording": ("Recording", "read_recording", "read_recordings", "write_recording"),
+    "motion.motion": ("Motion", "motion_of", "stretches"),
+    "model.base_parameters": ("BaseParameters", "check_base_parameters", "find_base_parameters"),
+    "model.model": ("TorqueModel", "build_model"),
+    "model.regressor.kernel": ("RegressorKernel", "build_kernel"),
+    "estimation.information": ("Information", "merge"),
+    "estimation.observations": ("Evidence", "gather", "gather_all"),
+    "estimation.estimate": ("Estimate",),
+    "estimation.least_squares": ("ols", "wls"),
+    "estimation.recursive": ("rls",),
+    "estimation.consistent.estimator": ("ConsistentEstimate", "consistent"),
+    "estimation.consistent.options": ("ConsistentOptions",),
+    "identification.identify": ("Identification", "identified_arm", "identify"),
+    "identification.compare": ("Comparison", "compare"),
+    "effects.effect": ("Effect",),
+    "diagnosis.diagnose": ("Diagnosis", "diagnose"),
+    "excitation.design": ("Design", "design_excitation"),
+    "excitation.output": ("write_trajectory",),
+    "export.robots": ("export_mjcf", "export_urdf"),
+    "simulation.defaults": ("virtual_arm",),
+    "simulation.arm": ("VirtualArm",),
+    "simulation.effects": ("parse_effect",),
+    "simulation.named": ("named_motion",),
+    "simulation.simulate": ("SimulationResult", "simulate"),
 }
+_HOMES = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [*sorted(_HOMES), "__version__"]
 

@@ -29,3 +29,7 @@ class RegressorMismatch(ScaraIdentError):
 
 class EstimationError(ScaraIdentError):
     """An estimate that the information at hand does not allow."""
+
+
+class PluginWarning(UserWarning):
+    """What an installed package adds is left out; the rest works without it."""

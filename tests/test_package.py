@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import re
 import subprocess
 import sys
 import tarfile
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -70,6 +73,23 @@ def test_the_wheel_says_what_it_needs_and_brings_the_command(wheel: Path):
     always = {name for name in required if "extra ==" not in name}
     # A user needs no tools of developers.
     assert not [name for name in always if name.startswith(("pytest", "mkdocs", "mypy", "ruff", "playwright"))]
+
+
+# In a package's metadata and in imports some names differ.
+MODULE = {"pin": "pinocchio", "pyyaml": "yaml", "example-robot-data": None}
+# Declared though only tests import it: what is exported is read by a second reader.
+FOR_TESTS = {"yourdfpy"}
+
+
+def test_what_is_declared_is_what_is_imported():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    declared = {re.match(r"[a-z-]+", line)[0] for line in settings["dependencies"]}
+    trees = [ast.walk(ast.parse(path.read_text())) for path in PACKAGE.rglob("*.py")]
+    nodes = [node for tree in trees for node in tree]
+    names = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    names += [node.module for node in nodes if isinstance(node, ast.ImportFrom)]
+    imported = {name.partition(".")[0] for name in names} - set(sys.stdlib_module_names) - {"scara_ident"}
+    assert imported == {MODULE.get(name, name) for name in declared - FOR_TESTS} - {None}
 
 
 def test_outside_the_checkout_the_wheel_finds_its_arm_and_its_assets(installed: Path, tmp_path: Path):

@@ -7,8 +7,8 @@ from scara_ident.cli.console import JsonOption, OutputOption, RobotOption, outpu
 
 def base(robot: RobotOption = None, output: OutputOption = None, json: JsonOption = False) -> None:
     """Print the base parameters: what each is made of, what is not identifiable and why."""
+    from scara_ident.files import check_output, write_json
     from scara_ident.report.base import base_dict
-    from scara_ident.report.files import check_output, write_json
     from scara_ident.robot.robot import load_robot
 
     check_output(output)

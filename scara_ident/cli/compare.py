@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
-
-import typer
-
 from scara_ident.cli.console import (
     JsonOption,
+    MethodOption,
+    ModelOption,
     OutputOption,
     RecordingArguments,
     RobotOption,
@@ -23,19 +21,17 @@ from scara_ident.cli.console import (
 def compare(
     recordings: RecordingArguments,
     robot: RobotOption = None,
-    model: Annotated[
-        Literal["complete", "reduced", "basic"], typer.Option(help="Terms of the torque equation.")
-    ] = "complete",
-    method: Annotated[Literal["ols", "wls", "rls", "consistent"], typer.Option(help="Estimator.")] = "ols",
+    model: ModelOption = "complete",
+    method: MethodOption = "ols",
     output: OutputOption = None,
     json: JsonOption = False,
     verbose: VerboseOption = False,
 ) -> None:
     """Set every trajectory's parameters against every trajectory."""
+    from scara_ident.files import check_output, write_json, written_together
     from scara_ident.identification.compare import compare as run
     from scara_ident.recording.recording import read_recordings
     from scara_ident.report.comparison import comparison_dict
-    from scara_ident.report.files import check_output, write_json, written_together
     from scara_ident.robot.robot import load_robot
 
     check_output(output)

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from warnings import catch_warnings, simplefilter
 
 import typer
 from rich.console import Console
 from rich.table import Table
+from typer.core import TyperCommand, TyperOption
+
+from scara_ident.errors import PluginWarning
+from scara_ident.identification import ESTIMATORS
+from scara_ident.model import MODELS
 
 if TYPE_CHECKING:
     from scara_ident.recording.recording import Recording
@@ -27,7 +34,36 @@ RecordingArguments = Annotated[
     ),
 ]
 RobotOption = Annotated[
-    Path | None, typer.Option("--robot", metavar="FILE", help="robot.yaml (or a URDF); default: the embedded SCARA03.")
+    Path | None,
+    typer.Option(
+        "--robot",
+        metavar="FILE",
+        help="robot.yaml, a URDF, or a robot of example-robot-data by its name, as ur5; default: the embedded SCARA03.",
+    ),
+]
+ModelOption = Annotated[
+    str,
+    typer.Option(
+        "--model",
+        metavar="NAME",
+        callback=MODELS.check,
+        autocompletion=MODELS.names,
+        help="Terms of the torque equation: {models}.",
+    ),
+]
+MethodOption = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        metavar="NAME",
+        callback=ESTIMATORS.check,
+        autocompletion=ESTIMATORS.names,
+        help="Estimator: {methods}; consistent: an arm that can exist.",
+    ),
+]
+BandOption = Annotated[
+    float | None,
+    typer.Option("--band", metavar="HZ", min=1e-3, help="Low-pass for all joints; default: chosen from the data."),
 ]
 OutputOption = Annotated[
     Path | None, typer.Option("--output", metavar="DIR", help="Folder for the results; made if needed.")
@@ -36,6 +72,19 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JS
 VerboseOption = Annotated[
     bool, typer.Option("--verbose", help="Also list what every file holds and what its audit found.")
 ]
+
+
+class Command(TyperCommand):
+    """A command whose help lists what the registries hold; they are asked then only, as finding out takes time."""
+
+    def get_help(self, ctx: Any) -> str:
+        """Return the help."""
+        lists = {"{models}": MODELS, "{methods}": ESTIMATORS}
+        for option in self.params:
+            for word, registry in lists.items():
+                if isinstance(option, TyperOption) and word in (option.help or ""):
+                    option.help = str(option.help).replace(word, ", ".join(registry.names()))
+        return super().get_help(ctx)
 
 
 class PlainConsole(Console):
@@ -62,6 +111,23 @@ def errors_console() -> Console:
 
 
 @contextmanager
+def plugin_notices() -> Iterator[None]:
+    """Say in one line on stderr what of an installed package is left out."""
+    with catch_warnings():
+        simplefilter("once", PluginWarning)
+        others = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+            if issubclass(category, PluginWarning):
+                errors_console().print(f"scara-ident: note: {message}", markup=False, soft_wrap=True)
+            else:
+                others(message, category, *where, **more)
+
+        warnings.showwarning = show
+        yield
+
+
+@contextmanager
 def progress() -> Iterator[Callable[[str], None]]:
     """Show the step that runs on a terminal, and nothing in a pipe."""
     console = errors_console()
@@ -82,7 +148,7 @@ def table(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
 
 def print_json(content: dict[str, Any]) -> None:
     """Print a result as JSON for scripts; files are still written when nobody reads it."""
-    from scara_ident.report.files import json_text
+    from scara_ident.files import json_text
 
     try:
         typer.echo(json_text(content))

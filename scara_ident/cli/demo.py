@@ -27,7 +27,7 @@ def demo(
     from scara_ident.cli.identify import identify
     from scara_ident.cli.paper import paper_in_short
     from scara_ident.cli.simulate import simulate
-    from scara_ident.report.files import check_output
+    from scara_ident.files import check_output
 
     check_output(output)
     console = output_console()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
 from scara_ident.cli.console import (
+    BandOption,
     JsonOption,
+    ModelOption,
     OutputOption,
     RecordingArguments,
     RobotOption,
@@ -20,12 +22,32 @@ from scara_ident.cli.console import (
 )
 
 
+def _known(names: str | None) -> str | None:
+    if names is not None:
+        from scara_ident.effects import EFFECTS
+
+        for name in _parted(names):
+            EFFECTS.check(name)
+    return names
+
+
+def _parted(names: str) -> list[str]:
+    return [name.strip() for name in names.split(",")]
+
+
 def diagnose(
     recordings: RecordingArguments,
     robot: RobotOption = None,
-    model: Annotated[Literal["complete", "reduced", "basic"], typer.Option(help="Base model.")] = "complete",
+    model: ModelOption = "complete",
     validate: Annotated[
         list[str] | None, typer.Option("--validate", metavar="RECORDING", help="Recording held out; may be repeated.")
+    ] = None,
+    band: BandOption = None,
+    effects: Annotated[
+        str | None,
+        typer.Option(
+            "--effects", metavar="NAME,...", callback=_known, help="Try only these effects; default: all there are."
+        ),
     ] = None,
     output: OutputOption = None,
     json: JsonOption = False,
@@ -33,9 +55,10 @@ def diagnose(
 ) -> None:
     """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
     from scara_ident.diagnosis import diagnose as run
+    from scara_ident.effects import effects_named
+    from scara_ident.files import check_output, write_json, write_text, written_together
     from scara_ident.recording.recording import read_recordings
     from scara_ident.report.diagnosis import diagnosis_dict, diagnosis_markdown
-    from scara_ident.report.files import check_output, write_json, write_text, written_together
     from scara_ident.robot.robot import load_robot
 
     check_output(output)
@@ -44,7 +67,15 @@ def diagnose(
         step("reading the recordings")
         training = read_recordings(recordings, arm)
         held_out = read_recordings(validate, arm) if validate else ()
-        result = run(arm, model, training, held_out, progress=step)
+        result = run(
+            arm,
+            model,
+            training,
+            held_out,
+            bands=None if band is None else [band] * arm.n,
+            catalogue=None if effects is None else effects_named(*_parted(effects)),
+            progress=step,
+        )
     content = diagnosis_dict(result)
     if json:
         print_json(content)

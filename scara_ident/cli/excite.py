@@ -7,14 +7,12 @@ from typing import Annotated, Literal
 
 import typer
 
-from scara_ident.cli.console import JsonOption, RobotOption, output_console, print_json, progress, table
+from scara_ident.cli.console import JsonOption, ModelOption, RobotOption, output_console, print_json, progress, table
 
 
 def excite(
     robot: RobotOption = None,
-    model: Annotated[
-        Literal["complete", "reduced", "basic"], typer.Option(help="Model whose parameters are to be told.")
-    ] = "complete",
+    model: ModelOption = "complete",
     criterion: Annotated[
         Literal["logdet", "cond"], typer.Option(help="ln det or the condition of the stacked regressor.")
     ] = "logdet",
@@ -80,10 +78,10 @@ def excite(
     from scara_ident.excitation.design import SAMPLES, check_size
     from scara_ident.excitation.known import read_parameters
     from scara_ident.excitation.output import check_rate, file_names
+    from scara_ident.files import check_output, write_json, written_together
     from scara_ident.identification.identify import known_information
     from scara_ident.model.model import build_model
     from scara_ident.recording.recording import read_recordings
-    from scara_ident.report.files import check_output, write_json, written_together
     from scara_ident.report.html import excitation_report
     from scara_ident.robot.robot import load_robot
 

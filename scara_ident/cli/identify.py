@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import Annotated, Literal
 
 import typer
 
 from scara_ident.cli.console import (
+    BandOption,
     JsonOption,
+    MethodOption,
+    ModelOption,
     OutputOption,
     RecordingArguments,
     RobotOption,
@@ -24,12 +28,8 @@ from scara_ident.cli.console import (
 def identify(
     recordings: RecordingArguments,
     robot: RobotOption = None,
-    model: Annotated[
-        Literal["complete", "reduced", "basic"], typer.Option(help="Terms of the torque equation.")
-    ] = "complete",
-    method: Annotated[
-        Literal["ols", "wls", "rls", "consistent"], typer.Option(help="Estimator; consistent: an arm that can exist.")
-    ] = "ols",
+    model: ModelOption = "complete",
+    method: MethodOption = "ols",
     friction: Annotated[
         Literal["dissipative", "lubricated", "free"],
         typer.Option(help="Friction of the method consistent: takes energy out; also grows and flattens; anything."),
@@ -37,20 +37,17 @@ def identify(
     validate: Annotated[
         list[str] | None, typer.Option("--validate", metavar="RECORDING", help="Recording held out; may be repeated.")
     ] = None,
-    band: Annotated[
-        float | None,
-        typer.Option("--band", metavar="HZ", min=1e-3, help="Low-pass for all joints; default: chosen from the data."),
-    ] = None,
+    band: BandOption = None,
     output: OutputOption = None,
     json: JsonOption = False,
     verbose: VerboseOption = False,
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
     from scara_ident.estimation.consistent.options import ConsistentOptions
+    from scara_ident.files import check_output, write_json, write_whole, written_together
     from scara_ident.identification.identify import identified_arm
     from scara_ident.identification.identify import identify as run
     from scara_ident.recording.recording import read_recordings
-    from scara_ident.report.files import check_output, write_json, write_whole, written_together
     from scara_ident.report.identification import identification_dict, sentences
     from scara_ident.robot.robot import load_robot
 
@@ -105,19 +102,20 @@ def identify(
     for sentence in sentences(result):
         console.print(sentence, markup=False)
     if output is not None:
+        from scara_ident.export.robots import export_mjcf, export_urdf
         from scara_ident.report.figure import torque_figure
         from scara_ident.report.html import identification_report
-        from scara_ident.report.robots import write_robots
 
         arm_found = identified_arm(result)
+        urdf, mjcf = f"{arm.name}_identified.urdf", f"{arm.name}_identified.xml"
         with written_together(output) as place:
             if arm_found is not None:
-                for note in write_robots(place, arm_found):
+                notes = [export_urdf(arm_found, place / urdf), export_mjcf(arm_found, place / mjcf)]
+                for note in dict.fromkeys(chain.from_iterable(notes)):
                     console.print(f"note: {note}", markup=False, style="dim")
             write_whole(place / "torque.png", lambda path: torque_figure(path, result, (*training, *held_out)))
             identification_report(place / "report.html", result, training, held_out)
             write_json(place / "identification.json", content)
-        robots = (f"{arm.name}_identified.urdf", f"{arm.name}_identified.xml") if arm_found is not None else ()
-        names = ("identification.json", "report.html", "torque.png", *robots)
+        names = ("identification.json", "report.html", "torque.png", *((urdf, mjcf) if arm_found is not None else ()))
         written = ", ".join(str(output / name) for name in names)
         console.print(f"written: {written}", markup=False, soft_wrap=True)

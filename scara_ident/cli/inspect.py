@@ -12,7 +12,7 @@ from scara_ident.cli.console import OutputOption, output_console, print_json, pr
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from scara_ident.recording.inspect.inspection import Inspection
+    from scara_ident.inspection.inspection import Inspection
 
 # Of columns that are no channels so many are shown on a terminal; --json has them all.
 OTHERS_SHOWN = 20
@@ -38,8 +38,8 @@ def inspect(
 ) -> None:
     """Show what is in a file, guess which columns are the arm's, audit it and write a first robot.yaml."""
     from scara_ident.errors import ScaraIdentError, UsageError
-    from scara_ident.recording.inspect.inspection import inspect_file
-    from scara_ident.report.files import check_output, write_text
+    from scara_ident.files import check_output, write_text
+    from scara_ident.inspection.inspection import inspect_file
 
     target = None if output is None else output / "robot.yaml"
     if target is not None and urdf is None:

@@ -11,7 +11,7 @@ import typer
 
 from scara_ident.cli.base import base
 from scara_ident.cli.compare import compare
-from scara_ident.cli.console import errors_console
+from scara_ident.cli.console import Command, errors_console, plugin_notices
 from scara_ident.cli.demo import demo
 from scara_ident.cli.diagnose import diagnose
 from scara_ident.cli.excite import excite
@@ -64,7 +64,7 @@ _COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (demo, "Run the whole story on the embedded arm."),
 )
 for _command, _line in _COMMANDS:
-    app.command(short_help=_line)(_command)
+    app.command(short_help=_line, cls=Command)(_command)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -75,7 +75,8 @@ def main(arguments: list[str] | None = None) -> None:
 def run(arguments: list[str]) -> int:
     """Run the program and return its exit status: 0 done, 1 cannot be given, 2 bad usage."""
     try:
-        result = app(args=arguments, prog_name="scara-ident", standalone_mode=False)
+        with plugin_notices():
+            result = app(args=arguments, prog_name="scara-ident", standalone_mode=False)
         status = int(result) if isinstance(result, int) else 0
         if status == INTERRUPTED:
             _complain("interrupted; no file is left half-written")

@@ -12,8 +12,8 @@ _IN_FULL = ("Table 1", "Limits", "Torque rms from Table 5")
 
 def paper(output: OutputOption = None) -> None:
     """Set the printed tables of the paper (Indri et al., 2002) beside what the program computes."""
+    from scara_ident.files import check_output, write_json
     from scara_ident.paper import check_paper
-    from scara_ident.report.files import check_output, write_json
 
     check_output(output)
     report = check_paper()
@@ -51,8 +51,8 @@ def paper(output: OutputOption = None) -> None:
 
 def paper_in_short(output: Path) -> None:
     """Count what agrees, section by section, and write ``paper.json``."""
+    from scara_ident.files import check_output, write_json
     from scara_ident.paper import check_paper
-    from scara_ident.report.files import check_output, write_json
 
     check_output(output)
     report = check_paper()

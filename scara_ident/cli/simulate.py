@@ -25,7 +25,7 @@ def simulate(
     output: Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the recordings.")] = Path("."),
 ) -> None:
     """Record the virtual arm in closed loop, with what it really was in a JSON beside."""
-    from scara_ident.report.files import check_output, written_together
+    from scara_ident.files import check_output, written_together
     from scara_ident.robot.robot import load_robot
     from scara_ident.simulation import parse_effect, virtual_arm, write_simulation
     from scara_ident.simulation import simulate as run

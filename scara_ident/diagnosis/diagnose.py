@@ -16,15 +16,15 @@ from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.model_selection import Task, Unexplained, joint_rms, outcome_of
 from scara_ident.diagnosis.screening import Dependence
 from scara_ident.diagnosis.search import Search, is_delay
-from scara_ident.effects import CATALOGUE, Effect, Parameter
+from scara_ident.effects import Effect, Parameter, available_effects
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.errors import RecordingError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.observations import Evidence, gather_all
 from scara_ident.identification.channel_check import mapping_faults
-from scara_ident.identification.identify import check_held_out, data_notes
-from scara_ident.model.model import ModelName, TorqueModel, build_model
+from scara_ident.identification.identify import check_bands, check_held_out, data_notes
+from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 
@@ -113,12 +113,12 @@ class Diagnosis:
 
 def diagnose(
     robot: Robot,
-    model: ModelName | TorqueModel,
+    model: str | TorqueModel,
     recordings: Sequence[Recording],
     validation: Sequence[Recording] = (),
     *,
     bands: Sequence[float | None] | None = None,
-    catalogue: Sequence[Effect] = CATALOGUE,
+    catalogue: Sequence[Effect] | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Diagnosis:
     """Find what a model lacks, trace it to a physical effect, add it, and report before and after.
@@ -126,7 +126,7 @@ def diagnose(
     Parameters
     ----------
     robot : Robot
-    model : {"complete", "reduced", "basic"} or TorqueModel
+    model : str or TorqueModel
         The base model.
     recordings : sequence of Recording
         Every choice is made on these.
@@ -135,7 +135,7 @@ def diagnose(
     bands : sequence of float or None, one per joint, optional
         Low-pass on both sides; by default the widest band that any joint's data allow, for all joints.
     catalogue : sequence of Effect, optional
-        Families to try; a user's own can be among them.
+        Families to try; a user's own can be among them. By default all, those of installed packages included.
     progress : callable, optional
 
     Returns
@@ -145,7 +145,7 @@ def diagnose(
     Raises
     ------
     UsageError
-        If a recording is both fitted and held out.
+        If a recording is both fitted and held out, or a band is no frequency that the slowest recording carries.
     RecordingError
         If a recording cannot be used, or its channels are not what the mapping says (see `mapping_faults`).
     """
@@ -159,10 +159,12 @@ def diagnose(
         # A joint whose model lacks something seems to have less band than it has.
         bands = (max(choice.bands),) * robot.n
         notes += choice.notes
+    else:
+        check_bands(robot, bands, (*recordings, *validation))
     faults = mapping_faults(base, recordings, bands)
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))
-    task = Task(base, tuple(recordings), tuple(catalogue), progress)
+    task = Task(base, tuple(recordings), available_effects() if catalogue is None else tuple(catalogue), progress)
     outcome = outcome_of(task, bands, free=not given)
     found, after = outcome.search, outcome.after
     held_out = corrected(found, validation)

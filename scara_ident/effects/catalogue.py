@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
-from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from itertools import chain, groupby
+from typing import Any
 
 from scara_ident.effects.coupling import DriveCoupling, InertiaCoupling
 from scara_ident.effects.drift import OffsetDrift, WarmUp
@@ -18,10 +17,7 @@ from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibr
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
 from scara_ident.effects.tilt import BaseTilt, NominalBaseTilt
-from scara_ident.errors import UsageError
-
-GROUP = "scara_ident.effects"
-"""Group of entry points by which a package adds a subclass of `Effect`, or an instance of one."""
+from scara_ident.registry import Registry
 
 CATALOGUE: tuple[Effect, ...] = (
     TransmissionLoss(),
@@ -54,46 +50,47 @@ CATALOGUE: tuple[Effect, ...] = (
 )
 
 
-@cache
+def _families(found: Any) -> tuple[Effect, ...]:
+    """Return what a package adds, a subclass of `Effect`, an instance or a tuple of them, as families."""
+    made = found() if isinstance(found, type) else found
+    families: tuple[Any, ...] = made if isinstance(made, tuple) else (made,)
+    for family in families:
+        if not isinstance(family, Effect):
+            raise TypeError(f"{family!r} is no scara_ident.effects.Effect")
+        missing = [part for part in ("name", "summary") if not getattr(family, part, "")]
+        if missing:
+            raise TypeError(f"{type(family).__name__} has no {' and no '.join(missing)}")
+    return families
+
+
+EFFECTS: Registry[tuple[Effect, ...]] = Registry(
+    "effect",
+    "scara_ident.effects",
+    {name: tuple(same) for name, same in groupby(CATALOGUE, lambda effect: effect.name)},
+    _families,
+)
+"""Families by the name of the effect, which several share."""
+
+
 def available_effects() -> tuple[Effect, ...]:
     """Return the effects built in, then those of installed packages.
 
-    Raises
-    ------
-    UsageError
-        If a package's effect cannot be loaded; the line names the package.
+    Warns
+    -----
+    PluginWarning
+        For every effect of a package that cannot be used.
     """
-    return (*CATALOGUE, *(_loaded(point) for point in entry_points(group=GROUP)))
+    return tuple(chain.from_iterable(EFFECTS.all().values()))
 
 
 def effects_named(*names: str) -> tuple[Effect, ...]:
-    """Return the families of the given names, all that share one, in the order of `available_effects`.
+    """Return the families of the given names, all that share one.
 
     Raises
     ------
     UsageError
         If there is none of a name.
+    ScaraIdentError
+        If a package's effect cannot be used; the line names the package.
     """
-    known = tuple(dict.fromkeys(effect.name for effect in available_effects()))
-    for name in names:
-        if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f"did you mean {near[0]}? " if near else ""
-            raise UsageError(f"effect {name!r}: no such effect; {hint}there are {', '.join(known)}")
-    return tuple(effect for effect in available_effects() if effect.name in names)
-
-
-def _loaded(point: EntryPoint) -> Effect:
-    package = point.value if point.dist is None else point.dist.name
-    try:
-        found = point.load()
-        found = found() if isinstance(found, type) else found
-    except Exception as error:
-        reason = " ".join(str(error).split())
-        raise UsageError(f"package {package}: effect {point.name}: {type(error).__name__}: {reason}") from None
-    if not isinstance(found, Effect):
-        raise UsageError(f"package {package}: effect {point.name}: {point.value} is no scara_ident.effects.Effect")
-    missing = [part for part in ("name", "summary") if not getattr(found, part, "")]
-    if missing:
-        raise UsageError(f"package {package}: effect {point.name}: {point.value} has no {' and no '.join(missing)}")
-    return found
+    return tuple(chain.from_iterable(EFFECTS.get(name) for name in dict.fromkeys(names)))

@@ -14,8 +14,8 @@ from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.estimate import paper_criteria, pooled_information
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.observations import Evidence, gather_all
-from scara_ident.identification.identify import Method, data_notes, estimate_by
-from scara_ident.model.model import ModelName, TorqueModel, build_model
+from scara_ident.identification.identify import data_notes, estimate_by
+from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.motion import motion_of, stretches
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.recording.recording import Recording
@@ -86,8 +86,8 @@ def compare(
     robot: Robot,
     recordings: Sequence[Recording],
     *,
-    model: ModelName | TorqueModel = "complete",
-    method: Method = "ols",
+    model: str | TorqueModel = "complete",
+    method: str = "ols",
     bands: Sequence[float | None] | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Comparison:
@@ -156,7 +156,7 @@ def _summary(
     evidence: Sequence[Evidence],
     recordings: Sequence[Recording],
     bands: Sequence[float | None],
-    method: Method,
+    method: str,
     sigma: Array | None,
 ) -> TrajectorySummary:
     n = model.robot.n

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.errors import UsageError
-from scara_ident.estimation import Estimate, History, JointError, ols, rls, wls
+from scara_ident.estimation import Estimate, History, JointError
 from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, consistent, physical_consistency
 from scara_ident.estimation.consistent.feasibility import PhysicalConsistency
@@ -18,8 +18,9 @@ from scara_ident.estimation.consistent.options import ConsistentOptions
 from scara_ident.estimation.estimate import paper_criteria, pooled_information
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Evidence, gather_all
+from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.channel_check import mapping_faults
-from scara_ident.model.model import ModelName, TorqueModel, build_model
+from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.motion import stretches
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.motion.velocity_audit import audit_velocity
@@ -27,8 +28,6 @@ from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
-Method = Literal["ols", "wls", "rls", "consistent"]
-METHODS: tuple[str, ...] = get_args(Method)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +82,8 @@ def identify(
     robot: Robot,
     recordings: Sequence[Recording],
     *,
-    model: ModelName | TorqueModel = "complete",
-    method: Method = "ols",
+    model: str | TorqueModel = "complete",
+    method: str = "ols",
     validation: Sequence[Recording] = (),
     bands: Sequence[float | None] | None = None,
     options: ConsistentOptions | None = None,
@@ -97,8 +96,11 @@ def identify(
     robot : Robot
     recordings : sequence of Recording
         The recordings to fit.
-    model : {"complete", "reduced", "basic"} or TorqueModel, optional
-    method : {"ols", "wls", "rls", "consistent"}, optional
+    model : str or TorqueModel, optional
+        A name of `scara_ident.model.MODELS`: ``complete``, ``reduced``, ``basic`` or an installed package's.
+    method : str, optional
+        A name of `scara_ident.identification.ESTIMATORS`: ``ols``, ``wls``, ``rls``, ``consistent`` or an installed
+        package's.
     validation : sequence of Recording, optional
         Recordings that take no part in the fit nor in any choice.
     bands : sequence of float or None, one per joint, optional
@@ -115,15 +117,14 @@ def identify(
     Raises
     ------
     UsageError
-        If there are no recordings, the method is unknown, a recording is both fitted and held out, or a band is no
+        If there are no recordings, the model or the method is unknown, a recording is both fitted and held out, or a band is no
         frequency that the slowest recording carries.
     RecordingError
         If a recording cannot be used.
     """
     if not recordings:
         raise UsageError("no recordings to identify from")
-    if method not in METHODS:
-        raise UsageError(f"method {method!r}: expected one of {', '.join(METHODS)}")
+    ESTIMATORS.check(method)
     check_held_out(recordings, validation)
     equation = build_model(robot, model) if isinstance(model, str) else model
     notes = data_notes((*recordings, *validation))
@@ -133,7 +134,7 @@ def identify(
         bands = choice.bands
         notes += choice.notes
     else:
-        _check_bands(robot, bands, (*recordings, *validation))
+        check_bands(robot, bands, (*recordings, *validation))
     progress("absorbing the recordings")
     training = gather_all(equation, recordings, bands)
     held_out = gather_all(equation, validation, bands)
@@ -184,7 +185,13 @@ def known_information(model: TorqueModel, recordings: Sequence[Recording], rate:
     return merge(sampled)
 
 
-def _check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequence[Recording]) -> None:
+def check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequence[Recording]) -> None:
+    """Refuse bands that are not one for each joint, or no frequencies that the slowest recording carries.
+
+    Raises
+    ------
+    UsageError
+    """
     if len(bands) != robot.n:
         raise UsageError(f"bands: {len(bands)} given; expected one for each of {', '.join(robot.joints)}")
     for joint, band in zip(robot.joints, bands, strict=True):
@@ -199,20 +206,17 @@ def _check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequen
 
 
 def estimate_by(
-    method: Method,
+    method: str,
     model: TorqueModel,
     evidence: Sequence[Evidence],
     noise: Array | None = None,
     options: ConsistentOptions | None = None,
 ) -> tuple[Estimate, History | None]:
     """Estimate by a method given by name; ``noise`` is each joint's, where repetitions tell it."""
-    if method == "consistent":
-        return consistent(model, evidence, options=options), None
-    if method == "rls":
-        return rls(model, evidence)
-    if method == "wls":
-        return wls(model, evidence, noise), None
-    return ols(model, evidence), None
+    estimator = ESTIMATORS.get(method)
+    more: dict[str, dict[str, Any]] = {"consistent": {"options": options}, "wls": {"noise": noise}}
+    found = estimator(model, evidence, **more.get(method, {}))
+    return found if isinstance(found, tuple) else (found, None)
 
 
 def _joint_noise(noise: Mapping[str, Array]) -> Array | None:

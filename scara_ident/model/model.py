@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.errors import UsageError
+from scara_ident.model import MODELS
 from scara_ident.model.terms import Column, Friction, Offset, RigidBody, Term
 from scara_ident.model.terms.rigid_body import rigid_body
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
-
-ModelName = Literal["complete", "reduced", "basic"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,26 +74,36 @@ class TorqueModel:
         return np.concatenate([term.regressor(motion) for term in self.terms], axis=1)
 
 
-def build_model(robot: Robot, name: ModelName = "complete") -> TorqueModel:
-    """Build one of the three models of the command line.
+def build_model(robot: Robot, name: str = "complete") -> TorqueModel:
+    """Build a model by its name.
 
     Parameters
     ----------
     robot : Robot
-    name : {"complete", "reduced", "basic"}
-        ``complete``: rigid bodies, rotors, friction to the third power of speed and offset. ``reduced``: no
-        cubic friction and no offset; on the SCARA03 no P_d3 either, which leaves the ten parameters of
-        Indri et al. 2002. ``basic``: Coulomb and viscous friction and offset.
+    name : str
+        ``complete``, ``reduced``, ``basic``, or one that an installed package adds to `scara_ident.model.MODELS`.
 
     Raises
     ------
     UsageError
-        If the name is none of these.
+        If there is no model of this name; the message lists the names.
     """
-    if name == "complete":
-        return TorqueModel(name, robot, (rigid_body(robot), Friction(robot), Offset(robot)))
-    if name == "reduced":
-        return TorqueModel(name, robot, (rigid_body(robot, without=("P_d3",)), Friction(robot, (0, 1, 2))))
-    if name == "basic":
-        return TorqueModel(name, robot, (rigid_body(robot), Friction(robot, (0, 1)), Offset(robot)))
-    raise UsageError(f"model {name!r}: expected one of {', '.join(get_args(ModelName))}")
+    return MODELS.get(name)(robot)
+
+
+def complete(robot: Robot) -> TorqueModel:
+    """Return rigid bodies, rotors, friction to the third power of speed and offset."""
+    return TorqueModel("complete", robot, (rigid_body(robot), Friction(robot), Offset(robot)))
+
+
+def reduced(robot: Robot) -> TorqueModel:
+    """Return the model without cubic friction and offset.
+
+    On the SCARA03 without P_d3 either, which leaves the ten parameters of Indri et al. 2002.
+    """
+    return TorqueModel("reduced", robot, (rigid_body(robot, without=("P_d3",)), Friction(robot, (0, 1, 2))))
+
+
+def basic(robot: Robot) -> TorqueModel:
+    """Return rigid bodies, rotors, Coulomb and viscous friction and offset."""
+    return TorqueModel("basic", robot, (rigid_body(robot), Friction(robot, (0, 1)), Offset(robot)))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.recording.audit import Finding, Samples, audit
-from scara_ident.recording.files import READERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
+from scara_ident.recording.files import IMPORTERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
 from scara_ident.robot.signal_map import Channel, Channels, contract_channels
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 OPTIONAL = ("velocity", "acceleration", "temperature")
-_OTHERS = ", ".join([*list(READERS)[2:], "rosbag2 folder"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,7 +334,7 @@ def _paths(word: str) -> list[Path]:
         found = _in_folder(path)
         if not found:
             raise RecordingError(
-                f"{path}: no .parquet or .csv file in this folder, nor another recording ({_OTHERS}); "
+                f"{path}: no .parquet or .csv file in this folder, nor another recording ({_others()}); "
                 "name one that holds recordings"
             )
         return found
@@ -350,8 +349,12 @@ def _paths(word: str) -> list[Path]:
     for match in matches:
         found += [match] if is_recording(match) else _in_folder(match) if match.is_dir() else []
     if not found:
-        raise RecordingError(f"{word}: matches {len(matches)} files but no .parquet or .csv file ({_OTHERS})")
+        raise RecordingError(f"{word}: matches {len(matches)} files but no .parquet or .csv file ({_others()})")
     return found
+
+
+def _others() -> str:
+    return ", ".join([*IMPORTERS.names()[2:], "rosbag2 folder"])
 
 
 def _in_folder(folder: Path) -> list[Path]:

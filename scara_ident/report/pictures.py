@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from scara_ident.diagnosis import Diagnosis
+from scara_ident.files import write_whole
 from scara_ident.recording.recording import Recording
-from scara_ident.report.files import write_whole
 from scara_ident.report.html.chapters import chapters
 from scara_ident.report.html.plot import (
     Band,

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from scara_ident.errors import RobotError
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
+from scara_ident.robot.examples import example_urdf, is_name
 from scara_ident.robot.signal_map import Channels, build_channels
+from scara_ident.robot.transmissions import reductions, rotor_inertias
 from scara_ident.robot.urdf_validation import urdf_fault
 
 if TYPE_CHECKING:
@@ -127,8 +129,8 @@ def load_robot(path: Path | str | None = None) -> Robot:
     Parameters
     ----------
     path : path, optional
-        A ``robot.yaml``, or a URDF whose movable joints are all to be identified with effort at the joints.
-        Without it the embedded SCARA03 is loaded.
+        A ``robot.yaml``, or a URDF whose movable joints are all to be identified with effort at the joints, or the
+        name of such a robot of example-robot-data, as ``"ur5"``. Without it the embedded SCARA03 is loaded.
 
     Returns
     -------
@@ -142,6 +144,8 @@ def load_robot(path: Path | str | None = None) -> Robot:
     if path is None:
         return build_robot(RobotDescription(urdf=embedded_urdf(), effort_side="motor"), embedded_urdf())
     source = Path(path)
+    if is_name(source):
+        source = example_urdf(source.name)
     if source.suffix.lower() in (".urdf", ".xml"):
         return build_robot(RobotDescription(urdf=source.resolve(), effort_side="joint"), source)
     return build_robot(read_description(source), source)
@@ -170,7 +174,7 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
     order = np.array([model.joints[i].idx_v for i in ids], dtype=np.intp)
     position = np.array([model.joints[i].idx_q for i in ids], dtype=np.intp)
     unbounded = np.array([model.joints[i].nq != 1 for i in ids])
-    reduction = _reductions(names, joints, urdf, tree)
+    reduction = reductions(names, joints, urdf, tree)
     prismatic = ["P" in model.joints[i].shortname().removeprefix("JointModel") for i in ids]
     side = description.effort_side
     if side is None:
@@ -189,7 +193,7 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
         order=order,
         prismatic=np.array(prismatic),
         reduction=reduction,
-        rotor_inertia=_rotor_inertias(names, joints, urdf, tree),
+        rotor_inertia=rotor_inertias(names, joints, urdf, tree),
         effort_side=side,
         effort_gain=np.array([joint.effort_gain for joint in joints]),
         lower=np.where(unbounded, -np.inf, _given(model.lowerPositionLimit[position])),
@@ -353,48 +357,3 @@ def _moved_link(model: pin.Model, joint_id: int) -> str:
         if body.type == pin.FrameType.BODY and body.parentFrame == frame:
             return str(body.name)
     return str(model.names[joint_id])
-
-
-def _reductions(
-    names: Sequence[str], joints: Sequence[JointDescription], urdf: Path, tree: ElementTree.Element
-) -> NDArray[np.float64]:
-    from_urdf = _actuator_numbers(tree, urdf, ("mechanicalReduction", "mechanical_reduction"))
-    for name, value in from_urdf.items():
-        if value == 0.0:
-            raise RobotError(f"{urdf}: transmission of {name}: mechanicalReduction is 0; expected another number")
-    given = [joint.reduction for joint in joints]
-    return np.array([_first(value, from_urdf.get(name), 1.0) for name, value in zip(names, given, strict=True)])
-
-
-def _rotor_inertias(
-    names: Sequence[str], joints: Sequence[JointDescription], urdf: Path, tree: ElementTree.Element
-) -> NDArray[np.float64]:
-    from_urdf = _actuator_numbers(tree, urdf, ("rotorInertia",))
-    given = [joint.rotor_inertia for joint in joints]
-    return np.array([_first(value, from_urdf.get(name), 0.0) for name, value in zip(names, given, strict=True)])
-
-
-def _first(*values: float | None) -> float:
-    return float(next(value for value in values if value is not None))
-
-
-def _actuator_numbers(tree: ElementTree.Element, urdf: Path, tags: Sequence[str]) -> dict[str, float]:
-    """Read a number from the transmission of every joint that has one.
-
-    yourdfpy 0.0.60 parses the element but loses its text (an element without children is false), so the
-    file is read here.
-    """
-    found: dict[str, float] = {}
-    for transmission in tree.iter("transmission"):
-        texts = [element.text for tag in tags for element in transmission.iter(tag)]
-        names = [joint.get("name", "") for joint in transmission.findall("joint")]
-        if not texts:
-            continue
-        for name in names:
-            try:
-                found[name] = float(texts[0] or "")
-            except ValueError:
-                found[name] = np.nan
-            if not np.isfinite(found[name]):
-                raise RobotError(f"{urdf}: transmission of {name}: {tags[0]} is {texts[0]!r}; expected a number")
-    return found

@@ -14,7 +14,7 @@ import polars as pl
 import pytest
 
 from scara_ident.cli.main import run
-from scara_ident.report.files import check_output, written_together
+from scara_ident.files import check_output, written_together
 from scara_ident.robot.robot import embedded_urdf
 from tests.made_recordings import columns, save
 

@@ -50,6 +50,7 @@ RECORDINGS = [
 ]
 ROBOTS = [
     ("no.yaml", 1, ("no.yaml: no such robot description",)),
+    ("ur6", 1, ("ur6: no such file, nor a robot of example-robot-data; did you mean ur5",)),
     ("nothing", 1, ("nothing: is a folder", "give its robot.yaml")),
     ("list.yaml", 1, ("list.yaml: expected a mapping", "found list")),
     ("syntax.yaml", 1, ("syntax.yaml, line 2: not YAML",)),
@@ -75,8 +76,8 @@ OTHERS = [
     # identify
     ("identify", 2, ("RECORDING", "see scara-ident identify --help")),
     ("identify good_1.parquet --colour", 2, ("No such option: --colour", "see scara-ident identify --help")),
-    ("identify good_1.parquet --model full", 2, ("--model", "'full' is not one of 'complete', 'reduced', 'basic'")),
-    ("identify good_1.parquet --method magic", 2, ("--method", "'magic' is not one of", "'ols'")),
+    ("identify good_1.parquet --model full", 2, ("model 'full': expected one of complete, reduced, basic",)),
+    ("identify good_1.parquet --method magic", 2, ("method 'magic': expected one of ols, wls, rls, consistent",)),
     ("identify good_1.parquet --band=-3", 2, ("--band", "greater than", "see scara-ident identify --help")),
     ("identify good_1.parquet --band=nan", 2, ("--band", "greater than", "see scara-ident identify --help")),
     ("identify good_1.parquet --band=inf", 2, ("band of joint1 is inf Hz", "expected a frequency above 0")),
@@ -93,14 +94,16 @@ OTHERS = [
     ("diagnose missing.csv", 2, ("missing.csv: no such file",)),
     ("diagnose nothing", 1, ("nothing: no .parquet or .csv file in this folder",)),
     ("diagnose text_1.csv", 1, ("text_1.csv: column 'joint1.position', row 2",)),
-    ("diagnose good_1.parquet --model full", 2, ("--model", "'full' is not one of")),
+    ("diagnose good_1.parquet --model full", 2, ("model 'full': expected one of",)),
+    ("diagnose good_1.parquet --band 5000", 2, ("band of joint1 is 5000 Hz", "give a lower band")),
+    ("diagnose good_1.parquet --effects spring,glue", 2, ("effect 'glue': expected one of transmission_loss",)),
     ("diagnose good_1.parquet --validate good_1.parquet", 2, ("good_1.parquet: given to fit and to", "held out")),
     ("diagnose good_1.parquet --robot reduction.yaml", 1, ("reduction.yaml: joints.joint1.reduction",)),
     # compare
     ("compare missing.csv", 2, ("missing.csv: no such file",)),
     ("compare good_1.parquet", 2, ("at least two trajectories, found 1", "_<number>")),
     ("compare good_1.parquet good_1.csv", 1, ("two recordings named 'good_1'", "rename one")),
-    ("compare good_1.parquet --method magic", 2, ("--method", "'magic' is not one of")),
+    ("compare good_1.parquet --method magic", 2, ("method 'magic': expected one of",)),
     ("compare good_1.parquet day1/run_1.parquet still_1.parquet", 1, ("still_1.parquet: nothing is left",)),
     # simulate
     ("simulate nowhere.csv", 2, ("'nowhere.csv': no such file", "OJK, OJD")),

@@ -18,8 +18,8 @@ from scara_ident.excitation import (
 )
 from scara_ident.excitation.curves import make_basis
 from scara_ident.excitation.output import joint_trajectory_yaml, notes
+from scara_ident.files import plain
 from scara_ident.model.model import build_model
-from scara_ident.report.files import plain
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import ReferenceMotion
 

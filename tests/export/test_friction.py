@@ -10,16 +10,14 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information
 from scara_ident.export.friction import JointFriction, friction_of
 from scara_ident.export.urdf import urdf_text
-from scara_ident.model.model import ModelName, build_model
+from scara_ident.model.model import build_model
 from scara_ident.model.terms import Friction
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot, load_robot
 from tests.export.arms import branched, random_motion
 
 
-def estimate_of(
-    robot: Robot, name: ModelName, values: dict[str, float], undetermined: tuple[str, ...] = ()
-) -> Estimate:
+def estimate_of(robot: Robot, name: str, values: dict[str, float], undetermined: tuple[str, ...] = ()) -> Estimate:
     model = build_model(robot, name)
     p = len(model.names)
     value = np.array([values.get(key, 0.0) for key in model.names])

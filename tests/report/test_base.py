@@ -6,8 +6,8 @@ import json
 
 import numpy as np
 
+from scara_ident.files import plain
 from scara_ident.report.base import base_dict
-from scara_ident.report.files import plain
 from scara_ident.robot.robot import load_robot
 from tests.arms import example_urdf
 

@@ -10,8 +10,8 @@ import pytest
 from scara_ident.diagnosis import diagnose
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.position import Spring
+from scara_ident.files import plain
 from scara_ident.report.diagnosis import best_by_label, diagnosis_dict, diagnosis_markdown, sentences
-from scara_ident.report.files import plain
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, with_torque
 

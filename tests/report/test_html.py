@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 from scara_ident.diagnosis import diagnose
 from scara_ident.effects.position import Spring
 from scara_ident.errors import ScaraIdentError
+from scara_ident.files import plain
 from scara_ident.identification.compare import compare
 from scara_ident.model.terms import Friction
 from scara_ident.motion.motion import Motion
 from scara_ident.report.comparison import comparison_dict
-from scara_ident.report.files import plain
 from scara_ident.report.html import comparison_report, diagnosis_report, excitation_report, identification_report
 from scara_ident.report.html.bins import binned_means, tail_means
 from scara_ident.report.html.excitation import joint_points

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.report.files import plain
+from scara_ident.files import plain
 from scara_ident.report.identification import identification_dict, sentences
 from tests.report.simulated import made, run
 

@@ -11,7 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from scara_ident.report.files import write_whole
+from scara_ident.files import write_whole
 from scara_ident.report.html.plot import Figure, Matrix
 
 # A space at which no line ends.

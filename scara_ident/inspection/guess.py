@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.recording.inspect.names import CURRENT, TORQUE, Meaning, meaning
-from scara_ident.recording.inspect.values import Reading, position_readings, slopes, time_unit, velocity_reading
+from scara_ident.inspection.names import CURRENT, TORQUE, Meaning, meaning
+from scara_ident.inspection.values import Reading, position_readings, slopes, time_unit, velocity_reading
 from scara_ident.robot.units import COUNT, DRIVE, TIME, Unit, find_unit, table_of
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from scara_ident.recording.inspect.inspection import inspect_file
+from scara_ident.inspection.inspection import inspect_file
 from scara_ident.robot.robot import load_robot
 from tests.arms import PLANAR_2R, Link, write_urdf
 from tests.made_recordings import save

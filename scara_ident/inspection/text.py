@@ -12,7 +12,7 @@ from scara_ident.robot.signal_map import fill
 from scara_ident.robot.units import DRIVE, table_of
 
 if TYPE_CHECKING:
-    from scara_ident.recording.inspect.guess import Guess, Signal
+    from scara_ident.inspection.guess import Guess, Signal
     from scara_ident.robot.robot import Robot
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import ScaraIdentError
-from scara_ident.report.files import plain, write_json, write_text, write_whole
+from scara_ident.files import plain, write_json, write_text, write_whole
 
 
 def refuse(constant: str) -> None:

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.errors import RecordingError, UsageError
+from scara_ident.inspection.guess import Guess, guess
+from scara_ident.inspection.names import Meaning, meaning
+from scara_ident.inspection.text import description_text, mapping
 from scara_ident.recording.files import column_names, is_bag_folder, read_columns
-from scara_ident.recording.inspect.guess import Guess, guess
-from scara_ident.recording.inspect.names import Meaning, meaning
-from scara_ident.recording.inspect.text import description_text, mapping
 from scara_ident.recording.recording import Recording, read_recording
 from scara_ident.robot.description import RobotDescription, check_description
 from scara_ident.robot.robot import Robot, build_robot, load_robot
@@ -292,7 +292,7 @@ def _scale(recording: Recording, arm: Robot, text: str) -> str | None:
     """Return what the URDF says of the scale of effort; None where a gear leaves the side open."""
     if recording.effort is None or any(arm.reduction != 1.0):
         return None
-    from scara_ident.recording.inspect.scale import scale_note
+    from scara_ident.inspection.scale import scale_note
 
     return scale_note(recording, _described(text, arm))
 

@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 from scara_ident.errors import RecordingError, UsageError
-from scara_ident.recording.inspect.inspection import Inspection, inspect_file
-from scara_ident.recording.inspect.names import meaning
-from scara_ident.recording.inspect.values import time_unit
+from scara_ident.inspection.inspection import Inspection, inspect_file
+from scara_ident.inspection.names import meaning
+from scara_ident.inspection.values import time_unit
 from scara_ident.recording.recording import read_recording
 from scara_ident.robot.robot import embedded_urdf, load_robot
 from tests.arms import Link, write_urdf

@@ -1,0 +1,60 @@
+"""What the transmissions of a URDF say of drives: reductions and rotor inertias."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.errors import RobotError
+from scara_ident.robot.description import JointDescription
+
+
+def reductions(
+    names: Sequence[str], joints: Sequence[JointDescription], urdf: Path, tree: ElementTree.Element
+) -> NDArray[np.float64]:
+    """Return the reduction of each joint, shape (n,): the description's, else the URDF's, else 1."""
+    from_urdf = _actuator_numbers(tree, urdf, ("mechanicalReduction", "mechanical_reduction"))
+    for name, value in from_urdf.items():
+        if value == 0.0:
+            raise RobotError(f"{urdf}: transmission of {name}: mechanicalReduction is 0; expected another number")
+    given = [joint.reduction for joint in joints]
+    return np.array([_first(value, from_urdf.get(name), 1.0) for name, value in zip(names, given, strict=True)])
+
+
+def rotor_inertias(
+    names: Sequence[str], joints: Sequence[JointDescription], urdf: Path, tree: ElementTree.Element
+) -> NDArray[np.float64]:
+    """Return the rotor inertia of each joint, kg m^2 at the motor, shape (n,): where none is stated, 0."""
+    from_urdf = _actuator_numbers(tree, urdf, ("rotorInertia",))
+    given = [joint.rotor_inertia for joint in joints]
+    return np.array([_first(value, from_urdf.get(name), 0.0) for name, value in zip(names, given, strict=True)])
+
+
+def _first(*values: float | None) -> float:
+    return float(next(value for value in values if value is not None))
+
+
+def _actuator_numbers(tree: ElementTree.Element, urdf: Path, tags: Sequence[str]) -> dict[str, float]:
+    """Read a number from the transmission of every joint that has one.
+
+    yourdfpy 0.0.60 parses the element but loses its text (an element without children is false), so the
+    file is read here.
+    """
+    found: dict[str, float] = {}
+    for transmission in tree.iter("transmission"):
+        texts = [element.text for tag in tags for element in transmission.iter(tag)]
+        names = [joint.get("name", "") for joint in transmission.findall("joint")]
+        if not texts:
+            continue
+        for name in names:
+            try:
+                found[name] = float(texts[0] or "")
+            except ValueError:
+                found[name] = np.nan
+            if not np.isfinite(found[name]):
+                raise RobotError(f"{urdf}: transmission of {name}: {tags[0]} is {texts[0]!r}; expected a number")
+    return found

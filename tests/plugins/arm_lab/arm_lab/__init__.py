@@ -1,0 +1,1 @@
+"""What a laboratory adds to scara-ident, without a change of it."""
