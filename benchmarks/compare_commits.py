@@ -32,7 +32,8 @@ DIAGNOSED = (
     *("verdict", "effects", "tentative", "unexplained", "not_identifiable", "events"),
     *("band_hz", "noise_floor", "parameters", "training", "validation"),
 )
-PROSE = ("meaning", "description", "why", "settled_by", "summary", "notes")
+# Keys that are prose, or outside of the contract.
+LEFT_OUT = ("meaning", "description", "why", "settled_by", "summary", "notes", "rivals")
 
 
 def commands(shared: Path, sets: Path | None) -> dict[str, list[str]]:
@@ -90,7 +91,7 @@ def _leaves(value: Any, path: str, scale: float) -> Iterator[tuple[str, tuple[An
     if isinstance(value, Mapping):
         std = value.get("std") or 0.0
         for key, item in value.items():
-            if key not in PROSE:
+            if key not in LEFT_OUT:
                 yield from _leaves(item, f"{path}.{key}", std if key == "value" else 0.0)
     elif isinstance(value, list) and value and isinstance(value[0], Mapping):
         seen: dict[str, int] = {}
