@@ -13,13 +13,13 @@ import json
 import os
 import time
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 from attribution_tables import report
+from virtual_sets import KINDS, simulate_set, tasks
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.candidates import Candidate
@@ -29,136 +29,13 @@ from scara_ident.effects import CATALOGUE, Member
 from scara_ident.effects.measurement import shifted
 from scara_ident.estimation.least_squares import wls
 from scara_ident.estimation.observations import gather_all
-from scara_ident.paper import OJD, OJK
-from scara_ident.robot.robot import load_robot
-from scara_ident.simulation import EFFECTS, ReferenceMotion, sampled, simulate, virtual_arm
-
-# Effects that are not told by one name: their size is this parameter, scaled by a random factor.
-SIZE = {
-    "transmission_loss": "loss_coefficient",
-    "stribeck": "amplitude",
-    "asymmetric_friction": "viscous_difference",
-    "presliding": "presliding_distance",
-    "warm_up": "share",
-    "torque_ripple": "amplitude",
-    "position_dependent_friction": "share",
-    "spring": "stiffness",
-    "base_tilt": "tilt_x",
-    "payload_change": "mass",
-    "time_delay": "delay",
-    "torque_sensor_nonlinearity": "cubic",
-    "torque_gain_mismatch": "ratio",
-    "joint_elasticity": "stiffness",
-    "backlash": "width",
-    "encoder_eccentricity": "amplitude",
-    "friction_coupling": "coulomb",
-    "offset_drift": "rate",
-    "vibration": "amplitude",
-}
-# Elasticity is the larger the smaller its parameter.
-INVERSE = ("joint_elasticity",)
-WHOLE_ARM = ("base_tilt", "payload_change", "time_delay")
-UNLISTED = ("unlisted_1", "unlisted_2")
-
-
-def random_arm(rng: np.random.Generator):
-    """An arm like the SCARA03 with its own inertias and friction."""
-    arm = virtual_arm(load_robot())
-    scale = rng.uniform(0.85, 1.15, (arm.robot.n, 1))
-    return replace(
-        arm,
-        bodies=arm.bodies * scale,
-        rotor_inertia=arm.rotor_inertia * rng.uniform(0.9, 1.1, arm.robot.n),
-        friction=arm.friction * rng.uniform(0.75, 1.25, (arm.robot.n, 1)),
-        torque_offset=rng.normal(0.0, 0.005, arm.robot.n),
-        torque_noise=np.array([0.020, 0.008]),
-    )
-
-
-def multisine(name: str, robot, seed: int, duration: float) -> ReferenceMotion:
-    """A sum of five harmonics per joint with rest at both ends."""
-    rng = np.random.default_rng(seed)
-    order = np.arange(1, 6)
-    amplitude = rng.normal(0.0, 1.0, (robot.n, 5)) / order
-    phase = rng.uniform(0.0, 2.0 * np.pi, (robot.n, 5))
-    centre = np.array([1.57, 0.0])
-    omega = 2.0 * np.pi * order / duration
-    t = np.linspace(0.0, duration, 400)
-    wave = np.einsum("jk,jkt->jt", amplitude, np.cos(omega[:, None] * t + phase[:, :, None]))
-    # Fill the ranges but stay under 2.5 rad/s.
-    speed = np.einsum("jk,jkt->jt", amplitude * omega, -np.sin(omega[:, None] * t + phase[:, :, None]))
-    reach = np.minimum(1.9 / np.abs(wave).max(axis=1), 2.5 / np.abs(speed).max(axis=1))
-    amplitude = amplitude * reach[:, None]
-
-    def motion(time_):
-        angle = omega[:, None] * time_ + phase[:, :, None]
-        q = centre[:, None] + np.einsum("jk,jkt->jt", amplitude, np.cos(angle))
-        v = -np.einsum("jk,jkt->jt", amplitude * omega, np.sin(angle))
-        a = -np.einsum("jk,jkt->jt", amplitude * omega**2, np.cos(angle))
-        return q, v, a
-
-    return sampled(name, robot, motion, duration)
-
-
-def pick_effects(kind: str, arm, rng: np.random.Generator):
-    """Return effects of a random size and the size factor."""
-    names = {"none": [], "unlisted": [rng.choice(UNLISTED)]}.get(kind)
-    if names is None:
-        names = list(rng.choice(list(SIZE), 2, replace=False)) if kind == "pair" else [kind]
-    effects, factors = [], []
-    for name in names:
-        joint = None if name in WHOLE_ARM else str(rng.choice(arm.robot.joints))
-        if name == "torque_gain_mismatch":
-            joint = arm.robot.joints[1]
-        effect = EFFECTS[name](joint=joint).resolve(arm)
-        factor = float(np.exp(rng.uniform(np.log(0.25), np.log(3.0)))) if kind != "pair" else 1.5
-        key = SIZE.get(name)
-        if name == "torque_gain_mismatch":
-            effect = replace(effect, ratio=1.0 + factor * (effect.ratio - 1.0))
-        elif name == "base_tilt":
-            effect = replace(effect, tilt_x=factor * effect.tilt_x, tilt_y=factor * effect.tilt_y)
-        elif name == "friction_coupling":
-            effect = replace(effect, viscous=factor * effect.viscous, coulomb=factor * effect.coulomb)
-        elif name in INVERSE:
-            effect = replace(effect, stiffness=effect.stiffness / factor)
-        elif key:
-            value = factor * getattr(effect, key)
-            effect = replace(effect, **{key: min(value, 0.9) if key in ("share", "loss_coefficient") else value})
-        else:
-            effect = replace(
-                effect, **{k: factor * getattr(effect, k) for k in ("amplitude", "viscous") if hasattr(effect, k)}
-            )
-        if name == "payload_change":
-            effect = replace(effect, time=float(rng.uniform(3.0, 7.0)))
-        if name == "torque_ripple":
-            effect = replace(effect, order=float(rng.choice([1.0, 2.0, 4.0, 6.0])))
-        effects.append(effect)
-        factors.append(factor)
-    return effects, factors
 
 
 def one_set(task: tuple[str, int]) -> dict:
     """Simulate a set, diagnose it, and compare with what the arm was."""
     kind, seed = task
-    rng = np.random.default_rng(seed)
-    arm = random_arm(rng)
-    robot = arm.robot
-    effects, factors = pick_effects(kind, arm, rng)
-    ojd = sampled("OJD", robot, OJD.motion, 14.0)
-    ojk = sampled("OJK", robot, OJK.motion, 10.0)
-    training_motions = [
-        ojd,
-        ojk,
-        multisine("F1", robot, seed + 10_000, 8.0),
-        multisine("F2", robot, seed + 20_000, 12.0),
-    ]
-    test_motion = multisine("F3", robot, seed + 30_000, 10.0)
-    training = [
-        simulate(arm, motion, effects=effects, seed=seed, repetition=k).recording
-        for motion in training_motions
-        for k in (1, 2)
-    ]
-    held_out = [simulate(arm, test_motion, effects=effects, seed=seed + 1).recording]
+    made = simulate_set(kind, seed)
+    robot, effects, training, held_out = made.arm.robot, made.effects, made.training, made.held_out
     began = time.perf_counter()
     result = diagnose(robot, "complete", training, held_out)
     seconds = time.perf_counter() - began
@@ -167,7 +44,7 @@ def one_set(task: tuple[str, int]) -> dict:
     return {
         "kind": kind,
         "seed": seed,
-        "factors": factors,
+        "factors": made.factors,
         "true": [{"effect": e.name, "joint": e.joint, "parameters": e.as_dict()["parameters"]} for e in effects],
         "verdict": result.verdict,
         "found": [
@@ -236,11 +113,9 @@ def main() -> None:
     if arguments.tables:
         report(json.loads(arguments.tables.read_text(encoding="utf-8")))
         return
-    kinds = arguments.only or [*SIZE, "none", "none", "none", "unlisted", "unlisted", "pair", "pair"]
-    tasks = [(kinds[k % len(kinds)], arguments.seed * 100_000 + k) for k in range(arguments.sets)]
     with ProcessPoolExecutor(max_workers=2) as pool:
         results = []
-        for k, item in enumerate(pool.map(one_set, tasks)):
+        for k, item in enumerate(pool.map(one_set, tasks(arguments.sets, arguments.seed, arguments.only or KINDS))):
             results.append(item)
             found = ", ".join(f"{f['effect']}/{f['joint']}" for f in item["found"])
             true = ", ".join(f"{t['effect']}/{t['joint']}" for t in item["true"])
