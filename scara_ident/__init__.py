@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from scara_ident.estimation.estimate import Estimate
     from scara_ident.estimation.information import Information, merge
     from scara_ident.estimation.least_squares import ols, wls
-    from scara_ident.estimation.observations import Evidence, gather, gather_all
+    from scara_ident.estimation.observations import Observations, observe
     from scara_ident.estimation.recursive import rls
     from scara_ident.excitation.design import Design, design_excitation
     from scara_ident.excitation.output import write_trajectory
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from scara_ident.model.model import TorqueModel, build_model
     from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
     from scara_ident.motion.motion import Motion, motion_of, stretches
+    from scara_ident.motion.prepared import PreparedData, prepare
     from scara_ident.recording.recording import Recording, read_recording, read_recordings, write_recording
     from scara_ident.robot.robot import Robot, load_robot
     from scara_ident.simulation.arm import VirtualArm
@@ -51,11 +52,12 @@ _NAMES = {
     "robot.robot": ("Robot", "load_robot"),
     "recording.recording": ("Recording", "read_recording", "read_recordings", "write_recording"),
     "motion.motion": ("Motion", "motion_of", "stretches"),
+    "motion.prepared": ("PreparedData", "prepare"),
     "model.base_parameters": ("BaseParameters", "check_base_parameters", "find_base_parameters"),
     "model.model": ("TorqueModel", "build_model"),
     "model.regressor.kernel": ("RegressorKernel", "build_kernel"),
     "estimation.information": ("Information", "merge"),
-    "estimation.observations": ("Evidence", "gather", "gather_all"),
+    "estimation.observations": ("Observations", "observe"),
     "estimation.estimate": ("Estimate",),
     "estimation.least_squares": ("ols", "wls"),
     "estimation.recursive": ("rls",),

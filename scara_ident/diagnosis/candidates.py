@@ -1,19 +1,27 @@
-"""Candidates: members of families of effects, and all of them as one term."""
+"""Candidates: members of families of effects, and their columns on the rows of observations, each made once."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Hashable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
-from scara_ident.model.terms import Column
-from scara_ident.motion.motion import Motion
+from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.motion.prepared import PreparedStretch
+from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
+# Columns of a candidate, shape (k, N) on the N rows of each joint that it acts on.
+Rows = dict[int, Array]
+# Effect, member, and the estimate where its columns follow that.
+Key = tuple[Effect, Member, Hashable]
+
+# Columns that pass the low-pass together: more of them leave the cache.
+AT_ONCE = 16
 
 
 @dataclass(frozen=True)
@@ -45,6 +53,11 @@ class Candidate:
         partner = "" if self.member.partner is None else f" by {scene.robot.joints[self.member.partner]}"
         return f"{self.effect.name} of {joint}{partner}"
 
+    @property
+    def corrects_data(self) -> bool:
+        """Whether it is taken out of the recordings instead of becoming a term of the model."""
+        return self.effect.corrects_data(self.member)
+
     def at(self, nonlinear: Sequence[float]) -> Candidate:
         """Return the member with other nonlinear parameters."""
         return replace(self, member=replace(self.member, nonlinear=tuple(float(x) for x in nonlinear)))
@@ -55,44 +68,123 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Bank:
-    """Candidates as one term; what they share is computed once per stretch of motion."""
+class CandidateColumns:
+    """The columns of candidates on the rows of observations, each made once per value of its nonlinear parameters.
 
-    scene: Scene
-    candidates: tuple[Candidate, ...]
+    Columns that follow the estimate, such as those of a gear's load, are made again when it changes.
 
-    @property
-    def name(self) -> str:
-        """Name of the term."""
-        return "candidates"
+    Attributes
+    ----------
+    observations : Observations
+        Of the base model.
+    """
 
-    @cached_property
-    def terms(self) -> tuple[EffectTerm, ...]:
-        """The candidates as terms."""
-        return tuple(candidate.term(self.scene) for candidate in self.candidates)
+    observations: Observations
+    _rows: dict[Key, Rows] = field(default_factory=dict, repr=False)
+    _raw: dict[Key, tuple[Rows, ...]] = field(default_factory=dict, repr=False)
 
-    @cached_property
-    def columns(self) -> tuple[Column, ...]:
-        """Columns of all candidates."""
-        return tuple(column for term in self.terms for column in term.columns)
+    def beside(self, observations: Observations) -> CandidateColumns:
+        """Return the same columns beside other torques on the same motion."""
+        return CandidateColumns(observations, self._rows, self._raw)
 
-    @cached_property
-    def pattern(self) -> NDArray[np.bool_]:
-        """Which entries can differ from zero, shape (n, k)."""
-        if not self.terms:
-            return np.zeros((self.scene.robot.n, 0), dtype=bool)
-        return np.concatenate([term.pattern for term in self.terms], axis=1)
+    def rows(self, scene: Scene, candidates: Sequence[Candidate]) -> list[Rows]:
+        """Return the columns of candidates within the bands, on the rows of each joint that they act on."""
+        self._make(scene, [item for item in candidates if _key(scene, item) not in self._rows], keep=False)
+        return [self._rows[_key(scene, item)] for item in candidates]
 
-    @cached_property
-    def places(self) -> tuple[slice, ...]:
-        """Where each candidate's columns stand."""
-        bounds = np.cumsum([0, *(len(term.columns) for term in self.terms)])
-        return tuple(slice(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True))
+    def raw(self, scene: Scene, candidates: Sequence[Candidate]) -> list[tuple[Rows, ...]]:
+        """Return the columns of candidates at every sample of every stretch, not filtered."""
+        self._make(scene, [item for item in candidates if _key(scene, item) not in self._raw], keep=True)
+        return [self._raw[_key(scene, item)] for item in candidates]
 
-    def regressor(self, motion: Motion) -> Array:
-        """Return the columns of all candidates, shape (n, k, N)."""
-        signals = Signals(self.scene, motion)
-        result = np.zeros((self.scene.robot.n, len(self.columns), motion.samples))
-        for candidate, place in zip(self.candidates, self.places, strict=True):
-            result[:, place] = candidate.effect.regressor(signals, candidate.member)
-        return result
+    def predicted(self, scene: Scene, chosen: Sequence[Candidate], value: Array) -> tuple[Array, ...]:
+        """Return the torque that the base model with effects predicts on every stretch, shape (n, N) each."""
+        start = self.observations.parameters
+        torque = [part.copy() for part in self.observations.predicted(value[:start])]
+        for candidate, raw in zip(chosen, self.raw(scene, chosen), strict=True):
+            stop = start + len(candidate.effect.columns(scene, candidate.member))
+            for part, columns in zip(torque, raw, strict=True):
+                for joint, rows in columns.items():
+                    part[joint] += value[start:stop] @ rows
+            start = stop
+        return tuple(torque)
+
+    def _make(self, scene: Scene, candidates: Sequence[Candidate], *, keep: bool) -> None:
+        wanted = list(dict.fromkeys(candidates))
+        if not wanted:
+            return
+        stretches = self.observations.data.stretches
+        with one_blas_thread(), ThreadPoolExecutor(max_workers=2) as pool:
+            made = list(pool.map(lambda part: _on_stretch(scene, wanted, part, keep=keep), stretches))
+        for k, candidate in enumerate(wanted):
+            key = _key(scene, candidate)
+            parts = [rows[k] for rows, _ in made]
+            used = [part for part, stretch in zip(parts, stretches, strict=True) if stretch.usable]
+            self._rows[key] = {j: np.concatenate([part[j] for part in used], axis=1) for j in parts[0]}
+            if keep:
+                self._raw[key] = tuple(raws[k] for _, raws in made)
+
+    def forget_all_but(self, *scenes: Scene) -> None:
+        """Forget columns that follow other estimates than those of some scenes."""
+        current = {None, *(_estimate(scene) for scene in scenes)}
+        for held in (self._rows, self._raw):
+            for key in [key for key in held if key[2] not in current]:
+                del held[key]
+
+
+def _estimate(scene: Scene) -> Hashable:
+    return scene.value.tobytes(), tuple(sorted(scene.armatures.items()))
+
+
+def _key(scene: Scene, candidate: Candidate) -> Key:
+    follows = candidate.effect.follows_estimate
+    return candidate.effect, candidate.member, _estimate(scene) if follows else None
+
+
+def _on_stretch(
+    scene: Scene, candidates: Sequence[Candidate], part: PreparedStretch, *, keep: bool
+) -> tuple[list[Rows], list[Rows]]:
+    """Return every candidate's columns within the bands and, if they are to be kept, as they are."""
+    signals = Signals(scene, part.motion)
+    kept: list[Rows] = [{} for _ in candidates]
+    unfiltered: list[Rows] = [{} for _ in candidates]
+    waiting: dict[int, list[tuple[int, Array]]] = {}
+
+    def flush(joint: int) -> None:
+        held = waiting.pop(joint)
+        rows = part.rows(joint, np.concatenate([columns for _, columns in held]))
+        start = 0
+        for k, columns in held:
+            kept[k][joint] = rows[start : start + len(columns)]
+            start += len(columns)
+
+    for k, candidate in enumerate(candidates):
+        dense = candidate.effect.regressor(signals, candidate.member)
+        for joint in candidate.effect.rows(scene, candidate.member):
+            if keep:
+                unfiltered[k][joint] = dense[joint]
+            if part.usable:
+                waiting.setdefault(joint, []).append((k, dense[joint]))
+                if sum(len(columns) for _, columns in waiting[joint]) >= AT_ONCE:
+                    flush(joint)
+            else:
+                kept[k][joint] = np.zeros((dense.shape[1], 0))
+    for joint in list(waiting):
+        flush(joint)
+    return kept, unfiltered
+
+
+def with_columns(observations: Observations, added: Sequence[Rows]) -> tuple[JointRows, ...]:
+    """Return the rows of every joint with further columns, numbered on from those of the model."""
+    found = []
+    for joint, rows in enumerate(observations.joints):
+        places, tables, start = [rows.columns], [rows.table[:-1]], observations.parameters
+        for item in added:
+            size = len(next(iter(item.values())))
+            if joint in item:
+                places.append(np.arange(start, start + size))
+                tables.append(item[joint])
+            start += size
+        table = np.concatenate([*tables, rows.table[-1:]]) if len(tables) > 1 else rows.table
+        found.append(JointRows(np.concatenate(places), table, rows.starts, rows.counts))
+    return tuple(found)

@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.confounding import Confounder, confounders
+from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
-from scara_ident.diagnosis.model_selection import Task, Unexplained, joint_rms, outcome_of
+from scara_ident.diagnosis.model_selection import Unexplained, rms_of, select_model
 from scara_ident.diagnosis.screening import Dependence
-from scara_ident.diagnosis.search import Search, is_delay
-from scara_ident.effects import Effect, Parameter, available_effects
+from scara_ident.diagnosis.search import Search, SearchTask, columns_at_hand, corrected
+from scara_ident.diagnosis.selection_step import SelectionStep, observed_at_every_sample
+from scara_ident.effects import Effect, Parameter
 from scara_ident.effects.aliases import Alias, aliases
+from scara_ident.effects.catalogue import available_effects
 from scara_ident.errors import RecordingError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.bands import choose_bands
-from scara_ident.estimation.observations import Evidence, gather_all
-from scara_ident.identification.channel_check import mapping_faults
+from scara_ident.estimation.observations import Observations, observe
+from scara_ident.identification.channel_check import channel_faults
 from scara_ident.identification.identify import check_bands, check_held_out, data_notes
 from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 
@@ -77,7 +81,7 @@ class Diagnosis:
         Every candidate tried, with its statistics.
     before, after : Estimate
         The base model, and the model with the effects found.
-    training_before, training_after, validation_before, validation_after : tuple of Evidence
+    training_before, training_after, validation_before, validation_after : Observations
     fit_before, fit_after : tuple of LackOfFit
         Per joint; empty without repetitions.
     effects : tuple of FoundEffect
@@ -93,10 +97,10 @@ class Diagnosis:
     search: Search
     before: Estimate
     after: Estimate
-    training_before: tuple[Evidence, ...]
-    training_after: tuple[Evidence, ...]
-    validation_before: tuple[Evidence, ...]
-    validation_after: tuple[Evidence, ...]
+    training_before: Observations
+    training_after: Observations
+    validation_before: Observations
+    validation_after: Observations
     fit_before: tuple[LackOfFit, ...]
     fit_after: tuple[LackOfFit, ...]
     effects: tuple[FoundEffect, ...]
@@ -119,6 +123,7 @@ def diagnose(
     *,
     bands: Sequence[float | None] | None = None,
     catalogue: Sequence[Effect] | None = None,
+    criteria: SelectionCriteria = CRITERIA,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Diagnosis:
     """Find what a model lacks, trace it to a physical effect, add it, and report before and after.
@@ -135,7 +140,9 @@ def diagnose(
     bands : sequence of float or None, one per joint, optional
         Low-pass on both sides; by default the widest band that any joint's data allow, for all joints.
     catalogue : sequence of Effect, optional
-        Families to try; a user's own can be among them. By default all, those of installed packages included.
+        Families to try, by default all that are built in or installed; a user's own can be among them.
+    criteria : SelectionCriteria, optional
+        When an effect is believed.
     progress : callable, optional
 
     Returns
@@ -147,28 +154,31 @@ def diagnose(
     UsageError
         If a recording is both fitted and held out, or a band is no frequency that the slowest recording carries.
     RecordingError
-        If a recording cannot be used, or its channels are not what the mapping says (see `mapping_faults`).
+        If a recording cannot be used, or its channels are not what the mapping says (see `channel_faults`).
     """
     check_held_out(recordings, validation)
+    if bands is not None:
+        check_bands(robot, bands, (*recordings, *validation))
     base = build_model(robot, model) if isinstance(model, str) else model
-    notes = list(data_notes((*recordings, *validation)))
+    data, held_out = prepare(recordings), prepare(validation)
+    notes = data_notes((*data.recordings, *held_out.recordings))
     given = bands is not None
     if bands is None:
         progress("choosing the band")
-        choice = choose_bands(base, recordings)
+        choice = choose_bands(base, data)
         # A joint whose model lacks something seems to have less band than it has.
         bands = (max(choice.bands),) * robot.n
         notes += choice.notes
-    else:
-        check_bands(robot, bands, (*recordings, *validation))
-    faults = mapping_faults(base, recordings, bands)
+    data = data.at(bands)
+    faults = channel_faults(observe(base, data))
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))
-    task = Task(base, tuple(recordings), available_effects() if catalogue is None else tuple(catalogue), progress)
-    outcome = outcome_of(task, bands, free=not given)
+    families = available_effects() if catalogue is None else tuple(catalogue)
+    outcome = select_model(SearchTask(base, families, criteria, progress), data, free=not given)
     found, after = outcome.search, outcome.after
-    held_out = corrected(found, validation)
-    effects = _effects(found, after)
+    step = replace(found.step, weights=after.weights)
+    validation_before = observe(base, held_out.at(found.bands))
+    effects = _effects(found, step)
     notes += outcome.demoted
     negligible = _negligible(found)
     if negligible is not None:
@@ -179,10 +189,10 @@ def diagnose(
         found,
         found.start,
         after,
-        found.start_evidence,
+        found.uncorrected,
         outcome.training,
-        gather_all(base, validation, found.bands),
-        gather_all(found.model, held_out, found.bands),
+        validation_before,
+        _with_effects(found, validation_before),
         outcome.fit_before,
         outcome.fit_after,
         tuple(effects),
@@ -193,26 +203,35 @@ def diagnose(
     )
 
 
-def _effects(found: Search, after: Estimate) -> list[FoundEffect]:
+def _with_effects(found: Search, before: Observations) -> Observations:
+    """Return held-out observations, corrected as the training ones were, with the effects found."""
+    if not before.data.recordings:
+        return replace(before, model=found.model)
+    if found.correction is not None:
+        data = corrected(before.data, found.correction.candidate, found.correction.value)
+        before = before.with_torque(data)
+    scene = replace(found.scene, columns=columns_at_hand(before))
+    return observed_at_every_sample(replace(found.step, scene=scene, columns=CandidateColumns(before)))
+
+
+def _effects(found: Search, step: SelectionStep) -> list[FoundEffect]:
     scene = found.scene
-    groups = confounders(found, after.weights) if found.chosen else []
-    parameters = (
-        physical_parameters(scene, found.recordings, found.bands, after.weights, found.chosen) if found.chosen else []
-    )
+    groups = confounders(step, found.decisions) if found.chosen else []
+    parameters = physical_parameters(step) if found.chosen else []
     labels = [item.label(scene) for item in found.chosen]
     results = []
-    before = joint_rms(found.start.value, found.start_evidence)
-    for step in found.steps:
-        decision = step.decision
+    before = rms_of(found.start.value, found.uncorrected)
+    for item in found.steps:
+        decision = item.decision
         candidate = decision.candidate
-        now = joint_rms(step.estimate.value, step.evidence)
-        if is_delay(candidate) and found.delay is not None:
+        now = item.rms
+        if candidate.corrects_data and found.correction is not None:
             if _negligible(found) is not None:
                 before = now
                 continue
-            value, std = found.delay
+            covariance = np.diag(found.correction.std**2)
             values: Mapping[str, Parameter] = candidate.effect.parameters(
-                scene, candidate.member, np.array([value]), np.array([[std**2]])
+                scene, candidate.member, found.correction.value, covariance
             )
             confounded: tuple[Confounder, ...] = ()
         else:
@@ -237,23 +256,9 @@ def _effects(found: Search, after: Estimate) -> list[FoundEffect]:
     return results
 
 
-def corrected(found: Search, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
-    """Return recordings with what the search corrected in the data taken out of them."""
-    candidate = _correction(found)
-    if candidate is None or found.delay is None:
-        return tuple(recordings)
-    value = np.array([found.delay[0]])
-    return tuple(candidate.effect.corrected(recording, candidate.member, value) for recording in recordings)
-
-
-def _correction(found: Search) -> Candidate | None:
-    candidates = (step.decision.candidate for step in found.steps)
-    return next((candidate for candidate in candidates if is_delay(candidate)), None)
-
-
 def _negligible(found: Search) -> str | None:
     """Say why what was corrected in the data is no effect to speak of."""
-    candidate = _correction(found)
-    if candidate is None or found.delay is None:
+    if found.correction is None:
         return None
-    return candidate.effect.negligible(found.scene, candidate.member, np.array([found.delay[0]]))
+    candidate = found.correction.candidate
+    return candidate.effect.negligible(found.scene, candidate.member, found.correction.value)

@@ -2,40 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.candidate_tests import examine
-from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.nonlinear_fit import Linearised, linearise
-from scara_ident.diagnosis.table import Table, tabulate
-from scara_ident.effects import Parameter, Scene
+from scara_ident.diagnosis.candidates import Candidate, Rows
+from scara_ident.diagnosis.nonlinear_fit import DERIVATIVE_STEP, Linearised, linearise
+from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.effects import Parameter
 from scara_ident.estimation.covariance import block_covariance
-from scara_ident.estimation.information import Information, triangular
-from scara_ident.recording.recording import Recording
+from scara_ident.estimation.information import merge
 
 Array = NDArray[np.float64]
 
 
-def physical_parameters(
-    scene: Scene,
-    recordings: Sequence[Recording],
-    bands: Sequence[float | None],
-    weights: Array,
-    chosen: Sequence[Candidate],
-) -> list[dict[str, Parameter]]:
-    """Return the physical parameters of each effect.
+def physical_parameters(step: SelectionStep) -> list[dict[str, Parameter]]:
+    """Return the physical parameters of each chosen effect.
 
     Nonlinear parameters, armatures included, join the fit by the derivative of the effects' columns, so that the
     covariance is that of all parameters together.
     """
-    state = linearise(scene, recordings, bands, tabulate(scene.model, recordings, bands), weights, chosen)
-    covariance = _covariance(state)
+    state = linearise(step.scene, step.columns, step.weights, step.chosen)
+    covariance = _covariance(step, state)
     found = []
-    for owner, (candidate, own) in enumerate(zip(chosen, state.places, strict=True)):
-        parameters = dict(candidate.effect.parameters(scene, candidate.member, state.value[own], covariance[own, own]))
+    for owner, (candidate, own) in enumerate(zip(step.chosen, state.places, strict=True)):
+        parameters = dict(
+            candidate.effect.parameters(step.scene, candidate.member, state.value[own], covariance[own, own])
+        )
         for position, unknown in enumerate(state.unknowns):
             if unknown.owner != owner:
                 continue
@@ -50,46 +43,37 @@ def physical_parameters(
     return found
 
 
-def parameters_beside(
-    scene: Scene,
-    recordings: Sequence[Recording],
-    bands: Sequence[float | None],
-    table: Table,
-    weights: Array,
-    candidate: Candidate,
-) -> dict[str, Parameter]:
+def parameters_beside(step: SelectionStep, candidate: Candidate) -> dict[str, Parameter]:
     """Return the physical parameters of one effect beside a model, as `physical_parameters` at a fraction of the work.
 
     The model's columns are projected out, and the covariance is that of the effect's block scores. Armatures stay as
     they are.
     """
-    state = linearise(scene, recordings, bands, table, weights, [candidate])
-    nonlinear = [k for k, unknown in enumerate(state.unknowns) if unknown.owner is not None]
-    first, own = table.columns.shape[1], state.places[0]
-    wide = state.table.beside(state.derivatives[:, nonlinear])
-    (found,) = examine(wide, range(first), [list(range(first, wide.columns.shape[1]))])
-    size = own.stop - own.start
-    return dict(candidate.effect.parameters(scene, candidate.member, state.value[own], found.covariance[:size, :size]))
+    (own,) = step.columns.rows(step.scene, [candidate])
+    (alone,) = examine(step.model, [own], step.criteria)
+    wide: Rows = {joint: rows for joint, rows in own.items()}
+    size = len(alone.value)
+    for place, parameter in enumerate(candidate.effect.nonlinear):
+        value = candidate.member.nonlinear[place]
+        reach = DERIVATIVE_STEP * (abs(value) if value else parameter.upper - parameter.lower)
+        sides = []
+        for sign in (1.0, -1.0):
+            moved = list(candidate.member.nonlinear)
+            moved[place] = value + sign * reach
+            sides.append(candidate.at(moved))
+        up, down = step.columns.rows(step.scene, sides)
+        for joint in wide:
+            change = alone.value @ (up[joint] - down[joint]) / (2.0 * reach)
+            wide[joint] = np.concatenate([wide[joint], change[None]])
+    (found,) = examine(step.model, [wide], step.criteria)
+    covariance = found.covariance[:size, :size]
+    return dict(candidate.effect.parameters(step.scene, candidate.member, alone.value, covariance))
 
 
-def _covariance(state: Linearised) -> Array:
-    """Block covariance of all parameters, columns scaled to unit size meanwhile."""
-    rows, aim = state.prior
-    columns = state.columns
-    size = np.linalg.norm(np.vstack([columns, rows]), axis=0)
-    size[size == 0.0] = 1.0
-    table = np.column_stack([columns / size, state.table.torque])
-    prior = np.column_stack([rows / size, aim])
-    bounds = [*state.table.starts, len(columns)]
-    sequences: dict[int, list[tuple[Information, ...]]] = {}
-    for block, recording in enumerate(state.table.recording):
-        part = table[bounds[block] : bounds[block + 1]]
-        factor = triangular(part)
-        sequences.setdefault(int(recording), []).append((Information(factor, float(len(part))),))
-    whole = Information(triangular(np.vstack([table, prior])), float(len(table)))
-    inverse = whole.inverse()
+def _covariance(step: SelectionStep, state: Linearised) -> Array:
+    """Block covariance of all parameters, with what the priors leave open, which no residual shows."""
+    inverse = merge([state.information, state.prior]).inverse()
     value = np.concatenate([state.value, np.zeros(len(state.unknowns))])
-    spread = block_covariance(inverse, value * size, list(sequences.values())).matrix
-    # What the priors leave open, which no residual shows.
-    spread = spread + state.variance * inverse @ (prior[:, :-1].T @ prior[:, :-1]) @ inverse
-    return np.asarray(spread / np.outer(size, size))
+    spread = block_covariance(inverse, value, state.joints, step.observations.owner, step.weights).matrix
+    known = state.prior.factor[:, :-1]
+    return np.asarray(spread + state.variance * inverse @ (known.T @ known) @ inverse)

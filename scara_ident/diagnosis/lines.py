@@ -19,10 +19,7 @@ from scara_ident.effects.spectra import (
     order_width,
     whitened,
 )
-from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import stretches
-from scara_ident.motion.prepared import rows_of, trim_of
-from scara_ident.recording.recording import Recording
+from scara_ident.estimation.residuals import Residuals
 
 Array = NDArray[np.float64]
 
@@ -36,24 +33,14 @@ SIGNIFICANCE = 1e-3
 LEAST_PERIODS = 6.0
 
 
-def line_candidates(
-    scene: Scene,
-    model: TorqueModel,
-    value: Array,
-    recordings: Sequence[Recording],
-    bands: Sequence[float | None],
-    catalogue: Sequence[Effect],
-) -> list[Candidate]:
+def line_candidates(scene: Scene, residuals: Residuals, catalogue: Sequence[Effect]) -> list[Candidate]:
     """Return periodic effects at the strongest line of each joint's residual, in motor angle and in time.
 
     Parameters
     ----------
     scene : Scene
-    model : TorqueModel
-        With the effects found so far.
-    value : ndarray, shape (p,)
-    recordings : sequence of Recording
-    bands : sequence of float or None, one per joint
+    residuals : Residuals
+        Of the model with the effects found so far.
     catalogue : sequence of Effect
         Only families that are in it are offered.
     """
@@ -61,16 +48,20 @@ def line_candidates(
     if not seeded:
         return []
     found: list[Candidate] = []
-    parts = [_residuals(model, value, recording, bands) for recording in recordings]
-    pieces = [piece for part in parts for piece in part]
-    for j in range(scene.robot.n):
-        residuals = [residual[j] for residual, _, _ in pieces]
-        rate = pieces[0][2]
-        if not residuals or not any(np.any(residual) for residual in residuals):
+    for j, reduction in enumerate(scene.robot.reduction):
+        pieces, turns, rates = [], [], []
+        for part, banded in zip(residuals.data.stretches, residuals.banded, strict=True):
+            if part.samples <= 4 * part.trim:
+                continue
+            inside = slice(part.trim, part.samples - part.trim)
+            pieces.append(np.where(part.rest[j], 0.0, banded[j])[inside])
+            turns.append((reduction * part.motion.q[j])[inside])
+            rates.append(part.rate)
+        if not any(np.any(piece) for piece in pieces):
             continue
-        band = bands[j]
-        white = whitened(residuals, rate, highest=band)
-        order = _strongest_order(white, [turns[j] for _, turns, _ in pieces])
+        rate, band = rates[0], residuals.data.bands[j]
+        white = whitened(pieces, rate, highest=band)
+        order = _strongest_order(white, turns)
         frequency = _strongest_frequency(white, rate, band or 0.4 * rate)
         strongest = [] if order is None else [SpectralLine("order", order)]
         strongest += [] if frequency is None else [SpectralLine("frequency", frequency)]
@@ -80,26 +71,6 @@ def line_candidates(
             for effect in seeded
             for member in effect.seeds(scene, j, line)
         ]
-    return found
-
-
-def _residuals(
-    model: TorqueModel, value: Array, recording: Recording, bands: Sequence[float | None]
-) -> list[tuple[list[Array], list[Array], float]]:
-    """Residual of every joint within its band and its motor angle, per stretch; zero where the joint stands."""
-    found = []
-    for part in stretches(recording):
-        trim = trim_of(part, bands)
-        if len(part.time) <= 4 * trim:
-            continue
-        rows = rows_of(model, part, bands)
-        rest = rows.rest
-        inside = slice(trim, len(part.time) - trim)
-        residual = [
-            np.where(rest[j], 0.0, banded[-1] - value @ banded[:-1])[inside] for j, banded in enumerate(rows.banded)
-        ]
-        turns = [(model.robot.reduction[j] * rows.motion.q[j])[inside] for j in range(model.robot.n)]
-        found.append((residual, turns, part.rate))
     return found
 
 

@@ -1,8 +1,8 @@
-"""Nonlinear parameters of the effects in a model, all fitted together with its linear ones by Gauss and Newton.
+"""Fitting the nonlinear parameters of all effects in a model together, by Gauss and Newton.
 
-To the nonlinear parameters of the effects come the armatures of joints whose gear they depend on: where the base model
-cannot tell a rotor from its link, the load that a gear transmits follows from the nominal rotor inertia only, which a
-data sheet gives without shaft, brake and wave generator. It enters with that uncertainty as a prior.
+Armatures are among them: where the base model cannot tell a rotor from its link, the load that a gear transmits follows
+from the nominal rotor inertia only, which a data sheet gives without shaft, brake and wave generator. It enters with
+that uncertainty as a prior.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.table import Table, tabulate_candidates
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
 from scara_ident.effects import Scene
-from scara_ident.recording.recording import Recording
+from scara_ident.estimation.information import Information, weighted
+from scara_ident.estimation.observations import JointRows
+from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,8 @@ SETTLED = 0.1
 LONGEST_STEP = 0.5
 # A rise of the squared error by more than this share turns a step back; loads that settle may raise it by less.
 RISE = 1e-5
+# Directions whose singular value, columns scaled to unit length, is below this share of the largest take no step.
+STEPLESS = 1e-9
 
 
 @dataclass(frozen=True)
@@ -76,143 +79,159 @@ class Linearised:
     scene : Scene
     chosen : tuple of Candidate
     unknowns : tuple of Unknown
-    table : Table
-        Columns of the base model, then of the effects, weighted.
     places : tuple of slice
-        Columns of each effect in the table.
-    value : ndarray, shape (k,)
-        Linear parameters that fit best at the present nonlinear ones.
-    derivatives : ndarray, shape (N, s)
-        Change of the torque per unit of each nonlinear parameter.
+        Columns of each effect.
+    joints : tuple of JointRows
+        Columns of the base model, of the effects, and the change of the torque per unit of each nonlinear parameter.
+    information : Information
+        Of all weighted rows; its parameters are k linear ones, then s nonlinear ones.
     """
 
     scene: Scene
     chosen: tuple[Candidate, ...]
     unknowns: tuple[Unknown, ...]
-    table: Table
     places: tuple[slice, ...]
-    value: Array
-    derivatives: Array
+    joints: tuple[JointRows, ...]
+    information: Information
 
     @property
-    def columns(self) -> Array:
-        """Columns of all parameters, linear first, shape (N, k + s)."""
-        return np.hstack([self.table.columns, self.derivatives])
+    def linear(self) -> int:
+        """Number of linear parameters k."""
+        return self.information.parameters - len(self.unknowns)
+
+    @cached_property
+    def value(self) -> Array:
+        """Linear parameters that fit best at the present nonlinear ones, shape (k,)."""
+        return self.information.select(range(self.linear)).solve().value
+
+    @cached_property
+    def rows(self) -> int:
+        """Number of rows."""
+        return sum(rows.table.shape[1] for rows in self.joints)
 
     @cached_property
     def variance(self) -> float:
-        """Mean squared residual of a row."""
-        left = self.table.torque - self.table.columns @ self.value
-        return float(np.mean(left**2))
+        """Mean squared residual of a weighted row."""
+        value = np.concatenate([self.value, np.zeros(len(self.unknowns))])
+        return self.information.residual_sum(value) / self.rows
 
     @property
     def error(self) -> float:
         """Squared residual with what the priors add to it."""
         prior = sum(((item.value - item.nominal) / item.spread) ** 2 for item in self.unknowns)
-        return self.variance * (len(self.table.torque) + prior)
+        return self.variance * (self.rows + prior)
 
     @property
-    def prior(self) -> tuple[Array, Array]:
-        """Rows of the priors on the nonlinear parameters, and their right-hand side, as weighty as measured rows."""
+    def prior(self) -> Information:
+        """Rows of the priors on the nonlinear parameters, as weighty as measured rows."""
         known = [k for k, item in enumerate(self.unknowns) if np.isfinite(item.spread)]
-        rows = np.zeros((len(known), len(self.value) + len(self.unknowns)))
-        aim = np.zeros(len(known))
+        rows = np.zeros((len(known), self.information.parameters + 1))
         for row, k in enumerate(known):
             item = self.unknowns[k]
             weight = np.sqrt(self.variance) / item.spread
-            rows[row, len(self.value) + k] = weight
-            aim[row] = weight * (item.nominal - item.value)
-        return rows, aim
+            rows[row, self.linear + k] = weight
+            rows[row, -1] = weight * (item.nominal - item.value)
+        return Information(rows, 0.0)
 
     def solve(self) -> tuple[Array, Array]:
         """Return the best change of the nonlinear parameters and the white standard deviations of all parameters."""
-        rows, aim = self.prior
-        columns = np.vstack([self.columns, rows])
-        target = np.concatenate([self.table.torque, aim])
+        rows = np.vstack([self.information.factor, self.prior.factor])
+        columns, target = rows[:, :-1], rows[:, -1]
         size = np.linalg.norm(columns, axis=0)
         size[size == 0.0] = 1.0
         left, singular, right = np.linalg.svd(columns / size, full_matrices=False)
-        kept = singular > 1e-9 * singular[0]
+        kept = singular > STEPLESS * singular[0]
         half = right[kept].T / singular[kept]
         best = half @ (left[:, kept].T @ target) / size
-        return best[len(self.value) :], np.sqrt(self.variance * np.sum(half**2, axis=1)) / size
+        return best[self.linear :], np.sqrt(self.variance * np.sum(half**2, axis=1)) / size
 
 
-def linearise(
-    scene: Scene,
-    recordings: Sequence[Recording],
-    bands: Sequence[float | None],
-    base: Table,
-    weights: Array,
-    chosen: Sequence[Candidate],
-) -> Linearised:
+def linearise(scene: Scene, columns: CandidateColumns, weights: Array, chosen: Sequence[Candidate]) -> Linearised:
     """Return the linear model about the present nonlinear parameters.
 
     Parameters
     ----------
     scene : Scene
-    recordings : sequence of Recording
-    bands : sequence of float or None, one per joint
-    base : Table
-        Rows of the base model, not weighted.
+    columns : CandidateColumns
+        On the rows of the base model.
     weights : ndarray, shape (n,)
     chosen : sequence of Candidate
     """
+    observations = columns.observations
     unknowns = _unknowns(scene, chosen)
-    nonlinear = [item for item in unknowns if item.owner is not None]
-    variants = [
-        _moved_candidate(chosen[item.owner], item.place, item.value + sign * item.step)
-        for item in nonlinear
-        if item.owner is not None
-        for sign in (1.0, -1.0)
-    ]
-    columns, places = tabulate_candidates(scene, [*chosen, *variants], recordings, bands)
-    size = base.columns.shape[1]
-    own = [slice(size + place.start, size + place.stop) for place in places[: len(chosen)]]
-    stop = places[len(chosen) - 1].stop if chosen else 0
-    table = base.beside(columns[:, :stop]).weighted(weights)
-    value = _solve(table.columns, table.torque)
-    of_row = weights[table.joint]
-    changes = []
-    for k, item in enumerate(nonlinear):
-        up, down = (columns[:, places[len(chosen) + 2 * k + side]] for side in (0, 1))
-        changes.append((up - down) @ value[own[item.owner or 0]] / (2.0 * item.step))
-    for item in unknowns[len(nonlinear) :]:
-        up, down = (
-            tabulate_candidates(_with_armature(scene, item, sign), chosen, recordings, bands)[0] for sign in (1.0, -1.0)
-        )
-        changes.append((up - down) @ value[size:] / (2.0 * item.step))
-    derivatives = np.column_stack(changes) * of_row[:, None] if changes else np.zeros((len(of_row), 0))
-    return Linearised(scene, tuple(chosen), unknowns, table, tuple(own), value, derivatives)
+    own = columns.rows(scene, chosen)
+    bounds = observations.parameters + np.cumsum([0, *(len(next(iter(rows.values()))) for rows in own)])
+    places = tuple(slice(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True))
+    joints = with_columns(observations, own)
+    linear = int(bounds[-1])
+    value = _pooled(joints, linear, weights).solve().value
+    changes = [_change(scene, columns, chosen, item, places, value) for item in unknowns]
+    extended = tuple(_beside(rows, joint, changes, linear) for joint, rows in enumerate(joints))
+    information = _pooled(extended, linear + len(unknowns), weights)
+    return Linearised(scene, tuple(chosen), unknowns, places, extended, information)
+
+
+def _pooled(joints: Sequence[JointRows], parameters: int, weights: Array) -> Information:
+    with one_blas_thread():
+        return weighted([rows.information(parameters) for rows in joints], weights)
+
+
+def _change(
+    scene: Scene,
+    columns: CandidateColumns,
+    chosen: Sequence[Candidate],
+    item: Unknown,
+    places: Sequence[slice],
+    value: Array,
+) -> dict[int, Array]:
+    """Return the change of each joint's torque per unit of a nonlinear parameter, shape (N,)."""
+    total: dict[int, Array] = {}
+    for owner, place in enumerate(places):
+        if item.owner is not None and owner != item.owner:
+            continue
+        sides: list[Rows] = []
+        for sign in (1.0, -1.0):
+            at = item.value + sign * item.step
+            if item.owner is None:
+                sides += columns.rows(_with_armature(scene, item.place, at), [chosen[owner]])
+            else:
+                sides += columns.rows(scene, [_moved_candidate(chosen[owner], item.place, at)])
+        for joint in sides[0]:
+            change = value[place] @ (sides[0][joint] - sides[1][joint]) / (2.0 * item.step)
+            total[joint] = total.get(joint, 0.0) + change
+    return total
+
+
+def _beside(rows: JointRows, joint: int, changes: Sequence[dict[int, Array]], first: int) -> JointRows:
+    acting = [k for k, change in enumerate(changes) if joint in change]
+    if not acting:
+        return rows
+    table = np.concatenate([rows.table[:-1], [changes[k][joint] for k in acting], rows.table[-1:]])
+    return JointRows(np.concatenate([rows.columns, [first + k for k in acting]]), table, rows.starts, rows.counts)
 
 
 def tune(
-    scene: Scene,
-    recordings: Sequence[Recording],
-    bands: Sequence[float | None],
-    base: Table,
-    weights: Array,
-    chosen: Sequence[Candidate],
-) -> tuple[Scene, list[Candidate]]:
+    scene: Scene, columns: CandidateColumns, weights: Array, chosen: Sequence[Candidate]
+) -> tuple[Scene, tuple[Candidate, ...]]:
     """Fit the nonlinear parameters of all effects in a model together, and settle the loads that they depend on.
 
     Parameters
     ----------
-    scene, recordings, bands, base, weights, chosen
+    scene, columns, weights, chosen
         See `linearise`.
 
     Returns
     -------
-    tuple of (Scene, list of Candidate)
+    tuple of (Scene, tuple of Candidate)
         With the parameters fitted.
     """
     if not chosen:
-        return scene, []
-    size = base.columns.shape[1]
+        return scene, ()
+    size = columns.observations.parameters
     best: Linearised | None = None
     change = np.zeros(0)
     for _ in range(ROUNDS):
-        now = linearise(scene, recordings, bands, base, weights, chosen)
+        now = linearise(scene, columns, weights, chosen)
         if best is not None and now.error > (1.0 + RISE) * best.error:
             change = 0.5 * change
             scene, chosen = _moved(best, change)
@@ -228,7 +247,7 @@ def tune(
             break
         scene, chosen = _moved(best, change)
     assert best is not None
-    return replace(best.scene, value=best.value[:size]), list(best.chosen)
+    return replace(best.scene, value=best.value[:size]), best.chosen
 
 
 def _unknowns(scene: Scene, chosen: Sequence[Candidate]) -> tuple[Unknown, ...]:
@@ -238,19 +257,16 @@ def _unknowns(scene: Scene, chosen: Sequence[Candidate]) -> tuple[Unknown, ...]:
         for owner, candidate in enumerate(chosen)
         for place, parameter in enumerate(candidate.effect.nonlinear)
     ]
-    joints = (candidate.effect.geared_joint(candidate.member) for candidate in chosen)
+    joints = [candidate.effect.geared_joint(candidate.member) for candidate in chosen]
     for joint in dict.fromkeys(joint for joint in joints if joint is not None):
         nominal = scene.nominal_armature(joint)
         if scene.told_armature(joint) is None and nominal > 0.0:
-            found.append(
-                Unknown(
-                    None, joint, scene.armature(joint), 0.1 * nominal, 3.0 * nominal, nominal, ARMATURE_STD * nominal
-                )
-            )
+            held, spread = scene.armature(joint), ARMATURE_STD * nominal
+            found.append(Unknown(None, joint, held, 0.1 * nominal, 3.0 * nominal, nominal, spread))
     return tuple(found)
 
 
-def _moved(state: Linearised, change: Array) -> tuple[Scene, list[Candidate]]:
+def _moved(state: Linearised, change: Array) -> tuple[Scene, tuple[Candidate, ...]]:
     """Return scene and effects with the nonlinear parameters changed, within their bounds and not too far at once."""
     chosen = list(state.chosen)
     armatures = dict(state.scene.armatures)
@@ -262,7 +278,7 @@ def _moved(state: Linearised, change: Array) -> tuple[Scene, list[Candidate]]:
         else:
             chosen[item.owner] = _moved_candidate(chosen[item.owner], item.place, value)
     size = len(state.scene.model.columns)
-    return replace(state.scene, value=state.value[:size], armatures=armatures), chosen
+    return replace(state.scene, value=state.value[:size], armatures=armatures), tuple(chosen)
 
 
 def _moved_candidate(candidate: Candidate, place: int, value: float) -> Candidate:
@@ -271,11 +287,5 @@ def _moved_candidate(candidate: Candidate, place: int, value: float) -> Candidat
     return candidate.at(nonlinear)
 
 
-def _with_armature(scene: Scene, item: Unknown, sign: float) -> Scene:
-    return replace(scene, armatures={**scene.armatures, item.place: item.value + sign * item.step})
-
-
-def _solve(columns: Array, target: Array) -> Array:
-    size = np.linalg.norm(columns, axis=0)
-    size[size == 0.0] = 1.0
-    return np.asarray(np.linalg.lstsq(columns / size, target, rcond=1e-10)[0] / size)
+def _with_armature(scene: Scene, joint: int, value: float) -> Scene:
+    return replace(scene, armatures={**scene.armatures, joint: value})

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.diagnosis.selection_step import PARTS
+from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import Motion, stretches
-from scara_ident.motion.prepared import row_step, rows_of, trim_of
-from scara_ident.recording.recording import Recording
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -21,8 +21,6 @@ SINGLE_BINS = 24
 PAIR_BINS = 10
 # A bin's mean is shrunk as if this many further samples of zero were in it.
 SHRINKAGE = 5.0
-# Folds where there is only one trajectory.
-PARTS = 4
 
 
 @dataclass(frozen=True)
@@ -46,18 +44,14 @@ class Dependence:
     rms: float
 
 
-def screen(
-    model: TorqueModel, value: Array, recordings: Sequence[Recording], bands: Sequence[float | None]
-) -> tuple[Dependence, ...]:
+def screen(model: TorqueModel, residuals: Residuals) -> tuple[Dependence, ...]:
     """Rank what each joint's residual depends on.
 
     Parameters
     ----------
     model : TorqueModel
-        With the effects found so far.
-    value : ndarray, shape (p,)
-    recordings : sequence of Recording
-    bands : sequence of float or None, one per joint
+        Any; its robot names the signals.
+    residuals : Residuals
 
     Returns
     -------
@@ -66,7 +60,7 @@ def screen(
     """
     found: list[Dependence] = []
     for j, joint in enumerate(model.robot.joints):
-        residual, signals, fold = _samples(model, value, recordings, bands, j)
+        residual, signals, fold = _samples(model.robot, residuals, j)
         if len(residual) < 10 * PAIR_BINS**2 or not np.any(residual):
             continue
         total = float(np.mean(residual**2))
@@ -80,44 +74,41 @@ def screen(
     return tuple(sorted(found, key=lambda item: -item.explained))
 
 
-def _samples(
-    model: TorqueModel, value: Array, recordings: Sequence[Recording], bands: Sequence[float | None], j: int
-) -> tuple[Array, dict[str, Array], NDArray[np.intp]]:
+def _samples(robot: Robot, residuals: Residuals, j: int) -> tuple[Array, dict[str, Array], NDArray[np.intp]]:
     """Residual of a joint within its band at independent times, the signals then, and the fold of each."""
-    trajectories = list(dict.fromkeys(recording.trajectory for recording in recordings))
-    residual, signals, fold = [], [], []
-    for recording in recordings:
-        begin = float(recording.time[0])
-        for part in stretches(recording):
-            rows = rows_of(model, part, bands)
-            rest = rows.rest[j]
-            trim = trim_of(part, bands)
-            places = np.arange(trim, len(part.time) - trim, row_step(part.rate, bands[j]))
-            places = places[~rest[places]]
-            residual.append((rows.banded[j][-1] - value @ rows.banded[j][:-1])[places])
-            signals.append(_signals(model, rows.motion, rows.raw[j], value, j, begin, places))
-            fold.append(np.full(len(places), trajectories.index(recording.trajectory)))
+    data = residuals.data
+    trajectories = data.trajectories
+    error, signals, fold = [], [], []
+    parts = zip(residuals.banded, residuals.predicted, strict=True)
+    for item in data.recordings:
+        begin = float(item.recording.time[0])
+        for part in item.stretches:
+            banded, predicted = next(parts)
+            places = np.arange(part.trim, part.samples - part.trim, part.steps[j])
+            places = places[~part.rest[j][places]]
+            error.append(banded[j][places])
+            signals.append(_signals(robot, part.motion, predicted[j], j, begin, places))
+            fold.append(np.full(len(places), trajectories.index(item.trajectory)))
     merged = {name: np.concatenate([part[name] for part in signals]) for name in signals[0]}
-    error = np.concatenate(residual)
+    residual = np.concatenate(error)
     groups = np.concatenate(fold)
     if len(trajectories) == 1:
-        groups = np.arange(len(error)) * PARTS // max(1, len(error))
-    return error, merged, groups
+        groups = np.arange(len(residual)) * PARTS // max(1, len(residual))
+    return residual, merged, groups
 
 
 def _signals(
-    model: TorqueModel, motion: Motion, rows: Array, value: Array, j: int, begin: float, places: NDArray[np.intp]
+    robot: Robot, motion: Motion, predicted: Array, j: int, begin: float, places: NDArray[np.intp]
 ) -> dict[str, Array]:
-    names = model.robot.joints
     found: dict[str, Array] = {}
-    for i, name in enumerate(names):
+    for i, name in enumerate(robot.joints):
         found[f"position of {name}"] = motion.q[i][places]
         found[f"velocity of {name}"] = motion.v[i][places]
         found[f"acceleration of {name}"] = motion.a[i][places]
-    found["predicted torque"] = (value @ rows[:-1])[places]
+    found["predicted torque"] = predicted[places]
     found["time"] = motion.time[places] - begin
-    if abs(model.robot.reduction[j]) != 1.0:
-        found["motor angle"] = np.mod(model.robot.reduction[j] * motion.q[j][places], 2.0 * np.pi)
+    if abs(robot.reduction[j]) != 1.0:
+        found["motor angle"] = np.mod(robot.reduction[j] * motion.q[j][places], 2.0 * np.pi)
     return found
 
 

@@ -3,38 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.acceptance import Decision, decide
-from scara_ident.diagnosis.candidate_tests import examine
-from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import parameters_beside
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.nonlinear_fit import tune
-from scara_ident.diagnosis.table import Table, tabulate, tabulate_candidates
-from scara_ident.effects import CATALOGUE, Effect, Scene
-from scara_ident.estimation import Estimate
-from scara_ident.estimation.least_squares import wls
-from scara_ident.estimation.observations import Evidence, gather_all
+from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, model_with, observed
+from scara_ident.effects import Effect, Scene
+from scara_ident.effects.catalogue import available_effects
+from scara_ident.estimation import Estimate, wls
+from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import motion_of, stretches
-from scara_ident.recording.recording import Recording
+from scara_ident.motion.motion import Motion
+from scara_ident.motion.prepared import PreparedData, PreparedRecording
 
 Array = NDArray[np.float64]
 
-# More effects than this at once are not believed.
-MOST_EFFECTS = 6
-# Families whose best member gains at least this share of the best are refined before one is chosen.
-NEAR_BEST = 0.6
-MOST_REFINED = 4
-# Standard deviations by which an effect must differ from none once its nonlinear parameters are free too.
-TOLD = 2.5
-# Points on the line between neighbouring scan points, and rounds of narrowing.
-LINE_POINTS = 7
-LINE_ROUNDS = 4
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """An effect that was taken out of the recordings, such as a delay.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    value, std : ndarray, shape (k,)
+        In all, and the standard deviation of the last step.
+    """
+
+    candidate: Candidate
+    value: Array
+    std: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +50,23 @@ class Step:
     Attributes
     ----------
     decision : Decision
-    evidence : tuple of Evidence
-        Of the training recordings with the effects so far.
-    estimate : Estimate
-        With the effects so far.
+    scene : Scene
+    chosen : tuple of Candidate
+        The effects in the model so far.
+    data : PreparedData
+        As corrected so far.
+    value : ndarray, shape (k,)
+        Parameters of the model with the effects so far.
+    rms : tuple of float or None
+        Error of each joint over the training recordings, within the band.
     """
 
     decision: Decision
-    evidence: tuple[Evidence, ...]
-    estimate: Estimate
+    scene: Scene
+    chosen: tuple[Candidate, ...]
+    data: PreparedData
+    value: Array
+    rms: tuple[float | None, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,38 +75,56 @@ class Search:
 
     Attributes
     ----------
-    base : TorqueModel
-    scene : Scene
-        At the end.
-    bands : tuple of float or None
+    step : SelectionStep
+        The model with the effects that stayed, its scene, its rows.
+    uncorrected : Observations
+        Of the base model, before any correction of the data.
     start : Estimate
         Of the base model.
-    start_evidence : tuple of Evidence
     steps : tuple of Step
         The effects let in, in their order.
-    chosen : tuple of Candidate
-        The effects that stayed.
-    delay : tuple of (float, float) or None
-        Delay corrected in the data and its standard deviation, s.
+    correction : Correction or None
+        What was taken out of the data.
     decisions : tuple of Decision
         On the best member of every family at the end, rejected ones included.
-    tried : int
-        Candidates and scan points tried.
-    recordings : tuple of Recording
-        The training recordings as corrected.
     """
 
-    base: TorqueModel
-    scene: Scene
-    bands: tuple[float | None, ...]
+    step: SelectionStep
+    uncorrected: Observations
     start: Estimate
-    start_evidence: tuple[Evidence, ...]
     steps: tuple[Step, ...]
-    chosen: tuple[Candidate, ...]
-    delay: tuple[float, float] | None
+    correction: Correction | None
     decisions: tuple[Decision, ...]
-    tried: int
-    recordings: tuple[Recording, ...]
+
+    @property
+    def scene(self) -> Scene:
+        """At the end."""
+        return self.step.scene
+
+    @property
+    def chosen(self) -> tuple[Candidate, ...]:
+        """The effects that stayed."""
+        return self.step.chosen
+
+    @property
+    def tried(self) -> int:
+        """Candidates and scan points tried."""
+        return self.step.tried
+
+    @property
+    def base(self) -> TorqueModel:
+        """The base model."""
+        return self.start.model
+
+    @property
+    def data(self) -> PreparedData:
+        """The training recordings as corrected."""
+        return self.step.observations.data
+
+    @property
+    def bands(self) -> tuple[float | None, ...]:
+        """Low-pass of each joint, Hz."""
+        return self.data.bands
 
     @property
     def model(self) -> TorqueModel:
@@ -100,270 +132,162 @@ class Search:
         return model_with(self.scene, self.chosen)
 
 
-def model_with(scene: Scene, chosen: Sequence[Candidate]) -> TorqueModel:
-    """Return the base model with effects as further terms."""
-    if not chosen:
-        return scene.model
-    terms = tuple(candidate.term(scene) for candidate in chosen)
-    return TorqueModel(scene.model.name, scene.robot, (*scene.model.terms, *terms))
+@dataclass(frozen=True, eq=False)
+class SearchTask:
+    """What is to be searched.
+
+    Attributes
+    ----------
+    model : TorqueModel
+        The base model.
+    catalogue : tuple of Effect
+        Families to try.
+    criteria : SelectionCriteria
+    progress : callable
+        Called with the name of every step.
+    """
+
+    model: TorqueModel
+    catalogue: tuple[Effect, ...] = field(default_factory=available_effects)
+    criteria: SelectionCriteria = CRITERIA
+    progress: Callable[[str], None] = lambda step: None
 
 
-def search(
-    model: TorqueModel,
-    recordings: Sequence[Recording],
-    bands: Sequence[float | None],
-    *,
-    catalogue: Sequence[Effect] = CATALOGUE,
-    without: Collection[str] = (),
-    progress: Callable[[str], None] = lambda step: None,
-) -> Search:
+def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[str] = ()) -> Search:
     """Find what the model lacks.
 
     Parameters
     ----------
-    model : TorqueModel
-        The base model.
-    recordings : sequence of Recording
-    bands : sequence of float or None, one per joint
-    catalogue : sequence of Effect, optional
-        Families to try.
+    task : SearchTask
+    columns : CandidateColumns
+        On the rows of the base model, with what is known already from an earlier search on them.
     without : collection of str, optional
         Labels of candidates that are not to be tried.
-    progress : callable, optional
-        Called with the name of every step.
 
     Returns
     -------
     Search
     """
-    data = tuple(recordings)
-    start_evidence = gather_all(model, data, bands)
-    start = wls(model, start_evidence)
-    scene = _scene(model, start.value, data, bands)
-    everything = [Candidate(effect, member) for effect in catalogue for member in effect.members(scene)]
+    criteria = task.criteria
+    observations = uncorrected = columns.observations
+    start = wls(observations)
+    first = scene = scene_of(task.model, start.value, observations)
+    everything = [Candidate(effect, member) for effect in task.catalogue for member in effect.members(scene)]
     candidates = [item for item in everything if item.label(scene) not in without]
     tried = max(1, len(candidates))
-    progress(f"making the columns of {len(candidates)} candidates")
-    base = tabulate(model, data, bands)
-    columns, places = tabulate_candidates(scene, candidates, data, bands)
-    chosen: list[Candidate] = []
+    task.progress(f"making the columns of {len(candidates)} candidates")
+    columns.rows(first, candidates)
+    chosen: tuple[Candidate, ...] = ()
     steps: list[Step] = []
-    delay: tuple[float, float] | None = None
-    weights, estimate = start.weights, start
+    correction: Correction | None = None
+    weights, value = start.weights, start.value
     while True:
-        progress(f"trying {len(candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else ""))
-        own, _ = tabulate_candidates(scene, chosen, data, bands)
-        beside = Beside(scene, data, tuple(bands), base.beside(own), weights, tried)
-        decisions = beside.judge(candidates, columns, places)
-        fitted = model_with(scene, chosen)
-        seeds = line_candidates(scene, fitted, estimate.value, data, bands, catalogue)
+        task.progress(f"trying {len(candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else ""))
+        columns.forget_all_but(first, scene)
+        step = SelectionStep(scene, columns, chosen, weights, tried, criteria)
+        decisions = step.judge(candidates, first)
+        residuals = Residuals(observations.data, columns.predicted(scene, chosen, value))
+        seeds = line_candidates(scene, residuals, task.catalogue)
         taken = {*without, *(item.label(scene) for item in chosen)}
-        decisions += beside.judge_new([item for item in seeds if item.label(scene) not in taken])
-        if len(steps) >= MOST_EFFECTS:
+        decisions += step.judge([item for item in seeds if item.label(scene) not in taken])
+        if len(steps) >= criteria.most_effects:
             break
-        winner = _choose(beside, decisions)
+        winner = _choose(step, decisions)
         if winner is None:
             break
-        if is_delay(winner.candidate):
-            data, delay = _correct_delay(data, winner, delay)
-            base = replace(base, torque=tabulate(model, data, bands).torque)
+        candidate, found = winner.candidate, winner.examination
+        if candidate.corrects_data:
+            observations = observations.with_torque(corrected(observations.data, candidate, found.value))
+            columns = columns.beside(observations)
+            std = np.sqrt(np.diag(found.covariance))
+            correction = Correction(candidate, found.value + (correction.value if correction else 0.0), std)
         else:
-            chosen.append(winner.candidate)
-        done = not is_delay(winner.candidate) or winner.candidate.effect.settled(winner.examination.value)
-        if done:
-            left = [k for k, item in enumerate(candidates) if item.label(scene) != winner.label]
-            candidates, places = [candidates[k] for k in left], tuple(places[k] for k in left)
-        scene, chosen = tune(scene, data, bands, base, weights, chosen)
-        fitted = model_with(scene, chosen)
-        evidence = gather_all(fitted, data, bands)
-        estimate = wls(fitted, evidence)
-        weights = estimate.weights
-        scene = replace(scene, value=estimate.value[: len(model.columns)])
+            chosen = (*chosen, candidate)
+        if not candidate.corrects_data or candidate.effect.settled(found.value):
+            candidates = [item for item in candidates if item.label(scene) != winner.label]
+        scene, chosen = tune(scene, columns, weights, chosen)
+        fitted = observed(SelectionStep(scene, columns, chosen, weights, tried, criteria))
+        estimate = wls(fitted)
+        weights, value = estimate.weights, estimate.value
+        scene = replace(scene, value=value[: len(task.model.columns)])
         repeated = bool(steps) and steps[-1].decision.label == winner.label
-        steps[len(steps) - repeated :] = [Step(winner, evidence, estimate)]
-    kept = _backward(scene, data, bands, base, weights, chosen, tried)
-    scene, kept = tune(scene, data, bands, base, weights, kept)
+        left = tuple(item.rms(value) if item.rows else None for item in fitted.by_joint)
+        steps[len(steps) - repeated :] = [Step(winner, scene, chosen, observations.data, value, left)]
+    kept = _backward(SelectionStep(scene, columns, chosen, weights, tried, criteria))
+    scene, kept = tune(scene, columns, weights, kept)
     labels = {item.label(scene) for item in kept}
-    steps = [step for step in steps if step.decision.label in labels or is_delay(step.decision.candidate)]
-    return Search(
-        model, scene, tuple(bands), start, start_evidence, tuple(steps), tuple(kept), delay,
-        tuple(decisions), tried, data,
-    )  # fmt: skip
+    stayed = [item for item in steps if item.decision.label in labels or item.decision.candidate.corrects_data]
+    final = SelectionStep(scene, columns, kept, weights, tried, criteria)
+    return Search(final, uncorrected, start, tuple(stayed), correction, tuple(decisions))
 
 
-@dataclass(frozen=True, eq=False)
-class Beside:
-    """The model that candidates are tried beside: its rows, and what judging needs.
-
-    Attributes
-    ----------
-    scene : Scene
-    recordings : tuple of Recording
-    bands : tuple of float or None
-    table : Table
-        Columns of the model and of the effects in it.
-    weights : ndarray, shape (n,)
-    tried : int
-        Candidates and scan points tried.
-    """
-
-    scene: Scene
-    recordings: tuple[Recording, ...]
-    bands: tuple[float | None, ...]
-    table: Table
-    weights: Array
-    tried: int
-
-    def judge(self, candidates: Sequence[Candidate], columns: Array, places: Sequence[slice]) -> list[Decision]:
-        """Examine candidates whose columns are at hand, and decide on each."""
-        if not candidates:
-            return []
-        count = self.table.columns.shape[1]
-        rows = self.table.beside(columns).weighted(self.weights)
-        groups = [list(range(count + place.start, count + place.stop)) for place in places]
-        found = examine(rows, range(count), groups)
-        return [decide(item, result, self.scene, self.tried) for item, result in zip(candidates, found, strict=True)]
-
-    def judge_new(self, candidates: Sequence[Candidate]) -> list[Decision]:
-        """Make the columns of candidates and judge them."""
-        if not candidates:
-            return []
-        return self.judge(candidates, *tabulate_candidates(self.scene, candidates, self.recordings, self.bands))
-
-
-def is_delay(candidate: Candidate) -> bool:
-    """Whether a candidate is corrected in the data, as the delay of all joints is."""
-    return candidate.effect.corrects_data(candidate.member)
-
-
-def _scene(model: TorqueModel, value: Array, recordings: Sequence[Recording], bands: Sequence[float | None]) -> Scene:
-    robot = model.robot
-    travel, speed = np.zeros(robot.n), np.zeros(robot.n)
-    longest, slowest = 0.0, np.inf
+def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Scene:
+    """Return how far recordings reach, and what the base model says of them."""
+    data = observations.data
+    travel, speed = np.zeros(model.robot.n), np.zeros(model.robot.n)
+    longest = 0.0
     start: dict[str, float] = {}
-    for recording in recordings:
-        start[recording.name] = float(recording.time[0])
-        longest = max(longest, float(recording.time[-1] - recording.time[0]))
-        travel = np.maximum(travel, np.ptp(recording.position, axis=1))
-        for part in stretches(recording):
-            slowest = min(slowest, part.rate)
-            speed = np.maximum(speed, np.max(np.abs(motion_of(part, bands).v), axis=1))
-    band = max((band for band in bands if band is not None), default=0.45 * slowest)
-    return Scene(model, value, longest, float(slowest), band, travel, speed, start)
+    for item in data.recordings:
+        time = item.recording.time
+        start[item.name] = float(time[0])
+        longest = max(longest, float(time[-1] - time[0]))
+        travel = np.maximum(travel, np.ptp(item.recording.position, axis=1))
+    for part in data.stretches:
+        speed = np.maximum(speed, np.max(np.abs(part.motion.v), axis=1))
+    slowest = float(min(part.rate for part in data.stretches))
+    band = max((band for band in data.bands if band is not None), default=0.45 * slowest)
+    return Scene(model, value, longest, slowest, band, travel, speed, start, columns=columns_at_hand(observations))
 
 
-def best_of_each(decisions: Sequence[Decision]) -> dict[str, Decision]:
-    """Return the best scan point of every family and joint, acceptable ones first."""
-    best: dict[str, Decision] = {}
-    for decision in decisions:
-        held = best.get(decision.label)
-        if held is None or (decision.accepted, decision.gain) > (held.accepted, held.gain):
-            best[decision.label] = decision
-    return best
+def columns_at_hand(observations: Observations) -> dict[Motion, tuple[Array, ...]]:
+    """Return the base model's columns on the motions of observations."""
+    raws = [raw for recording in observations.raw for raw in recording]
+    return {part.motion: raw for part, raw in zip(observations.data.stretches, raws, strict=True)}
 
 
-def _choose(beside: Beside, decisions: Sequence[Decision]) -> Decision | None:
-    """Refine the best families and return the best acceptable member of them that is told from zero."""
+def corrected(data: PreparedData, candidate: Candidate, value: Array) -> PreparedData:
+    """Return recordings without an effect that is taken out of them."""
+
+    def mended(item: PreparedRecording) -> PreparedRecording:
+        effect, member = candidate.effect, candidate.member
+        return item.with_torque(
+            [effect.corrected_torque(part.torque, part.rate, member, value) for part in item.stretches]
+        )
+
+    return replace(data, recordings=tuple(mended(item) for item in data.recordings))
+
+
+def _choose(step: SelectionStep, decisions: Sequence[Decision]) -> Decision | None:
+    """Refine the best families and return the best acceptable member of them whose size is significant."""
+    criteria = step.criteria
     accepted = [item for item in best_of_each(decisions).values() if item.accepted]
     accepted.sort(key=lambda item: -item.examination.held_out)
     if not accepted:
         return None
-    enough = NEAR_BEST * accepted[0].examination.held_out
-    leaders = [item for item in accepted if item.examination.held_out >= enough][:MOST_REFINED]
+    enough = criteria.near_best * accepted[0].examination.held_out
+    leaders = [item for item in accepted if item.examination.held_out >= enough][: criteria.most_refined]
     sound = sorted(
-        (item for item in refine(beside, leaders) if item.accepted), key=lambda item: -item.examination.held_out
+        (item for item in step.refine(leaders) if item.accepted), key=lambda item: -item.examination.held_out
     )
-    return next((item for item in sound if _told_from_zero(beside, item.candidate)), None)
+    return next((item for item in sound if _is_significant(step, item.candidate)), None)
 
 
-def _told_from_zero(beside: Beside, candidate: Candidate) -> bool:
+def _is_significant(step: SelectionStep, candidate: Candidate) -> bool:
     """Whether an effect has a size beyond its uncertainty, that of its nonlinear parameters included."""
     if not candidate.effect.nonlinear:
         return True
     nonlinear = {parameter.name for parameter in candidate.effect.nonlinear}
-    found = parameters_beside(beside.scene, beside.recordings, beside.bands, beside.table, beside.weights, candidate)
+    found = parameters_beside(step, candidate)
     sizes = [parameter for name, parameter in found.items() if name not in nonlinear and name != "phase"]
-    return any(abs(parameter.value) > TOLD * parameter.std for parameter in sizes)
+    return any(abs(parameter.value) > step.criteria.least_size * parameter.std for parameter in sizes)
 
 
-def refine(beside: Beside, leaders: Sequence[Decision]) -> list[Decision]:
-    """Refine the nonlinear parameters of several candidates on lines that narrow about the best point so far."""
-    current = list(leaders)
-    for round_ in range(LINE_ROUNDS):
-        variants = [
-            (place, item) for place, held in enumerate(current) for item in _line(beside.scene, held.candidate, round_)
-        ]
-        found = beside.judge_new([item for _, item in variants])
-        for (place, _), decision in zip(variants, found, strict=True):
-            held = current[place]
-            if decision.examination.gain > held.examination.gain and (decision.accepted or not held.accepted):
-                current[place] = decision
-    return current
-
-
-def _line(scene: Scene, candidate: Candidate, round_: int) -> list[Candidate]:
-    """Return variants of a candidate on a line for each nonlinear parameter, a third as long every round."""
-    variants = []
-    for k, parameter in enumerate(candidate.effect.nonlinear):
-        value = candidate.member.nonlinear[k]
-        reach = _spacing(scene, candidate, k) * (2.0 / (LINE_POINTS - 1)) ** round_
-        offsets = np.linspace(-reach, reach, LINE_POINTS)
-        points = value * np.exp(offsets) if parameter.logarithmic else value + offsets
-        for point in points:
-            if abs(point - value) > 1e-12 * abs(value) and parameter.lower <= point <= parameter.upper:
-                nonlinear = list(candidate.member.nonlinear)
-                nonlinear[k] = float(point)
-                variants.append(candidate.at(nonlinear))
-    return variants
-
-
-def _spacing(scene: Scene, candidate: Candidate, k: int) -> float:
-    """Distance to the next scan point of a nonlinear parameter, in its logarithm where it is scanned so.
-
-    A family that knows how far apart values must be to be told apart says so by ``resolution``.
-    """
-    parameter = candidate.effect.nonlinear[k]
-    widths = candidate.effect.resolution(scene, candidate.member)
-    if widths is not None:
-        return widths[k] / candidate.member.nonlinear[k] if parameter.logarithmic else widths[k]
-    grid = np.array(sorted({member.nonlinear[k] for member in candidate.effect.members(scene)}))
-    if parameter.logarithmic:
-        return float(np.min(np.diff(np.log(grid)))) if len(grid) > 1 else float(np.log(2.0))
-    return float(np.min(np.diff(grid))) if len(grid) > 1 else 0.1 * (parameter.upper - parameter.lower)
-
-
-def _correct_delay(
-    recordings: Sequence[Recording], decision: Decision, delay: tuple[float, float] | None
-) -> tuple[tuple[Recording, ...], tuple[float, float]]:
-    """Shift the effort of all recordings by the delay found."""
-    step = float(decision.examination.value[0])
-    std = float(np.sqrt(decision.examination.covariance[0, 0]))
-    total = step + (delay[0] if delay else 0.0)
-    effect, member, value = decision.candidate.effect, decision.candidate.member, decision.examination.value
-    return tuple(effect.corrected(recording, member, value) for recording in recordings), (total, std)
-
-
-def _backward(
-    scene: Scene,
-    recordings: Sequence[Recording],
-    bands: Sequence[float | None],
-    base: Table,
-    weights: Array,
-    chosen: Sequence[Candidate],
-    tried: int,
-) -> list[Candidate]:
+def _backward(step: SelectionStep) -> tuple[Candidate, ...]:
     """Drop, one at a time, effects that the others have made superfluous."""
-    kept = list(chosen)
-    while len(kept) > 1:
-        columns, places = tabulate_candidates(scene, kept, recordings, bands)
-        decisions = []
-        for k, item in enumerate(kept):
-            rest = np.hstack([columns[:, place] for i, place in enumerate(places) if i != k])
-            beside = Beside(scene, tuple(recordings), tuple(bands), base.beside(rest), weights, tried)
-            own = columns[:, places[k]]
-            decisions += beside.judge([item], own, [slice(0, own.shape[1])])
-        weakest = min(range(len(kept)), key=lambda k: decisions[k].gain)
+    while len(step.chosen) > 1:
+        decisions = [step.without(k).judge([item])[0] for k, item in enumerate(step.chosen)]
+        weakest = min(range(len(decisions)), key=lambda k: decisions[k].gain)
         if decisions[weakest].accepted:
             break
-        kept.pop(weakest)
-    return kept
+        step = step.without(weakest)
+    return step.chosen

@@ -40,6 +40,8 @@ class Scene:
         Time of the first sample of every recording, s.
     armatures : Mapping[int, float]
         Armature N^2 Jm of joints (by place) where the data tell it by an effect only; nominal for the others.
+    columns : Mapping[Motion, tuple of ndarray]
+        The base model's columns on motions where they are at hand, see `TorqueModel.joint_columns`.
     """
 
     model: TorqueModel
@@ -51,6 +53,7 @@ class Scene:
     speed: Array
     start: dict[str, float]
     armatures: Mapping[int, float] = field(default_factory=dict)
+    columns: Mapping[Motion, tuple[Array, ...]] = field(default_factory=dict, repr=False)
 
     @property
     def robot(self) -> Robot:
@@ -95,16 +98,27 @@ class Signals:
         return self.scene.robot.drive_sign[:, None] * np.sign(self.motion.v)
 
     @cached_property
+    def columns(self) -> tuple[Array, ...]:
+        """The base model's columns that act on each joint, see `TorqueModel.joint_columns`."""
+        held = self.scene.columns.get(self.motion)
+        return self.scene.model.joint_columns(self.motion) if held is None else held
+
+    @cached_property
     def predicted(self) -> Array:
         """Recorded torque as the base model predicts it, shape (n, N)."""
-        return np.asarray(np.einsum("jpn,p->jn", self.scene.model.regressor(self.motion), self.scene.value))
+        return self._predicted(np.ones(len(self.scene.value), dtype=bool))
 
     @cached_property
     def rigid(self) -> Array:
         """Torque of links and rotors as the base model predicts it, recorded side, shape (n, N)."""
-        model = self.scene.model
-        term = model.rigid_body
-        return np.asarray(np.einsum("jpn,p->jn", term.regressor(self.motion), self.scene.value[model.place(term)]))
+        wanted = np.zeros(len(self.scene.value), dtype=bool)
+        wanted[self.scene.model.place(self.scene.model.rigid_body)] = True
+        return self._predicted(wanted)
+
+    def _predicted(self, wanted: NDArray[np.bool_]) -> Array:
+        value = np.where(wanted, self.scene.value, 0.0)
+        active = self.scene.model.active
+        return np.array([value[own] @ rows for own, rows in zip(active, self.columns, strict=True)])
 
     def load(self, joint: int) -> Array:
         """Torque that the gear of a joint transmits, recorded side, shape (N,): rigid torque without the own rotor's."""

@@ -1,4 +1,4 @@
-"""Estimators: evidence in, estimate out; one function and one file each."""
+"""Estimators: observations in, estimate out; one function and one file each."""
 
 from scara_ident.estimation.consistent.estimator import (
     ConsistentEstimate,

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.estimation.information import merge
-from scara_ident.estimation.observations import gather_all
+from scara_ident.estimation.observations import observe
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import Stretch, motion_of, stretches, torque_of
-from scara_ident.recording.recording import Recording
+from scara_ident.motion.motion import Stretch, motion_of, torque_of
+from scara_ident.motion.prepared import PreparedData
 
 Array = NDArray[np.float64]
 
@@ -64,67 +64,70 @@ class BandChoice:
     notes: tuple[str, ...]
 
 
-def choose_bands(model: TorqueModel, recordings: Sequence[Recording]) -> BandChoice:
+def choose_bands(model: TorqueModel, data: PreparedData) -> BandChoice:
     """Choose the low-pass band of every joint.
 
     Parameters
     ----------
     model : TorqueModel
-    recordings : sequence of Recording
-        With effort. The first repetition of each trajectory is looked at first.
+    data : PreparedData
+        With effort; in any bands. The first repetition of each trajectory is looked at first.
 
     Returns
     -------
     BandChoice
     """
-    chosen = _sample(recordings)
-    parts = [part for recording in chosen for part in stretches(recording)]
+    chosen = _sample(data)
+    parts = [part.stretch for part in chosen.stretches]
     edges = _edges(parts)
     highest = HIGHEST_BAND * min(part.rate for part in parts)
     start = _first_bands(parts, edges, model.robot.n)
-    choice = _refined(model, chosen, parts, edges, start, highest)
+    spectra = _Spectra(model, parts, edges)
+    choice = _refined(chosen, spectra, start, highest)
     # Where the first band holds so much noise that nothing is explained, a narrower one may show what is.
     for _ in range(MOST_HALVINGS):
         if any(share > 0.0 for share in choice.explained):
             break
         start = [0.5 * band for band in start]
-        choice = _refined(model, chosen, parts, edges, start, highest)
+        choice = _refined(chosen, spectra, start, highest)
     return choice
 
 
-def _refined(
-    model: TorqueModel,
-    chosen: Sequence[Recording],
-    parts: Sequence[Stretch],
-    edges: Array,
-    start: Sequence[float],
-    highest: float,
-) -> BandChoice:
+def _refined(data: PreparedData, spectra: _Spectra, start: Sequence[float], highest: float) -> BandChoice:
     """Repeat fit and choice of bands from a first band on until they agree."""
-    n = model.robot.n
+    n = spectra.model.robot.n
     choice = BandChoice((max(start),) * n, (0.0,) * n, ())
     for _ in range(MOST_ROUNDS):
         before = choice.bands
-        evidence = gather_all(model, chosen, before)
-        value = merge(item.joint(j) for item in evidence for j in range(n)).solve().value
-        choice = _explained_bands(model, parts, edges, value, start, highest)
+        value = merge(observe(spectra.model, data.at(before)).by_joint).solve().value
+        choice = _explained_bands(spectra, value, start, highest)
         if choice.bands == before:
             break
     return choice
 
 
-def _explained_bands(
-    model: TorqueModel, parts: Sequence[Stretch], edges: Array, value: Array, start: Sequence[float], highest: float
-) -> BandChoice:
+class _Spectra:
+    """Power of the torque, and of the columns of a hardly filtered motion, in bins of frequency."""
+
+    def __init__(self, model: TorqueModel, parts: Sequence[Stretch], edges: Array) -> None:
+        self.model, self.parts, self.edges = model, parts, edges
+        self.torque = np.sum([binned_power(torque_of(part), part.rate, edges) for part in parts], axis=0)
+        wide = [motion_of(part, [WIDE_FILTER * part.rate] * model.robot.n) for part in parts]
+        self.columns = [model.joint_columns(motion) for motion in wide]
+
+    def error(self, value: Array) -> Array:
+        """Return the power that parameters leave of the torque, shape (n, bins)."""
+        total = np.zeros((self.model.robot.n, len(self.edges) - 1))
+        for part, columns in zip(self.parts, self.columns, strict=True):
+            predicted = [value[own] @ rows for own, rows in zip(self.model.active, columns, strict=True)]
+            total += binned_power(torque_of(part) - np.array(predicted), part.rate, self.edges)
+        return total
+
+
+def _explained_bands(spectra: _Spectra, value: Array, start: Sequence[float], highest: float) -> BandChoice:
     """Return the bands up to which parameters explain the torque."""
-    torque = np.zeros((model.robot.n, len(edges) - 1))
-    error = np.zeros_like(torque)
-    for part in parts:
-        motion = motion_of(part, [WIDE_FILTER * part.rate] * model.robot.n)
-        predicted = np.einsum("jpn,p->jn", model.regressor(motion), value)
-        recorded = torque_of(part)
-        torque += binned_power(recorded, part.rate, edges)
-        error += binned_power(recorded - predicted, part.rate, edges)
+    model, edges = spectra.model, spectra.edges
+    torque, error = spectra.torque, spectra.error(value)
     bands, explained, notes = [], [], []
     for j, joint in enumerate(model.robot.joints):
         gain = np.cumsum(torque[j] * (1.0 - EXPLAINED) - error[j])
@@ -142,22 +145,23 @@ def _explained_bands(
     return BandChoice(tuple(bands), tuple(explained), tuple(notes))
 
 
-def _sample(recordings: Sequence[Recording]) -> list[Recording]:
+def _sample(data: PreparedData) -> PreparedData:
     """Take one repetition of each trajectory, then more, until there is enough to look at."""
     seen: dict[str, int] = {}
     ranked = []
-    for place, recording in enumerate(recordings):
-        turn = seen.get(recording.trajectory, 0)
-        seen[recording.trajectory] = turn + 1
-        ranked.append((turn, place, recording))
-    chosen: list[Recording] = []
+    for place, item in enumerate(data.recordings):
+        turn = seen.get(item.trajectory, 0)
+        seen[item.trajectory] = turn + 1
+        ranked.append((turn, place))
+    chosen: list[int] = []
     total = 0
-    for _, _, recording in sorted(ranked, key=lambda item: item[:2]):
-        if chosen and total + len(recording.time) > ENOUGH_SAMPLES:
+    for _, place in sorted(ranked):
+        count = len(data.recordings[place].recording.time)
+        if chosen and total + count > ENOUGH_SAMPLES:
             continue
-        chosen.append(recording)
-        total += len(recording.time)
-    return chosen
+        chosen.append(place)
+        total += count
+    return data.of(chosen)
 
 
 def _edges(parts: Sequence[Stretch]) -> Array:

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.estimation.information import Information, merge
+from scara_ident.estimation.observations import JointRows
 
 Array = NDArray[np.float64]
-Block = Sequence[Information]
 
 # With fewer blocks than this many per parameter the matrix of scores is too noisy to stand for itself.
 BLOCKS_PER_PARAMETER = 2.5
@@ -48,7 +48,9 @@ class Covariance:
     blocks: int
 
 
-def block_covariance(inverse: Array, value: Array, sequences: Sequence[Sequence[Block]]) -> Covariance:
+def block_covariance(
+    inverse: Array, value: Array, joints: Sequence[JointRows], owner: NDArray[np.intp], weights: Array
+) -> Covariance:
     """Covariance of a least-squares estimate from blocks of rows.
 
     Parameters
@@ -57,78 +59,77 @@ def block_covariance(inverse: Array, value: Array, sequences: Sequence[Sequence[
         Inverse of ``W.T @ W`` of all rows (and of a prior, if there is one).
     value : ndarray, shape (p,)
         The estimate.
-    sequences : sequence of sequence of tuple of Information
-        For every recording its blocks in order of time, each with the rows of every joint, weighted as in the
-        estimate.
+    joints : sequence of JointRows
+        Rows of every joint.
+    owner : ndarray of int, shape (blocks,)
+        Recording of each block; blocks of one recording follow each other in time.
+    weights : ndarray, shape (n,)
+        Weight of each joint's rows in the estimate.
 
     Returns
     -------
     Covariance
     """
     root = _square_root(inverse)
-    count = sum(len(blocks) for blocks in sequences)
-    meat = _scattered(root, value, sequences) if count >= BLOCKS_PER_PARAMETER * root.shape[1] else None
+    scores = [_scores(rows, weight, root, value) for rows, weight in zip(joints, weights, strict=True)]
+    meat = _scattered(scores, owner) if len(owner) >= BLOCKS_PER_PARAMETER * root.shape[1] else None
     if meat is None:
-        return Covariance(_pooled(root, value, sequences), "pooled block", count)
-    return Covariance(root @ meat @ root.T, "block", count)
+        return Covariance(_pooled(scores, root), "pooled block", len(owner))
+    return Covariance(root @ meat @ root.T, "block", len(owner))
 
 
-def _scattered(root: Array, value: Array, sequences: Sequence[Sequence[Block]]) -> Array | None:
+@dataclass(frozen=True, eq=False)
+class _Scores:
+    """Of one joint, block by block: scores (blocks, r) in the directions of the root, and their products (blocks, r, r)."""
+
+    scores: Array
+    products: Array
+
+
+def _scores(rows: JointRows, weight: float, root: Array, value: Array) -> _Scores:
+    half = weight * (rows.table[:-1].T @ root[rows.columns])
+    residual = weight * (rows.table[-1] - value[rows.columns] @ rows.table[:-1])
+    size = root.shape[1]
+    scores, products = np.zeros((len(rows.counts), size)), np.zeros((len(rows.counts), size, size))
+    for b, (start, stop) in enumerate(pairwise(rows.starts)):
+        part = half[start:stop]
+        scores[b], products[b] = part.T @ residual[start:stop], part.T @ part
+    return _Scores(scores, products)
+
+
+def _scattered(joints: Sequence[_Scores], owner: NDArray[np.intp]) -> Array | None:
     """Scatter of the scores block by block; None where a block leaves no residual to judge a direction by."""
-    meat = np.zeros((root.shape[1], root.shape[1]))
-    for blocks in sequences:
-        before = None
-        for block in blocks:
-            score = _reduced_score(merge(block), root, value)
-            if score is None:
-                return None
-            meat += np.outer(score, score)
-            if before is not None:
-                meat += 0.5 * (np.outer(score, before) + np.outer(before, score))
-            before = score
-    return meat
+    products, scores = sum(joint.products for joint in joints), sum(joint.scores for joint in joints)
+    # With H = half half', half' (1 - H)^-1/2 = (1 - half' half)^-1/2 half': the smaller of two symmetric problems.
+    leverage, directions = np.linalg.eigh(products)
+    if np.any(leverage[:, -1] > FULL_LEVERAGE):
+        return None
+    turned = np.einsum("bji,bj->bi", directions, scores) / np.sqrt(1.0 - leverage)
+    reduced = np.einsum("bij,bj->bi", directions, turned)
+    follows = owner[1:] == owner[:-1]
+    cross = reduced[1:][follows].T @ reduced[:-1][follows]
+    return np.asarray(reduced.T @ reduced + 0.5 * (cross + cross.T))
 
 
-def _pooled(root: Array, value: Array, sequences: Sequence[Sequence[Block]]) -> Array:
+def _pooled(joints: Sequence[_Scores], root: Array) -> Array:
     """Covariance as if residuals were white and of one size per joint, the size from all scores together.
 
     White residuals of variance s^2 leave scores of total power s^2 sum tr(H (1 - H)) with the leverages H.
     """
-    joints = len(sequences[0][0])
     matrix = np.zeros((root.shape[0], root.shape[0]))
     total = np.sum(root**2, axis=1)
     unknown = np.zeros(root.shape[0], dtype=bool)
-    for j in range(joints):
-        power, expected = 0.0, 0.0
-        product = np.zeros((root.shape[1], root.shape[1]))
-        for blocks in sequences:
-            for block in blocks:
-                half = block[j].regressor_factor @ root
-                score = half.T @ (block[j].projected_torque - block[j].regressor_factor @ value)
-                leverage = np.linalg.eigvalsh(half.T @ half)
-                power += float(score @ score)
-                expected += float(np.sum(leverage * np.clip(1.0 - leverage, 0.0, None)))
-                product += half.T @ half
-        share = root @ product @ root.T
+    for joint in joints:
+        leverage = np.linalg.eigvalsh(joint.products)
+        expected = float(np.sum(leverage * np.clip(1.0 - leverage, 0.0, None)))
+        share = root @ np.sum(joint.products, axis=0) @ root.T
         if expected > NO_REDUNDANCY:
-            matrix += power / expected * share
+            matrix += float(np.sum(joint.scores**2)) / expected * share
         else:
             # Rows that fix the parameters without any redundancy say nothing of the noise.
             unknown |= np.diag(share) > NO_REDUNDANCY * total
     matrix[np.diag_indices_from(matrix)] = np.where(unknown, np.inf, np.diag(matrix))
     return matrix
-
-
-def _reduced_score(block: Information, root: Array, value: Array) -> Array | None:
-    """Score of a block in the directions of ``root``, with residuals freed of the bias of fitting."""
-    residual = block.projected_torque - block.regressor_factor @ value
-    half = block.regressor_factor @ root
-    # With H = half half', half' (1 - H)^-1/2 = (1 - half' half)^-1/2 half': the smaller of two symmetric problems.
-    leverage, directions = np.linalg.eigh(half.T @ half)
-    if leverage[-1] > FULL_LEVERAGE:
-        return None
-    score = directions.T @ (half.T @ residual)
-    return np.asarray(directions @ (score / np.sqrt(1.0 - leverage)))
 
 
 def _square_root(matrix: Array) -> Array:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.errors import EstimationError
 from scara_ident.estimation.information import Information, merge
-from scara_ident.estimation.observations import Evidence
+from scara_ident.estimation.observations import Observations
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 
@@ -81,63 +79,35 @@ class Estimate:
         """Predict the recorded torque along a motion, shape (n, N)."""
         return np.asarray(np.einsum("jpn,p->jn", self.model.regressor(motion), self.value))
 
-    def errors(self, evidence: Evidence) -> tuple[JointError | None, ...]:
-        """Return the error on a recording, joint by joint; None where no sample of a joint was used."""
-        return tuple(
-            joint_error(evidence.joint(j), evidence.unfiltered[j], self.value) for j in range(self.model.robot.n)
-        )
+    def errors(self, observations: Observations) -> tuple[JointError | None, ...]:
+        """Return the error on recordings, joint by joint; None where no sample of a joint was used."""
+        return joint_errors(self.value, observations)
 
 
-def joint_error(banded: Information, unfiltered: Information, value: Array) -> JointError | None:
-    """Return the error of parameters on rows of one joint, None without rows."""
-    if not banded.rows or not unfiltered.rows:
-        return None
-    rms, raw = banded.rms(value), unfiltered.rms(value)
-    return JointError(rms, _share(rms, banded.torque_rms), raw, _share(raw, unfiltered.torque_rms))
+def joint_errors(value: Array, observations: Observations) -> tuple[JointError | None, ...]:
+    """Return the error of parameters on recordings together, joint by joint; None where no sample of a joint was used."""
+    left, torque = observations.unfiltered_rms(value), observations.unfiltered_rms(np.zeros_like(value))
+    found: list[JointError | None] = []
+    for banded, rms, whole in zip(observations.by_joint, left, torque, strict=True):
+        known = banded.rows > 0.0 and np.isfinite(rms)
+        within = banded.rms(value)
+        error = JointError(within, _share(within, banded.torque_rms), float(rms), _share(float(rms), float(whole)))
+        found.append(error if known else None)
+    return tuple(found)
 
 
 def _share(part: float, whole: float) -> float | None:
     return part / whole if whole > 0.0 else None
 
 
-def pooled_information(evidence: Sequence[Evidence], weights: Array) -> Information:
-    """Merge the rows of all recordings and joints, each joint's with its weight.
-
-    Raises
-    ------
-    EstimationError
-        If there is nothing to merge.
-    """
-    if not evidence:
-        raise EstimationError("no recording to estimate from")
-    return merge(item.joint(j).scaled(float(weights[j])) for item in evidence for j in range(len(weights)))
-
-
-def weighted_blocks(evidence: Sequence[Evidence], weights: Array) -> list[list[tuple[Information, ...]]]:
-    """Return for every recording its blocks, each joint's rows with its weight."""
-    return [
-        [
-            tuple(part.scaled(float(weight)) for part, weight in zip(block, weights, strict=True))
-            for block in item.blocks
-        ]
-        for item in evidence
-    ]
-
-
-def paper_criteria(information: Information, evidence: Sequence[Evidence]) -> tuple[float, float]:
-    """Return J_d and J_k of Indri et al. (2002) for 2500 equally spaced samples of the recordings.
-
-    Parameters
-    ----------
-    information : Information
-        Unweighted rows of all joints (R_v = identity).
-    evidence : sequence of Evidence
+def paper_criteria(observations: Observations) -> tuple[float, float]:
+    """Return J_d and J_k of Indri et al. (2002) for 2500 equally spaced samples of recordings.
 
     Returns
     -------
     tuple of float
-        ``ln det(H.T H)`` and ``cond(H.T H)`` of the stacked regressor H.
+        ``ln det(H.T H)`` and ``cond(H.T H)`` of the stacked regressor H of all joints, unweighted (R_v = identity).
     """
-    joints = len(evidence[0].unfiltered)
-    share = PAPER_SAMPLES / (information.rows / joints)
+    information = merge(observations.by_joint)
+    share = PAPER_SAMPLES / (information.rows / len(observations.joints))
     return information.log_det() + information.parameters * float(np.log(share)), information.condition()

@@ -125,7 +125,7 @@ class Information:
 
     def embed(self, columns: Sequence[int] | NDArray[np.intp], parameters: int) -> Information:
         """Return the information in a larger model whose other columns are zero on these rows."""
-        wide = np.zeros((self.parameters + 1, parameters + 1))
+        wide = np.zeros((len(self.factor), parameters + 1))
         wide[:, [*columns, parameters]] = self.factor
         return Information(triangular(wide), self.rows)
 
@@ -152,16 +152,8 @@ class Information:
 
     def inverse(self) -> Array:
         """Return the inverse of ``W.T @ W`` on what is determined, shape (p, p)."""
-        r = self.regressor_factor
-        size = np.linalg.norm(r, axis=0)
-        entering = size > 0.0
-        result = np.zeros((self.parameters, self.parameters))
-        if np.any(entering):
-            _, singular, right = np.linalg.svd(r[:, entering] / size[entering], full_matrices=False)
-            known = singular > UNDETERMINED * singular[0]
-            half = right[known].T / singular[known] / size[entering][:, None]
-            result[np.ix_(entering, entering)] = half @ half.T
-        return result
+        half = orthonormal(self.regressor_factor)
+        return half @ half.T
 
     def residual_sum(self, value: Array | None = None) -> float:
         """Return the sum of squared residuals of parameters, by default of the least-squares estimate."""
@@ -256,6 +248,22 @@ def joint_noise(joints: Sequence[Information]) -> Array:
         # An exact fit would give an infinite weight; rounding is the floor.
         noise = np.array([max(part.rms(value), LEAST_NOISE * part.torque_rms) or 1.0 for part in joints])
     return noise
+
+
+def orthonormal(factor: Array) -> Array:
+    """Return the sums of columns, shape (p, r), that are orthonormal on the rows of a triangular factor, shape (k, p).
+
+    Directions that are not determined are left out.
+    """
+    size = np.linalg.norm(factor, axis=0)
+    entering = size > 0.0
+    if not np.any(entering):
+        return np.zeros((factor.shape[1], 0))
+    _, singular, right = np.linalg.svd(factor[:, entering] / size[entering], full_matrices=False)
+    known = singular > UNDETERMINED * singular[0]
+    result = np.zeros((factor.shape[1], int(np.count_nonzero(known))))
+    result[entering] = right[known].T / singular[known] / size[entering][:, None]
+    return result
 
 
 def triangular(rows: Array) -> Array:

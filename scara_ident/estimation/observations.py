@@ -1,137 +1,279 @@
-"""What a recording says of a model: one triangular factor per joint and block of time.
+"""What recordings say of a model: its columns on prepared data, joint by joint and block by block of time.
 
-The rows of a recording are made twice from the same motion: in the band, where columns and torque pass the same
-low-pass and every row that the band leaves independent is kept; and unfiltered, where the recorded torque is
-taken as it is. Stretches of samples are generated, absorbed and forgotten.
+A joint's rows hold only the columns that act on it. Each row is weighted to stand for all samples that the band makes
+dependent on it, so that `Information.rows` counts samples. All that an estimate needs follows from triangular factors
+of these rows, by block, recording, fold or joint.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.errors import RecordingError
-from scara_ident.estimation.information import Information, merge
+from scara_ident.estimation.information import Information
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import stretches
-from scara_ident.motion.prepared import band_blocks, raw_rows, row_step, standstill, trim_of
-from scara_ident.recording.recording import Recording
+from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
 from scara_ident.threads import one_blas_thread
+
+Array = NDArray[np.float64]
+# Columns of every joint at every sample of a stretch, (k, N) each.
+Raw = tuple[Array, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
-    """The information that one recording holds on a model.
+class JointRows:
+    """Rows of one joint within its band, in the order of time, recording after recording.
 
     Attributes
     ----------
-    recording, trajectory : str
-    samples : int
-        Samples of the recording on its uniform time grid.
-    blocks : tuple of tuple of Information
-        ``blocks[b][j]``: rows of joint j within the band in block b of time. Each row is weighted to stand for
-        all samples that the band makes dependent on it, so that ``rows`` counts samples.
-    unfiltered : tuple of Information
-        Per joint, all samples, the recorded torque without any filter.
-    row_step : tuple of int
-        Per joint, how many samples one row of the band stands for.
-    left_out_ends : float
-        Seconds left out at the ends of its stretches.
-    left_out_rest : tuple of float
-        Per joint, share of the remaining samples left out because the joint stood still.
+    columns : ndarray of int, shape (k,)
+        The model's columns that act on the joint.
+    table : ndarray, shape (k + 1, N)
+        These columns, then the torque.
+    starts : ndarray of int, shape (blocks + 1,)
+        Where each block of time begins.
+    counts : ndarray, shape (blocks,)
+        Samples that the rows of each block stand for.
     """
 
-    recording: str
-    trajectory: str
-    samples: int
-    blocks: tuple[tuple[Information, ...], ...]
-    unfiltered: tuple[Information, ...]
-    row_step: tuple[int, ...]
-    left_out_ends: float
-    left_out_rest: tuple[float, ...]
+    columns: NDArray[np.intp]
+    table: Array
+    starts: NDArray[np.intp]
+    counts: Array
+
+    def information(self, parameters: int, blocks: slice = slice(None)) -> Information:
+        """Return the triangular factor of consecutive blocks among all parameters of the model."""
+        starts, counts = self.starts[:-1][blocks], self.counts[blocks]
+        if not len(starts):
+            return Information.empty(parameters)
+        stop = self.starts[1:][blocks][-1]
+        own = Information.empty(len(self.columns)).absorb_columns(self.table[:, starts[0] : stop])
+        return Information(own.factor, float(np.sum(counts))).embed(self.columns, parameters)
+
+    def part(self, blocks: NDArray[np.intp]) -> JointRows:
+        """Return some of the blocks, in their order."""
+        sizes = np.diff(self.starts)[blocks]
+        rows = [np.arange(self.starts[b], self.starts[b + 1]) for b in blocks]
+        chosen = np.concatenate(rows) if rows else np.zeros(0, dtype=np.intp)
+        whole = len(chosen) == self.table.shape[1]
+        table = self.table if whole else self.table[:, chosen]
+        return JointRows(self.columns, table, np.concatenate([[0], np.cumsum(sizes)]), self.counts[blocks])
+
+    def faded(self, shares: Array) -> JointRows:
+        """Return the rows with each block weighted to count for a share of its samples, shares of shape (blocks,)."""
+        size = np.repeat(np.sqrt(shares), np.diff(self.starts))
+        return JointRows(self.columns, self.table * size, self.starts, self.counts * shares)
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """What recordings say of a model.
+
+    Attributes
+    ----------
+    model : TorqueModel
+    data : PreparedData
+    joints : tuple of JointRows
+    owner : ndarray of int, shape (blocks,)
+        Recording of each block.
+    raw : tuple of tuple of tuple of ndarray, each of shape (k, N)
+        For every recording, stretch and joint the columns at every sample, not filtered.
+    """
+
+    model: TorqueModel
+    data: PreparedData
+    joints: tuple[JointRows, ...]
+    owner: NDArray[np.intp]
+    raw: tuple[tuple[Raw, ...], ...]
+
+    @property
+    def parameters(self) -> int:
+        """Number of parameters p."""
+        return len(self.model.columns)
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks of time."""
+        return len(self.owner)
 
     @cached_property
-    def joints(self) -> tuple[Information, ...]:
-        """All rows of each joint within the band."""
-        return tuple(merge(block[j] for block in self.blocks) for j in range(len(self.unfiltered)))
+    def each(self) -> tuple[Observations, ...]:
+        """The observations of each recording alone."""
+        if len(self.data.recordings) == 1:
+            return (self,)
+        return tuple(self.of([k]) for k in range(len(self.data.recordings)))
 
-    def joint(self, joint: int) -> Information:
-        """Return all rows of one joint within the band."""
-        return self.joints[joint]
+    def of(self, places: Sequence[int]) -> Observations:
+        """Return the observations of some recordings."""
+        blocks = np.concatenate([np.flatnonzero(self.owner == k) for k in places])
+        owner = np.concatenate([np.full(np.count_nonzero(self.owner == k), i) for i, k in enumerate(places)])
+        return replace(
+            self,
+            data=self.data.of(places),
+            joints=tuple(joint.part(blocks) for joint in self.joints),
+            owner=owner.astype(np.intp),
+            raw=tuple(self.raw[k] for k in places),
+        )
+
+    @cached_property
+    def by_joint(self) -> tuple[Information, ...]:
+        """All rows of each joint within its band."""
+        return tuple(joint.information(self.parameters) for joint in self.joints)
+
+    def unfiltered_rms(self, value: Array) -> Array:
+        """Return the rms of what parameters leave of the recorded torque, nothing filtered, shape (n,).
+
+        Over all samples of a joint that are neither at rest nor at the ends; NaN where there is none.
+        """
+        squares, count = np.zeros(len(self.joints)), np.zeros(len(self.joints))
+        for part, raw in self._stretches():
+            for j, (joint, columns) in enumerate(zip(self.joints, raw, strict=True)):
+                left = (part.torque[j] - value[joint.columns] @ columns)[part.used[j]]
+                squares[j] += left @ left
+                count[j] += len(left)
+        return np.asarray(np.sqrt(np.divide(squares, count, out=np.full(len(count), np.nan), where=count > 0.0)))
+
+    def block(self, place: int) -> tuple[Information, ...]:
+        """Return the rows of every joint in one block of time."""
+        return tuple(joint.information(self.parameters, slice(place, place + 1)) for joint in self.joints)
+
+    @property
+    def name(self) -> str:
+        """Name of the recording, or of the first of several."""
+        return self.data.recordings[0].name
+
+    @property
+    def trajectory(self) -> str:
+        """Trajectory of the recording, or of the first of several."""
+        return self.data.recordings[0].trajectory
+
+    @property
+    def samples(self) -> int:
+        """Samples on the uniform time grids."""
+        return sum(part.samples for part in self.data.stretches)
+
+    @property
+    def row_step(self) -> tuple[int, ...]:
+        """For each joint how many samples one row stands for."""
+        return next((part.steps for part, _ in self._stretches()), (1,) * len(self.joints))
+
+    @property
+    def left_out_ends(self) -> float:
+        """Seconds left out at the ends of stretches."""
+        return sum(min(2 * part.trim, part.samples) / part.rate for part in self.data.stretches)
+
+    @cached_property
+    def left_out_rest(self) -> tuple[float, ...]:
+        """For each joint the share of the remaining samples left out because it stood still."""
+        used, rested = np.zeros(len(self.joints)), np.zeros(len(self.joints))
+        for part, _ in self._stretches():
+            used += np.count_nonzero(part.used, axis=1)
+            rested += np.count_nonzero(part.rest[:, part.trim : part.samples - part.trim], axis=1)
+        return tuple(float(share) for share in rested / np.maximum(used + rested, 1.0))
+
+    def with_torque(self, data: PreparedData) -> Observations:
+        """Return observations of the same motion with the torque of other data."""
+        joints = []
+        for j, joint in enumerate(self.joints):
+            parts = [part.rows(j, part.torque[j : j + 1]) for part in data.stretches if part.usable]
+            joints.append(replace(joint, table=np.concatenate([joint.table[:-1], np.concatenate(parts, axis=1)])))
+        return replace(self, data=data, joints=tuple(joints))
+
+    def predicted(self, value: Array) -> tuple[Array, ...]:
+        """Return the torque that parameters predict on every stretch, shape (n, N) each, not filtered."""
+        columns = [joint.columns for joint in self.joints]
+        return tuple(
+            np.array([value[own] @ row for own, row in zip(columns, raw, strict=True)])
+            for recording in self.raw
+            for raw in recording
+        )
+
+    def _stretches(self) -> Iterator[tuple[PreparedStretch, Raw]]:
+        """Give the stretches that are long enough, with their columns."""
+        for recording, raws in zip(self.data.recordings, self.raw, strict=True):
+            for part, raw in zip(recording.stretches, raws, strict=True):
+                if part.usable:
+                    yield part, raw
 
 
-def gather(model: TorqueModel, recording: Recording, bands: Sequence[float | None]) -> Evidence:
-    """Make the rows of a recording and absorb them.
+def observe(model: TorqueModel, data: PreparedData) -> Observations:
+    """Make a model's rows on prepared data.
 
     Parameters
     ----------
     model : TorqueModel
-    recording : Recording
+    data : PreparedData
         With effort.
-    bands : sequence of float or None, one per joint
-        Cut-off of the low-pass on both sides of each joint's equation in Hz; None filters nothing.
 
     Returns
     -------
-    Evidence
+    Observations
 
     Raises
     ------
     RecordingError
-        If no row is left.
+        If no row of a recording is left.
     """
-    size = len(model.columns)
-    blocks: list[tuple[Information, ...]] = []
-    unfiltered = [Information.empty(size) for _ in range(model.robot.n)]
-    samples, ends, used, rested = 0, 0.0, np.zeros(model.robot.n), np.zeros(model.robot.n)
-    steps = [1] * model.robot.n
-    for stretch in stretches(recording):
-        samples += len(stretch.time)
-        trim = trim_of(stretch, bands)
-        ends += min(2 * trim, len(stretch.time)) / stretch.rate
-        if len(stretch.time) <= 2 * trim + 1:
-            continue
-        motion, raw = raw_rows(model, stretch, bands)
-        rest = standstill(stretch, motion, bands)
-        steps = [row_step(stretch.rate, band) for band in bands]
-        for j in range(model.robot.n):
-            keep = ~rest[j]
-            keep[:trim] = keep[-trim:] = False
-            used[j] += np.count_nonzero(keep)
-            rested[j] += np.count_nonzero(rest[j][trim : len(keep) - trim])
-            unfiltered[j] = unfiltered[j].absorb_columns(raw[j][:, keep])
-        for block in band_blocks(model, stretch, raw, rest, bands):
-            blocks.append(tuple(_absorbed(rows, step) for rows, step in zip(block, steps, strict=True)))
-    if not blocks or not np.any(used):
+    with one_blas_thread(), ThreadPoolExecutor(max_workers=2) as pool:
+        raws = list(
+            pool.map(lambda item: tuple(model.joint_columns(part.motion) for part in item.stretches), data.recordings)
+        )
+        joints, owner = rows_of(data, model.active, raws)
+    return Observations(model, data, joints, owner, tuple(raws))
+
+
+def rows_of(
+    data: PreparedData, columns: Sequence[NDArray[np.intp]], raws: Sequence[tuple[Raw, ...]]
+) -> tuple[tuple[JointRows, ...], NDArray[np.intp]]:
+    """Return the rows of every joint within its band, and the recording of each block."""
+    with one_blas_thread(), ThreadPoolExecutor(max_workers=2) as pool:
+        parts = list(pool.map(_recording_rows, data.recordings, raws))
+    owner = np.concatenate([np.full(len(part[0].counts), k) for k, part in enumerate(parts)]) if parts else np.zeros(0)
+    joints = []
+    for j, own in enumerate(columns):
+        rows = [part[j] for part in parts]
+        ends = np.cumsum([0, *(item.table.shape[1] for item in rows)])
+        starts = [item.starts[:-1] + end for item, end in zip(rows, ends[:-1], strict=True)]
+        joints.append(
+            JointRows(
+                own,
+                np.concatenate([item.table for item in rows], axis=1) if rows else np.zeros((len(own) + 1, 0)),
+                np.concatenate([*starts, ends[-1:]]).astype(np.intp),
+                np.concatenate([item.counts for item in rows]) if rows else np.zeros(0),
+            )
+        )
+    return tuple(joints), owner.astype(np.intp)
+
+
+def _recording_rows(item: PreparedRecording, raws: tuple[Raw, ...]) -> list[JointRows]:
+    usable = [(part, raw) for part, raw in zip(item.stretches, raws, strict=True) if part.usable]
+    if not any(len(kept) for part, _ in usable for kept in part.kept):
+        samples = sum(part.samples for part in item.stretches)
         raise RecordingError(
-            f"{recording.path or recording.name}: nothing is left of {samples} samples once the ends and the times "
+            f"{item.recording.path or item.name}: nothing is left of {samples} samples once the ends and the times "
             "at rest are left out; record longer or moving data"
         )
-    share = rested / np.maximum(used + rested, 1.0)
-    return Evidence(
-        recording.name,
-        recording.trajectory,
-        samples,
-        tuple(blocks),
-        tuple(unfiltered),
-        tuple(steps),
-        ends,
-        tuple(float(x) for x in share),
-    )
-
-
-def _absorbed(rows: np.ndarray, step: int) -> Information:
-    information = Information.empty(rows.shape[1] - 1).absorb_columns(rows.T)
-    return Information(information.factor, step * information.rows)
-
-
-def gather_all(
-    model: TorqueModel, recordings: Sequence[Recording], bands: Sequence[float | None]
-) -> tuple[Evidence, ...]:
-    """Make the rows of several recordings, two at a time; see `gather`."""
-    with one_blas_thread(), ThreadPoolExecutor(max_workers=2) as pool:
-        return tuple(pool.map(lambda recording: gather(model, recording, bands), recordings))
+    found = []
+    for j in range(len(item.bands)):
+        tables, starts, counts, total = [], [], [], 0
+        for part, raw in usable:
+            tables.append(part.rows(j, np.concatenate([raw[j], part.torque[j : j + 1]])))
+            begin = part.block_starts(j)
+            starts.append(begin[:-1] + total)
+            counts.append(part.steps[j] * np.diff(begin).astype(float))
+            total += int(begin[-1])
+        found.append(
+            JointRows(
+                np.arange(tables[0].shape[0] - 1),
+                np.concatenate(tables, axis=1),
+                np.concatenate([*starts, [total]]),
+                np.concatenate(counts),
+            )
+        )
+    return found

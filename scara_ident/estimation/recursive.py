@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,8 +11,7 @@ from scara_ident.errors import UsageError
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.least_squares import least_squares
-from scara_ident.estimation.observations import Evidence
-from scara_ident.model.model import TorqueModel
+from scara_ident.estimation.observations import Observations
 
 Array = NDArray[np.float64]
 
@@ -41,8 +39,7 @@ class History:
 
 
 def rls(
-    model: TorqueModel,
-    evidence: Sequence[Evidence],
+    observations: Observations,
     *,
     prior: Information | None = None,
     forgetting: float = 1.0,
@@ -55,8 +52,7 @@ def rls(
 
     Parameters
     ----------
-    model : TorqueModel
-    evidence : sequence of Evidence
+    observations : Observations
         In the order of time.
     prior : Information, optional
         Rows of a prior, see `Information.prior`; by default nothing is known (R_P = infinity).
@@ -76,33 +72,28 @@ def rls(
     """
     if not 0.0 < forgetting <= 1.0:
         raise UsageError(f"forgetting is {forgetting:g}; expected a factor per sample above 0 and up to 1")
-    counts = np.array([merge(block).rows / model.robot.n for item in evidence for block in item.blocks])
-    state = prior if prior is not None else Information.empty(len(model.columns))
+    equal = np.ones(len(observations.joints))
+    counts = np.mean([joint.counts for joint in observations.joints], axis=0)
+    state = prior if prior is not None else Information.empty(observations.parameters)
     value, std, log_det = [], [], []
-    blocks = (block for item in evidence for block in item.blocks)
-    for block, count in zip(blocks, counts, strict=True):
-        state = merge([_faded(state, forgetting**count), *block])
+    for place, count in enumerate(counts):
+        state = merge([_faded(state, forgetting**count), *observations.block(place)])
         solution = state.solve()
         value.append(np.where(solution.undetermined, np.nan, solution.value))
         std.append(_white_std(state, solution.value, solution.undetermined))
         log_det.append(-np.inf if np.any(solution.undetermined) else state.log_det())
     history = History(np.cumsum(counts), np.array(value), np.array(std), np.array(log_det))
     if forgetting == 1.0:
-        return least_squares(model, evidence, np.ones(model.robot.n), "rls", prior=prior), history
+        return least_squares(observations, equal, "rls", prior=prior), history
     # What each block still weighs at the end.
-    age = np.sum(counts) - np.cumsum(counts)
-    places = iter(forgetting**age)
-    remembered = [replace(item, blocks=tuple(_faded_block(b, next(places)) for b in item.blocks)) for item in evidence]
+    remaining = forgetting ** (np.sum(counts) - np.cumsum(counts))
+    remembered = replace(observations, joints=tuple(joint.faded(remaining) for joint in observations.joints))
     old = None if prior is None else _faded(prior, float(forgetting ** np.sum(counts)))
-    return least_squares(model, remembered, np.ones(model.robot.n), "rls", prior=old), history
+    return least_squares(remembered, equal, "rls", prior=old), history
 
 
 def _faded(information: Information, decay: float) -> Information:
     return Information(np.sqrt(decay) * information.factor, decay * information.rows)
-
-
-def _faded_block(block: tuple[Information, ...], decay: float) -> tuple[Information, ...]:
-    return tuple(_faded(part, decay) for part in block)
 
 
 def _white_std(state: Information, value: Array, undetermined: NDArray[np.bool_]) -> Array:

@@ -17,7 +17,7 @@ ESTIMATORS: Registry[Callable[..., Any]] = Registry(
         "consistent": "scara_ident.estimation.consistent.estimator:consistent",
     },
 )
-"""Functions from a torque model and what recordings say of it to an `Estimate`, by the name of the method.
+"""Functions from `Observations` to an `Estimate`, by the name of the method.
 
 A function may also return the estimate with a `History` of how it came about.
 """

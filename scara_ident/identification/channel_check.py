@@ -11,13 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.estimation import Estimate
-from scara_ident.estimation.information import merge
 from scara_ident.estimation.least_squares import weighted_value, wls
-from scara_ident.estimation.observations import Evidence, gather_all
-from scara_ident.model.model import TorqueModel
+from scara_ident.estimation.observations import Observations, observe
 from scara_ident.model.terms.friction import Friction
-from scara_ident.motion.motion import motion_of, stretches
-from scara_ident.recording.recording import Recording
+from scara_ident.motion.prepared import PreparedData, PreparedStretch
 
 Array = NDArray[np.float64]
 Signal = Literal["effort", "position", "effort and position"]
@@ -36,7 +33,7 @@ PUSHING_STD = 4.0
 
 
 @dataclass(frozen=True)
-class MappingFault:
+class ChannelFault:
     """Another reading of the channels that fits far better.
 
     Attributes
@@ -78,9 +75,7 @@ class MappingFault:
         return f"{self.signal} of {names} {verb} like the opposite sign: turned round {gain}; {turn}"
 
 
-def mapping_faults(
-    model: TorqueModel, recordings: Sequence[Recording], bands: Sequence[float | None]
-) -> tuple[MappingFault, ...]:
+def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     """Find efforts and positions of opposite sign, and those of two joints that are exchanged.
 
     A sign is suspected where friction would feed energy in, an exchange where two joints are hardly explained; only
@@ -88,43 +83,42 @@ def mapping_faults(
 
     Parameters
     ----------
-    model : TorqueModel
-    recordings : sequence of Recording
-        With effort; the first run of every trajectory is used.
-    bands : sequence of float or None, one per joint
+    observations : Observations
+        The first run of every trajectory is used.
 
     Returns
     -------
-    tuple of MappingFault
+    tuple of ChannelFault
         To be mended together; empty where nothing else fits better.
     """
-    data = tuple({item.trajectory: item for item in reversed(recordings)}.values())
+    recordings = observations.data.recordings
+    first = {item.trajectory: place for place, item in reversed(list(enumerate(recordings)))}
+    held = observations.of(sorted(first.values()))
+    model = observations.model
     joints = model.robot.joints
-    faults: list[MappingFault] = []
+    faults: list[ChannelFault] = []
     for _ in range(2 * len(joints)):
-        evidence = gather_all(model, data, bands)
-        fitted = wls(model, evidence)
-        errors, score = _relative(fitted.value, evidence), _score(fitted.value, evidence)
-        pushing = _pushing(fitted, data, bands)
-        best: tuple[MappingFault, tuple[Recording, ...]] | None = None
+        fitted = wls(held)
+        errors, score = _relative(fitted.value, held), _score(fitted.value, held)
+        pushing = _pushing(fitted, held)
+        best: tuple[ChannelFault, Observations] | None = None
         for signal, chosen, exchanged in _suspects(errors, pushing):
-            other = tuple(_read_as(item, signal, chosen, exchanged) for item in data)
-            held = gather_all(model, other, bands)
-            mended = _score(weighted_value(model, held), held)
+            other = observe(model, _read_as(held.data, signal, chosen, exchanged))
+            mended = _score(weighted_value(other), other)
             if mended >= (MENDED * score if best is None else best[0].mended):
                 continue
             # A turned sign must take the push away; signs that an exchange brings to light are the next round's.
             allowed = np.count_nonzero(pushing) - (signal != "effort and position")
-            if not exchanged and np.count_nonzero(_pushing(wls(model, held), other, bands)) > allowed:
+            if not exchanged and np.count_nonzero(_pushing(wls(other), other)) > allowed:
                 continue
             names = tuple(joints[j] for j in chosen)
-            best = MappingFault(signal, names, exchanged, score, mended), other
+            best = ChannelFault(signal, names, exchanged, score, mended), other
         if best is not None:
             faults.append(best[0])
-            data = best[1]
+            held = best[1]
             continue
-        if np.all(pushing) and _net_power(data) < 0.0:
-            faults.append(MappingFault("effort", tuple(joints), False, score, score))
+        if np.all(pushing) and _net_power(held.data) < 0.0:
+            faults.append(ChannelFault("effort", tuple(joints), False, score, score))
         break
     return tuple(faults)
 
@@ -145,58 +139,63 @@ def _suspects(errors: Array, pushing: NDArray[np.bool_]) -> list[tuple[Signal, t
     return found
 
 
-def _read_as(recording: Recording, signal: Signal, joints: Sequence[int], exchanged: bool) -> Recording:
-    """Return the recording with a signal of one joint negated, or of two exchanged."""
-    order = list(range(len(recording.joints)))
-    sign = np.ones((len(order), 1))
+def _read_as(data: PreparedData, signal: Signal, joints: Sequence[int], exchanged: bool) -> PreparedData:
+    """Return the recordings with a signal of one joint negated, or of two exchanged."""
+    n = len(data.bands)
+    order = list(range(n))
+    sign = np.ones((n, 1))
     if exchanged:
         order[joints[0]], order[joints[1]] = joints[1], joints[0]
     else:
         sign[joints[0]] = -1.0
-    effort, position = recording.effort, recording.position
-    assert effort is not None
-    if signal == "effort":
-        return replace(recording, effort=sign * effort[order])
-    # What is derived from position would contradict it.
-    position = sign * position[order]
-    effort = effort if signal == "position" else sign * effort[order]
-    return replace(recording, position=position, effort=effort, velocity=None, acceleration=None)
+
+    def turned(rows: Array, wanted: bool) -> Array:
+        return sign * rows[order] if wanted else rows
+
+    def read(part: PreparedStretch) -> PreparedStretch:
+        position = turned(part.stretch.position, "position" in signal)
+        torque = turned(part.torque, "effort" in signal)
+        return PreparedStretch(replace(part.stretch, position=position, torque=torque, _filtered={}), part.bands)
+
+    recordings = [replace(item, stretches=tuple(map(read, item.stretches))) for item in data.recordings]
+    return replace(data, recordings=tuple(recordings))
 
 
-def _net_power(data: Sequence[Recording]) -> float:
+def _net_power(data: PreparedData) -> float:
     """Return the energy that the efforts feed into the arm over recordings, up to the reductions' scale."""
-    return float(sum(np.sum(item.effort[:, 1:] * np.diff(item.position)) for item in data if item.effort is not None))
+    return float(sum(np.sum(part.torque[:, 1:] * np.diff(part.stretch.position)) for part in data.stretches))
 
 
-def _relative(value: Array, evidence: Sequence[Evidence]) -> Array:
-    joints = [merge(item.joint(j) for item in evidence) for j in range(len(evidence[0].unfiltered))]
-    return np.array([part.rms(value) / max(part.torque_rms, np.finfo(float).tiny) for part in joints])
+def _relative(value: Array, observations: Observations) -> Array:
+    tiny = np.finfo(float).tiny
+    return np.array([part.rms(value) / max(part.torque_rms, tiny) for part in observations.by_joint])
 
 
-def _score(value: Array, evidence: Sequence[Evidence]) -> float:
-    return float(np.exp(np.mean(np.log(np.maximum(_relative(value, evidence), 1e-12)))))
+def _score(value: Array, observations: Observations) -> float:
+    return float(np.exp(np.mean(np.log(np.maximum(_relative(value, observations), 1e-12)))))
 
 
-def _pushing(estimate: Estimate, data: Sequence[Recording], bands: Sequence[float | None]) -> NDArray[np.bool_]:
+def _pushing(estimate: Estimate, observations: Observations) -> NDArray[np.bool_]:
     """Return the joints whose estimated friction feeds energy in over the recorded motion, beyond its uncertainty."""
     model = estimate.model
     robot = model.robot
-    result = np.zeros(robot.n, dtype=bool)
-    start = 0
+    friction = np.zeros(len(model.columns), dtype=bool)
     for term in model.terms:
-        stop = start + len(term.columns)
         if isinstance(term, Friction):
-            power, passed, count = np.zeros((robot.n, stop - start)), np.zeros(robot.n), 0
-            for recording in data:
-                part = max(stretches(recording), key=lambda item: len(item.time))
-                motion = motion_of(part, bands)
-                torque = part.torque if part.torque is not None else np.zeros_like(motion.v)
-                drive = robot.drive_sign[:, None] * motion.v
-                power += np.einsum("jpn,jn->jp", term.regressor(motion), drive)
-                passed += np.sum(np.abs(torque * drive), axis=1)
-                count += motion.samples
-            value = power @ estimate.value[start:stop]
-            std = np.sqrt(np.einsum("jp,pq,jq->j", power, estimate.covariance[start:stop, start:stop], power))
-            result |= (value < -PUSHING * passed) & (value < -PUSHING_STD * std)
-        start = stop
+            friction[model.place(term)] = True
+    result = np.zeros(robot.n, dtype=bool)
+    for j, rows in enumerate(observations.joints):
+        own = np.flatnonzero(friction[rows.columns])
+        if not len(own):
+            continue
+        power, passed = np.zeros(len(own)), 0.0
+        for item, raws in zip(observations.data.recordings, observations.raw, strict=True):
+            part, raw = max(zip(item.stretches, raws, strict=True), key=lambda pair: pair[0].samples)
+            drive = robot.drive_sign[j] * part.motion.v[j]
+            power += raw[j][own] @ drive
+            passed += float(np.sum(np.abs(part.torque[j] * drive)))
+        places = rows.columns[own]
+        value = float(power @ estimate.value[places])
+        std = float(np.sqrt(power @ estimate.covariance[np.ix_(places, places)] @ power))
+        result[j] = value < -PUSHING * passed and value < -PUSHING_STD * std
     return result

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from scara_ident.errors import UsageError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.bands import choose_bands
-from scara_ident.estimation.estimate import paper_criteria, pooled_information
-from scara_ident.estimation.information import merge
-from scara_ident.estimation.observations import Evidence, gather_all
+from scara_ident.estimation.estimate import paper_criteria
+from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.identify import data_notes, estimate_by
 from scara_ident.model.model import TorqueModel, build_model
-from scara_ident.motion.motion import motion_of, stretches
+from scara_ident.motion.prepared import prepare
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
@@ -110,28 +109,28 @@ def compare(
     UsageError
         If there are fewer than two trajectories.
     """
-    names = list(dict.fromkeys(recording.trajectory for recording in recordings))
+    data = prepare(recordings)
+    names = data.trajectories
     if len(names) < 2:
         raise UsageError(
             f"compare needs recordings of at least two trajectories, found {len(names)}; "
             "a trajectory's name is the file's stem without its last _<number>"
         )
     equation = build_model(robot, model) if isinstance(model, str) else model
-    notes = list(data_notes(recordings))
+    notes = data_notes(data.recordings)
     if bands is None:
         progress("choosing the bands")
-        choice = choose_bands(equation, recordings)
+        choice = choose_bands(equation, data)
         bands, notes = choice.bands, [*notes, *choice.notes]
     progress("absorbing the recordings")
-    evidence = gather_all(equation, recordings, bands)
-    noise = repeatability(recordings)
+    observations = observe(equation, data.at(bands))
+    noise = repeatability(data)
     summaries, rows = [], []
     for name in names:
         progress(f"estimating from {name}")
-        own = [item for item in evidence if item.trajectory == name]
-        runs = [recording for recording in recordings if recording.trajectory == name]
-        rows.append([merge(item.joint(j) for item in own) for j in range(robot.n)])
-        summaries.append(_summary(name, equation, own, runs, bands, method, noise.get(name)))
+        own = observations.of([k for k, item in enumerate(data.recordings) if item.trajectory == name])
+        rows.append(own.by_joint)
+        summaries.append(_summary(name, own, method, noise.get(name)))
     errors = np.zeros((len(names), len(names), robot.n))
     expected = np.zeros_like(errors)
     for i, predicted in enumerate(rows):
@@ -150,27 +149,18 @@ def compare(
     return Comparison(equation, method, tuple(bands), tuple(summaries), errors, expected, tuple(notes))
 
 
-def _summary(
-    name: str,
-    model: TorqueModel,
-    evidence: Sequence[Evidence],
-    recordings: Sequence[Recording],
-    bands: Sequence[float | None],
-    method: str,
-    sigma: Array | None,
-) -> TrajectorySummary:
-    n = model.robot.n
-    estimate, _ = estimate_by(method, model, evidence)
-    log_det, condition = paper_criteria(pooled_information(evidence, np.ones(n)), evidence)
-    motions = [motion_of(part, bands) for recording in recordings[:1] for part in stretches(recording)]
+def _summary(name: str, observations: Observations, method: str, sigma: Array | None) -> TrajectorySummary:
+    estimate, _ = estimate_by(method, observations)
+    log_det, condition = paper_criteria(observations)
+    motions = [part.motion for part in observations.data.recordings[0].stretches]
     return TrajectorySummary(
         name,
-        tuple(item.recording for item in evidence),
+        tuple(item.name for item in observations.data.recordings),
         log_det,
         condition,
         sigma,
         np.max([np.max(np.abs(motion.v), axis=1) for motion in motions], axis=0),
         np.max([np.max(np.abs(motion.a), axis=1) for motion in motions], axis=0),
-        np.array([merge(item.joint(j) for item in evidence).torque_rms for j in range(n)]),
+        np.array([information.torque_rms for information in observations.by_joint]),
         estimate,
     )

@@ -15,13 +15,13 @@ from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, consistent, physical_consistency
 from scara_ident.estimation.consistent.feasibility import PhysicalConsistency
 from scara_ident.estimation.consistent.options import ConsistentOptions
-from scara_ident.estimation.estimate import paper_criteria, pooled_information
+from scara_ident.estimation.estimate import paper_criteria
 from scara_ident.estimation.information import Information, merge
-from scara_ident.estimation.observations import Evidence, gather_all
+from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification import ESTIMATORS
-from scara_ident.identification.channel_check import mapping_faults
+from scara_ident.identification.channel_check import channel_faults
 from scara_ident.model.model import TorqueModel, build_model
-from scara_ident.motion.motion import stretches
+from scara_ident.motion.prepared import PreparedRecording, prepare
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.motion.velocity_audit import audit_velocity
 from scara_ident.recording.recording import Recording
@@ -41,8 +41,8 @@ class Identification:
         Of the recursive estimate.
     bands : tuple of float or None
         Low-pass on both sides of each joint's equation, Hz; None where nothing was filtered.
-    training, validation : tuple of Evidence
-        What each recording says; validation took no part in any choice.
+    training, validation : Observations
+        What the recordings say; validation took no part in any choice.
     noise : mapping of str to ndarray
         Repeatability of the torque per trajectory, see `repeatability`.
     physical_consistency : PhysicalConsistency
@@ -56,8 +56,8 @@ class Identification:
     estimate: Estimate
     history: History | None
     bands: tuple[float | None, ...]
-    training: tuple[Evidence, ...]
-    validation: tuple[Evidence, ...]
+    training: Observations
+    validation: Observations
     noise: Mapping[str, Array]
     physical_consistency: PhysicalConsistency
     log_det: float
@@ -71,11 +71,11 @@ class Identification:
 
     def training_errors(self) -> dict[str, tuple[JointError | None, ...]]:
         """Return the errors on the recordings that were fitted, by recording."""
-        return {item.recording: self.estimate.errors(item) for item in self.training}
+        return {item.name: self.estimate.errors(item) for item in self.training.each}
 
     def validation_errors(self) -> dict[str, tuple[JointError | None, ...]]:
         """Return the errors on the recordings that were not, by recording."""
-        return {item.recording: self.estimate.errors(item) for item in self.validation}
+        return {item.name: self.estimate.errors(item) for item in self.validation.each}
 
 
 def identify(
@@ -127,29 +127,29 @@ def identify(
     ESTIMATORS.check(method)
     check_held_out(recordings, validation)
     equation = build_model(robot, model) if isinstance(model, str) else model
-    notes = data_notes((*recordings, *validation))
+    if bands is not None:
+        check_bands(robot, bands, (*recordings, *validation))
+    data, held_out = prepare(recordings), prepare(validation)
+    notes = data_notes((*data.recordings, *held_out.recordings))
     if bands is None:
         progress("choosing the bands")
-        choice = choose_bands(equation, recordings)
+        choice = choose_bands(equation, data)
         bands = choice.bands
         notes += choice.notes
-    else:
-        check_bands(robot, bands, (*recordings, *validation))
     progress("absorbing the recordings")
-    training = gather_all(equation, recordings, bands)
-    held_out = gather_all(equation, validation, bands)
-    notes += [str(fault) for fault in mapping_faults(equation, recordings, bands)]
+    training = observe(equation, data.at(bands))
+    validated = observe(equation, held_out.at(bands))
+    notes += [str(fault) for fault in channel_faults(training)]
     progress("estimating")
-    noise = repeatability(recordings)
-    estimate, history = estimate_by(method, equation, training, _joint_noise(noise), options)
+    noise = repeatability(data)
+    estimate, history = estimate_by(method, training, _joint_noise(noise), options)
     if isinstance(estimate, ConsistentEstimate):
         notes += estimate.notes
     progress("checking whether such an arm can exist")
     possible = physical_consistency(estimate)
-    unweighted = pooled_information(training, np.ones(robot.n))
-    log_det, condition = paper_criteria(unweighted, training)
+    log_det, condition = paper_criteria(training)
     return Identification(
-        estimate, history, tuple(bands), training, held_out, noise, possible, log_det, condition, tuple(notes)
+        estimate, history, tuple(bands), training, validated, noise, possible, log_det, condition, tuple(notes)
     )
 
 
@@ -163,7 +163,7 @@ def identified_arm(identification: Identification) -> ConsistentEstimate | None:
         return estimate
     if not identification.physical_consistency.possible:
         return None
-    return consistent(identification.model, identification.training)
+    return consistent(identification.training)
 
 
 def known_information(model: TorqueModel, recordings: Sequence[Recording], rate: float) -> Information:
@@ -176,13 +176,13 @@ def known_information(model: TorqueModel, recordings: Sequence[Recording], rate:
     rate : float
         Samples per second that the design they are to be joined with counts.
     """
-    evidence = gather_all(model, recordings, choose_bands(model, recordings).bands)
-    sampled = [
-        item.joint(j).scaled(float(np.sqrt(rate / recording.rate)))
-        for item, recording in zip(evidence, recordings, strict=True)
-        for j in range(model.robot.n)
-    ]
-    return merge(sampled)
+    data = prepare(recordings)
+    observations = observe(model, data.at(choose_bands(model, data).bands))
+    return merge(
+        information.scaled(float(np.sqrt(rate / recording.rate)))
+        for item, recording in zip(observations.each, recordings, strict=True)
+        for information in item.by_joint
+    )
 
 
 def check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequence[Recording]) -> None:
@@ -207,15 +207,14 @@ def check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequenc
 
 def estimate_by(
     method: str,
-    model: TorqueModel,
-    evidence: Sequence[Evidence],
+    observations: Observations,
     noise: Array | None = None,
     options: ConsistentOptions | None = None,
 ) -> tuple[Estimate, History | None]:
     """Estimate by a method given by name; ``noise`` is each joint's, where repetitions tell it."""
     estimator = ESTIMATORS.get(method)
     more: dict[str, dict[str, Any]] = {"consistent": {"options": options}, "wls": {"noise": noise}}
-    found = estimator(model, evidence, **more.get(method, {}))
+    found = estimator(observations, **more.get(method, {}))
     return found if isinstance(found, tuple) else (found, None)
 
 
@@ -243,14 +242,14 @@ def check_held_out(recordings: Sequence[Recording], validation: Sequence[Recordi
             )
 
 
-def data_notes(recordings: Sequence[Recording]) -> list[str]:
+def data_notes(recordings: Sequence[PreparedRecording]) -> list[str]:
     """Return what the audits found, the same remark on many recordings in one line."""
     found: dict[str, list[str]] = {}
-    for recording in recordings:
-        remarks = [finding.message for finding in recording.findings]
-        longest = max(stretches(recording), key=lambda part: len(part.time))
+    for item in recordings:
+        remarks = [finding.message for finding in item.recording.findings]
+        longest = item.longest.stretch
         verdicts: dict[str, list[str]] = {}
-        for audit in audit_velocity(recording, longest):
+        for audit in audit_velocity(item.recording, longest):
             verdict = audit.verdict(longest.rate)
             if verdict is not None:
                 verdicts.setdefault(verdict, []).append(audit.joint)
@@ -258,7 +257,7 @@ def data_notes(recordings: Sequence[Recording]) -> list[str]:
             f"recorded velocity of {', '.join(joints)} is not used: {verdict}" for verdict, joints in verdicts.items()
         ]
         for remark in remarks:
-            found.setdefault(remark, []).append(recording.name)
+            found.setdefault(remark, []).append(item.name)
     return [f"{_listed(names)}: {remark}" for remark, names in found.items()]
 
 

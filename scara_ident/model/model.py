@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +73,21 @@ class TorqueModel:
             Torque of each joint per parameter, on the side where the torque is recorded.
         """
         return np.concatenate([term.regressor(motion) for term in self.terms], axis=1)
+
+    @cached_property
+    def active(self) -> tuple[NDArray[np.intp], ...]:
+        """Columns that can differ from zero on each joint."""
+        return tuple(np.flatnonzero(row) for row in self.pattern)
+
+    def joint_columns(self, motion: Motion) -> tuple[NDArray[np.float64], ...]:
+        """Return for each joint the columns that act on it, each of shape (k, N), see `active`."""
+        found = tuple(np.empty((len(active), motion.samples)) for active in self.active)
+        start = np.zeros(self.robot.n, dtype=np.intp)
+        for term in self.terms:
+            stop = start + np.count_nonzero(term.pattern, axis=1)
+            term.fill(motion, [rows[a:b] for rows, a, b in zip(found, start, stop, strict=True)])
+            start = stop
+        return found
 
 
 def build_model(robot: Robot, name: str = "complete") -> TorqueModel:

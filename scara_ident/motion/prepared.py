@@ -1,18 +1,33 @@
-"""Rows of the torque equation: columns and torque of every joint, as they are and within its band."""
+"""Recordings made ready for one choice of bands: everything that does not depend on a model, each part made once.
+
+Both sides of a joint's torque equation are faded out towards rest, where friction is unknown, and then low-passed at the
+joint's band. Of the low-passed samples only as many are kept as the band leaves independent; they stand in blocks of
+time, long against the filter's memory.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import Motion, Stretch, differentiate, low_pass, low_pass_every, motion_of, torque_of
+from scara_ident.motion.motion import (
+    Motion,
+    Stretch,
+    differentiate,
+    low_pass,
+    low_pass_every,
+    motion_of,
+    stretches,
+    torque_of,
+)
+from scara_ident.recording.recording import Recording
 
 Array = NDArray[np.float64]
+Bands = Sequence[float | None]
 
 # Positions pass a filter three times as wide as the band: inside the band it then changes them by under 2e-4.
 POSITION_BAND = 3.0
@@ -39,108 +54,234 @@ BLOCK_SECONDS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Rows of a stretch: ``[columns; torque]`` per joint, shape (p + 1, N).
+class PreparedStretch:
+    """A gapless part of a recording, ready for one choice of bands.
 
     Attributes
     ----------
-    motion : Motion
-    rest : ndarray of bool, shape (n, N)
-        Where each joint stands still, see `standstill`.
-    raw : tuple of ndarray
-        Before the low-pass.
-    banded : tuple of ndarray
-        Faded out towards rest, then low-passed: what happens at rest does not reach beyond it.
+    stretch : Stretch
+    bands : tuple of float or None, one per joint
+        Low-pass on both sides of each joint's equation, Hz; None filters nothing.
     """
 
-    motion: Motion
-    rest: NDArray[np.bool_]
-    raw: tuple[Array, ...]
-    banded: tuple[Array, ...]
+    stretch: Stretch
+    bands: tuple[float | None, ...]
+
+    @property
+    def name(self) -> str:
+        """The recording it belongs to."""
+        return self.stretch.name
+
+    @property
+    def rate(self) -> float:
+        """Samples per second."""
+        return self.stretch.rate
+
+    @property
+    def samples(self) -> int:
+        """Number of samples N."""
+        return len(self.stretch.time)
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Filtered position, velocity and acceleration on the whole time grid."""
+        return motion_of(self.stretch, position_cuts(self.rate, self.bands))
+
+    @property
+    def torque(self) -> Array:
+        """Recorded torque, shape (n, N), not filtered."""
+        return torque_of(self.stretch)
+
+    @cached_property
+    def trim(self) -> int:
+        """Samples left out at each end."""
+        slowest = min((band for band in self.bands if band is not None), default=np.inf)
+        return max(END_SAMPLES, int(np.ceil(END_PERIODS * self.rate / slowest * (1.0 - ROUNDING))))
+
+    @property
+    def usable(self) -> bool:
+        """Whether anything is left between its ends."""
+        return self.samples > 2 * self.trim + 1
+
+    @cached_property
+    def rest(self) -> NDArray[np.bool_]:
+        """Where each joint stands still, shape (n, N), widened by the memory of the position's filter."""
+        return standstill(self.stretch, self.motion, self.bands)
+
+    @cached_property
+    def fade(self) -> Array:
+        """Weight of both sides of the equation, shape (n, N): 0 at rest, 1 away from it, see `fading`."""
+        return fading(self.rest, self.rate, self.bands)
+
+    @cached_property
+    def used(self) -> NDArray[np.bool_]:
+        """Samples that say something, shape (n, N): neither at rest nor at the ends."""
+        used = ~self.rest
+        used[:, : self.trim] = used[:, max(self.trim, self.samples - self.trim) :] = False
+        return used
+
+    @cached_property
+    def steps(self) -> tuple[int, ...]:
+        """How many samples one kept row of each joint stands for."""
+        return tuple(row_step(self.rate, band) for band in self.bands)
+
+    @cached_property
+    def blocks(self) -> NDArray[np.intp]:
+        """Bounds of the blocks of time, samples, shape (blocks + 1,)."""
+        slowest = min((band for band in self.bands if band is not None), default=np.inf)
+        length = max(1, int(self.rate * max(BLOCK_SECONDS, BLOCK_PERIODS / slowest) * (1.0 + ROUNDING)))
+        inside = self.samples - 2 * self.trim
+        return np.linspace(self.trim, self.samples - self.trim, max(1, round(inside / length)) + 1).astype(np.intp)
+
+    @cached_property
+    def kept(self) -> tuple[NDArray[np.intp], ...]:
+        """Samples whose rows are kept, joint by joint."""
+        first, last = self.blocks[0], self.blocks[-1]
+        found = []
+        for rest, step in zip(self.rest, self.steps, strict=True):
+            places = np.arange(0, self.samples, step)
+            found.append(places[~rest[places] & (places >= first) & (places < last)])
+        return tuple(found)
+
+    def block_starts(self, joint: int) -> NDArray[np.intp]:
+        """Return where each block begins among the kept rows of a joint, shape (blocks + 1,)."""
+        return np.asarray(np.searchsorted(self.kept[joint], self.blocks), dtype=np.intp)
+
+    def rows(self, joint: int, signals: Array) -> Array:
+        """Return signals within a joint's band at its kept samples, weighted to stand for all samples, shape (k, K).
+
+        Parameters
+        ----------
+        joint : int
+        signals : ndarray, shape (k, N)
+            Columns of the joint's equation, or its torque.
+        """
+        step, band = self.steps[joint], self.bands[joint]
+        low = low_pass_every(self.fade[joint] * signals, self.rate, band, step)
+        return np.asarray(np.sqrt(step) * low[:, self.kept[joint] // step])
+
+    def smooth(self, joint: int, signal: Array) -> Array:
+        """Return a signal of a joint's equation, shape (..., N), faded out towards rest and within the joint's band."""
+        return low_pass(self.fade[joint] * signal, self.rate, self.bands[joint])
+
+    @cached_property
+    def smooth_torque(self) -> Array:
+        """Recorded torque within the bands at every sample, shape (n, N)."""
+        return np.array([self.smooth(j, row) for j, row in enumerate(self.torque)])
 
 
-def rows_of(model: TorqueModel, stretch: Stretch, bands: Sequence[float | None]) -> Rows:
-    """Return the rows of a stretch on its whole time grid.
+@dataclass(frozen=True, eq=False)
+class PreparedRecording:
+    """A recording with its stretches, ready for one choice of bands.
+
+    Attributes
+    ----------
+    recording : Recording
+    stretches : tuple of PreparedStretch
+        At least one.
+    """
+
+    recording: Recording
+    stretches: tuple[PreparedStretch, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the recording."""
+        return self.recording.name
+
+    @property
+    def trajectory(self) -> str:
+        """Trajectory of which it is a repetition."""
+        return self.recording.trajectory
+
+    @property
+    def bands(self) -> tuple[float | None, ...]:
+        """Low-pass of each joint, Hz."""
+        return self.stretches[0].bands
+
+    @property
+    def longest(self) -> PreparedStretch:
+        """Its longest stretch."""
+        return max(self.stretches, key=lambda part: part.samples)
+
+    def at(self, bands: Bands) -> PreparedRecording:
+        """Return it in other bands; what does not depend on them is shared."""
+        if tuple(bands) == self.bands:
+            return self
+        return replace(self, stretches=tuple(PreparedStretch(part.stretch, tuple(bands)) for part in self.stretches))
+
+    def with_torque(self, torques: Sequence[Array]) -> PreparedRecording:
+        """Return it with other torques, one array (n, N) per stretch; the motion is shared."""
+        moved = zip(self.stretches, torques, strict=True)
+        return replace(
+            self,
+            stretches=tuple(PreparedStretch(replace(part.stretch, torque=row), part.bands) for part, row in moved),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedData:
+    """Recordings made ready for one choice of bands.
+
+    Attributes
+    ----------
+    recordings : tuple of PreparedRecording
+    bands : tuple of float or None, one per joint
+    """
+
+    recordings: tuple[PreparedRecording, ...]
+    bands: tuple[float | None, ...]
+
+    @property
+    def trajectories(self) -> tuple[str, ...]:
+        """Trajectories in the order in which they come."""
+        return tuple(dict.fromkeys(item.trajectory for item in self.recordings))
+
+    @property
+    def sources(self) -> tuple[Recording, ...]:
+        """The recordings as they were read."""
+        return tuple(item.recording for item in self.recordings)
+
+    @property
+    def stretches(self) -> tuple[PreparedStretch, ...]:
+        """All stretches, recording by recording."""
+        return tuple(part for item in self.recordings for part in item.stretches)
+
+    def at(self, bands: Bands) -> PreparedData:
+        """Return the recordings in other bands; what does not depend on them is shared."""
+        return PreparedData(tuple(item.at(bands) for item in self.recordings), tuple(bands))
+
+    def of(self, places: Sequence[int]) -> PreparedData:
+        """Return some of the recordings."""
+        return PreparedData(tuple(self.recordings[k] for k in places), self.bands)
+
+
+def prepare(recordings: Sequence[Recording], bands: Bands = ()) -> PreparedData:
+    """Cut recordings at their gaps and make them ready for a choice of bands.
 
     Parameters
     ----------
-    model : TorqueModel
-    stretch : Stretch
-        With torque.
-    bands : sequence of float or None, one per joint
+    recordings : sequence of Recording
+    bands : sequence of float or None, one per joint, optional
+        Low-pass on both sides of each joint's equation, Hz; not filtered by default.
 
     Returns
     -------
-    Rows
+    PreparedData
+
+    Raises
+    ------
+    RecordingError
+        If a recording has no stretch that is long enough.
     """
-    motion, raw = raw_rows(model, stretch, bands)
-    rest = standstill(stretch, motion, bands)
-    banded = []
-    for rows, active, fade, band in zip(raw, active_rows(model), fading(rest, stretch.rate, bands), bands, strict=True):
-        smooth = np.zeros_like(rows)
-        smooth[active] = low_pass(fade * rows[active], stretch.rate, band)
-        banded.append(smooth)
-    return Rows(motion, rest, raw, tuple(banded))
+    made = []
+    for recording in recordings:
+        chosen = tuple(bands) or (None,) * len(recording.joints)
+        made.append(PreparedRecording(recording, tuple(PreparedStretch(part, chosen) for part in stretches(recording))))
+    return PreparedData(tuple(made), made[0].bands if made else tuple(bands))
 
 
-def raw_rows(model: TorqueModel, stretch: Stretch, bands: Sequence[float | None]) -> tuple[Motion, tuple[Array, ...]]:
-    """Return the motion that goes with the bands and, per joint, ``[columns; torque]``, shape (p + 1, N)."""
-    torque = torque_of(stretch)
-    motion = motion_of(stretch, position_cuts(stretch.rate, bands))
-    regressor = model.regressor(motion)
-    return motion, tuple(np.concatenate([regressor[j], torque[j : j + 1]]) for j in range(len(bands)))
-
-
-def active_rows(model: TorqueModel) -> list[list[int]]:
-    """Return for every joint which of its p + 1 columns can differ from zero; the last is the torque."""
-    pattern = model.pattern
-    return [[*(int(k) for k in np.flatnonzero(row)), pattern.shape[1]] for row in pattern]
-
-
-def band_blocks(
-    model: TorqueModel,
-    stretch: Stretch,
-    raw: Sequence[Array],
-    rest: NDArray[np.bool_],
-    bands: Sequence[float | None],
-) -> list[tuple[Array, ...]]:
-    """Return the rows within the bands, in blocks of time.
-
-    Of every joint one row is kept per ``row_step`` samples, the others being dependent on them, and weighted to
-    stand for all of them.
-
-    Parameters
-    ----------
-    model : TorqueModel
-    stretch : Stretch
-    raw : sequence of ndarray, each of shape (p + 1, N)
-        See `raw_rows`.
-    rest : ndarray of bool, shape (n, N)
-        Samples to leave out, see `standstill`.
-    bands : sequence of float or None, one per joint
-
-    Returns
-    -------
-    list of tuple of ndarray, each of shape (k, p + 1)
-        Per block and joint.
-    """
-    count, trim = len(stretch.time), trim_of(stretch, bands)
-    length = _block_length(stretch.rate, bands)
-    bounds = np.linspace(trim, count - trim, max(1, round((count - 2 * trim) / length)) + 1).astype(int)
-    per_joint = []
-    fades = fading(rest, stretch.rate, bands)
-    for j, (rows, active, band) in enumerate(zip(raw, active_rows(model), bands, strict=True)):
-        step = row_step(stretch.rate, band)
-        kept = low_pass_every(fades[j] * rows[active], stretch.rate, band, step)
-        table = np.zeros((kept.shape[1], rows.shape[0]))
-        table[:, active] = np.sqrt(step) * kept.T
-        places = step * np.arange(kept.shape[1])
-        used = ~rest[j][places]
-        per_joint.append([table[used & (places >= start) & (places < stop)] for start, stop in pairwise(bounds)])
-    return list(zip(*per_joint, strict=True))
-
-
-def position_cuts(rate: float, bands: Sequence[float | None]) -> list[float | None]:
+def position_cuts(rate: float, bands: Bands) -> list[float | None]:
     """Return the cut-offs of the positions that go with the bands; None where that is beyond half the rate."""
     return [None if band is None or POSITION_BAND * band > 0.45 * rate else POSITION_BAND * band for band in bands]
 
@@ -148,17 +289,6 @@ def position_cuts(rate: float, bands: Sequence[float | None]) -> list[float | No
 def row_step(rate: float, band: float | None) -> int:
     """Return how many samples one row stands for in a band."""
     return 1 if band is None else max(1, int(rate / (ROWS_PER_PERIOD * band) * (1.0 + ROUNDING)))
-
-
-def trim_of(stretch: Stretch, bands: Sequence[float | None]) -> int:
-    """Return how many samples are left out at each end of a stretch."""
-    slowest = min((band for band in bands if band is not None), default=np.inf)
-    return max(END_SAMPLES, int(np.ceil(END_PERIODS * stretch.rate / slowest * (1.0 - ROUNDING))))
-
-
-def _block_length(rate: float, bands: Sequence[float | None]) -> int:
-    slowest = min((band for band in bands if band is not None), default=np.inf)
-    return max(1, int(rate * max(BLOCK_SECONDS, BLOCK_PERIODS / slowest) * (1.0 + ROUNDING)))
 
 
 def standstill(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) -> NDArray[np.bool_]:

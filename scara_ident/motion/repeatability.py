@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.motion.motion import stretches, torque_of
-from scara_ident.recording.recording import Recording
+from scara_ident.motion.motion import Stretch, torque_of
+from scara_ident.motion.prepared import PreparedData
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ SAME_MOTION = 0.01
 SAME_RATE = 1e-3
 
 
-def repeatability(recordings: Sequence[Recording]) -> dict[str, Array]:
+def repeatability(data: PreparedData) -> dict[str, Array]:
     """Standard deviation of each joint's torque over the repetitions of each trajectory.
 
     The sigma of Indri et al. (2002, Table 1): repetitions are aligned in time by their positions, and the
@@ -28,17 +28,18 @@ def repeatability(recordings: Sequence[Recording]) -> dict[str, Array]:
 
     Parameters
     ----------
-    recordings : sequence of Recording
+    data : PreparedData
+        In any bands.
 
     Returns
     -------
     dict of str to ndarray, shape (n,)
         By trajectory, for those with at least two repetitions of the same motion.
     """
-    groups: dict[str, list[Recording]] = {}
-    for recording in recordings:
-        if recording.effort is not None:
-            groups.setdefault(recording.trajectory, []).append(recording)
+    groups: dict[str, list[Stretch]] = {}
+    for item in data.recordings:
+        if item.recording.effort is not None:
+            groups.setdefault(item.trajectory, []).append(item.longest.stretch)
     found = {}
     for trajectory, group in groups.items():
         sigma = _scatter(group) if len(group) > 1 else None
@@ -47,9 +48,8 @@ def repeatability(recordings: Sequence[Recording]) -> dict[str, Array]:
     return found
 
 
-def _scatter(group: Sequence[Recording]) -> Array | None:
+def _scatter(longest: Sequence[Stretch]) -> Array | None:
     """Scatter about the mean of the repetitions of the first motion that has any."""
-    longest = [max(stretches(recording), key=lambda part: len(part.time)) for recording in group]
     for place, first in enumerate(longest[:-1]):
         aligned = [(torque_of(first), 0)]
         for other in longest[place + 1 :]:

@@ -75,7 +75,7 @@ def audit_velocity(recording: Recording, part: Stretch) -> tuple[VelocityAudit, 
     inside = (recording.time >= part.time[0] - 1e-9) & (recording.time <= part.time[-1] + 1e-9)
     for j, joint in enumerate(recording.joints):
         recorded = np.interp(part.time, recording.time[inside], recording.velocity[j][inside])
-        _, v, a = differentiate(part.position[j], part.rate, cut)
+        _, v, a = part.filtered(j, cut)
         smooth = differentiate(recorded, part.rate, cut)[0]
         scale = float(np.sqrt(np.mean(smooth**2)))
         if float(np.max(np.abs(v))) < 1e-4 * max(1.0, float(np.max(np.abs(recorded)))):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +17,9 @@ from scara_ident.estimation.consistent.programme import MARGIN, Programme
 from scara_ident.estimation.consistent.solution import StandardPrior, fill, solve_joints
 from scara_ident.estimation.consistent.unknowns import Unknowns
 from scara_ident.estimation.covariance import block_covariance
-from scara_ident.estimation.estimate import Estimate, weighted_blocks
-from scara_ident.estimation.information import UNDETERMINED, Information, merge
-from scara_ident.estimation.observations import Evidence
-from scara_ident.model.model import TorqueModel
+from scara_ident.estimation.estimate import Estimate
+from scara_ident.estimation.information import UNDETERMINED, Information
+from scara_ident.estimation.observations import Observations
 from scara_ident.threads import one_blas_thread
 
 __all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "physical_consistency"]
@@ -59,8 +57,7 @@ class ConsistentEstimate(Estimate):
 
 @one_blas_thread()
 def consistent(
-    model: TorqueModel,
-    evidence: Sequence[Evidence],
+    observations: Observations,
     *,
     options: ConsistentOptions | None = None,
     programme: Programme | None = None,
@@ -75,9 +72,7 @@ def consistent(
 
     Parameters
     ----------
-    model : TorqueModel
-    evidence : sequence of Evidence
-        One per recording.
+    observations : Observations
     options : ConsistentOptions, optional
     programme : Programme, optional
         Compiled with the same model and options, to spare compiling it again.
@@ -89,27 +84,26 @@ def consistent(
     Raises
     ------
     EstimationError
-        If there is no evidence or the programme cannot be solved.
+        If there is nothing to estimate from or the programme cannot be solved.
     UsageError
         If an option names what the robot or the model does not have.
     """
+    model = observations.model
     if programme is None:
         programme = Programme(model, options)
     options = programme.options
-    if not evidence:
+    if not observations.blocks:
         raise EstimationError("no recording to estimate from")
     u = programme.unknowns
     parameter_prior, standard_prior = _priors(u, options)
-    joints = [merge(item.joint(j) for item in evidence) for j in range(model.robot.n)]
     found, information, weights = solve_joints(
-        programme, joints, parameter_prior=parameter_prior, standard_prior=standard_prior
+        programme, observations.by_joint, parameter_prior=parameter_prior, standard_prior=standard_prior
     )
     x = fill(programme, information, found.x, standard_prior=standard_prior)
     value = u.parameters(x)
     held, labels = active(u, found.point) if found.point is not None else (np.zeros((0, u.size + u.auxiliary)), ())
-    spread = block_covariance(
-        _inverse_along(information, tangent(u, held), sizes(u, value)), value, weighted_blocks(evidence, weights)
-    )
+    inverse = _inverse_along(information, tangent(u, held), sizes(u, value))
+    spread = block_covariance(inverse, value, observations.joints, observations.owner, weights)
     undetermined = information.solve().undetermined
     covariance = spread.matrix.copy()
     covariance[np.diag_indices_from(covariance)] = np.where(undetermined, np.inf, np.diag(covariance))

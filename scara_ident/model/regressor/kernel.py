@@ -6,7 +6,7 @@ Pinocchio on random states whenever it is built: Pinocchio stays the truth.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -96,6 +96,24 @@ class RegressorKernel:
                 target[run] = 0.0
             program.evaluate(states[:, start:stop], target, buffers[:, : stop - start])
         return out
+
+    def fill(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, targets: Mapping[int, Array]) -> None:
+        """Evaluate the entries that are not zero for every state, each into a vector of its own.
+
+        Parameters
+        ----------
+        q, v, a : array_like (nv, samples)
+            As for a call.
+        targets : mapping of int to ndarray (samples,)
+            Where to write the entry of row r and column k, at ``r p + k``, for all that `pattern` holds.
+        """
+        states = self._states(q, v, a)
+        samples = states.shape[1]
+        buffers = np.empty((self._program.buffers, min(_CHUNK, samples)))
+        for start in range(0, samples, _CHUNK):
+            stop = min(start + _CHUNK, samples)
+            parts = {place: target[start:stop] for place, target in targets.items()}
+            self._program.evaluate(states[:, start:stop], parts, buffers[:, : stop - start])
 
     def _states(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
         """Return the three inputs as one array (3 nv, samples)."""

@@ -193,7 +193,7 @@ class Program:
         The code itself.
     """
 
-    evaluate: Callable[[Array, Array, Array], None]
+    evaluate: Callable[[Array, Any, Array], None]
     buffers: int
     operations: int
     source: str

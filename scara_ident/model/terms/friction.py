@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.model.terms.constraints import BrakingPolynomial, Constraint
-from scara_ident.model.terms.term import Column, per_speed
+from scara_ident.model.terms.term import Column, Filled, per_speed
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
@@ -16,7 +17,7 @@ _WORDS = ("Coulomb", "viscous", "quadratic", "cubic")
 
 
 @dataclass(frozen=True, eq=False)
-class Friction:
+class Friction(Filled):
     """Friction of every joint as a polynomial of its own speed (equation 3 of Indri et al. 2002).
 
     ``u_f = a0 sign(v) + a1 v + a2 sign(v) v^2 + a3 v^3`` with the joint's speed v, on the side of the recorded
@@ -72,23 +73,19 @@ class Friction:
             for i, joint in enumerate(self.robot.joints)
         )
 
-    def regressor(self, motion: Motion) -> NDArray[np.float64]:
-        """Return the columns on a stretch of motion, shape (n, p, N)."""
-        n, k = self.robot.n, len(self.powers)
-        result = np.zeros((n, n * k, motion.samples))
-        for i in range(n):
+    def fill(self, motion: Motion, rows: Sequence[NDArray[np.float64]]) -> None:
+        """Write the powers of each joint's speed."""
+        for i, columns in enumerate(rows):
             v = self.robot.drive_sign[i] * motion.v[i]
-            for place, power in enumerate(self.powers):
-                column = result[i, i * k + place]
+            for power, column in zip(self.powers, columns, strict=True):
                 if power % 2:
                     np.power(v, power, out=column)
                 else:
                     np.multiply(np.sign(v), v**power, out=column)
-        return result
 
 
 @dataclass(frozen=True, eq=False)
-class Offset:
+class Offset(Filled):
     """A constant torque on every joint: offset of the measurement or friction that differs by direction."""
 
     robot: Robot
@@ -111,9 +108,7 @@ class Offset:
         """Each joint's offset acts on that joint only."""
         return np.eye(self.robot.n, dtype=bool)
 
-    def regressor(self, motion: Motion) -> NDArray[np.float64]:
-        """Return the columns on a stretch of motion, shape (n, n, N)."""
-        n = self.robot.n
-        result = np.zeros((n, n, motion.samples))
-        result[np.arange(n), np.arange(n)] = 1.0
-        return result
+    def fill(self, motion: Motion, rows: Sequence[NDArray[np.float64]]) -> None:
+        """Write ones."""
+        for row in rows:
+            row.fill(1.0)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scara_ident.model.base_parameters import BaseParameters, find_base_parameters
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
 from scara_ident.model.terms.constraints import Constraint, RealBodies
-from scara_ident.model.terms.term import Column
+from scara_ident.model.terms.term import Column, Filled
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
@@ -21,7 +21,7 @@ _SCARA_MEANINGS = ("I1z + m2 l1^2 + Jm1/tau1^2", "m2 s2x", "m2 s2y", "I2z", "Jm2
 
 
 @dataclass(frozen=True, eq=False)
-class RigidBody:
+class RigidBody(Filled):
     """Inertia, Coriolis and gravity torques of the links and the inertia of the rotors.
 
     Attributes
@@ -53,20 +53,24 @@ class RigidBody:
         """Return that the columns belong to bodies that can exist."""
         return (RealBodies(),)
 
-    def regressor(self, motion: Motion) -> NDArray[np.float64]:
-        """Return the columns on a stretch of motion, shape (n, p, N), on the side of the recorded torque."""
+    def fill(self, motion: Motion, rows: Sequence[NDArray[np.float64]]) -> None:
+        """Write the columns that links and rotors lead."""
         robot = self.robot
-        result = np.zeros((robot.n, len(self.columns), motion.samples))
+        place = np.cumsum(self.pattern, axis=1) - 1
         links, rotors = _split(self.base.kept[self.kept], robot.n)
         if self.kernel is not None:
             back = np.argsort(robot.order)
-            columns = self.kernel(motion.q[back], motion.v[back], motion.a[back])
-            result[:, links] = columns[robot.order]
-        for place in rotors:
-            joint = int(self.base.kept[self.kept[place]]) - 10 * robot.n
-            result[joint, place] = motion.a[joint]
-        result *= robot.row_scale[:, None, None]
-        return result
+            inner = np.argwhere(self.kernel.pattern[robot.order])
+            targets = {
+                int(robot.order[joint]) * len(links) + int(k): rows[joint][place[joint, links[k]]] for joint, k in inner
+            }
+            self.kernel.fill(motion.q[back], motion.v[back], motion.a[back], targets)
+        for column in rotors:
+            joint = int(self.base.kept[self.kept[column]]) - 10 * robot.n
+            rows[joint][place[joint, column]] = motion.a[joint]
+        for joint, scale in enumerate(robot.row_scale):
+            if scale != 1.0:
+                np.multiply(rows[joint], scale, out=rows[joint])
 
 
 def rigid_body(robot: Robot, *, without: Sequence[str] = ()) -> RigidBody:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -54,9 +55,35 @@ class Term(Protocol):
         """Which entries can differ from zero, shape (n, p)."""
         ...
 
-    def regressor(self, motion: Motion) -> NDArray[np.float64]:
-        """Return the term's columns on a stretch of motion, shape (n, p, N), on the side of the recorded torque."""
+    def fill(self, motion: Motion, rows: Sequence[NDArray[np.float64]]) -> None:
+        """Write the columns on a stretch of motion, on the side of the recorded torque.
+
+        Parameters
+        ----------
+        motion : Motion
+            N samples.
+        rows : sequence of ndarray, shape (k, N)
+            For each joint, where to write the columns that `pattern` has on it, in their order.
+        """
         ...
+
+    def regressor(self, motion: Motion) -> NDArray[np.float64]:
+        """Return the columns on a stretch of motion, shape (n, p, N), on the side of the recorded torque."""
+        ...
+
+
+class Filled:
+    """A term whose dense regressor is made of what it fills in."""
+
+    def regressor(self: Term, motion: Motion) -> NDArray[np.float64]:
+        """Return the columns on a stretch of motion, shape (n, p, N), zero where the pattern says so."""
+        pattern = self.pattern
+        rows = [np.empty((np.count_nonzero(row), motion.samples)) for row in pattern]
+        self.fill(motion, rows)
+        result = np.zeros((*pattern.shape, motion.samples))
+        for joint, row in enumerate(pattern):
+            result[joint, row] = rows[joint]
+        return result
 
 
 def per_speed(robot: Robot, joint: int, power: int) -> str:

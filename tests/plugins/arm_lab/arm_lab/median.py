@@ -7,7 +7,7 @@ import numpy as np
 from scara_ident import ols
 
 
-def median(model, evidence):
+def median(observations):
     """Estimate from each recording alone, and take the median; the covariance is that of all together."""
-    each = [ols(model, [item]).value for item in evidence]
-    return replace(ols(model, evidence), method="median", value=np.median(each, axis=0))
+    each = [ols(item).value for item in observations.each]
+    return replace(ols(observations), method="median", value=np.median(each, axis=0))

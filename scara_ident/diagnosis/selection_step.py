@@ -1,0 +1,188 @@
+"""One step of the selection: a fitted model, and candidates tried beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.diagnosis.acceptance import Decision, decide
+from scara_ident.diagnosis.candidate_tests import FittedModel, examine
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
+from scara_ident.diagnosis.criteria import SelectionCriteria
+from scara_ident.effects import Scene
+from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.model.model import TorqueModel
+from scara_ident.motion.prepared import PreparedData
+
+Array = NDArray[np.float64]
+
+# Folds where there is one trajectory only: consecutive parts of it.
+PARTS = 4
+# Points on the line between neighbouring scan points, and rounds of narrowing.
+LINE_POINTS = 7
+LINE_ROUNDS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class SelectionStep:
+    """The model that candidates are tried beside, and what judging needs.
+
+    Attributes
+    ----------
+    scene : Scene
+    columns : CandidateColumns
+        On the rows of the base model.
+    chosen : tuple of Candidate
+        Effects that are in the model.
+    weights : ndarray, shape (n,)
+    tried : int
+        Candidates and scan points tried.
+    criteria : SelectionCriteria
+    """
+
+    scene: Scene
+    columns: CandidateColumns
+    chosen: tuple[Candidate, ...]
+    weights: Array
+    tried: int
+    criteria: SelectionCriteria
+
+    @property
+    def observations(self) -> Observations:
+        """Of the base model."""
+        return self.columns.observations
+
+    @cached_property
+    def model(self) -> FittedModel:
+        """The base model with the chosen effects, fitted."""
+        return fitted_model(self.observations, self.columns.rows(self.scene, self.chosen), self.weights)
+
+    def judge(self, candidates: Sequence[Candidate], scene: Scene | None = None) -> list[Decision]:
+        """Examine candidates, by the columns of another scene if one is given, and decide on each."""
+        return self.judge_rows(candidates, self.columns.rows(scene or self.scene, candidates))
+
+    def judge_rows(self, candidates: Sequence[Candidate], rows: Sequence[Rows]) -> list[Decision]:
+        """Examine candidates whose columns are given, and decide on each."""
+        found = examine(self.model, rows, self.criteria)
+        return [
+            decide(item, result, self.scene, self.tried, self.criteria)
+            for item, result in zip(candidates, found, strict=True)
+        ]
+
+    def without(self, place: int) -> SelectionStep:
+        """Return the step with one of the chosen effects left out of the model."""
+        return replace(self, chosen=(*self.chosen[:place], *self.chosen[place + 1 :]))
+
+    def refine(self, leaders: Sequence[Decision]) -> list[Decision]:
+        """Refine the nonlinear parameters of several candidates on lines that narrow about the best point so far."""
+        current = list(leaders)
+        for round_ in range(LINE_ROUNDS):
+            variants = [
+                (place, item)
+                for place, held in enumerate(current)
+                for item in _line(self.scene, held.candidate, round_)
+            ]
+            found = self.judge([item for _, item in variants])
+            for (place, _), decision in zip(variants, found, strict=True):
+                held = current[place]
+                if decision.examination.gain > held.examination.gain and (decision.accepted or not held.accepted):
+                    current[place] = decision
+        return current
+
+
+def fitted_model(observations: Observations, chosen: Sequence[Rows], weights: Array) -> FittedModel:
+    """Return the base model with further columns, to be tried beside; blocks without any row are left out."""
+    joints = with_columns(observations, chosen)
+    filled = np.flatnonzero(sum(np.diff(rows.starts) for rows in joints))
+    owner = observations.owner[filled]
+    # No column of a row is lost: only empty blocks go.
+    joints = tuple(
+        JointRows(rows.columns, rows.table, np.append(rows.starts[:-1][filled], rows.starts[-1]), rows.counts[filled])
+        for rows in joints
+    )
+    parameters = observations.parameters + sum(len(next(iter(rows.values()))) for rows in chosen)
+    return FittedModel(joints, parameters, owner, folds_of(observations.data, owner), weights)
+
+
+def model_with(scene: Scene, chosen: Sequence[Candidate]) -> TorqueModel:
+    """Return the base model with effects as further terms."""
+    if not chosen:
+        return scene.model
+    terms = tuple(candidate.term(scene) for candidate in chosen)
+    return TorqueModel(scene.model.name, scene.robot, (*scene.model.terms, *terms))
+
+
+def observed(step: SelectionStep) -> Observations:
+    """Return the rows of the base model with the chosen effects."""
+    joints = with_columns(step.observations, step.columns.rows(step.scene, step.chosen))
+    return replace(step.observations, model=model_with(step.scene, step.chosen), joints=joints, raw=())
+
+
+def observed_at_every_sample(step: SelectionStep) -> Observations:
+    """Return the rows of the base model with the chosen effects, and the columns that nothing filtered."""
+    added = step.columns.raw(step.scene, step.chosen)
+    raws, place = [], 0
+    for recording in step.observations.raw:
+        found = []
+        for raw in recording:
+            more = [item[place] for item in added]
+            found.append(
+                tuple(np.concatenate([rows, *(item[j] for item in more if j in item)]) for j, rows in enumerate(raw))
+            )
+            place += 1
+        raws.append(tuple(found))
+    return replace(observed(step), raw=tuple(raws))
+
+
+def folds_of(data: PreparedData, owner: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the fold of each block: its trajectory, or its part of the only one."""
+    names = data.trajectories
+    if len(names) == 1:
+        return np.minimum(np.arange(len(owner)) * PARTS // max(1, len(owner)), PARTS - 1)
+    place = np.array([names.index(item.trajectory) for item in data.recordings], dtype=np.intp)
+    return np.asarray(place[owner], dtype=np.intp)
+
+
+def best_of_each(decisions: Sequence[Decision]) -> dict[str, Decision]:
+    """Return the best scan point of every family and joint, acceptable ones first."""
+    best: dict[str, Decision] = {}
+    for decision in decisions:
+        held = best.get(decision.label)
+        if held is None or (decision.accepted, decision.gain) > (held.accepted, held.gain):
+            best[decision.label] = decision
+    return best
+
+
+def _line(scene: Scene, candidate: Candidate, round_: int) -> list[Candidate]:
+    """Return variants of a candidate on a line for each nonlinear parameter, a third as long every round."""
+    variants = []
+    for k, parameter in enumerate(candidate.effect.nonlinear):
+        value = candidate.member.nonlinear[k]
+        reach = _spacing(scene, candidate, k) * (2.0 / (LINE_POINTS - 1)) ** round_
+        offsets = np.linspace(-reach, reach, LINE_POINTS)
+        points = value * np.exp(offsets) if parameter.logarithmic else value + offsets
+        for point in points:
+            if abs(point - value) > 1e-12 * abs(value) and parameter.lower <= point <= parameter.upper:
+                nonlinear = list(candidate.member.nonlinear)
+                nonlinear[k] = float(point)
+                variants.append(candidate.at(nonlinear))
+    return variants
+
+
+def _spacing(scene: Scene, candidate: Candidate, k: int) -> float:
+    """Distance to the next scan point of a nonlinear parameter, in its logarithm where it is scanned so.
+
+    A family that knows how far apart values must be to be told apart says so by ``resolution``.
+    """
+    parameter = candidate.effect.nonlinear[k]
+    widths = candidate.effect.resolution(scene, candidate.member)
+    if widths is not None:
+        return widths[k] / candidate.member.nonlinear[k] if parameter.logarithmic else widths[k]
+    grid = np.array(sorted({member.nonlinear[k] for member in candidate.effect.members(scene)}))
+    if parameter.logarithmic:
+        return float(np.min(np.diff(np.log(grid)))) if len(grid) > 1 else float(np.log(2.0))
+    return float(np.min(np.diff(grid))) if len(grid) > 1 else 0.1 * (parameter.upper - parameter.lower)

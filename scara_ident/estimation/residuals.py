@@ -1,0 +1,36 @@
+"""What a model leaves of the torque at every sample, within the bands that the estimate used."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.motion.prepared import PreparedData
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """The residual of a model on prepared data.
+
+    Attributes
+    ----------
+    data : PreparedData
+    predicted : tuple of ndarray, shape (n, N)
+        Torque that the model predicts on every stretch, not filtered.
+    """
+
+    data: PreparedData
+    predicted: tuple[Array, ...]
+
+    @cached_property
+    def banded(self) -> tuple[Array, ...]:
+        """Residual on every stretch, shape (n, N), faded out towards rest and within the bands."""
+        return tuple(
+            np.array([part.smooth(j, row) for j, row in enumerate(part.torque - predicted)])
+            for part, predicted in zip(self.data.stretches, self.predicted, strict=True)
+        )
