@@ -155,9 +155,8 @@ class FittedModel:
 
     def by_block(self, signals: Sequence[Array]) -> Array:
         """Sum signals of every joint's rows, shape (..., N), over blocks, shape (..., blocks)."""
-        return np.sum(
-            [_block_sums(signal, rows.starts) for signal, rows in zip(signals, self.joints, strict=True)], axis=0
-        )
+        parts = zip(signals, self.joints, strict=True)
+        return np.asarray(np.sum([_block_sums(signal, rows.starts) for signal, rows in parts], axis=0))
 
 
 def _block_sums(signal: Array, starts: NDArray[np.intp]) -> Array:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from scara_ident.errors import ScaraIdentError
+from scara_ident.estimation.observations import observe
 from scara_ident.model.base_parameters import find_base_parameters
 from scara_ident.model.model import build_model
-from scara_ident.motion.motion import stretches
-from scara_ident.motion.prepared import rows_of
+from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 
@@ -55,12 +55,12 @@ def _scales(recording: Recording, robot: Robot) -> dict[int, float]:
     base = find_base_parameters(robot)
     stated = base.grouping @ robot.standard_parameters()
     bands = [min(BAND, 0.1 * recording.rate)] * robot.n
-    parts = [rows_of(model, part, bands).banded for part in stretches(recording)]
+    observations = observe(model, prepare([recording], bands))
     scales = {}
-    for j, joint in enumerate(robot.joints):
-        rows = np.concatenate([part[j] for part in parts], axis=1)
-        friction = [rows[k] for k in range(len(stated), len(rows) - 1) if model.columns[k].joint == joint]
-        rigid, effort = stated @ rows[: len(stated)], rows[-1]
+    for j, rows in enumerate(observations.joints):
+        leads = rows.columns < len(stated)
+        columns, effort = rows.table[:-1], rows.table[-1]
+        rigid, friction = stated[rows.columns[leads]] @ columns[leads], columns[~leads]
         if not np.any(rigid):
             continue
         with_urdf = np.stack([*friction, rigid], axis=1)
