@@ -157,14 +157,34 @@ def _difference(name: str, what: str, old: Any, new: Any, relative: float = math
     return {"command": name, "what": what, "old": old, "new": new, "relative": relative}
 
 
-def report(found: list[dict[str, Any]], count: int, most: int) -> None:
+def held_out_ratios(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[float]:
+    """Return the new error over the old one of every joint and held-out recording; none where a run failed."""
+    if old["status"] or new["status"]:
+        return []
+    before, after = figures(old["output"]), figures(new["output"])
+    paths = [
+        path
+        for path in before
+        if (path.startswith("errors.validation.") and path.endswith(".rms")) or path.startswith("validation.after.")
+    ]
+    pairs = [(before[path][0], after[path][0]) for path in paths if path in after]
+    return [float(error / other) for other, error in pairs if error and other]
+
+
+def report(found: list[dict[str, Any]], ratios: Mapping[str, list[float]], most: int) -> None:
     """Print a table of the differences, the largest of each command first."""
     shown: dict[str, list[dict[str, Any]]] = {}
     for item in found:
         shown.setdefault(item["command"], []).append(item)
-    print(f"{count} commands, {count - len(shown)} of them the same, {len(found)} differences")
+    print(f"{len(ratios)} commands, {len(ratios) - len(shown)} of them the same, {len(found)} differences")
     for name, items in shown.items():
-        print(f"\n{name}: {len(items)}")
+        held_out = "no figure is held out"
+        if ratios[name]:
+            mean = math.exp(sum(map(math.log, ratios[name])) / len(ratios[name]))
+            held_out = (
+                f"error held out, new / old: {mean:.4f} (from {min(ratios[name]):.4f} to {max(ratios[name]):.4f})"
+            )
+        print(f"\n{name}: {len(items)}; {held_out}")
         print(f"  {'what':70}{'old':>24}{'new':>24}{'relative':>10}")
         for item in sorted(items, key=lambda item: -item["relative"])[:most]:
             print(f"  {item['what']:70}{item['old']!s:>24}{item['new']!s:>24}{item['relative']:10.1e}")
@@ -191,18 +211,26 @@ def main() -> None:
     checkouts = [options.old] if options.new is None else [options.old, options.new]
     kept = [options.kept / sources(checkout) for checkout in checkouts]
     found, seconds = [], [0.0] * len(checkouts)
+    ratios: dict[str, list[float]] = {}
     for k, (name, words) in enumerate(chosen.items(), 1):
         results = [result_of(checkout, name, words, place) for checkout, place in zip(checkouts, kept, strict=True)]
         seconds = [total + result["seconds"] for total, result in zip(seconds, results, strict=True)]
         times = ", ".join(f"{result['seconds']:.1f} s" for result in results)
         now = differences(name, *results) if options.new else []
         found += now
+        ratios[name] = held_out_ratios(results[0], results[-1])
         print(f"{k}/{len(chosen)} {name}: {times}; {len(now)} differences", file=sys.stderr, flush=True)
     if options.new is None:
         return
-    report(found, len(chosen), options.most)
+    report(found, ratios, options.most)
     if options.output:
-        content = {"commands": len(chosen), "tolerance": TOLERANCE, "seconds": seconds, "differences": found}
+        content = {
+            "commands": len(chosen),
+            "tolerance": TOLERANCE,
+            "seconds": seconds,
+            "held_out_new_over_old": ratios,
+            "differences": found,
+        }
         options.output.parent.mkdir(parents=True, exist_ok=True)
         options.output.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     raise SystemExit(1 if found else 0)

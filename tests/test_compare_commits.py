@@ -94,3 +94,16 @@ def test_how_sure_an_effect_is_counts_by_its_power_of_ten(compare):
     assert found(compare, DIAGNOSED, new) == {}
     new["effects"][0]["p_value"] *= 10
     assert list(found(compare, DIAGNOSED, new)) == ["effects[spring/joint1].p_value (log10)"]
+
+
+def test_errors_held_out_are_compared_joint_by_joint(compare):
+    old = {
+        "status": 0,
+        "output": IDENTIFIED | {"errors": {"validation": {"F": {"a": {"rms": 0.2}, "b": {"rms": 0.1}}}}},
+    }
+    new = {
+        "status": 0,
+        "output": IDENTIFIED | {"errors": {"validation": {"F": {"a": {"rms": 0.1}, "b": {"rms": 0.1}}}}},
+    }
+    assert compare.held_out_ratios(old, new) == [0.5, 1.0]
+    assert compare.held_out_ratios(old, {"status": 1, "output": None}) == []
