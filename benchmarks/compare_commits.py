@@ -76,8 +76,9 @@ def result_of(checkout: Path, name: str, words: list[str], kept: Path) -> dict[s
             return before
     done = run(checkout, [*words, "--json"])
     now = {"words": words} | asdict(done) | {"output": json.loads(done.output) if done.status == 0 else None}
-    kept.mkdir(parents=True, exist_ok=True)
-    place.write_text(json.dumps(now) + "\n", encoding="utf-8")
+    if done.status == 0:
+        kept.mkdir(parents=True, exist_ok=True)
+        place.write_text(json.dumps(now) + "\n", encoding="utf-8")
     return now
 
 
