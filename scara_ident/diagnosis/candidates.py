@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
 from scara_ident.estimation.observations import JointRows, Observations
 from scara_ident.motion.prepared import PreparedStretch
-from scara_ident.threads import one_blas_thread
+from scara_ident.threads import side_by_side
 
 Array = NDArray[np.float64]
 # Columns of a candidate, shape (k, N) on the N rows of each joint that it acts on.
@@ -114,8 +113,7 @@ class CandidateColumns:
         if not wanted:
             return
         stretches = self.observations.data.stretches
-        with one_blas_thread(), ThreadPoolExecutor(max_workers=2) as pool:
-            made = list(pool.map(lambda part: _on_stretch(scene, wanted, part, keep=keep), stretches))
+        made = side_by_side(lambda part: _on_stretch(scene, wanted, part, keep=keep), stretches)
         for k, candidate in enumerate(wanted):
             key = _key(scene, candidate)
             parts = [rows[k] for rows, _ in made]

@@ -169,12 +169,12 @@ def diagnose(
         # A joint whose model lacks something seems to have less band than it has.
         bands = (max(choice.bands),) * robot.n
         notes += choice.notes
-    data = data.at(bands)
-    faults = channel_faults(observe(base, data))
+    observations = observe(base, data.at(bands))
+    faults = channel_faults(observations)
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))
     families = available_effects() if catalogue is None else tuple(catalogue)
-    outcome = select_model(SearchTask(base, families, criteria, progress), data, free=not given)
+    outcome = select_model(SearchTask(base, families, criteria, progress), observations, free=not given)
     found, after = outcome.search, outcome.after
     step = replace(found.step, weights=after.weights)
     validation_before = observe(base, held_out.at(found.bands))

@@ -77,19 +77,20 @@ class Outcome:
     demoted: tuple[str, ...] = ()
 
 
-def select_model(task: SearchTask, data: PreparedData, *, free: bool) -> Outcome:
+def select_model(task: SearchTask, observations: Observations, *, free: bool) -> Outcome:
     """Search for what a model lacks in the band where that can be told.
 
     Parameters
     ----------
     task : SearchTask
-    data : PreparedData
-        In the bands to begin with.
+    observations : Observations
+        Of the base model, in the bands to begin with.
     free : bool
         Whether another band may be chosen.
     """
     criteria = task.criteria
-    columns = CandidateColumns(observe(task.model, data))
+    data = observations.data
+    columns = CandidateColumns(observations)
     found = _searched(task, columns, ())
     for _ in range(criteria.most_widenings if free else 0):
         if not found.search.chosen:

@@ -10,16 +10,17 @@ in the position or in the torque, and the band ends.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.estimation.information import merge
-from scara_ident.estimation.observations import observe
+from scara_ident.estimation.observations import Observations, observe
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Stretch, motion_of, torque_of
 from scara_ident.motion.prepared import PreparedData
+from scara_ident.threads import side_by_side
 
 Array = NDArray[np.float64]
 
@@ -57,11 +58,14 @@ class BandChoice:
         Share of the torque's power within the band that the first fit explains, per joint.
     notes : tuple of str
         What a person should know, such as a joint whose torque the motion does not explain.
+    observations : Observations or None
+        Of the recordings that were looked at, in the bands of the last fit.
     """
 
     bands: tuple[float, ...]
     explained: tuple[float, ...]
     notes: tuple[str, ...]
+    observations: Observations | None = None
 
 
 def choose_bands(model: TorqueModel, data: PreparedData) -> BandChoice:
@@ -99,8 +103,9 @@ def _refined(data: PreparedData, spectra: _Spectra, start: Sequence[float], high
     choice = BandChoice((max(start),) * n, (0.0,) * n, ())
     for _ in range(MOST_ROUNDS):
         before = choice.bands
-        value = merge(observe(spectra.model, data.at(before)).by_joint).solve().value
-        choice = _explained_bands(spectra, value, start, highest)
+        observations = observe(spectra.model, data.at(before))
+        value = merge(observations.by_joint).solve().value
+        choice = replace(_explained_bands(spectra, value, start, highest), observations=observations)
         if choice.bands == before:
             break
     return choice
@@ -112,16 +117,20 @@ class _Spectra:
     def __init__(self, model: TorqueModel, parts: Sequence[Stretch], edges: Array) -> None:
         self.model, self.parts, self.edges = model, parts, edges
         self.torque = np.sum([binned_power(torque_of(part), part.rate, edges) for part in parts], axis=0)
-        wide = [motion_of(part, [WIDE_FILTER * part.rate] * model.robot.n) for part in parts]
-        self.columns = [model.joint_columns(motion) for motion in wide]
+
+        def wide(part: Stretch) -> tuple[Array, ...]:
+            return model.joint_columns(motion_of(part, [WIDE_FILTER * part.rate] * model.robot.n))
+
+        self.columns = side_by_side(wide, parts)
 
     def error(self, value: Array) -> Array:
         """Return the power that parameters leave of the torque, shape (n, bins)."""
-        total = np.zeros((self.model.robot.n, len(self.edges) - 1))
-        for part, columns in zip(self.parts, self.columns, strict=True):
+
+        def of_part(part: Stretch, columns: tuple[Array, ...]) -> Array:
             predicted = [value[own] @ rows for own, rows in zip(self.model.active, columns, strict=True)]
-            total += binned_power(torque_of(part) - np.array(predicted), part.rate, self.edges)
-        return total
+            return binned_power(torque_of(part) - np.array(predicted), part.rate, self.edges)
+
+        return np.asarray(np.sum(side_by_side(of_part, self.parts, self.columns), axis=0))
 
 
 def _explained_bands(spectra: _Spectra, value: Array, start: Sequence[float], highest: float) -> BandChoice:

@@ -120,8 +120,8 @@ def _pooled(joints: Sequence[_Scores], root: Array) -> Array:
     total = np.sum(root**2, axis=1)
     unknown = np.zeros(root.shape[0], dtype=bool)
     for joint in joints:
-        leverage = np.linalg.eigvalsh(joint.products)
-        expected = float(np.sum(leverage * np.clip(1.0 - leverage, 0.0, None)))
+        # tr(H (1 - H)): leverages of a part of the rows are at most 1.
+        expected = float(np.sum(np.trace(joint.products, axis1=1, axis2=2)) - np.sum(joint.products**2))
         share = root @ np.sum(joint.products, axis=0) @ root.T
         if expected > NO_REDUNDANCY:
             matrix += float(np.sum(joint.scores**2)) / expected * share

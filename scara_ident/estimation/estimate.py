@@ -86,7 +86,7 @@ class Estimate:
 
 def joint_errors(value: Array, observations: Observations) -> tuple[JointError | None, ...]:
     """Return the error of parameters on recordings together, joint by joint; None where no sample of a joint was used."""
-    left, torque = observations.unfiltered_rms(value), observations.unfiltered_rms(np.zeros_like(value))
+    left, torque = observations.unfiltered_rms(value), observations.unfiltered_torque_rms
     found: list[JointError | None] = []
     for banded, rms, whole in zip(observations.by_joint, left, torque, strict=True):
         known = banded.rows > 0.0 and np.isfinite(rms)

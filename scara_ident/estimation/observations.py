@@ -7,8 +7,7 @@ of these rows, by block, recording, fold or joint.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,7 +18,7 @@ from scara_ident.errors import RecordingError
 from scara_ident.estimation.information import Information
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
-from scara_ident.threads import one_blas_thread
+from scara_ident.threads import side_by_side
 
 Array = NDArray[np.float64]
 # Columns of every joint at every sample of a stretch, (k, N) each.
@@ -124,20 +123,31 @@ class Observations:
     @cached_property
     def by_joint(self) -> tuple[Information, ...]:
         """All rows of each joint within its band."""
-        return tuple(joint.information(self.parameters) for joint in self.joints)
+        return tuple(side_by_side(lambda joint: joint.information(self.parameters), self.joints))
 
     def unfiltered_rms(self, value: Array) -> Array:
         """Return the rms of what parameters leave of the recorded torque, nothing filtered, shape (n,).
 
         Over all samples of a joint that are neither at rest nor at the ends; NaN where there is none.
         """
-        squares, count = np.zeros(len(self.joints)), np.zeros(len(self.joints))
-        for part, raw in self._stretches():
-            for j, (joint, columns) in enumerate(zip(self.joints, raw, strict=True)):
-                left = (part.torque[j] - value[joint.columns] @ columns)[part.used[j]]
-                squares[j] += left @ left
-                count[j] += len(left)
-        return np.asarray(np.sqrt(np.divide(squares, count, out=np.full(len(count), np.nan), where=count > 0.0)))
+
+        def left(part: PreparedStretch, raw: Raw, j: int) -> Array:
+            return np.asarray(part.torque[j] - value[self.joints[j].columns] @ raw[j])
+
+        return self._unfiltered(left)
+
+    @cached_property
+    def unfiltered_torque_rms(self) -> Array:
+        """The rms of the recorded torque over the same samples, shape (n,)."""
+        return self._unfiltered(lambda part, raw, j: part.torque[j])
+
+    def _unfiltered(self, signal: Callable[[PreparedStretch, Raw, int], Array]) -> Array:
+        def mean_square(j: int) -> float:
+            used = [signal(part, raw, j)[part.used[j]] for part, raw in self._stretches()]
+            count = sum(len(part) for part in used)
+            return sum(float(part @ part) for part in used) / count if count else np.nan
+
+        return np.sqrt(side_by_side(mean_square, range(len(self.joints))))
 
     def block(self, place: int) -> tuple[Information, ...]:
         """Return the rows of every joint in one block of time."""
@@ -202,7 +212,7 @@ class Observations:
                     yield part, raw
 
 
-def observe(model: TorqueModel, data: PreparedData) -> Observations:
+def observe(model: TorqueModel, data: PreparedData, known: Observations | None = None) -> Observations:
     """Make a model's rows on prepared data.
 
     Parameters
@@ -210,6 +220,8 @@ def observe(model: TorqueModel, data: PreparedData) -> Observations:
     model : TorqueModel
     data : PreparedData
         With effort.
+    known : Observations, optional
+        Of the same model; recordings that it holds in the same bands are not observed again.
 
     Returns
     -------
@@ -220,35 +232,44 @@ def observe(model: TorqueModel, data: PreparedData) -> Observations:
     RecordingError
         If no row of a recording is left.
     """
-    with one_blas_thread(), ThreadPoolExecutor(max_workers=2) as pool:
-        raws = list(
-            pool.map(lambda item: tuple(model.joint_columns(part.motion) for part in item.stretches), data.recordings)
-        )
-        joints, owner = rows_of(data, model.active, raws)
-    return Observations(model, data, joints, owner, tuple(raws))
+    held = (
+        {}
+        if known is None or known.data.bands != data.bands
+        else {id(item.data.recordings[0].recording): item for item in known.each}
+    )
+    items = [
+        held[id(item.recording)].data.recordings[0] if id(item.recording) in held else item for item in data.recordings
+    ]
+    data = replace(data, recordings=tuple(items))
 
+    def of_recording(item: PreparedRecording) -> tuple[tuple[Raw, ...], Sequence[JointRows]]:
+        same = held.get(id(item.recording))
+        return _observed(model, item) if same is None else (same.raw[0], same.joints)
 
-def rows_of(
-    data: PreparedData, columns: Sequence[NDArray[np.intp]], raws: Sequence[tuple[Raw, ...]]
-) -> tuple[tuple[JointRows, ...], NDArray[np.intp]]:
-    """Return the rows of every joint within its band, and the recording of each block."""
-    with one_blas_thread(), ThreadPoolExecutor(max_workers=2) as pool:
-        parts = list(pool.map(_recording_rows, data.recordings, raws))
-    owner = np.concatenate([np.full(len(part[0].counts), k) for k, part in enumerate(parts)]) if parts else np.zeros(0)
+    parts = side_by_side(of_recording, data.recordings)
+    rows = [part for _, part in parts]
+    owner = [np.full(len(part[0].counts), k) for k, part in enumerate(rows)]
     joints = []
-    for j, own in enumerate(columns):
-        rows = [part[j] for part in parts]
-        ends = np.cumsum([0, *(item.table.shape[1] for item in rows)])
-        starts = [item.starts[:-1] + end for item, end in zip(rows, ends[:-1], strict=True)]
+    for j, own in enumerate(model.active):
+        each = [part[j] for part in rows]
+        ends = np.cumsum([0, *(item.table.shape[1] for item in each)])
+        starts = [item.starts[:-1] + end for item, end in zip(each, ends[:-1], strict=True)]
         joints.append(
             JointRows(
                 own,
-                np.concatenate([item.table for item in rows], axis=1) if rows else np.zeros((len(own) + 1, 0)),
+                np.concatenate([np.zeros((len(own) + 1, 0)), *(item.table for item in each)], axis=1),
                 np.concatenate([*starts, ends[-1:]]).astype(np.intp),
-                np.concatenate([item.counts for item in rows]) if rows else np.zeros(0),
+                np.concatenate([np.zeros(0), *(item.counts for item in each)]),
             )
         )
-    return tuple(joints), owner.astype(np.intp)
+    whole = np.concatenate([np.zeros(0), *owner]).astype(np.intp)
+    return Observations(model, data, tuple(joints), whole, tuple(raw for raw, _ in parts))
+
+
+def _observed(model: TorqueModel, item: PreparedRecording) -> tuple[tuple[Raw, ...], Sequence[JointRows]]:
+    """Return the columns of a recording at every sample, and its rows."""
+    raw = tuple(model.joint_columns(part.motion) for part in item.stretches)
+    return raw, _recording_rows(item, raw)
 
 
 def _recording_rows(item: PreparedRecording, raws: tuple[Raw, ...]) -> list[JointRows]:

@@ -10,7 +10,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.estimation import Estimate
 from scara_ident.estimation.least_squares import weighted_value, wls
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.model.terms.friction import Friction
@@ -98,8 +97,8 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     joints = model.robot.joints
     faults: list[ChannelFault] = []
     for _ in range(2 * len(joints)):
-        fitted = wls(held)
-        errors, score = _relative(fitted.value, held), _score(fitted.value, held)
+        fitted = weighted_value(held)
+        errors, score = _relative(fitted, held), _score(fitted, held)
         pushing = _pushing(fitted, held)
         best: tuple[ChannelFault, Observations] | None = None
         for signal, chosen, exchanged in _suspects(errors, pushing):
@@ -109,7 +108,7 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
                 continue
             # A turned sign must take the push away; signs that an exchange brings to light are the next round's.
             allowed = np.count_nonzero(pushing) - (signal != "effort and position")
-            if not exchanged and np.count_nonzero(_pushing(wls(other), other)) > allowed:
+            if not exchanged and np.count_nonzero(_pushing(weighted_value(other), other)) > allowed:
                 continue
             names = tuple(joints[j] for j in chosen)
             best = ChannelFault(signal, names, exchanged, score, mended), other
@@ -175,27 +174,30 @@ def _score(value: Array, observations: Observations) -> float:
     return float(np.exp(np.mean(np.log(np.maximum(_relative(value, observations), 1e-12)))))
 
 
-def _pushing(estimate: Estimate, observations: Observations) -> NDArray[np.bool_]:
+def _pushing(value: Array, observations: Observations) -> NDArray[np.bool_]:
     """Return the joints whose estimated friction feeds energy in over the recorded motion, beyond its uncertainty."""
-    model = estimate.model
-    robot = model.robot
-    friction = np.zeros(len(model.columns), dtype=bool)
-    for term in model.terms:
+    robot = observations.model.robot
+    friction = np.zeros(observations.parameters, dtype=bool)
+    for term in observations.model.terms:
         if isinstance(term, Friction):
-            friction[model.place(term)] = True
-    result = np.zeros(robot.n, dtype=bool)
+            friction[observations.model.place(term)] = True
+    powers = np.zeros((robot.n, observations.parameters))
     for j, rows in enumerate(observations.joints):
         own = np.flatnonzero(friction[rows.columns])
-        if not len(own):
-            continue
-        power, passed = np.zeros(len(own)), 0.0
+        passed = 0.0
         for item, raws in zip(observations.data.recordings, observations.raw, strict=True):
             part, raw = max(zip(item.stretches, raws, strict=True), key=lambda pair: pair[0].samples)
             drive = robot.drive_sign[j] * part.motion.v[j]
-            power += raw[j][own] @ drive
+            powers[j, rows.columns[own]] += raw[j][own] @ drive
             passed += float(np.sum(np.abs(part.torque[j] * drive)))
-        places = rows.columns[own]
-        value = float(power @ estimate.value[places])
-        std = float(np.sqrt(power @ estimate.covariance[np.ix_(places, places)] @ power))
-        result[j] = value < -PUSHING * passed and value < -PUSHING_STD * std
-    return result
+        if powers[j] @ value >= -PUSHING * passed:
+            powers[j] = 0.0
+    if not np.any(powers):
+        return np.zeros(robot.n, dtype=bool)
+    # How sure the power is takes more time than the power, and mostly no joint is suspected.
+    covariance = wls(observations).covariance
+    known = np.isfinite(np.diag(covariance))
+    spread = np.where(known[:, None] & known, covariance, 0.0)
+    std = np.sqrt(np.einsum("jp,pq,jq->j", powers, spread, powers))
+    std[np.any(powers[:, ~known], axis=1)] = np.inf
+    return np.asarray((powers @ value < -PUSHING_STD * std) & np.any(powers, axis=1))

@@ -118,12 +118,13 @@ def compare(
         )
     equation = build_model(robot, model) if isinstance(model, str) else model
     notes = data_notes(data.recordings)
+    known = None
     if bands is None:
         progress("choosing the bands")
         choice = choose_bands(equation, data)
-        bands, notes = choice.bands, [*notes, *choice.notes]
+        bands, notes, known = choice.bands, [*notes, *choice.notes], choice.observations
     progress("absorbing the recordings")
-    observations = observe(equation, data.at(bands))
+    observations = observe(equation, data.at(bands), known)
     noise = repeatability(data)
     summaries, rows = [], []
     for name in names:

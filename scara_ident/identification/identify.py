@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -45,8 +46,6 @@ class Identification:
         What the recordings say; validation took no part in any choice.
     noise : mapping of str to ndarray
         Repeatability of the torque per trajectory, see `repeatability`.
-    physical_consistency : PhysicalConsistency
-        Whether an arm with these parameters can exist, and what contradicts it.
     log_det, condition : float
         J_d and J_k of the training recordings for the paper's 2500 samples.
     notes : tuple of str
@@ -59,7 +58,6 @@ class Identification:
     training: Observations
     validation: Observations
     noise: Mapping[str, Array]
-    physical_consistency: PhysicalConsistency
     log_det: float
     condition: float
     notes: tuple[str, ...]
@@ -68,6 +66,11 @@ class Identification:
     def model(self) -> TorqueModel:
         """The model that was fitted."""
         return self.estimate.model
+
+    @cached_property
+    def physical_consistency(self) -> PhysicalConsistency:
+        """Whether an arm with these parameters can exist, and what contradicts it; judged when it is first asked for."""
+        return physical_consistency(self.estimate)
 
     def training_errors(self) -> dict[str, tuple[JointError | None, ...]]:
         """Return the errors on the recordings that were fitted, by recording."""
@@ -131,13 +134,14 @@ def identify(
         check_bands(robot, bands, (*recordings, *validation))
     data, held_out = prepare(recordings), prepare(validation)
     notes = data_notes((*data.recordings, *held_out.recordings))
+    known = None
     if bands is None:
         progress("choosing the bands")
         choice = choose_bands(equation, data)
-        bands = choice.bands
+        bands, known = choice.bands, choice.observations
         notes += choice.notes
     progress("absorbing the recordings")
-    training = observe(equation, data.at(bands))
+    training = observe(equation, data.at(bands), known)
     validated = observe(equation, held_out.at(bands))
     notes += [str(fault) for fault in channel_faults(training)]
     progress("estimating")
@@ -145,12 +149,8 @@ def identify(
     estimate, history = estimate_by(method, training, _joint_noise(noise), options)
     if isinstance(estimate, ConsistentEstimate):
         notes += estimate.notes
-    progress("checking whether such an arm can exist")
-    possible = physical_consistency(estimate)
     log_det, condition = paper_criteria(training)
-    return Identification(
-        estimate, history, tuple(bands), training, validated, noise, possible, log_det, condition, tuple(notes)
-    )
+    return Identification(estimate, history, tuple(bands), training, validated, noise, log_det, condition, tuple(notes))
 
 
 def identified_arm(identification: Identification) -> ConsistentEstimate | None:
@@ -177,7 +177,8 @@ def known_information(model: TorqueModel, recordings: Sequence[Recording], rate:
         Samples per second that the design they are to be joined with counts.
     """
     data = prepare(recordings)
-    observations = observe(model, data.at(choose_bands(model, data).bands))
+    choice = choose_bands(model, data)
+    observations = observe(model, data.at(choice.bands), choice.observations)
     return merge(
         information.scaled(float(np.sqrt(rate / recording.rate)))
         for item, recording in zip(observations.each, recordings, strict=True)

@@ -233,15 +233,21 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int) -> 
     frequency = np.arange(min(closed // 2, int(8.0 * cut * closed / rate)) + 1) * (rate / closed)
     gain = 1.0 / (1.0 + (frequency / cut) ** 8)
     result = np.empty((signal.shape[0], kept))
+    whole = np.arange(count + 2 * reach, dtype=float)
+    buffer = np.zeros((min(ROWS_AT_ONCE, len(signal)), closed))
     for begin in range(0, signal.shape[0], ROWS_AT_ONCE):
         rows = signal[begin : begin + ROWS_AT_ONCE]
         start, stop = 2.0 * rows[:, :1] - rows[:, reach : reach + 1], 2.0 * rows[:, -1:] - rows[:, -1 - reach, None]
         slope = (stop - start) / (count - 1 + 2 * reach)
-        flat = np.zeros((len(rows), closed))
-        flat[:, lead : lead + count] = rows
-        flat[:, lead - reach : lead] = 2.0 * rows[:, :1] - rows[:, reach:0:-1]
-        flat[:, lead + count : lead + count + reach] = 2.0 * rows[:, -1:] - rows[:, -2 : -reach - 2 : -1]
-        flat[:, lead - reach : lead + count + reach] -= start + slope * np.arange(count + 2 * reach)
+        flat = buffer[: len(rows)]
+        # The chord of the continued signal, which then closes on itself.
+        chord = flat[:, lead - reach : lead + count + reach]
+        np.multiply(slope, whole, out=chord)
+        chord += start
+        np.subtract(rows, chord[:, reach : reach + count], out=chord[:, reach : reach + count])
+        np.subtract(2.0 * rows[:, :1] - rows[:, reach:0:-1], chord[:, :reach], out=chord[:, :reach])
+        tail = chord[:, reach + count :]
+        np.subtract(2.0 * rows[:, -1:] - rows[:, -2 : -reach - 2 : -1], tail, out=tail)
         spectrum = np.fft.rfft(flat, axis=1)[:, : len(frequency)] * gain
         folded = np.zeros((len(rows), low), dtype=complex)
         for first in range(0, len(frequency), low):

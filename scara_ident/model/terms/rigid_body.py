@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,13 +74,14 @@ class RigidBody(Filled):
                 np.multiply(rows[joint], scale, out=rows[joint])
 
 
-def rigid_body(robot: Robot, *, without: Sequence[str] = ()) -> RigidBody:
-    """Build the rigid-body term of a robot.
+@lru_cache(maxsize=16)
+def rigid_body(robot: Robot, *, without: tuple[str, ...] = ()) -> RigidBody:
+    """Build the rigid-body term of a robot, once for each robot.
 
     Parameters
     ----------
     robot : Robot
-    without : sequence of str, optional
+    without : tuple of str, optional
         Columns to leave out, by name: parameters held to be zero.
 
     Raises
