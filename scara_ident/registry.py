@@ -124,6 +124,10 @@ class Registry(Generic[T]):
                 warn(str(error), PluginWarning, stacklevel=2)
         return found
 
+    def refresh(self) -> None:
+        """Look again at what is installed, as after an installation into a running Python."""
+        self.__dict__.pop("_installed", None)
+
     def _load(self, name: str) -> T:
         thing = self._built_in[name]
         if not isinstance(thing, str):

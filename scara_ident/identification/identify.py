@@ -127,7 +127,7 @@ def identify(
     """
     if not recordings:
         raise UsageError("no recordings to identify from")
-    ESTIMATORS.check(method)
+    ESTIMATORS.get(method)  # a package that cannot be loaded is named before the work, not after it
     check_held_out(recordings, validation)
     equation = build_model(robot, model) if isinstance(model, str) else model
     if bands is not None:

@@ -15,6 +15,7 @@ import pytest
 
 from scara_ident import Identification, Recording, identify, load_robot, write_recording
 from tests.diagnosis.made import BANDS, exact_runs, virtual_runs, with_torque
+from tests.docs.pages import blocks
 from tests.plugins.made import make_installed
 from tests.shared import ROOT
 
@@ -107,6 +108,14 @@ def test_help_and_messages_list_what_it_adds(program: Program, tmp_path: Path):
     )
     (tmp_path / "run.txt").write_text("0\n")
     assert ".bag or .lab file" in program("identify", tmp_path / "run.txt").stderr
+
+
+def test_the_page_about_it_shows_this_package():
+    (shown,) = (block for block in blocks(ROOT / "docs" / "howto" / "my-own-package.md") if block.language == "toml")
+    own = (Path(__file__).parent / "arm_lab" / "pyproject.toml").read_text().splitlines()
+    lines = [line for line in shown.text.splitlines() if line]
+    assert len(lines) > 8
+    assert [line for line in lines if line not in own] == []
 
 
 def test_a_broken_package_harms_only_who_asks_for_it(tmp_path: Path):
