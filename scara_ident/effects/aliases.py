@@ -19,10 +19,10 @@ from scara_ident.model.base_parameters import standard_regressor
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.kinematics import axis, parent
-from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 Columns = Iterator[tuple[int | None, Array]]
+Candidates = Callable[[TorqueModel, Motion, np.random.Generator], Columns]
 
 # Shift of a joint's zero, rad or m, and share of a link's length, for derivatives.
 ZERO_STEP = 1e-4
@@ -65,7 +65,7 @@ class Hidden:
 
     effect: str
     opened_by: str
-    columns: Callable[[TorqueModel, Motion, np.random.Generator], Columns]
+    columns: Candidates
 
 
 def aliases(model: TorqueModel, *, seed: int = 0) -> tuple[Alias, ...]:
@@ -103,46 +103,28 @@ def aliases(model: TorqueModel, *, seed: int = 0) -> tuple[Alias, ...]:
     return tuple(found)
 
 
-def _row(robot: Robot, joint: int, *columns: Array) -> Array:
-    result = np.zeros((robot.n, len(columns), columns[0].size))
-    result[joint] = columns
-    return result
-
-
 def _payload(model: TorqueModel, motion: Motion, rng: np.random.Generator) -> Columns:
     """Give a mass at the tool that all recordings have."""
     tool = tool_of(model.robot)
     yield None, np.einsum("jkn,k->jn", tool.columns(model.robot, motion), point_mass(tool.point))[:, None]
 
 
-def _asymmetric_coulomb(model: TorqueModel, motion: Motion, rng: np.random.Generator) -> Columns:
-    """Give Coulomb friction that differs by direction."""
-    for joint in range(model.robot.n):
-        yield joint, _row(model.robot, joint, _drive_speed(model, motion, joint, 0) ** 2)
+def _of_speed(*laws: Callable[[Array], Array]) -> Candidates:
+    """Return what gives torques of each joint that are laws of its own speed in the direction of the drive."""
 
+    def columns(model: TorqueModel, motion: Motion, rng: np.random.Generator) -> Columns:
+        for joint, v in enumerate(model.robot.drive_sign[:, None] * motion.v):
+            result = np.zeros((model.robot.n, len(laws), motion.samples))
+            result[joint] = [law(v) for law in laws]
+            yield joint, result
 
-def _aerodynamic_drag(model: TorqueModel, motion: Motion, rng: np.random.Generator) -> Columns:
-    """Give drag of the air on a link, which grows with the square of its joint's speed."""
-    for joint in range(model.robot.n):
-        yield joint, _row(model.robot, joint, _drive_speed(model, motion, joint, 2))
-
-
-def _iron_loss(model: TorqueModel, motion: Motion, rng: np.random.Generator) -> Columns:
-    """Give hysteresis and eddy currents of a motor: constant against the motion, and proportional to speed."""
-    for joint in range(model.robot.n):
-        yield joint, _row(model.robot, joint, *(_drive_speed(model, motion, joint, power) for power in (0, 1)))
+    return columns
 
 
 def _common_torque_scale(model: TorqueModel, motion: Motion, rng: np.random.Generator) -> Columns:
     """Give a torque scale that is wrong for all joints alike, of arbitrary parameters."""
     value = rng.uniform(0.5, 1.5, len(model.columns))
     yield None, np.einsum("jpn,p->jn", model.regressor(motion), value)[:, None]
-
-
-def _drive_speed(model: TorqueModel, motion: Motion, joint: int, power: int) -> Array:
-    """Return ``sign(v) |v|^power`` in the direction of the drive."""
-    v = model.robot.drive_sign[joint] * motion.v[joint]
-    return np.asarray(np.sign(v) * np.abs(v) ** power)
 
 
 def _rotor_couplings(model: TorqueModel, motion: Motion, rng: np.random.Generator) -> Columns:
@@ -244,14 +226,14 @@ HIDDEN = (
     Hidden(
         "asymmetric_coulomb",
         "the torque's reading with the drive off, which is the sensor's offset alone",
-        _asymmetric_coulomb,
+        _of_speed(lambda v: np.sign(v) ** 2),
     ),
     Hidden(
         "aerodynamic_drag",
         "the same motion in another pose of the other links, or the gear's friction measured apart",
-        _aerodynamic_drag,
+        _of_speed(lambda v: np.abs(v) * v),
     ),
-    Hidden("iron_loss", "the motor run uncoupled from its gear", _iron_loss),
+    Hidden("iron_loss", "the motor run uncoupled from its gear", _of_speed(np.sign, lambda v: v)),
     Hidden("common_torque_scale", "a known payload, or weighing one link", _common_torque_scale),
 )
 """What might be an alias, in the order in which it is tried."""

@@ -126,9 +126,11 @@ class Effect(ABC):
 
     def fill(self, signals: Signals, member: Member, rows: Sequence[Array]) -> None:
         """Write the columns into those of each joint: (k, N) where they act, (0, N) where they do not."""
-        own = self.rows(signals.scene, member)
-        for k, column in enumerate(self.signal_columns(signals, member)):
-            for joint in own:
+        columns = list(self.signal_columns(signals, member))
+        for joint in self.rows(signals.scene, member):
+            if len(columns) != len(rows[joint]):
+                raise ValueError(f"effect {self.name}: {len(rows[joint])} coefficients, but {len(columns)} columns")
+            for k, column in enumerate(columns):
                 rows[joint][k] = column if np.ndim(column) == 1 else column[joint]
 
     def rows(self, scene: Scene, member: Member) -> list[int]:

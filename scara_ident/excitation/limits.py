@@ -122,7 +122,7 @@ def limits_of(
                 raise UsageError(f"{kind} limit of {robot.joints[joint]}: {limit:g} allows no motion; give more than 0")
             wanted[joint] = limit
     for joint, name in enumerate(robot.joints):
-        unit = "m" if robot.prismatic[joint] else "rad"
+        unit = robot.position_unit(joint)
         if not (np.isfinite(lower[joint]) and np.isfinite(upper[joint])):
             raise RobotError(
                 f"{robot.urdf}: joint {name!r} has no position limits; give <limit lower= upper=> in the URDF, or a "

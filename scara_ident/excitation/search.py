@@ -211,7 +211,7 @@ def _tightest(problem: Problem, seed: int) -> str:
         unit = {"tool_acceleration": "m/s^2", "tool_speed": "m/s"}.get(kind, "m")
         where = f"{kind.replace('_', ' ')} limit of {bound:.4g} {unit}"
     else:
-        length = "m" if robot.prismatic[joint] else "rad"
+        length = robot.position_unit(joint)
         bound, unit = {
             "position": (limits.upper[joint] - limits.lower[joint], length),
             "velocity": (limits.velocity[joint], f"{length}/s"),

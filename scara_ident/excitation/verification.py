@@ -114,7 +114,7 @@ def reached(task: Task, torque: Array, x: Array, times: int) -> tuple[Reached, .
         if joint is None:
             found.append(_of_tool(limits, kind, float(high)))
             continue
-        name, length = robot.joints[joint], "m" if robot.prismatic[joint] else "rad"
+        name, length = robot.joints[joint], robot.position_unit(joint)
         both = float(max(high, -low))
         if kind == "position":
             centre, half = limits.centre[joint], 0.5 * (limits.upper[joint] - limits.lower[joint])

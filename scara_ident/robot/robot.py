@@ -198,8 +198,8 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
         effort_gain=np.array([joint.effort_gain for joint in joints]),
         lower=np.where(unbounded, -np.inf, _given(model.lowerPositionLimit[position])),
         upper=np.where(unbounded, np.inf, _given(model.upperPositionLimit[position])),
-        velocity_limit=_positive_or_inf(_upper_velocity(model)[order]),
-        effort_limit=_positive_or_inf(_upper_effort(model)[order]),
+        velocity_limit=_positive_or_inf(_upper(model, "Velocity")[order]),
+        effort_limit=_positive_or_inf(_upper(model, "Effort")[order]),
         locked=locked,
         channels=None
         if description.recording is None
@@ -214,12 +214,10 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
     )
 
 
-def _upper_velocity(model: pin.Model) -> NDArray[np.float64]:
-    return np.asarray(model.upperVelocityLimit if hasattr(model, "upperVelocityLimit") else model.velocityLimit)
-
-
-def _upper_effort(model: pin.Model) -> NDArray[np.float64]:
-    return np.asarray(model.upperEffortLimit if hasattr(model, "upperEffortLimit") else model.effortLimit)
+def _upper(model: pin.Model, kind: Literal["Velocity", "Effort"]) -> NDArray[np.float64]:
+    # Older releases of Pinocchio have velocityLimit and effortLimit.
+    name = f"upper{kind}Limit"
+    return np.asarray(getattr(model, name if hasattr(model, name) else f"{kind.lower()}Limit"))
 
 
 def _given(limit: NDArray[np.float64]) -> NDArray[np.float64]:

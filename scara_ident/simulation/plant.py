@@ -111,6 +111,10 @@ class PlantDraft:
     drift: Array
     pickup: list[tuple[int, float, float, float]]
 
+    def array(self, name: str) -> NDArray[np.float64]:
+        """Return an array of the plant, or of the torque's measurement."""
+        return self.arrays[name] if name in self.arrays else np.asarray(getattr(self, name))
+
     def append(self, family: str, joint: int, *values: float) -> None:
         """Append a row to ``ripple`` or ``vibration``."""
         names = ("joint", "order" if family == "ripple" else "frequency", "amplitude", "phase")

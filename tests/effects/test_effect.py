@@ -79,6 +79,18 @@ def test_limits_are_said_with_the_coefficient():
     assert [Hook().inadmissible(scene, member, np.array([x]), std) for x in (-0.19, 0.0, 2.19)] == [None] * 3
 
 
+def test_columns_that_no_coefficient_names_are_an_error():
+    class Torn(Hook):
+        def signal_columns(self, signals, member):
+            return [signals.time, signals.time]
+
+    scene, item = scene_of(load_robot()), moving(load_robot(), 0.02)
+    with pytest.raises(ValueError, match="effect hook: 1 coefficients, but 2 columns"):
+        EffectTerm(Torn(), Member(0, (0.1,)), scene).fill(
+            item, [np.empty((1, item.samples)), np.empty((0, item.samples))]
+        )
+
+
 def test_effects_are_equal_by_class():
     assert Hook() == Hook()
     assert len({*CATALOGUE, *(type(effect)() for effect in CATALOGUE)}) == len(CATALOGUE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from scara_ident.report.diagnosis import diagnosis_markdown
 from scara_ident.report.html import diagnosis_report
 from scara_ident.report.html.chapters import Chapter
 from scara_ident.report.html.remainder import signal_of
-from scara_ident.report.html.story import chapter_group
+from scara_ident.report.html.story import SIGNALS, chapter_group
 from scara_ident.report.html.torque import torque_group
 from scara_ident.report.html.traces import Trace
 from scara_ident.report.pictures import COLORS, diagnosis_pictures, remove_stale
@@ -92,6 +93,17 @@ def test_after_a_reversal_the_distance_over_which_the_effect_acts_is_shown():
         assert 4.0 * distance < high < 0.5
         # However short the distance, there is something to see.
         assert np.any(np.isfinite(plot.panels[-1].layers[1].y))
+
+
+@pytest.mark.parametrize("signal", [*SIGNALS, "own", "order", "frequency"])
+def test_every_view_has_a_figure_and_an_effect_that_names_none_is_shown_over_its_own_torque(signal: str):
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal((2, 20000))
+    before = _trace(noise, np.ones(noise.shape, dtype=bool))
+    after = replace(before, predicted=0.1 * rng.standard_normal(noise.shape))
+    chapter = Chapter(1, "mine", 0, [before], [after], BANDS, "joint1", View(signal))
+    names = [figure.name for figure in chapter_group(load_robot(), chapter).figures]
+    assert names == ([] if signal == "own" else ["effect-1-view"]) + ["effect-1-own"]
 
 
 def test_a_residual_that_is_not_used_does_not_set_the_scale():

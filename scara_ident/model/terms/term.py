@@ -89,7 +89,7 @@ class Filled:
 def per_speed(robot: Robot, joint: int, power: int) -> str:
     """Return the unit of torque divided by speed to a power, such as ``N m s^2/rad^2``."""
     torque = robot.torque_unit(joint)
-    length = "m" if robot.prismatic[joint] else "rad"
+    length = robot.position_unit(joint)
     if power == 0:
         return torque
     exponent = "" if power == 1 else f"^{power}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.recording.audit.samples import IDLE_TRAVEL, Array, Finding, Samples, joint_range, runs, several, unit
+from scara_ident.recording.audit.samples import IDLE_TRAVEL, Array, Finding, Samples, joint_range, runs, several
 
 Checked = tuple[Samples, list[Finding]]
 
@@ -39,7 +39,7 @@ def dead_effort(samples: Samples) -> Checked:
             if not idle[joint]:
                 samples.refuse(
                     f"{name}.effort is {values[0]:g} throughout although the joint moves by "
-                    f"{np.ptp(samples.position[joint]):.3g} {unit(samples.robot, joint)}: a dead channel; "
+                    f"{np.ptp(samples.position[joint]):.3g} {samples.robot.position_unit(joint)}: a dead channel; "
                     f"record it again, or identify without {name}"
                 )
             said = f"{name}.effort is {values[0]:g} throughout, and the joint does not move: used as it is"

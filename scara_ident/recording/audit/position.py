@@ -17,7 +17,6 @@ from scara_ident.recording.audit.samples import (
     joint_range,
     several,
     speed_limit,
-    unit,
 )
 
 if TYPE_CHECKING:
@@ -81,7 +80,7 @@ def position_unit(samples: Samples) -> Checked:
         return samples, []
 
     joint = int(np.argmax(suspect))
-    values, name = samples.position[joint], unit(robot, joint)
+    values, name = samples.position[joint], robot.position_unit(joint)
     if beyond[joint] > 0:
         under = robot.lower[joint] - low[joint] > high[joint] - robot.upper[joint]
         index = int(np.argmin(values) if under else np.argmax(values))
@@ -169,7 +168,7 @@ def idle_joints(samples: Samples) -> Checked:
         return samples, []
     which = np.flatnonzero(idle)
     travel = float(np.max(np.ptp(samples.position[which], axis=1)))
-    small = f"(travel at most {travel:.2g} {unit(samples.robot, int(which[0]))})"
+    small = f"(travel at most {travel:.2g} {samples.robot.position_unit(int(which[0]))})"
     if idle.all() and len(which) > 1:
         said = f"no joint moves {small}: gravity and offsets can be learnt, nothing of motion"
         return samples, [Finding("idle_joint", said, len(which))]
@@ -194,7 +193,7 @@ def limits(samples: Samples) -> Checked:
         limit = robot.lower[joint] if under > over else robot.upper[joint]
         count = int(np.count_nonzero((values < robot.lower[joint]) | (values > robot.upper[joint])))
         said = (
-            f"{robot.joints[joint]}.position reaches {values[index]:.4g} {unit(robot, joint)} in "
+            f"{robot.joints[joint]}.position reaches {values[index]:.4g} {robot.position_unit(joint)} in "
             f"{samples.where(index)}, beyond the URDF's limit of {limit:.4g}: used as it is"
         )
         found.append(Finding("limits", said, count))
@@ -293,6 +292,6 @@ def _refuse_jump(samples: Samples) -> None:
     index = int(np.argmax(jump[joint])) + 1
     column = f"{samples.robot.joints[joint]}.position"
     samples.refuse(
-        f"{column} jumps by {step[joint, index - 1]:.3g} {unit(samples.robot, joint)} in {samples.where(index)} and "
+        f"{column} jumps by {step[joint, index - 1]:.3g} {samples.robot.position_unit(joint)} in {samples.where(index)} and "
         "stays, as after a reset of the encoder; cut the file there"
     )

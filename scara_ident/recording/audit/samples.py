@@ -133,8 +133,3 @@ def runs(same: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 def several(count: int, noun: str) -> str:
     """Write a number and what it counts: "1 row", "3 rows"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-def unit(robot: Robot, joint: int) -> str:
-    """Return the unit of a joint's position."""
-    return "m" if robot.prismatic[joint] else "rad"

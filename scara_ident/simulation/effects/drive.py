@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from scara_ident.simulation.effects.effect import BY_ARM, Effect, vacant
+from scara_ident.simulation.effects.effect import BY_ARM, Effect
 
 if TYPE_CHECKING:
     from scara_ident.simulation.arm import VirtualArm
@@ -26,14 +26,11 @@ class TorqueRipple(Effect):
     equation: ClassVar[str] = "u += amplitude sin(order N q + phase)"
     units: ClassVar[dict[str, str]] = {"order": "1 / motor turn", "amplitude": "N m", "phase": "rad"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"order": (0.0, np.inf), "amplitude": (0.0, np.inf)}
+    shares: ClassVar[dict[str, float]] = {"amplitude": 0.06}
     order: float = 2.0
     amplitude: float = BY_ARM
     phase: float = 0.7
     sensor: bool = False
-
-    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """Give a share of the usual torque."""
-        return {"amplitude": float(0.06 * arm.torque_scale[joint])}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Append a row."""
@@ -52,6 +49,8 @@ class Spring(Effect):
     name: ClassVar[str] = "spring"
     equation: ClassVar[str] = "u += stiffness (q - rest_position)"
     units: ClassVar[dict[str, str]] = {"stiffness": "N m/rad", "rest_position": "rad"}
+    arrays: ClassVar[dict[str, str]] = {"stiffness": "spring", "rest_position": "spring_rest"}
+    joint_side = ("stiffness",)
     stiffness: float = BY_ARM
     rest_position: float = 0.3
 
@@ -59,13 +58,6 @@ class Spring(Effect):
         """Give a share of the usual torque over a radian, or over a tenth of a metre."""
         way = 0.1 if arm.robot.prismatic[joint] else 1.0
         return {"stiffness": float(0.1 * arm.torque_scale[joint]) / way}
-
-    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
-        """Set stiffness and rest position."""
-        j = self.place(arm)
-        vacant(self, draft.arrays["spring"][j])
-        draft.arrays["spring"][j] = abs(draft.scale[j]) * self.stiffness
-        draft.arrays["spring_rest"][j] = self.rest_position
 
 
 @dataclass(frozen=True)
@@ -79,13 +71,10 @@ class Vibration(Effect):
     equation: ClassVar[str] = "u += amplitude sin(2 pi frequency t + phase)"
     units: ClassVar[dict[str, str]] = {"frequency": "Hz", "amplitude": "N m", "phase": "rad"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"frequency": (0.0, np.inf), "amplitude": (0.0, np.inf)}
+    shares: ClassVar[dict[str, float]] = {"amplitude": 0.05}
     frequency: float = 6.0
     amplitude: float = BY_ARM
     phase: float = 0.4
-
-    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """Give a share of the usual torque."""
-        return {"amplitude": float(0.05 * arm.torque_scale[joint])}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Append a row."""

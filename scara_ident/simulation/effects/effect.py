@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
@@ -18,7 +17,7 @@ BY_ARM = math.nan
 
 
 @dataclass(frozen=True)
-class Effect(ABC):
+class Effect:
     """One physical effect that a rigid body with polynomial friction and offset lacks.
 
     Attributes
@@ -34,6 +33,11 @@ class Effect(ABC):
     # Parameter -> smallest and largest value; both may be reached.
     bounds: ClassVar[dict[str, tuple[float, float]]] = {}
     whole_arm: ClassVar[Literal["never", "may be", "always"]] = "never"
+    # Parameter left to the arm -> share of its usual torque.
+    shares: ClassVar[dict[str, float]] = {}
+    # Parameter -> array of the draft into which it is written; those that are brought to the joint side of the gear.
+    arrays: ClassVar[dict[str, str]] = {}
+    joint_side: ClassVar[tuple[str, ...]] = ()
 
     joint: str | None = None
 
@@ -44,7 +48,7 @@ class Effect(ABC):
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
         """Return values for the parameters that are left to the arm."""
-        return {}
+        return {key: float(share * arm.torque_scale[joint]) for key, share in self.shares.items()}
 
     def first_choice(self, arm: VirtualArm) -> str:
         """Return the joint meant where none is named."""
@@ -80,9 +84,14 @@ class Effect(ABC):
         """Return the row of its joint in Pinocchio's order."""
         return int(arm.robot.order[arm.joint_index(self.joint or arm.robot.joints[0])])
 
-    @abstractmethod
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Add the effect, which must be resolved, to the arm's arrays."""
+        j = self.place(arm)
+        for place, (key, name) in enumerate(self.arrays.items()):
+            array = draft.array(name)
+            if place == 0:
+                vacant(self, array[j])
+            array[j] = (abs(draft.scale[j]) if key in self.joint_side else 1.0) * getattr(self, key)
 
     def as_dict(self) -> dict[str, Any]:
         """Return name, joint and parameters, ready for JSON."""

@@ -23,19 +23,14 @@ class Stribeck(Effect):
     equation: ClassVar[str] = "u += amplitude sign(v) exp(-(v/velocity)^2)"
     units: ClassVar[dict[str, str]] = {"amplitude": "N m", "velocity": "rad/s"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"amplitude": (0.0, np.inf), "velocity": (1e-6, np.inf)}
+    arrays: ClassVar[dict[str, str]] = {"amplitude": "stribeck_amplitude", "velocity": "stribeck_velocity"}
+    joint_side = ("amplitude",)
     amplitude: float = BY_ARM
     velocity: float = 0.1
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
         """Give half of the Coulomb friction, or a share of the torque where there is none."""
         return {"amplitude": float(0.5 * arm.friction[joint, 0] or 0.05 * arm.torque_scale[joint])}
-
-    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
-        """Set amplitude and velocity."""
-        j = self.place(arm)
-        vacant(self, draft.arrays["stribeck_amplitude"][j])
-        draft.arrays["stribeck_amplitude"][j] = abs(draft.scale[j]) * self.amplitude
-        draft.arrays["stribeck_velocity"][j] = self.velocity
 
 
 @dataclass(frozen=True)
@@ -73,13 +68,8 @@ class Presliding(Effect):
     equation: ClassVar[str] = "sign(v) -> z in the dry friction, dz/dt = v/presliding_distance (1 - z sign(v))"
     units: ClassVar[dict[str, str]] = {"presliding_distance": "rad"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"presliding_distance": (0.0, np.inf)}
+    arrays: ClassVar[dict[str, str]] = {"presliding_distance": "presliding"}
     presliding_distance: float = 0.005
-
-    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
-        """Set the distance."""
-        j = self.place(arm)
-        vacant(self, draft.arrays["presliding"][j])
-        draft.arrays["presliding"][j] = self.presliding_distance
 
 
 @dataclass(frozen=True)
@@ -90,15 +80,9 @@ class WarmUp(Effect):
     equation: ClassVar[str] = "u += share exp(-t/time_constant) (a0 sign(v) + a1 v + a2 sign(v) v^2 + a3 v^3)"
     units: ClassVar[dict[str, str]] = {"share": "1", "time_constant": "s"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"share": (-1.0, np.inf), "time_constant": (1e-6, np.inf)}
+    arrays: ClassVar[dict[str, str]] = {"share": "warm_share", "time_constant": "warm_time"}
     share: float = 0.3
     time_constant: float = 8.0
-
-    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
-        """Set share and time constant."""
-        j = self.place(arm)
-        vacant(self, draft.arrays["warm_share"][j])
-        draft.arrays["warm_share"][j] = self.share
-        draft.arrays["warm_time"][j] = self.time_constant
 
 
 @dataclass(frozen=True)
@@ -109,15 +93,9 @@ class PositionDependentFriction(Effect):
     equation: ClassVar[str] = "u += a0 share sin(q + phase) sign(v)"
     units: ClassVar[dict[str, str]] = {"share": "1", "phase": "rad"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"share": (-1.0, 1.0)}
+    arrays: ClassVar[dict[str, str]] = {"share": "position_share", "phase": "position_phase"}
     share: float = 0.3
     phase: float = 0.5
-
-    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
-        """Set share and phase."""
-        j = self.place(arm)
-        vacant(self, draft.arrays["position_share"][j])
-        draft.arrays["position_share"][j] = self.share
-        draft.arrays["position_phase"][j] = self.phase
 
 
 @dataclass(frozen=True)

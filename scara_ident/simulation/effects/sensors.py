@@ -39,17 +39,12 @@ class TorqueSensorNonlinearity(Effect):
     name: ClassVar[str] = "torque_sensor_nonlinearity"
     equation: ClassVar[str] = "recorded = u + cubic u^3"
     units: ClassVar[dict[str, str]] = {"cubic": "1/(N m)^2"}
+    arrays: ClassVar[dict[str, str]] = {"cubic": "cubic"}
     cubic: float = BY_ARM
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
         """Give a tenth at the usual torque."""
         return {"cubic": float(0.1 / arm.torque_scale[joint] ** 2)}
-
-    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
-        """Set the cubic."""
-        j = self.place(arm)
-        vacant(self, draft.cubic[j])
-        draft.cubic[j] = self.cubic
 
 
 @dataclass(frozen=True)
@@ -84,17 +79,9 @@ class OffsetDrift(Effect):
     name: ClassVar[str] = "offset_drift"
     equation: ClassVar[str] = "recorded = u + rate t"
     units: ClassVar[dict[str, str]] = {"rate": "N m/s"}
+    shares: ClassVar[dict[str, float]] = {"rate": 0.01}
+    arrays: ClassVar[dict[str, str]] = {"rate": "drift"}
     rate: float = BY_ARM
-
-    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """Give a tenth of the usual torque in 10 s."""
-        return {"rate": float(0.01 * arm.torque_scale[joint])}
-
-    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
-        """Set the rate."""
-        j = self.place(arm)
-        vacant(self, draft.drift[j])
-        draft.drift[j] = self.rate
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from scara_ident.effects.links import gravity_size, point_mass
 from scara_ident.simulation.effects.effect import BY_ARM, Effect, vacant
 
 if TYPE_CHECKING:
     from scara_ident.simulation.arm import VirtualArm
     from scara_ident.simulation.plant import PlantDraft
-
-STANDARD_GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
@@ -34,8 +33,9 @@ class BaseTilt(Effect):
         """Add to gravity."""
         nominal = np.asarray(arm.robot.model.gravity.linear)
         vacant(self, float(np.abs(draft.arrays["gravity"] - nominal).max()))
-        g = float(np.linalg.norm(nominal)) or STANDARD_GRAVITY
-        draft.arrays["gravity"] = draft.arrays["gravity"] - g * np.array([self.tilt_x, self.tilt_y, 0.0])
+        draft.arrays["gravity"] = draft.arrays["gravity"] - gravity_size(arm.robot) * np.array(
+            [self.tilt_x, self.tilt_y, 0.0]
+        )
 
 
 @dataclass(frozen=True)
@@ -61,12 +61,6 @@ class PayloadChange(Effect):
         vacant(self, float(draft.arrays["payload_time"]), np.inf)
         back = np.argsort(arm.robot.order)
         bodies = arm.bodies[back].copy()
-        bodies[-1] += point_mass(self.mass, arm.tool)
+        bodies[-1] += self.mass * point_mass(arm.tool)
         draft.arrays["bodies_after"] = turned_bodies(turned_frames(arm.robot.model)[-1], bodies)
         draft.arrays["payload_time"] = np.array(self.time)
-
-
-def point_mass(mass: float, point: np.ndarray) -> np.ndarray:
-    """Return the ten standard parameters of a point mass, Pinocchio's order, about the frame's origin."""
-    x, y, z = point
-    return mass * np.array([1.0, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from scara_ident.simulation.effects.effect import BY_ARM, Effect, vacant
+from scara_ident.simulation.effects.effect import BY_ARM, Effect
 
 if TYPE_CHECKING:
     from scara_ident.simulation.arm import VirtualArm
@@ -25,18 +25,15 @@ class UnlistedSignedSine(Effect):
     name: ClassVar[str] = "unlisted_1"
     equation: ClassVar[str] = "u_j += amplitude sin(3 q_k) sign(v_j)"
     units: ClassVar[dict[str, str]] = {"amplitude": "N m"}
+    shares: ClassVar[dict[str, float]] = {"amplitude": 0.06}
+    arrays: ClassVar[dict[str, str]] = {"amplitude": "signed_sine"}
+    joint_side = ("amplitude",)
     amplitude: float = BY_ARM
-
-    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """Give a share of the usual torque."""
-        return {"amplitude": float(0.06 * arm.torque_scale[joint])}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Set amplitude and the other joint."""
-        j = self.place(arm)
-        vacant(self, draft.arrays["signed_sine"][j])
-        draft.arrays["signed_sine"][j] = abs(draft.scale[j]) * self.amplitude
-        draft.arrays["signed_sine_of"][j] = _other(arm, self.joint)
+        super().apply(arm, draft)
+        draft.arrays["signed_sine_of"][self.place(arm)] = _other(arm, self.joint)
 
 
 @dataclass(frozen=True)
@@ -46,15 +43,12 @@ class UnlistedSwingingViscous(Effect):
     name: ClassVar[str] = "unlisted_2"
     equation: ClassVar[str] = "u_j += viscous cos(2 q_k) v_j"
     units: ClassVar[dict[str, str]] = {"viscous": "N m s/rad"}
+    shares: ClassVar[dict[str, float]] = {"viscous": 0.06}
+    arrays: ClassVar[dict[str, str]] = {"viscous": "swinging_viscous"}
+    joint_side = ("viscous",)
     viscous: float = BY_ARM
-
-    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """Give a share of the usual torque per unit of speed."""
-        return {"viscous": float(0.06 * arm.torque_scale[joint])}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Set size and the other joint."""
-        j = self.place(arm)
-        vacant(self, draft.arrays["swinging_viscous"][j])
-        draft.arrays["swinging_viscous"][j] = abs(draft.scale[j]) * self.viscous
-        draft.arrays["swinging_viscous_of"][j] = _other(arm, self.joint)
+        super().apply(arm, draft)
+        draft.arrays["swinging_viscous_of"][self.place(arm)] = _other(arm, self.joint)
