@@ -115,6 +115,8 @@ def sentences(identification: Identification) -> tuple[str, ...]:
     possible = identification.physical_consistency
     if possible.possible:
         found.append("An arm with these parameters can exist.")
+    elif possible.possible is None:
+        found.append(f"Whether an arm with these parameters can exist: {'; '.join(possible.reasons)}.")
     else:
         found.append(
             f"No real arm has these parameters: {'; '.join(possible.reasons)}. Use --method consistent for one that can exist."
