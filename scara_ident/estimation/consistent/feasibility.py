@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.errors import EstimationError, UsageError
-from scara_ident.estimation.consistent.friction import FrictionFault, friction_faults, shape_faults
-from scara_ident.estimation.consistent.options import ConsistentOptions, FrictionShape
+from scara_ident.estimation.consistent.friction import FrictionFault, friction_faults
+from scara_ident.estimation.consistent.options import ConsistentOptions
 from scara_ident.estimation.consistent.problem import DEPENDENT, Problem, Unknowns, build_unknowns, unless_panic
 from scara_ident.estimation.information import Information
 from scara_ident.model.model import TorqueModel
@@ -251,45 +251,6 @@ def _gap(result: Any) -> float:
         return np.inf
     left_over = result.r_dual * max(1.0, float(np.max(np.abs(result.x))))
     return float(abs(result.obj_val - result.obj_val_dual) + left_over)
-
-
-def arm_with(unknowns: Unknowns, value: Array) -> BestArm | None:
-    """Find a possible arm with given base parameters, None where none is found.
-
-    Parameters
-    ----------
-    unknowns : Unknowns
-    value : ndarray, shape (p,)
-        The model's parameters; bodies and rotors are sought for them, those of the other columns are taken as they are.
-    """
-    u = unknowns
-    given = fixed_columns(u, np.arange(u.place.start, u.place.stop), u.sizes(np.zeros(len(value))))
-    # The arm nearest to the nominal one may do already.
-    reference = u.reference.copy()
-    reference[11 * u.n :] = 0.0
-    x = given.corrected(reference, value)
-    found = BestArm(x, min(u.margin(x), ENOUGH), ENOUGH, np.zeros(0))
-    if found.margin <= ROUNDING:
-        found = furthest_inside(u, value, given)
-    if not found.possible:
-        return None
-    x = found.x.copy()
-    part = u.to_parameters[:, 11 * u.n :]
-    column = np.argmax(part != 0.0, axis=0)
-    x[11 * u.n :] = value[column] / part[column, np.arange(part.shape[1])]
-    return BestArm(x, found.margin, found.bound, found.multipliers)
-
-
-def is_allowed(unknowns: Unknowns, value: Array, friction: FrictionShape) -> bool:
-    """Whether friction and the signs of parameters are possible; says nothing of bodies."""
-    if np.any(value[unknowns.nonnegative] < 0.0):
-        return False
-    if friction == "free":
-        return True
-    parts = [(p, value[list(p.columns)]) for p in unknowns.polynomials]
-    if any(friction_faults(p, part) for p, part in parts):
-        return False
-    return friction != "lubricated" or not any(shape_faults(p, part) for p, part in parts)
 
 
 @one_blas_thread()

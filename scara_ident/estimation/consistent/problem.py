@@ -76,7 +76,7 @@ class Unknowns:
     reference : ndarray, shape (size,)
         Mean of the prior: the nominal arm, and zero for everything else.
     arm : tuple of Cone
-        Bodies, rotors, and limits on masses and centres of mass; on the first 11 n of x.
+        Bodies (n), rotors (n), and then limits on masses and centres of mass; on the first 11 n of x.
     others : tuple of Cone
         Friction and signs of the other columns; on [x; aux].
     polynomials : tuple of BrakingPolynomial
@@ -116,21 +116,10 @@ class Unknowns:
         return slice(0, 11 * self.n)
 
     @property
-    def limits(self) -> tuple[Cone, ...]:
-        """The part of ``arm`` that bounds masses and centres of mass."""
-        return self.arm[2 * self.n :]
-
-    @property
     def cones(self) -> tuple[Cone, ...]:
         """All constraints of the estimation problem, on [x; aux]; the arm's keep `MARGIN` from their boundary."""
         total, rigid = self.size + self.auxiliary, np.arange(11 * self.n)
         return (*(cone.inside(MARGIN).at(rigid, total) for cone in self.arm), *self.others)
-
-    @property
-    def sums(self) -> NDArray[np.intp]:
-        """Columns of bodies and rotors that are sums of what cannot be negative."""
-        columns = self.model.columns
-        return np.array([k for k in range(self.place.start, self.place.stop) if columns[k].nonnegative], dtype=np.intp)
 
     @property
     def bounded(self) -> NDArray[np.intp]:
@@ -329,14 +318,15 @@ class Problem:
         if info:
             raise EstimationError("the data hold numbers that are not finite, or a weight of the prior is 0")
         centre = root @ triangular[: u.size, u.size]
-        status = self._run(root[np.triu_indices(u.size)], centre, _SETTINGS)
-        if status != "Solved":
-            status = self._run(root[np.triu_indices(u.size)], centre, _CAREFUL)
-        if status != "Solved":
+        for settings in (_SETTINGS, _CAREFUL):
+            status = self._run(root[np.triu_indices(u.size)], centre, settings)
+            if status == "Solved":
+                break
+        else:
             raise EstimationError(_what_to_try(status))
         # A variable of no numbers has no value in cvxpy.
         auxiliary = self._auxiliary.value if u.auxiliary else np.zeros(0)
-        return Point(centre + np.triu(root) @ self._w.value, auxiliary, self._statement.multipliers())
+        return Point(centre + root @ self._w.value, auxiliary, self._statement.multipliers())
 
     def _run(self, root: Array, centre: Array, settings: dict[str, Any]) -> str:
         """Run Clarabel through cvxpy; ``Solved`` also stands for what is accepted after a careful run."""
@@ -401,11 +391,11 @@ def _triangle(size: int) -> Any:
 
 def _what_to_try(status: str) -> str:
     if "PrimalInfeasible" in status:
-        return (
-            f"the programme has no solution (CLARABEL: {status}): the given masses, centres of mass and friction "
-            "contradict each other; widen a tolerance or leave one out"
+        what = "has no solution"
+        advice = (
+            ": given masses, centres of mass and friction contradict each other; widen a tolerance or leave one out"
         )
-    return (
-        f"the programme was not solved (CLARABEL: {status}); try richer motion, another model, a larger prior_weight "
-        "or fewer limits"
-    )
+    else:
+        what = "was not solved"
+        advice = "; try richer motion, another model, a larger prior_weight or fewer limits"
+    return f"the estimation problem {what} (CLARABEL: {status}){advice}"

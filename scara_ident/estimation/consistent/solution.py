@@ -16,7 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.errors import EstimationError, UsageError
-from scara_ident.estimation.consistent.feasibility import arm_with, fixed, furthest_inside, is_allowed
+from scara_ident.estimation.consistent.feasibility import (
+    ROUNDING,
+    fixed,
+    fixed_columns,
+    furthest_inside,
+)
+from scara_ident.estimation.consistent.friction import friction_faults, shape_faults
+from scara_ident.estimation.consistent.options import FrictionShape
 from scara_ident.estimation.consistent.prior import nearest_to_nominal, prior_rows
 from scara_ident.estimation.consistent.problem import DEPENDENT, MARGIN, Point, Problem, Unknowns
 from scara_ident.estimation.information import (
@@ -255,7 +262,7 @@ def nearest_arm(
     if standard_prior is not None:
         rows.append(standard_prior.rows @ u.nominal.to_standard)
     result = x.copy()
-    result[u.rigid] = nearest_to_nominal(x[u.rigid], _unseen(np.vstack(rows)), u.limits)
+    result[u.rigid] = nearest_to_nominal(x[u.rigid], _unseen(np.vstack(rows)), u.arm[2 * u.n :])
     return result
 
 
@@ -275,10 +282,35 @@ def noise_of(information: Information, solution: Solution) -> float:
 def _determined(problem: Problem, value: Array) -> Array | None:
     """Return an arm that has these parameters, None where none is found."""
     u = problem.unknowns
-    if np.any(value[u.sums] < 0.0) or not is_allowed(u, value, problem.options.friction):
+    if not _is_allowed(u, value, problem.options.friction):
         return None
-    found = arm_with(u, value)
-    return None if found is None else _inside(u, found.x, found.margin)
+    given = fixed_columns(u, np.arange(u.place.start, u.place.stop), u.sizes(np.zeros(len(value))))
+    # The arm nearest to the nominal one may do already.
+    x = u.reference.copy()
+    x[11 * u.n :] = 0.0
+    x = given.corrected(x, value)
+    margin = u.margin(x)
+    if margin <= ROUNDING:
+        found = furthest_inside(u, value, given)
+        if not found.possible:
+            return None
+        x, margin = found.x.copy(), found.margin
+    others = u.to_parameters[:, 11 * u.n :]
+    column = np.argmax(others != 0.0, axis=0)
+    x[11 * u.n :] = value[column] / others[column, np.arange(others.shape[1])]
+    return _inside(u, x, margin)
+
+
+def _is_allowed(u: Unknowns, value: Array, friction: FrictionShape) -> bool:
+    """Whether friction and the signs of parameters are possible; says nothing of bodies."""
+    if np.any(value[u.nonnegative] < 0.0):
+        return False
+    if friction == "free":
+        return True
+    parts = [(p, value[list(p.columns)]) for p in u.polynomials]
+    if any(friction_faults(p, part) for p, part in parts):
+        return False
+    return friction != "lubricated" or not any(shape_faults(p, part) for p, part in parts)
 
 
 def _partly_determined(problem: Problem, least_squares: Solution, point: Point) -> Array | None:
@@ -293,10 +325,10 @@ def _partly_determined(problem: Problem, least_squares: Solution, point: Point) 
     size = u.sizes(least_squares.value)
     given = fixed(u, null_space((least_squares.null / size[:, None]).T, rcond=DEPENDENT).T / size)
     x = given.corrected(point.x, least_squares.value)
-    if u.margin(x) > MARGIN and is_allowed(u, u.parameters(x), friction):
+    if u.margin(x) > MARGIN and _is_allowed(u, u.parameters(x), friction):
         return x
     found = furthest_inside(u, least_squares.value, given)
-    if not found.possible or not is_allowed(u, u.parameters(found.x), friction):
+    if not found.possible or not _is_allowed(u, u.parameters(found.x), friction):
         return None
     return _inside(u, found.x, found.margin)
 
