@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from scara_ident.estimation import ConsistentEstimate
 from scara_ident.estimation.consistent.bodies import smallest_eigenvalue_share
-from scara_ident.estimation.observations import Evidence
+from scara_ident.estimation.observations import JointRows, Observations
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.motion import Motion
+from scara_ident.motion.prepared import PreparedData
 from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.threads import one_blas_thread
 from tests.arms import Link, example_urdf, motion, sines, write_urdf
-from tests.estimation.made import evidence
 
 Array = NDArray[np.float64]
 
@@ -100,11 +100,18 @@ def stroke(robot: Robot, speed: float = 0.65) -> Motion:
 
 
 @one_blas_thread()
-def observed(model: TorqueModel, item: Motion, value: Array, noise: float, seed: int = 0) -> Evidence:
-    w = model.regressor(item).transpose(0, 2, 1)
-    u = np.einsum("jnp,p->jn", w, value)
+def observed(model: TorqueModel, item: Motion, value: Array, noise: float, seed: int = 0) -> Observations:
+    """Rows of a motion, unfiltered, with white noise, in blocks of 200 samples; without prepared data."""
+    w = model.regressor(item)
+    u = np.einsum("jpn,p->jn", w, value)
     sigma = noise * np.sqrt(np.mean(u**2, axis=1, keepdims=True))
-    return evidence("made_1", w, u + sigma * np.random.default_rng(seed).standard_normal(u.shape), 200)
+    u = u + sigma * np.random.default_rng(seed).standard_normal(u.shape)
+    columns, starts = np.arange(len(value)), np.array([*range(0, u.shape[1], 200), u.shape[1]])
+    joints = tuple(
+        JointRows(columns, np.vstack([rows, torque]), starts, np.diff(starts).astype(float))
+        for rows, torque in zip(w, u, strict=True)
+    )
+    return Observations(model, PreparedData((), ()), joints, np.zeros(len(starts) - 1, dtype=np.intp), ())
 
 
 def truth(model: TorqueModel) -> Array:

@@ -12,10 +12,11 @@ from scara_ident.estimation import ConsistentOptions, consistent, links, ols, ph
 from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.consistent.options import Ellipsoid
 from scara_ident.estimation.information import merge
-from scara_ident.estimation.observations import gather
+from scara_ident.estimation.observations import observe
 from scara_ident.model.model import build_model
 from scara_ident.model.terms import Column
 from scara_ident.motion.motion import Motion
+from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import read_recording
 from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.threads import one_blas_thread
@@ -41,7 +42,7 @@ def test_an_impossible_estimate_becomes_possible_at_little_cost():
     model = build_model(ur5(), "basic")
     value = parameters(model, model.robot.standard_parameters(), (3.0, 2.0))
     item = observed(model, moving(model.robot), value, 0.2)
-    plain, found = ols(model, [item]), consistent(model, [item])
+    plain, found = ols(item), consistent(item)
     assert not physical_consistency(plain).possible
     checked = physical_consistency(found)
     assert checked.possible
@@ -51,7 +52,7 @@ def test_an_impossible_estimate_becomes_possible_at_little_cost():
     assert smallest(found) >= -1e-9
     np.testing.assert_allclose(base_of(found), found.value[found.model.place(found.model.rigid_body)], atol=1e-9)
     # It explains the torque as well as the truth does, which is possible too.
-    rows = merge(item.joint(j).scaled(float(found.weights[j])) for j in range(6))
+    rows = merge(item.by_joint[j].scaled(float(found.weights[j])) for j in range(6))
     assert rows.residual_sum(found.value) <= rows.residual_sum(value)
     other = moving(model.robot, seed=9)
     w = model.regressor(other)
@@ -66,7 +67,7 @@ def test_an_impossible_estimate_becomes_possible_at_little_cost():
 def test_the_arm_that_is_given_predicts_the_torque():
     model = scara()
     item = observed(model, stroke(model.robot), truth(model), 0.05)
-    found = consistent(model, [item])
+    found = consistent(item)
     arm = model.robot.model.copy()
     for body, k in zip(links(found), model.robot.order, strict=True):
         i = np.array(body.inertia)
@@ -88,9 +89,9 @@ def test_a_failed_solve_is_an_error_with_status_and_advice():
     item = observed(model, stroke(model.robot), truth(model), 0.05)
     impossible = ConsistentOptions(total_mass=(5.0, 0.1), link_mass={"link1": (4.0, 0.1), "link2": (4.0, 0.1)})
     with pytest.raises(EstimationError, match=r"PrimalInfeasible.*contradict each other; widen"):
-        consistent(model, [item], options=impossible)
+        consistent(item, options=impossible)
     with pytest.raises(EstimationError, match="no recording"):
-        consistent(model, [])
+        consistent(replace(item, owner=np.zeros(0, dtype=np.intp)))
 
 
 def test_known_masses_and_centres_of_mass_hold():
@@ -101,22 +102,22 @@ def test_known_masses_and_centres_of_mass_hold():
         link_mass={"joint2": (9.0, 0.2)},
         com={"link1": Ellipsoid((0.3, 0.0, 0.05), (0.05, 0.05, 0.05))},
     )
-    found = consistent(model, [item], options=options)
+    found = consistent(item, options=options)
     first, second = links(found)
     assert abs(first.mass + second.mass - 25.0) <= 0.5
     assert abs(second.mass - 9.0) <= 0.2
     assert np.linalg.norm((np.array(first.com) - (0.3, 0.0, 0.05)) / 0.05) <= 1.0
     # The masses are free to the torque, so nothing else had to give.
     assert found.was_possible
-    np.testing.assert_allclose(found.value, ols(model, [item]).value, rtol=1e-6)
-    inside = consistent(model, [item], options=ConsistentOptions(com="visual"))
+    np.testing.assert_allclose(found.value, ols(item).value, rtol=1e-6)
+    inside = consistent(item, options=ConsistentOptions(com="visual"))
     assert all(abs(body.com[1]) <= 0.08 for body in links(inside))
 
 
 def test_the_reduced_model_holds_its_missing_parameter_at_zero():
     model = scara("reduced")
     item = observed(model, stroke(model.robot), truth(model), 0.2)
-    found = consistent(model, [item])
+    found = consistent(item)
     assert abs(found.standard[12]) < 1e-9
     np.testing.assert_allclose(base_of(found), found.value[:4], rtol=1e-8)
 
@@ -126,8 +127,8 @@ def test_a_parameter_that_a_constraint_fixes_has_no_spread_of_its_own():
     value = truth(model)
     value[model.names.index("a02")] = 0.0
     weak = observed(model, moving(model.robot, size=0.05), value, 0.3, seed=2)
-    assert ols(model, [weak]).value[model.names.index("a02")] < 0.0
-    found = consistent(model, [weak])
+    assert ols(weak).value[model.names.index("a02")] < 0.0
+    found = consistent(weak)
     place = model.names.index("a02")
     assert "friction of joint2" in found.active
     assert found.value[place] == pytest.approx(0.0, abs=1e-6)
@@ -148,9 +149,9 @@ def test_a_slow_stroke_predicts_fast_motion():
     plain, braking, shaped = [], [], []
     for seed in range(5):
         item = observed(model, stroke(model.robot), value, 0.3, seed)
-        plain.append(error(ols(model, [item]).value))
-        braking.append(error(consistent(model, [item]).value))
-        shaped.append(error(consistent(model, [item], options=lubricated).value))
+        plain.append(error(ols(item).value))
+        braking.append(error(consistent(item).value))
+        shaped.append(error(consistent(item, options=lubricated).value))
     # The torque itself is 0.2 N m.
     assert np.median(plain) > 0.8
     assert np.median(braking) < 0.5 * np.median(plain)
@@ -182,11 +183,11 @@ def test_a_further_term_keeps_the_signs_that_it_declares():
     for stiffness in (0.05, -0.05):
         value = np.append(truth(plain), stiffness)
         item = observed(model, moving(model.robot), value, 0.02)
-        found = consistent(model, [item])
+        found = consistent(item)
         assert found.was_possible == (stiffness > 0.0)
-        assert found.value[-1] == pytest.approx(max(stiffness, 0.0), abs=3.0 * ols(model, [item]).std[-1] + 1e-6)
+        assert found.value[-1] == pytest.approx(max(stiffness, 0.0), abs=3.0 * ols(item).std[-1] + 1e-6)
         assert ("stiffness" in found.active) == (stiffness < 0.0)
-    assert "stiffness = spring = -0.0" in physical_consistency(ols(model, [item])).reasons[0]
+    assert "stiffness = spring = -0.0" in physical_consistency(ols(item)).reasons[0]
 
 
 def test_slow_stroke_of_the_cases_predicts_the_paper_trajectory():
@@ -194,17 +195,17 @@ def test_slow_stroke_of_the_cases_predicts_the_paper_trajectory():
     recordings = [
         shared_path("cases", "nothing_missing", *p) for p in (("test", "L2_1.parquet"), ("train", "OJD_1.parquet"))
     ]
-    slow, fast = (read_recording(path, model.robot) for path in recordings)
-    bands = choose_bands(model, [slow]).bands
-    seen, held_out = gather(model, slow, bands), gather(model, fast, bands)
+    slow, fast = (prepare([read_recording(path, model.robot)]) for path in recordings)
+    bands = choose_bands(model, slow).bands
+    seen, held_out = observe(model, slow.at(bands)), observe(model, fast.at(bands))
 
     def error(estimate) -> float:
         found = estimate.errors(held_out)[0]
         assert found is not None
         return found.rms
 
-    assert error(consistent(model, [seen])) < min(0.5, error(ols(model, [seen])))
-    assert error(consistent(model, [seen], options=ConsistentOptions(friction="lubricated"))) < 0.12
+    assert error(consistent(seen)) < min(0.5, error(ols(seen)))
+    assert error(consistent(seen, options=ConsistentOptions(friction="lubricated"))) < 0.12
 
 
 @one_blas_thread()
@@ -213,8 +214,9 @@ def test_ur10e_measured_is_possible_and_predicts_as_well():
     model = build_model(robot, "basic")
     names = ("ident_50s_12harm", "ident_50s_14harm_noload", "ident_40s_12harm")
     recordings = [read_recording(shared_path("data", "ur10e", f"{name}.parquet"), robot) for name in names]
-    *training, held_out = (gather(model, recording, (6.0,) * 6) for recording in recordings)
-    plain, found = ols(model, training), consistent(model, training)
+    training = observe(model, prepare(recordings[:2], (6.0,) * 6))
+    held_out = observe(model, prepare(recordings[2:], (6.0,) * 6))
+    plain, found = ols(training), consistent(training)
     assert not found.was_possible
     assert physical_consistency(found).possible
     assert smallest(found) >= -1e-9

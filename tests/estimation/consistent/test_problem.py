@@ -27,7 +27,7 @@ def test_the_problem_is_a_parametrised_one_of_one_size_and_repeats():
     shapes = set()
     for seed, count in enumerate((50, 500, 5000)):
         item = observed(model, moving(model.robot, seed, count, size=0.05), truth(model), 0.3)
-        rows = merge(item.joint(j) for j in range(2))
+        rows = merge(item.by_joint)
         again = solve_consistent(problem, rows)
         fresh = solve_consistent(Problem(model), rows)
         assert again.point is not None

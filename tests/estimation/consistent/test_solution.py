@@ -63,7 +63,7 @@ def test_where_least_squares_is_possible_it_is_the_estimate_whatever_the_urdf_sa
     for factor in (1.0, 5.0, 0.1):
         model = build_model(heavier(load_robot(), factor), "complete")
         item = observed(model, moving(model.robot), truth(scara()), 0.05)
-        plain, found = ols(model, [item]), consistent(model, [item])
+        plain, found = ols(item), consistent(item)
         assert found.was_possible
         assert found.active == ()
         np.testing.assert_allclose(found.value, plain.value, rtol=1e-6)
@@ -75,18 +75,18 @@ def test_where_least_squares_is_possible_it_is_the_estimate_whatever_the_urdf_sa
 def test_weighted_least_squares_is_the_estimate_where_it_is_possible_and_asked_for():
     model = scara()
     item = observed(model, moving(model.robot), truth(model), 0.05)
-    found = consistent(model, [item], options=ConsistentOptions(weighting="noise"))
-    np.testing.assert_allclose(found.value, wls(model, [item]).value, rtol=1e-6)
+    found = consistent(item, options=ConsistentOptions(weighting="noise"))
+    np.testing.assert_allclose(found.value, wls(item).value, rtol=1e-6)
     given = ConsistentOptions(weighting="noise", noise=np.array([0.02, 0.008]))
-    plain = wls(model, [item], np.array([0.02, 0.008]))
-    np.testing.assert_allclose(consistent(model, [item], options=given).value, plain.value, rtol=1e-6)
+    plain = wls(item, np.array([0.02, 0.008]))
+    np.testing.assert_allclose(consistent(item, options=given).value, plain.value, rtol=1e-6)
     with pytest.raises(UsageError, match="noise: expected 2 numbers"):
-        consistent(model, [item], options=ConsistentOptions(weighting="noise", noise=np.ones(3)))
+        consistent(item, options=ConsistentOptions(weighting="noise", noise=np.ones(3)))
 
 
 def test_what_torque_does_not_determine_is_nearest_to_nominal():
     model = scara()
-    found = consistent(model, [observed(model, moving(model.robot), truth(model), 0.0)])
+    found = consistent(observed(model, moving(model.robot), truth(model), 0.0))
     # With the nominal arm's own torque the nominal arm comes back, in all 22 standard parameters.
     np.testing.assert_allclose(found.standard, model.robot.standard_parameters(), rtol=1e-4, atol=1e-5)
 
@@ -96,14 +96,14 @@ def test_a_joint_that_never_moves_keeps_its_nominal_body():
     item = moving(model.robot)
     still = motion(item.q * [[1.0], [0.0]], item.v * [[1.0], [0.0]], item.a * [[1.0], [0.0]], rate=200.0)
     seen = observed(model, still, truth(model), 0.02)
-    found = consistent(model, [seen])
+    found = consistent(seen)
     assert np.any(found.undetermined)
     assert np.isinf(found.std[found.undetermined]).all()
     rotor = model.names.index("P_d5")
     nominal = truth(model)
     assert found.value[rotor] == pytest.approx(nominal[rotor], rel=1e-3)
     # What the first joint does tell, the sum of inertias at this angle, is least squares'.
-    plain = ols(model, [seen])
+    plain = ols(seen)
     np.testing.assert_allclose(found.predict(still)[0], plain.predict(still)[0], atol=1e-6)
     assert smallest(found) > 0.0
 
@@ -111,7 +111,7 @@ def test_a_joint_that_never_moves_keeps_its_nominal_body():
 def test_free_friction_is_left_alone():
     model = scara()
     item = observed(model, stroke(model.robot), truth(model), 0.05, seed=3)
-    found = consistent(model, [item], options=ConsistentOptions(friction="free"))
+    found = consistent(item, options=ConsistentOptions(friction="free"))
     assert not any("friction" in text for text in found.active)
     assert any("friction" in reason for reason in physical_consistency(found).reasons)
 
@@ -121,21 +121,21 @@ def test_a_velocity_limit_can_be_given():
     item = observed(model, stroke(model.robot), truth(model), 0.05, seed=3)
     # Up to the speed that was seen plain least squares is possible.
     slow = ConsistentOptions(speed={"joint1": 0.6, "joint2": 0.6})
-    found = consistent(model, [item], options=slow)
+    found = consistent(item, options=slow)
     assert not any("friction" in text for text in found.active)
 
 
 def test_priors_on_parameters_and_standard_parameters_count():
     model = scara()
     item = observed(model, stroke(model.robot), truth(model), 0.05)
-    free = consistent(model, [item])
-    known = consistent(model, [item], options=ConsistentOptions(priors={"P_d1": (16.0, 0.05), "m2": (8.0, 0.01)}))
+    free = consistent(item)
+    known = consistent(item, options=ConsistentOptions(priors={"P_d1": (16.0, 0.05), "m2": (8.0, 0.01)}))
     assert known.value[0] == pytest.approx(16.0, abs=0.2)
     assert abs(free.value[0] - 16.0) > abs(known.value[0] - 16.0)
     assert links(known)[1].mass == pytest.approx(8.0, abs=0.05)
     assert smallest(known) > 0.0
     with pytest.raises(UsageError, match="prior of 'P_d9'"):
-        consistent(model, [item], options=ConsistentOptions(priors={"P_d9": (1.0, 0.1)}))
+        consistent(item, options=ConsistentOptions(priors={"P_d9": (1.0, 0.1)}))
 
 
 @one_blas_thread()
@@ -146,7 +146,7 @@ def test_larger_arms_stay_possible_however_poor_the_data(arm):
     value = parameters(model, model.robot.standard_parameters(), (2.0, 1.0))
     for seed in range(3):
         item = observed(model, stroke(model.robot, 0.3), value, 0.3, seed)
-        rows = merge(item.joint(j) for j in range(model.robot.n))
+        rows = merge(item.by_joint)
         found = solve_consistent(problem, rows)
         x = nearest_arm(problem, rows, found.x)
         standard = problem.unknowns.standard(x)
