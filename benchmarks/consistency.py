@@ -278,7 +278,7 @@ def timings(name: str) -> dict[str, object]:
         "repeated_estimate_ms": 1e3 * estimating,
         "times_faster_first": of_all / first,
         "times_faster": of_all / (compressing + solving),
-        "difference_in_std": float(np.linalg.norm(factor @ (everything - found))),
+        "difference_in_std": float(np.linalg.norm(information.regressor_factor @ (everything - found)) / noise),
     }
 
 

@@ -268,7 +268,6 @@ class Problem:
     ----------
     options : ConsistentOptions
     unknowns : Unknowns
-    cvxpy : cvxpy.Problem
     """
 
     def __init__(self, model: TorqueModel, options: ConsistentOptions | None = None) -> None:
@@ -318,8 +317,9 @@ class Problem:
         if info:
             raise EstimationError("the data hold numbers that are not finite, or a weight of the prior is 0")
         centre = root @ triangular[: u.size, u.size]
-        for settings in (_SETTINGS, _CAREFUL):
-            status = self._run(root[np.triu_indices(u.size)], centre, settings)
+        # A solution that stops short counts if a careful run brings no better one.
+        for settings, accept in ((_SETTINGS, False), (_CAREFUL, True), (_SETTINGS, True)):
+            status = self._run(root[np.triu_indices(u.size)], centre, settings, accept)
             if status == "Solved":
                 break
         else:
@@ -328,8 +328,8 @@ class Problem:
         auxiliary = self._auxiliary.value if u.auxiliary else np.zeros(0)
         return Point(centre + root @ self._w.value, auxiliary, self._statement.multipliers())
 
-    def _run(self, root: Array, centre: Array, settings: dict[str, Any]) -> str:
-        """Run Clarabel through cvxpy; ``Solved`` also stands for what is accepted after a careful run."""
+    def _run(self, root: Array, centre: Array, settings: dict[str, Any], accept: bool) -> str:
+        """Run Clarabel through cvxpy; ``Solved`` also stands for a solution that stops short and is accepted."""
         import cvxpy as cp
 
         # Quick for parameters by the hundred; releases of cvxpy without it choose for themselves.
@@ -338,10 +338,9 @@ class Problem:
         problem = self.cvxpy
         self._root.value, self._centre.value = root, centre
         data, chain, inverse = problem.get_problem_data(cp.CLARABEL, canon_backend=backend, solver_opts=options)
-        warm = settings is _SETTINGS
-        result = unless_panic(lambda: chain.solve_via_data(problem, data, warm_start=warm, solver_opts=settings))
+        result = unless_panic(lambda: chain.solve_via_data(problem, data, settings is _SETTINGS, False, settings))
         status = "Panic" if result is None else str(result.status)
-        if settings is _CAREFUL and status in ("AlmostSolved", "InsufficientProgress"):
+        if accept and status in ("AlmostSolved", "InsufficientProgress"):
             gap = abs(result.obj_val - result.obj_val_dual)
             if gap <= max(ACCEPTED_GAP, ACCEPTED_RELATIVE_GAP * abs(result.obj_val)):
                 status = "Solved" if result.r_prim <= ACCEPTED_RESIDUAL else status
