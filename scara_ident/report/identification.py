@@ -116,7 +116,8 @@ def sentences(identification: Identification) -> tuple[str, ...]:
     if possible.possible:
         found.append("An arm with these parameters can exist.")
     elif possible.possible is None:
-        found.append(f"Whether an arm with these parameters can exist: {'; '.join(possible.reasons)}.")
+        why = "; ".join(possible.reasons)
+        found.append(f"{why[0].upper()}{why[1:]}.")
     else:
         found.append(
             f"No real arm has these parameters: {'; '.join(possible.reasons)}. Use --method consistent for one that can exist."

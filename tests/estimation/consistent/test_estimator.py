@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from scara_ident.errors import EstimationError
 from scara_ident.estimation import ConsistentOptions, consistent, links, ols, physical_consistency
 from scara_ident.estimation.bands import choose_bands
+from scara_ident.estimation.consistent.estimator import _inverse_along
 from scara_ident.estimation.consistent.options import Ellipsoid
-from scara_ident.estimation.information import merge
+from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import observe
 from scara_ident.model.model import build_model
 from scara_ident.model.terms import Column
@@ -222,3 +223,13 @@ def test_ur10e_measured_is_possible_and_predicts_as_well():
     assert smallest(found) >= -1e-9
     for before, after in zip(plain.errors(held_out), found.errors(held_out), strict=True):
         assert after.rms <= 1.05 * before.rms
+
+
+def test_the_solvers_last_digits_are_no_direction_to_move_in():
+    rng = np.random.default_rng(0)
+    rows = rng.standard_normal((50, 5))
+    information = Information.empty(5).absorb(rows, rng.standard_normal(50))
+    allowed = rng.standard_normal((5, 3))
+    rounding = np.column_stack([allowed, 1e-8 * rng.standard_normal(5)])
+    exact = allowed @ np.linalg.inv(allowed.T @ rows.T @ rows @ allowed) @ allowed.T
+    np.testing.assert_allclose(_inverse_along(information, rounding, np.ones(5)), exact, atol=1e-7)
