@@ -2,7 +2,7 @@
 
 Random arms that can exist, excited richly, less and less, and at last by a single slow stroke, with noise from none
 to 30 % of each joint's torque. Ordinary least squares and the consistent estimate see the same rows; both predict the
-torque of another, rich trajectory. Then the same programme is fed with all rows instead of their triangular factor.
+torque of another, rich trajectory. Then the same problem is given with all rows instead of their triangular factor.
 Prints tables and writes JSON.
 
     python benchmarks/consistency.py --draws 50 --output benchmarks/results/consistency.json
@@ -28,10 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.estimation.consistent.bodies import pack, smallest_eigenvalue_share
-from scara_ident.estimation.consistent.friction_certificate import friction_faults
-from scara_ident.estimation.consistent.programme import Programme, constraints_on
-from scara_ident.estimation.consistent.pull import prior_rows
-from scara_ident.estimation.consistent.solution import fill, least_squares_arm, solve_consistent, solve_joints
+from scara_ident.estimation.consistent.friction import friction_faults
+from scara_ident.estimation.consistent.prior import prior_rows
+from scara_ident.estimation.consistent.problem import Problem, constraints_on
+from scara_ident.estimation.consistent.solution import least_squares_arm, nearest_arm, solve_consistent, solve_joints
 from scara_ident.estimation.information import Information, merge
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.motion import Motion
@@ -62,8 +62,8 @@ def arm(name: str) -> Robot:
 
 
 @cache
-def programme(name: str) -> Programme:
-    return Programme(build_model(arm(name), MODELS[name]))
+def problem(name: str) -> Problem:
+    return Problem(build_model(arm(name), MODELS[name]))
 
 
 def sines(robot: Robot, rng: np.random.Generator, seconds: float, harmonics: int, speed: float) -> Motion:
@@ -107,7 +107,7 @@ EXCITATION: dict[str, Callable[[Robot, np.random.Generator], Motion]] = {
 
 def truth(name: str, rng: np.random.Generator) -> Array:
     """Parameters of a random arm that can exist."""
-    u = programme(name).unknowns
+    u = problem(name).unknowns
     x = np.zeros(u.size)
     for i in range(u.n):
         noise = SPREAD * rng.standard_normal((4, 4))
@@ -152,7 +152,7 @@ class Draw:
 
 def draw(name: str, excitation: str, noise: float, seed: int) -> Draw:
     rng = np.random.default_rng([seed, *map(ord, name + excitation)])
-    robot, solver = arm(name), programme(name)
+    robot, solver = arm(name), problem(name)
     model, u = solver.unknowns.model, solver.unknowns
     value = truth(name, rng)
     regressor, exact = torque(model, EXCITATION[excitation](robot, rng), value)
@@ -166,7 +166,7 @@ def draw(name: str, excitation: str, noise: float, seed: int) -> Draw:
     middle = time.perf_counter()
     found, used, _ = solve_joints(solver, joints)
     end = time.perf_counter()
-    x = fill(solver, used, found.x)
+    x = nearest_arm(solver, used, found.x)
     filled = time.perf_counter()
     estimate, standard = u.parameters(x), u.standard(x)
     shares = [smallest_eigenvalue_share(body) for body in standard[: 10 * u.n].reshape(u.n, 10)]
@@ -229,23 +229,23 @@ def summary(name: str, excitation: str, noise: float, draws: list[Draw]) -> dict
     }
 
 
-def all_rows(solver: Programme, rows: Array, measured: Array, noise: float, prior: Array) -> Array:
-    """Solve the same programme with every row in its cost; nothing of it is compiled before."""
+def all_rows(solver: Problem, rows: Array, measured: Array, noise: float, prior: Array) -> Array:
+    """Solve the same problem with every row in its cost; nothing of it is compiled before."""
     import cvxpy as cp
 
     u = solver.unknowns
     x, auxiliary = cp.Variable(u.size), cp.Variable(u.auxiliary)
     cost = cp.sum_squares(rows @ u.to_parameters / noise @ x - measured / noise)
     cost += cp.sum_squares(prior @ (x - u.reference))
-    problem = cp.Problem(cp.Minimize(cost), constraints_on(u, x, auxiliary))
-    problem.solve(cp.CLARABEL)
+    statement, held = constraints_on(u, x, auxiliary)
+    cp.Problem(cp.Minimize(cost), statement.constraints + held).solve(cp.CLARABEL)
     return u.parameters(np.asarray(x.value))
 
 
 def timings(name: str) -> dict[str, object]:
-    """Time one estimate from 1e4 samples: from all rows, from their factor with a new programme, and again."""
+    """Time one estimate from 1e4 samples: from all rows, from their factor with a new problem, and again."""
     rng = np.random.default_rng(1)
-    robot, solver = arm(name), programme(name)
+    robot, solver = arm(name), problem(name)
     model, u = solver.unknowns.model, solver.unknowns
     motion = sines(robot, rng, TIMED_SAMPLES / RATE, 5, 0.6)
     regressor, exact = torque(model, motion, truth(name, rng))
@@ -255,13 +255,14 @@ def timings(name: str) -> dict[str, object]:
 
     information = merge(factors(regressor, measured))
     noise = information.rms()
-    factor, target = information.regressor_factor / noise, information.projected_torque / noise
+    factor, target = information.regressor_factor @ u.to_parameters / noise, information.projected_torque / noise
     everything, of_all = best(3, lambda: all_rows(solver, rows, measured.ravel(), noise, prior))
 
     def first_time() -> Array:
         compressed = merge(factors(regressor, measured)).scaled(1.0 / noise)
-        fresh = Programme(model)
-        return fresh.solve(compressed.regressor_factor, compressed.projected_torque, prior).parameters
+        fresh = Problem(model)
+        point = fresh.solve(compressed.regressor_factor @ u.to_parameters, compressed.projected_torque, prior)
+        return u.parameters(point.x)
 
     found, first = best(3, first_time)
     _, compressing = best(15, lambda: merge(factors(regressor, measured)))
@@ -277,7 +278,7 @@ def timings(name: str) -> dict[str, object]:
         "repeated_estimate_ms": 1e3 * estimating,
         "times_faster_first": of_all / first,
         "times_faster": of_all / (compressing + solving),
-        "difference_in_std": float(np.linalg.norm(factor @ (everything - found))),
+        "difference_in_std": float(np.linalg.norm(information.regressor_factor @ (everything - found)) / noise),
     }
 
 

@@ -154,7 +154,7 @@ def identify(
 
 
 def identified_arm(identification: Identification) -> ConsistentEstimate | None:
-    """Return the estimate with all standard parameters of the links, None where no such arm can exist.
+    """Return the estimate with all standard parameters of the links, None where no such arm is known to exist.
 
     Where plain least squares belongs to an arm that can exist, that arm has its base parameters.
     """

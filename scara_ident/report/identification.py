@@ -115,6 +115,9 @@ def sentences(identification: Identification) -> tuple[str, ...]:
     possible = identification.physical_consistency
     if possible.possible:
         found.append("An arm with these parameters can exist.")
+    elif possible.possible is None:
+        why = "; ".join(possible.reasons)
+        found.append(f"{why[0].upper()}{why[1:]}.")
     else:
         found.append(
             f"No real arm has these parameters: {'; '.join(possible.reasons)}. Use --method consistent for one that can exist."

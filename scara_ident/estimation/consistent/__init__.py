@@ -1,1 +1,1 @@
-"""What a real arm can have: bodies, friction, limits, and the programme that keeps an estimate within them."""
+"""Estimates within what a real arm can have: bodies with mass, friction that brakes, known limits."""

@@ -12,6 +12,7 @@ units multiplies P and P0 alike and leaves Q as it is up to a rotation. What is 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pinocchio as pin
@@ -21,30 +22,38 @@ from scara_ident.model.base_parameters import pseudo_inertia
 
 Array = NDArray[np.float64]
 
-# Entries of a symmetric 4x4 matrix in the order of its packed form: the upper triangle column by column.
-_ROWS = np.array([i for j in range(4) for i in range(j + 1)])
-_COLUMNS = np.array([j for j in range(4) for i in range(j + 1)])
-# Off-diagonal entries weigh sqrt(2), so that packed vectors have the inner product of the matrices.
-_WEIGHT = np.where(_ROWS == _COLUMNS, 1.0, np.sqrt(2.0))
-PACKED_IDENTITY = np.where(_ROWS == _COLUMNS, 1.0, 0.0)
+
+@cache
+def _entries(size: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Rows and columns of the upper triangle column by column, as Clarabel packs it, and the weight of each entry."""
+    columns, rows = np.tril_indices(size)
+    # Off-diagonal entries weigh sqrt(2), so that packed vectors have the inner product of the matrices.
+    return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
 
 
 def pack(matrix: Array) -> Array:
-    """Pack symmetric matrices, shape (..., 4, 4), into vectors, shape (..., 10), keeping the inner product."""
-    return np.asarray(matrix[..., _ROWS, _COLUMNS] * _WEIGHT)
+    """Pack symmetric matrices, shape (..., k, k), into vectors, shape (..., k (k + 1) / 2), keeping the inner product."""
+    rows, columns, weight = _entries(matrix.shape[-1])
+    return np.asarray(matrix[..., rows, columns] * weight)
 
 
 def unpack(vector: Array) -> Array:
-    """Undo `pack`: vectors, shape (..., 10), to symmetric matrices, shape (..., 4, 4)."""
-    matrix = np.zeros((*vector.shape[:-1], 4, 4))
-    matrix[..., _ROWS, _COLUMNS] = vector / _WEIGHT
-    matrix[..., _COLUMNS, _ROWS] = vector / _WEIGHT
+    """Undo `pack`: vectors, shape (..., k (k + 1) / 2), to symmetric matrices, shape (..., k, k)."""
+    size = int(np.sqrt(2 * vector.shape[-1]))
+    rows, columns, weight = _entries(size)
+    matrix = np.zeros((*vector.shape[:-1], size, size))
+    matrix[..., rows, columns] = vector / weight
+    matrix[..., columns, rows] = vector / weight
     return matrix
 
 
-def unpacking() -> Array:
-    """Return the constant matrix, shape (16, 10), that takes a packed vector to its matrix row by row."""
-    return unpack(np.eye(10)).reshape(10, 16).T
+def unpacking(length: int = 10) -> Array:
+    """Return the constant matrix, shape (k^2, length), that takes a packed vector to its matrix row by row."""
+    return unpack(np.eye(length)).reshape(length, -1).T
+
+
+PACKED_IDENTITY = pack(np.eye(4))
+"""The nominal body relative to itself, shape (10,)."""
 
 
 def packed_pseudo_inertia() -> Array:
@@ -77,25 +86,9 @@ class LinkInertia:
 def link_inertia(name: str, parameters: Array) -> LinkInertia:
     """Write a body's ten standard parameters as mass, centre of mass and central inertia."""
     body = pin.Inertia.FromDynamicParameters(np.asarray(parameters, dtype=float))
-    centre, about = np.asarray(body.lever), np.asarray(body.inertia)
-    return LinkInertia(
-        name,
-        float(body.mass),
-        (float(centre[0]), float(centre[1]), float(centre[2])),
-        (
-            float(about[0, 0]),
-            float(about[0, 1]),
-            float(about[0, 2]),
-            float(about[1, 1]),
-            float(about[1, 2]),
-            float(about[2, 2]),
-        ),
-    )
-
-
-def smallest_share(bodies: Array) -> float:
-    """Return the smallest eigenvalue of bodies relative to nominal, packed one after another, shape (10 n,)."""
-    return float(np.min(np.linalg.eigvalsh(unpack(bodies.reshape(-1, 10)))))
+    x, y, z = np.asarray(body.lever).tolist()
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = np.asarray(body.inertia).tolist()
+    return LinkInertia(name, float(body.mass), (x, y, z), (xx, xy, xz, yy, yz, zz))
 
 
 def smallest_eigenvalue_share(parameters: Array) -> float:

@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.errors import EstimationError, UsageError
-from scara_ident.estimation.consistent.activity import active, tangent
 from scara_ident.estimation.consistent.bodies import LinkInertia, link_inertia
-from scara_ident.estimation.consistent.feasibility import PhysicalConsistency, check_possible
-from scara_ident.estimation.consistent.matching import sizes
+from scara_ident.estimation.consistent.constraints import active_set
+from scara_ident.estimation.consistent.feasibility import PhysicalConsistency, check_consistency
 from scara_ident.estimation.consistent.options import ConsistentOptions
-from scara_ident.estimation.consistent.programme import MARGIN, Programme
-from scara_ident.estimation.consistent.solution import StandardPrior, fill, solve_joints
-from scara_ident.estimation.consistent.unknowns import Unknowns
+from scara_ident.estimation.consistent.problem import DEPENDENT, MARGIN, Point, Problem, Unknowns
+from scara_ident.estimation.consistent.solution import StandardPrior, nearest_arm, solve_joints
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import UNDETERMINED, Information
@@ -25,6 +23,9 @@ from scara_ident.threads import one_blas_thread
 __all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "physical_consistency"]
 
 Array = NDArray[np.float64]
+
+# Directions that active constraints allow by less than this are what the solver's digits leave of forbidden ones.
+DIGITS = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +43,9 @@ class ConsistentEstimate(Estimate):
         Standard parameters of bodies and rotors, see `Robot.standard_parameters`. They give the estimated base
         parameters to rounding and are nearest to the URDF's in everything else.
     active : tuple of str
-        What holds the estimate, such as ``inertia of link2`` or ``friction of joint1``.
+        Active constraints, such as ``inertia of link2`` or ``friction of joint1``.
     was_possible : bool
-        Whether plain least squares was possible, so that nothing had to give.
+        Whether plain least squares was possible and is the estimate.
     notes : tuple of str
         What a person should know, such as nominal bodies that the URDF lacks.
     """
@@ -60,22 +61,22 @@ def consistent(
     observations: Observations,
     *,
     options: ConsistentOptions | None = None,
-    programme: Programme | None = None,
+    problem: Problem | None = None,
 ) -> ConsistentEstimate:
     """Estimate by least squares among all arms that can exist.
 
     Every body has a positive semidefinite pseudo-inertia (Wensing, Kim, Slotine 2018) and every rotor a positive
     inertia; friction takes energy out and can be overcome by the motor; each further term keeps what it declares.
-    What torque cannot determine is filled from the nominal bodies (see `nearest_to_nominal`). Where plain least
-    squares is possible it is the result; else directions that the data hardly determine are drawn to the nominal
-    bodies as well, see ``prior_weight`` of `ConsistentOptions`.
+    Where plain least squares is possible it is the result; else a prior on the nominal bodies acts on directions that
+    the data hardly determine, see ``prior_weight`` of `ConsistentOptions`. The standard parameters are those nearest to
+    the nominal bodies among all that have the estimated base parameters (see `nearest_to_nominal`).
 
     Parameters
     ----------
     observations : Observations
     options : ConsistentOptions, optional
-    programme : Programme, optional
-        Compiled with the same model and options, to spare compiling it again.
+    problem : Problem, optional
+        Compiled with the same model and options, to spare compiling it again; then its options count.
 
     Returns
     -------
@@ -84,25 +85,24 @@ def consistent(
     Raises
     ------
     EstimationError
-        If there is nothing to estimate from or the programme cannot be solved.
+        If there is nothing to estimate from or the problem cannot be solved.
     UsageError
         If an option names what the robot or the model does not have.
     """
     model = observations.model
-    if programme is None:
-        programme = Programme(model, options)
-    options = programme.options
+    problem = problem or Problem(model, options)
+    options = problem.options
     if not observations.blocks:
         raise EstimationError("no recording to estimate from")
-    u = programme.unknowns
+    u = problem.unknowns
     parameter_prior, standard_prior = _priors(u, options)
     found, information, weights = solve_joints(
-        programme, observations.by_joint, parameter_prior=parameter_prior, standard_prior=standard_prior
+        problem, observations.by_joint, parameter_prior=parameter_prior, standard_prior=standard_prior
     )
-    x = fill(programme, information, found.x, standard_prior=standard_prior)
+    x = nearest_arm(problem, information, found.x, standard_prior=standard_prior)
     value = u.parameters(x)
-    held, labels = active(u, found.point) if found.point is not None else (np.zeros((0, u.size + u.auxiliary)), ())
-    inverse = _inverse_along(information, tangent(u, held), sizes(u, value))
+    free, labels = _free_directions(u, found.point)
+    inverse = _inverse_along(information, free, u.sizes(value))
     spread = block_covariance(inverse, value, observations.joints, observations.owner, weights)
     undetermined = information.solve().undetermined
     covariance = spread.matrix.copy()
@@ -151,7 +151,7 @@ def physical_consistency(estimate: Estimate) -> PhysicalConsistency:
     -------
     PhysicalConsistency
     """
-    return check_possible(estimate.model, estimate.value, information=estimate.information)
+    return check_consistency(estimate.model, estimate.value, information=estimate.information)
 
 
 def _priors(u: Unknowns, options: ConsistentOptions) -> tuple[Information | None, StandardPrior | None]:
@@ -176,10 +176,24 @@ def _priors(u: Unknowns, options: ConsistentOptions) -> tuple[Information | None
     return on_model, StandardPrior(np.array(rows), np.array(target)) if rows else None
 
 
+def _free_directions(u: Unknowns, point: Point | None) -> tuple[Array, tuple[str, ...]]:
+    """Return the directions in which the parameters can still move, shape (p, k), and what is active."""
+    from scipy.linalg import null_space
+
+    free, labels = np.eye(u.size), tuple[str, ...]()
+    if point is not None:
+        whole = np.concatenate([point.x, point.auxiliary])
+        rows, labels = active_set(u.cones, whole, point.multipliers)
+        free = null_space(rows, rcond=DEPENDENT)[: u.size]
+    if len(u.held):
+        free = free @ null_space(u.held @ free, rcond=DEPENDENT)
+    return u.to_parameters @ free, labels
+
+
 def _inverse_along(information: Information, directions: Array, size: Array) -> Array:
     """Inverse of ``W.T @ W`` on the determined part of the directions, shape (p, p)."""
     left, singular, _ = np.linalg.svd(directions / size[:, None], full_matrices=False)
-    basis = size[:, None] * left[:, singular > 1e-9 * singular[0]] if singular.size else np.zeros((len(size), 0))
+    basis = size[:, None] * left[:, singular > DIGITS * singular[0]] if singular.size else np.zeros((len(size), 0))
     seen = information.regressor_factor @ basis
     length = np.linalg.norm(seen, axis=0)
     basis, seen = basis[:, length > 0.0] / length[length > 0.0], seen[:, length > 0.0] / length[length > 0.0]
@@ -192,7 +206,7 @@ def _inverse_along(information: Information, directions: Array, size: Array) -> 
 
 
 def _notes(
-    u: Unknowns, options: ConsistentOptions, held_by: tuple[str, ...], value: Array, covariance: Array
+    u: Unknowns, options: ConsistentOptions, active: tuple[str, ...], value: Array, covariance: Array
 ) -> tuple[str, ...]:
     notes = list(u.nominal.notes)
     if options.friction != "free":
@@ -202,11 +216,11 @@ def _notes(
                 f"{', '.join(slow)}: no velocity limit is known; friction takes energy out at every speed, and the "
                 "motor's limit is not used"
             )
-    if held_by:
-        notes.append(f"held by what an arm can have: {', '.join(held_by)}")
-    moved = MARGIN * sizes(u, value)
+    if active:
+        notes.append(f"held by what an arm can have: {', '.join(active)}")
+    moved = MARGIN * u.sizes(value)
     std = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
-    if held_by and np.any((std > 0.0) & (moved > 0.1 * std)):
+    if active and np.any((std > 0.0) & (moved > 0.1 * std)):
         notes.append(
             f"the data are so good that the distance of {MARGIN:g} kept from bodies without extent is more than a "
             "tenth of a standard deviation"

@@ -86,7 +86,7 @@ def nominal(robot: Robot) -> Nominal:
         armature[unknown] = ROTOR_SHARE * _moved(robot, stacked)[unknown]
         names = ", ".join(name for name, is_unknown in zip(robot.joints, unknown, strict=True) if is_unknown)
         notes.append(
-            f"rotor inertia of {names}: not in the URDF; where torque cannot tell it, it is taken near "
+            f"rotor inertia of {names}: not in the URDF; where torque does not determine it, it is taken near "
             f"{ROTOR_SHARE:.0%} of what the joint moves"
         )
     return Nominal(stacked, armature, _to_standard(stacked, armature), tuple(notes))

@@ -55,15 +55,14 @@ class ConsistentOptions:
         parameter such as ``m2``.
     weighting : {"auto", "equal", "noise"}
         Every joint's rows count the same, as in ordinary least squares, or are divided by the joint's noise. By
-        default ordinary least squares is the answer where it is possible; where something has to give, it gives
-        where the data are least sure, which takes each joint's noise.
+        default ordinary least squares is the answer where it is possible, and else rows are divided by the noise.
     noise : ndarray, shape (n,), optional
         Standard deviation of each joint's torque; by default its residual in ordinary least squares.
     prior_weight : float
         Weight of the nominal bodies against the data where plain least squares is impossible: a change of a body by
         its own size against one standard deviation of the noise. The default of 0.01 moves no direction that the
         data determine by as much as a tenth of its standard deviation, however wrong the URDF is, see
-        `scara_ident.estimation.consistent.pull`.
+        `scara_ident.estimation.consistent.prior`.
     """
 
     friction: FrictionShape = "dissipative"

@@ -1,72 +1,130 @@
-"""The bodies nearest to the nominal ones among all that give the same base parameters.
+"""The nominal arm as prior: as a quadratic penalty with the data, and where the data determine nothing.
 
-Near is meant in the entropic divergence of pseudo-inertias (Lee, Wensing, Park 2020, "Geometric robot dynamic
-identification: a convex programming approach")
+The distance between bodies is the entropic divergence of their pseudo-inertias (Lee, Wensing, Park 2020, "Geometric
+robot dynamic identification: a convex programming approach")
 
     D(P | P0) = tr(P0^-1 P) - log det(P0^-1 P) - 4,
 
-which knows neither frame nor unit. It is infinite at the edge of what a body can be, so the result is inside. Each
-rotor enters with the same divergence of numbers, a/a0 - log(a/a0) - 1. The minimum under linear equations is found by
-Newton's method, which for such a function is safe and quick (Nesterov, Nemirovskii 1994).
+which depends on neither frame nor unit and is infinite for a body that cannot exist. Each rotor has the same
+divergence of numbers, a/a0 - log(a/a0) - 1.
+
+**Prior weight.** Near the nominal arm the divergence is half the squared length of the bodies' difference from nominal,
+as matrices relative to nominal. In that length every direction has a standard deviation s that the data leave it, and
+an estimated distance z from nominal. A prior of weight w moves the estimate by w s z of its standard deviations. The
+weight is therefore
+
+- as given where z is within a few standard deviations of zero: it keeps poorly determined directions from following
+  the noise;
+- reduced where it is not, so that the estimate moves by no more than a twentieth of its standard deviation, however
+  wrong the nominal body is.
+
+**Undetermined directions.** Among all bodies with the same base parameters the divergence has one minimum. It is found
+by Newton's method, which converges for such a self-concordant function (Nesterov, Nemirovskii 1994).
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.errors import EstimationError
 from scara_ident.estimation.consistent.bodies import PACKED_IDENTITY, unpack
-from scara_ident.estimation.consistent.cones import Cones
+from scara_ident.estimation.consistent.constraints import Cone
+from scara_ident.estimation.consistent.problem import Unknowns
 
 Array = NDArray[np.float64]
 
+# The data distinguish a direction from nominal at this many standard deviations; then the prior moves it by this share
+# of one.
+SIGNIFICANT = 4.0
+MOST_BIAS = 0.05
+# No arm differs from its nominal one by more than this factor; a larger standard deviation distinguishes nothing.
+FARTHEST = 1e5
+# Singular values below this share of the largest are made of rounding.
+ROUNDING = 1e-12
+
 # Newton's method stops when the divergence is known to this, relative to itself where it is large.
 PRECISION = 1e-10
-# On the way there this is enough, and the way is taken in strides of this factor.
-ROUGH = 1e-2
+# A start that is far heavier than nominal approaches it by lighter and lighter nominal arms, each this factor lighter,
+# and each reached to a rough precision only.
 STRIDE = 4.0
+ROUGH = 1e-2
 MOST_STEPS = 100
 LINE_STEPS = 12
-# Weights of the barrier of limits, the last so small that it moves nothing.
+# Weights of the logarithmic barrier of limits; the last is too small to move anything.
 BARRIER = (1.0, 1e-2, 1e-4, 1e-6, 1e-8)
-# Singular values below this share of the largest are equations that say nothing new.
-DEPENDENT = 1e-9
 
 
-def divergence(x: Array, pull: float = 1.0) -> float:
+def prior_rows(u: Unknowns, rows: Array, target: Array, weight: float) -> Array:
+    """Return the rows of the prior's quadratic form.
+
+    Parameters
+    ----------
+    u : Unknowns
+    rows : ndarray, shape (r, size)
+        Data on x, divided by the noise.
+    target : ndarray, shape (r,)
+    weight : float
+        Cost, in squared standard deviations of the noise, of a rotor that differs from nominal by its own inertia.
+
+    Returns
+    -------
+    ndarray, shape (size, size)
+        Rows W on x less its reference; the prior is ``|W (x - reference)|^2``.
+    """
+    scales = np.ones(u.size)
+    scales[11 * u.n :] = _other_scales(u, rows, target)
+    scaled = rows * scales
+    left, singular, right = np.linalg.svd(scaled, full_matrices=False)
+    # Distance from nominal in standard deviations, z / s, with s = 1 / singular.
+    apart = np.abs(left.T @ (target - rows @ u.reference))
+    significant = (apart > SIGNIFICANT) & (singular * FARTHEST > 1.0) & (singular > ROUNDING * singular[0])
+    reduced = np.minimum(weight, MOST_BIAS * singular[significant] ** 2 / apart[significant])
+    directions = right[significant]
+    form = np.sqrt(weight) * np.eye(u.size)
+    form += directions.T @ ((np.sqrt(reduced) - np.sqrt(weight))[:, None] * directions)
+    return np.asarray(form / scales)
+
+
+def _other_scales(u: Unknowns, rows: Array, target: Array) -> Array:
+    """Size of the other columns' unknowns: their torque limit's, or that at which one makes the whole torque."""
+    size = np.linalg.norm(rows[:, 11 * u.n :], axis=0)
+    torque = float(np.linalg.norm(target))
+    scales = np.where(size > 0.0, torque / np.where(size > 0.0, size, 1.0), 1.0)
+    column = np.argmax(u.to_parameters[:, 11 * u.n :] != 0.0, axis=0)
+    scales[np.isin(column, u.bounded)] = 1.0
+    return np.where(scales > 0.0, scales, 1.0)
+
+
+def divergence(x: Array, weight: float = 1.0) -> float:
     """Return the divergence of bodies and rotors relative to nominal, shape (11 n,), from the nominal arm.
 
-    With ``pull`` the nominal arm is 1/pull times as heavy (and the result differs by a constant).
+    With ``weight`` on the traces the nominal arm is 1/weight times as heavy, and the result differs by a constant.
     """
     n = len(x) // 11
     bodies = np.linalg.eigvalsh(unpack(x[: 10 * n].reshape(n, 10)))
     values = np.concatenate([bodies.ravel(), x[10 * n :]])
     if np.any(values <= 0.0):
         return np.inf
-    return float(np.sum(pull * values - np.log(values) - 1.0))
+    return float(np.sum(weight * values - np.log(values) - 1.0))
 
 
-def null_space(rows: Array) -> Array:
-    """Return an orthonormal basis of the directions that rows do not see, shape (k, free)."""
-    if rows.shape[0] == 0:
-        return np.eye(rows.shape[1])
-    _, singular, right = np.linalg.svd(rows)
-    rank = int(np.count_nonzero(singular > DEPENDENT * singular[0])) if singular[0] > 0.0 else 0
-    return np.asarray(right[rank:].T)
-
-
-def nearest_to_nominal(start: Array, free: Array, limits: Cones) -> Array:
+def nearest_to_nominal(start: Array, free: Array, limits: Sequence[Cone] = ()) -> Array:
     """Find the bodies nearest to nominal along free directions.
+
+    This is not left to cvxpy: Clarabel with ``log_det`` takes 85 ms on the arm of UR5 and 33 ms on SCARA03, where these
+    steps take 10 and 3, and leaves errors of up to 7e-4 of the nominal bodies.
 
     Parameters
     ----------
     start : ndarray, shape (11 n,)
         Bodies and rotors relative to nominal (see `Unknowns`), strictly possible and strictly within the limits.
     free : ndarray, shape (11 n, k)
-        Directions along which nothing that torque tells changes.
-    limits : Cones
-        On the 11 n unknowns.
+        Directions along which nothing changes that torque depends on.
+    limits : sequence of Cone, optional
+        Bounds of masses and centres of mass, on the 11 n unknowns.
 
     Returns
     -------
@@ -79,25 +137,25 @@ def nearest_to_nominal(start: Array, free: Array, limits: Cones) -> Array:
     """
     if free.shape[1] == 0:
         return start
-    bounded = bool(len(limits.nonnegative) or len(limits.ball))
+    weights = BARRIER if limits else (0.0,)
     n = len(start) // 11
     x = start
-    # A start much heavier than nominal goes there in strides, by nominal arms that get lighter.
-    pull = 5.0 * n / max(5.0 * n, float(np.tile(PACKED_IDENTITY, n) @ start[: 10 * n] + start[10 * n :].sum()))
-    while pull < 1.0:
-        x = _newton(x, free, limits, BARRIER[0] if bounded else 0.0, pull, ROUGH)
-        pull *= STRIDE
-    for weight in BARRIER if bounded else (0.0,):
+    # The share of its weight at which the nominal arm is as heavy as the start.
+    heavy = 5.0 * n / max(5.0 * n, float(np.tile(PACKED_IDENTITY, n) @ start[: 10 * n] + start[10 * n :].sum()))
+    while heavy < 1.0:
+        x = _newton(x, free, limits, weights[0], heavy, ROUGH)
+        heavy *= STRIDE
+    for weight in weights:
         x = _newton(x, free, limits, weight, 1.0, PRECISION)
     return x
 
 
-def _newton(start: Array, free: Array, limits: Cones, weight: float, pull: float, precision: float) -> Array:
+def _newton(start: Array, free: Array, limits: Sequence[Cone], weight: float, heavy: float, precision: float) -> Array:
     n = len(start) // 11
     directions = unpack(np.moveaxis(free[: 10 * n].reshape(n, 10, -1), 2, 1))
-    x, value = start, _value(start, limits, weight, pull)
+    x, value = start, _value(start, limits, weight, heavy)
     for _ in range(MOST_STEPS):
-        gradient, root, local = _slopes(x, n, directions, free, limits, weight, pull)
+        gradient, root, local = _slopes(x, n, directions, free, limits, weight, heavy)
         triangular = np.asarray(np.linalg.qr(root, mode="r"))
         half = np.linalg.solve(triangular.T, gradient)
         step = -np.linalg.solve(triangular, half)
@@ -105,11 +163,11 @@ def _newton(start: Array, free: Array, limits: Cones, weight: float, pull: float
         change = free @ step
         if decrement < precision * max(1.0, abs(value)):
             # The last step squares what error is left, and too little is gained to measure it.
-            return x + change if np.isfinite(_value(x + change, limits, weight, pull)) else x
-        length = 1.0 if weight else _length(np.tensordot(local, step, axes=(1, 0)), change, x, pull)
+            return x + change if np.isfinite(_value(x + change, limits, weight, heavy)) else x
+        length = 1.0 if weight else _length(np.tensordot(local, step, axes=(1, 0)), change, x, heavy)
         while True:
             trial = x + length * change
-            new = _value(trial, limits, weight, pull)
+            new = _value(trial, limits, weight, heavy)
             if new < value:
                 break
             length *= 0.5
@@ -124,7 +182,7 @@ def _newton(start: Array, free: Array, limits: Cones, weight: float, pull: float
     )
 
 
-def _length(local: Array, change: Array, x: Array, pull: float) -> float:
+def _length(local: Array, change: Array, x: Array, heavy: float) -> float:
     """Length of the step that makes the divergence smallest along it.
 
     Near the edge Newton's own length only doubles the distance from it; along a line the divergence is a sum of
@@ -132,7 +190,7 @@ def _length(local: Array, change: Array, x: Array, pull: float) -> float:
     """
     n = len(local)
     rates = np.concatenate([np.linalg.eigvalsh(local).ravel(), change[10 * n :] / x[10 * n :]])
-    linear = pull * float(np.tile(PACKED_IDENTITY, n) @ change[: 10 * n] + change[10 * n :].sum())
+    linear = heavy * float(np.tile(PACKED_IDENTITY, n) @ change[: 10 * n] + change[10 * n :].sum())
     fastest = float(np.min(rates))
     low, high = 0.0, (1.0 / -fastest if fastest < 0.0 else 1e12)
     length = min(1.0, 0.5 * high)
@@ -149,20 +207,20 @@ def _length(local: Array, change: Array, x: Array, pull: float) -> float:
     return float(length)
 
 
-def _value(x: Array, limits: Cones, weight: float, pull: float) -> float:
-    value = divergence(x, pull)
+def _value(x: Array, limits: Sequence[Cone], weight: float, heavy: float) -> float:
+    value = divergence(x, heavy)
     if weight == 0.0 or not np.isfinite(value):
         return value
-    slack = limits.nonnegative(x)
-    cones = limits.ball(x).reshape(-1, 4)
-    room = cones[:, 0] ** 2 - np.sum(cones[:, 1:] ** 2, axis=1)
-    if np.any(slack <= 0.0) or np.any(room <= 0.0) or np.any(cones[:, 0] <= 0.0):
-        return np.inf
-    return value - weight * float(np.sum(np.log(slack)) + np.sum(np.log(room)))
+    for limit in limits:
+        if not limit.margin(x) > 0.0:
+            return np.inf
+        distances = limit(x) if limit.kind == "nonnegative" else _LORENTZ @ limit(x) ** 2
+        value -= weight * float(np.sum(np.log(distances)))
+    return value
 
 
 def _slopes(
-    x: Array, n: int, directions: Array, free: Array, limits: Cones, weight: float, pull: float
+    x: Array, n: int, directions: Array, free: Array, limits: Sequence[Cone], weight: float, heavy: float
 ) -> tuple[Array, Array, Array]:
     """Gradient along the free directions, a square root of the Hessian as rows, and the directions seen from x."""
     inverse_root = np.linalg.inv(np.linalg.cholesky(unpack(x[: 10 * n].reshape(n, 10))))
@@ -172,25 +230,25 @@ def _slopes(
     own = rotors / x[10 * n :, None]
     trace = np.trace(local, axis1=2, axis2=3)
     linear = np.tile(PACKED_IDENTITY, n) @ free[: 10 * n] + rotors.sum(axis=0)
-    gradient = pull * linear - trace.sum(axis=0) - own.sum(axis=0)
+    gradient = heavy * linear - trace.sum(axis=0) - own.sum(axis=0)
     count = free.shape[1]
     rows = [np.moveaxis(local, 1, 3).reshape(16 * n, count), own]
-    if weight > 0.0:
-        slack = limits.nonnegative(x)
-        closing = limits.nonnegative.matrix @ free / slack[:, None]
-        gradient = gradient - weight * closing.sum(axis=0)
-        rows.append(np.sqrt(weight) * closing)
-        for first in range(0, len(limits.ball), 4):
-            slope, root = _ball(limits.ball.matrix[first : first + 4] @ free, limits.ball(x)[first : first + 4])
-            gradient = gradient + weight * slope
-            rows.append(np.sqrt(weight) * root)
+    for limit in limits:
+        slope, root_of_hessian = _barrier(limit, x)
+        gradient = gradient + weight * (slope @ limit.matrix @ free)
+        rows.append(np.sqrt(weight) * (root_of_hessian @ limit.matrix @ free))
     return gradient, np.vstack(rows), local
 
 
-def _ball(rows: Array, value: Array) -> tuple[Array, Array]:
-    """Gradient and a root of the Hessian of -log(t^2 - |u|^2) along rows of (t, u)."""
-    flip = np.array([1.0, -1.0, -1.0, -1.0])
-    room = float(flip @ value**2)
-    slope = -2.0 / room * (flip * value)
-    hessian = np.outer(slope, slope) - 2.0 / room * np.diag(flip)
-    return slope @ rows, np.linalg.cholesky(hessian).T @ rows
+_LORENTZ = np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def _barrier(limit: Cone, x: Array) -> tuple[Array, Array]:
+    """Gradient and a root of the Hessian of minus the logarithm of a limit's slack, in its own values."""
+    value = limit(x)
+    if limit.kind == "nonnegative":
+        return -1.0 / value, np.diag(1.0 / value)
+    distance = float(_LORENTZ @ value**2)
+    slope = -2.0 / distance * (_LORENTZ * value)
+    hessian = np.outer(slope, slope) - 2.0 / distance * np.diag(_LORENTZ)
+    return slope, np.asarray(np.linalg.cholesky(hessian).T)

@@ -1,10 +1,10 @@
 """From a triangular factor to the possible arm that explains it best, in two steps.
 
-First the parameters. Where plain least squares belongs to an arm that can exist, it is the answer and no prior pulls
-at it. Else the programme finds the best possible arm, with the prior's weak pull so that directions which the data
-hardly determine do not follow the noise to the edge of what is possible.
+First the parameters. Where plain least squares belongs to an arm that can exist, it is the solution and no prior acts
+on it. Else the estimation problem is solved, with a weak prior so that directions which the data hardly determine do
+not follow the noise to the edge of what is possible.
 
-Then what torque cannot tell: with all that it can tell held, the bodies nearest to the nominal ones.
+Then the bodies: among those that have these parameters, the nearest to the nominal ones.
 """
 
 from __future__ import annotations
@@ -16,11 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.errors import EstimationError, UsageError
-from scara_ident.estimation.consistent.matching import fixed, is_allowed, margin_of, match, sizes
-from scara_ident.estimation.consistent.prior import nearest_to_nominal, null_space
-from scara_ident.estimation.consistent.programme import MARGIN, Point, Programme
-from scara_ident.estimation.consistent.pull import prior_rows
-from scara_ident.estimation.consistent.unknowns import Unknowns
+from scara_ident.estimation.consistent.feasibility import (
+    ROUNDING,
+    fixed,
+    fixed_columns,
+    furthest_inside,
+)
+from scara_ident.estimation.consistent.friction import friction_faults, shape_faults
+from scara_ident.estimation.consistent.options import FrictionShape
+from scara_ident.estimation.consistent.prior import nearest_to_nominal, prior_rows
+from scara_ident.estimation.consistent.problem import DEPENDENT, MARGIN, Point, Problem, Unknowns
 from scara_ident.estimation.information import (
     LEAST_NOISE,
     UNDETERMINED,
@@ -34,7 +39,7 @@ from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
-# The solver keeps its constraints to so many digits, relative to the nominal bodies.
+# The solver's constraints are kept to this, relative to the nominal bodies.
 DIGITS = 1e-6
 
 
@@ -60,11 +65,11 @@ class ConsistentSolution:
     Attributes
     ----------
     x : ndarray
-        See `Unknowns`; what torque cannot tell is not yet filled.
+        See `Unknowns`; undetermined directions are not yet nearest to nominal, see `nearest_arm`.
     value : ndarray, shape (p,)
         The model's parameters.
     point : Point or None
-        What the solver found; None where plain least squares is possible.
+        Solution of the estimation problem; None where plain least squares is possible.
     """
 
     x: Array
@@ -79,7 +84,7 @@ class ConsistentSolution:
 
 @one_blas_thread()
 def solve_joints(
-    programme: Programme,
+    problem: Problem,
     joints: Sequence[Information],
     *,
     parameter_prior: Information | None = None,
@@ -89,7 +94,7 @@ def solve_joints(
 
     Parameters
     ----------
-    programme : Programme
+    problem : Problem
     joints : sequence of Information
         All rows of each joint.
     parameter_prior : Information, optional
@@ -107,23 +112,23 @@ def solve_joints(
     Raises
     ------
     EstimationError
-        If the programme cannot be solved.
+        If the problem cannot be solved.
     UsageError
         If the noise in the options does not fit the joints.
     """
-    options = programme.options
+    options = problem.options
     weights = np.ones(len(joints))
     if options.weighting != "noise":
         information = _weighted(joints, weights, parameter_prior)
         if options.weighting == "equal":
-            found = solve_consistent(programme, information, standard_prior=standard_prior)
+            found = solve_consistent(problem, information, standard_prior=standard_prior)
             return found, information, weights
-        possible = None if standard_prior is not None else least_squares_arm(programme, information)
+        possible = None if standard_prior is not None else least_squares_arm(problem, information)
         if possible is not None:
             return possible, information, weights
     weights = 1.0 / _joint_noise(joints, options.noise)
     information = _weighted(joints, weights, parameter_prior)
-    return solve_consistent(programme, information, standard_prior=standard_prior), information, weights
+    return solve_consistent(problem, information, standard_prior=standard_prior), information, weights
 
 
 def _weighted(joints: Sequence[Information], weights: Array, prior: Information | None) -> Information:
@@ -144,13 +149,13 @@ def _joint_noise(joints: Sequence[Information], given: Array | None) -> Array:
 
 @one_blas_thread()
 def solve_consistent(
-    programme: Programme, information: Information, *, standard_prior: StandardPrior | None = None
+    problem: Problem, information: Information, *, standard_prior: StandardPrior | None = None
 ) -> ConsistentSolution:
     """Find the best possible parameters for one factor; what Monte Carlo and cross-validation repeat.
 
     Parameters
     ----------
-    programme : Programme
+    problem : Problem
     information : Information
         All rows, weighted, with those of priors on the model's parameters.
     standard_prior : StandardPrior, optional
@@ -162,30 +167,30 @@ def solve_consistent(
     Raises
     ------
     EstimationError
-        If the programme cannot be solved.
+        If the problem cannot be solved.
     """
-    u = programme.unknowns
+    u = problem.unknowns
     if standard_prior is None:
-        possible = least_squares_arm(programme, information)
+        possible = least_squares_arm(problem, information)
         if possible is not None:
             return possible
-    point = _best(programme, information, standard_prior)
-    margin = margin_of(u, point.x)
+    point = _best(problem, information, standard_prior)
+    margin = u.margin(point.x)
     x = _inside(u, point.x, margin) if margin > -DIGITS else None
     if x is None:
         raise EstimationError(
-            f"the programme's solution misses its constraints by {-margin:.1g}; try richer motion, a larger "
+            f"the solution misses its constraints by {-margin:.1g}; try richer motion, a larger "
             "prior_weight or wider limits"
         )
     return ConsistentSolution(x, u.parameters(x), point)
 
 
-def least_squares_arm(programme: Programme, information: Information) -> ConsistentSolution | None:
-    """Return an arm that plain least squares describes, None where there is none.
+def least_squares_arm(problem: Problem, information: Information) -> ConsistentSolution | None:
+    """Return an arm that plain least squares describes, None where there is none or the solver finds none.
 
     Parameters
     ----------
-    programme : Programme
+    problem : Problem
     information : Information
 
     Returns
@@ -195,18 +200,18 @@ def least_squares_arm(programme: Programme, information: Information) -> Consist
     Raises
     ------
     EstimationError
-        If that cannot be decided.
+        If the rows leave parameters undetermined and the problem cannot be solved.
     """
     least_squares = information.solve()
     if least_squares.null.shape[1] == 0:
-        x = _determined(programme, least_squares.value)
+        x = _determined(problem, least_squares.value)
     else:
-        x = _partly_determined(programme, least_squares, _best(programme, information, None))
-    return None if x is None else ConsistentSolution(x, programme.unknowns.parameters(x), None)
+        x = _partly_determined(problem, least_squares, _best(problem, information, None))
+    return None if x is None else ConsistentSolution(x, problem.unknowns.parameters(x), None)
 
 
-def _best(programme: Programme, information: Information, standard_prior: StandardPrior | None) -> Point:
-    u = programme.unknowns
+def _best(problem: Problem, information: Information, standard_prior: StandardPrior | None) -> Point:
+    u = problem.unknowns
     noise = noise_of(information, information.solve())
     rows = information.regressor_factor @ u.to_parameters / noise
     target = information.projected_torque / noise
@@ -214,22 +219,22 @@ def _best(programme: Programme, information: Information, standard_prior: Standa
         extra = np.zeros((len(standard_prior.target), u.size))
         extra[:, u.rigid] = standard_prior.rows @ u.nominal.to_standard
         rows, target = np.vstack([rows, extra]), np.concatenate([target, standard_prior.target])
-    return programme.solve_rows(rows, target, prior_rows(u, rows, target, programme.options.prior_weight))
+    return problem.solve(rows, target, prior_rows(u, rows, target, problem.options.prior_weight))
 
 
 @one_blas_thread()
-def fill(
-    programme: Programme,
+def nearest_arm(
+    problem: Problem,
     information: Information,
     x: Array,
     *,
     standard_prior: StandardPrior | None = None,
 ) -> Array:
-    """Fill what torque cannot tell of the bodies from the nominal ones.
+    """Find the arm nearest to the nominal one among those that give the same torque.
 
     Parameters
     ----------
-    programme : Programme
+    problem : Problem
     information : Information
         The rows that x was found from.
     x : ndarray
@@ -240,31 +245,33 @@ def fill(
     Returns
     -------
     ndarray
-        The same arm in all that its rows can tell, nearest to nominal in the rest.
+        The same in every direction that the rows determine, nearest to nominal in the others.
 
     Raises
     ------
     EstimationError
         If it is not found.
     """
-    u = programme.unknowns
+    u = problem.unknowns
     factor = information.regressor_factor[:, u.place]
     size = np.linalg.norm(factor, axis=0)
     size[size == 0.0] = 1.0
     _, singular, right = np.linalg.svd(factor / size)
-    seen = singular > UNDETERMINED * singular[0]
-    if np.all(seen) and standard_prior is None:
-        free = u.unseen
-    else:
-        rows = [right[seen] * size @ u.to_parameters[u.place, u.rigid], u.held[:, u.rigid]]
-        if standard_prior is not None:
-            rows.append(standard_prior.rows @ u.nominal.to_standard)
-        stacked = np.vstack(rows)
-        length = np.linalg.norm(stacked, axis=1, keepdims=True)
-        free = null_space(stacked / np.where(length > 0.0, length, 1.0))
+    determined = right[singular > UNDETERMINED * singular[0]] * size
+    rows = [determined @ u.to_parameters[u.place, u.rigid], u.held[:, u.rigid]]
+    if standard_prior is not None:
+        rows.append(standard_prior.rows @ u.nominal.to_standard)
     result = x.copy()
-    result[u.rigid] = nearest_to_nominal(x[u.rigid], free, u.limits)
+    result[u.rigid] = nearest_to_nominal(x[u.rigid], _unseen(np.vstack(rows)), u.arm[2 * u.n :])
     return result
+
+
+def _unseen(rows: Array) -> Array:
+    """Return an orthonormal basis of the directions that rows do not see."""
+    from scipy.linalg import null_space
+
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    return np.asarray(null_space(rows / np.where(length > 0.0, length, 1.0), rcond=DEPENDENT))
 
 
 def noise_of(information: Information, solution: Solution) -> float:
@@ -272,41 +279,67 @@ def noise_of(information: Information, solution: Solution) -> float:
     return max(information.rms(solution.value), LEAST_NOISE * information.torque_rms) or 1.0
 
 
-def _determined(programme: Programme, value: Array) -> Array | None:
-    """Return an arm that has these parameters, None where there is none."""
-    u = programme.unknowns
-    if np.any(value[u.sums] < 0.0) or not is_allowed(u, value, programme.options.friction):
+def _determined(problem: Problem, value: Array) -> Array | None:
+    """Return an arm that has these parameters, None where none is found."""
+    u = problem.unknowns
+    if not _is_allowed(u, value, problem.options.friction):
         return None
-    found = programme.matcher.find(value)
-    return None if found is None else _inside(u, found.x, found.margin)
+    given = fixed_columns(u, np.arange(u.place.start, u.place.stop), u.sizes(np.zeros(len(value))))
+    # The arm nearest to the nominal one may do already.
+    x = u.reference.copy()
+    x[11 * u.n :] = 0.0
+    x = given.corrected(x, value)
+    margin = u.margin(x)
+    if margin <= ROUNDING:
+        found = furthest_inside(u, value, given)
+        if not found.possible:
+            return None
+        x, margin = found.x.copy(), found.margin
+    others = u.to_parameters[:, 11 * u.n :]
+    column = np.argmax(others != 0.0, axis=0)
+    x[11 * u.n :] = value[column] / others[column, np.arange(others.shape[1])]
+    return _inside(u, x, margin)
 
 
-def _partly_determined(programme: Programme, least_squares: Solution, point: Point) -> Array | None:
-    """Return an arm that explains the rows as well as least squares does, None where there is none.
+def _is_allowed(u: Unknowns, value: Array, friction: FrictionShape) -> bool:
+    """Whether friction and the signs of parameters are possible; says nothing of bodies."""
+    if np.any(value[u.nonnegative] < 0.0):
+        return False
+    if friction == "free":
+        return True
+    parts = [(p, value[list(p.columns)]) for p in u.polynomials]
+    if any(friction_faults(p, part) for p, part in parts):
+        return False
+    return friction != "lubricated" or not any(shape_faults(p, part) for p, part in parts)
 
-    What the rows leave open may take any value that makes the rest possible. The arm that the programme found is
-    nearest to nominal there; where one step from it is no arm, one that is furthest inside is taken.
+
+def _partly_determined(problem: Problem, least_squares: Solution, point: Point) -> Array | None:
+    """Return an arm that explains the rows as well as least squares does, None where none is found.
+
+    What the rows leave open may take any value that makes the rest possible. The solution of the problem is nearest
+    to nominal there; where one step from it is no arm, one that is furthest inside is taken.
     """
-    u, friction = programme.unknowns, programme.options.friction
-    size = sizes(u, least_squares.value)
-    what = fixed(u, null_space((least_squares.null / size[:, None]).T).T / size)
-    target = np.concatenate([what.combinations @ least_squares.value, np.zeros(len(u.held))])
-    x = point.x + what.inverse @ (target - what.rows @ point.x)
-    if margin_of(u, x) > MARGIN and is_allowed(u, u.parameters(x), friction):
+    from scipy.linalg import null_space
+
+    u, friction = problem.unknowns, problem.options.friction
+    size = u.sizes(least_squares.value)
+    given = fixed(u, null_space((least_squares.null / size[:, None]).T, rcond=DEPENDENT).T / size)
+    x = given.corrected(point.x, least_squares.value)
+    if u.margin(x) > MARGIN and _is_allowed(u, u.parameters(x), friction):
         return x
-    found = match(u, least_squares.value, what)
-    if not found.possible or not is_allowed(u, u.parameters(found.x), friction):
+    found = furthest_inside(u, least_squares.value, given)
+    if not found.possible or not _is_allowed(u, u.parameters(found.x), friction):
         return None
     return _inside(u, found.x, found.margin)
 
 
 def _inside(u: Unknowns, x: Array, margin: float) -> Array | None:
-    """Move an arm at the very edge, or out by the solver's last digits, inside by the margin that all estimates keep.
+    """Move an arm on the boundary, or outside by the solver's tolerance, inside by the margin of all estimates.
 
-    It goes towards the nominal arm by a share of the distance that is no more than that margin and those digits.
+    It moves towards the nominal arm by a share of the distance that is no more than margin and tolerance together.
     """
     if margin >= 0.5 * MARGIN:
         return x
     moved = x.copy()
     moved[u.rigid] += (2.0 * MARGIN - margin) * (u.nominal.relative - x[u.rigid])
-    return moved if margin_of(u, moved) > 0.0 else None
+    return moved if u.margin(moved) > 0.0 else None

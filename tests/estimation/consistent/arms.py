@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.estimation import ConsistentEstimate
+from scara_ident.estimation.consistent.bodies import smallest_eigenvalue_share
+from scara_ident.estimation.observations import JointRows, Observations
 from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.motion.motion import Motion
+from scara_ident.motion.prepared import PreparedData
 from scara_ident.robot.robot import Robot, load_robot
-from tests.arms import Link, example_urdf, write_urdf
+from scara_ident.threads import one_blas_thread
+from tests.arms import Link, example_urdf, motion, sines, write_urdf
 
 Array = NDArray[np.float64]
 
@@ -67,3 +74,55 @@ def heavier(robot: Robot, factor: float) -> Robot:
         body = model.inertias[k]
         model.inertias[k] = type(body)(factor * body.mass, body.lever, factor * np.asarray(body.inertia))
     return replace(robot, model=model, rotor_inertia=factor * robot.rotor_inertia)
+
+
+@cache
+def scara(name: str = "complete") -> TorqueModel:
+    return build_model(load_robot(), name)
+
+
+def moving(robot: Robot, seed: int = 1, count: int = 2000, size: float = 0.6) -> Motion:
+    rng = np.random.default_rng(seed)
+    return motion(*sines(rng, np.arange(count) / 200.0, robot.n, size=size, lowest=0.3), rate=200.0)
+
+
+def stroke(robot: Robot, speed: float = 0.65) -> Motion:
+    """One slow stroke of every joint below a speed; each takes a little longer than the one before, up to 2.5 s."""
+    time = np.linspace(0.0, 2.5, 1000)
+    q, v, a = (np.zeros((robot.n, 1000)) for _ in range(3))
+    for j in range(robot.n):
+        duration = 2.5 * (1.0 - 0.3 * (robot.n - 1 - j) / robot.n)
+        s, length = np.minimum(time / duration, 1.0), speed * duration / 1.875
+        q[j] = length * (10 * s**3 - 15 * s**4 + 6 * s**5)
+        v[j] = length * (30 * s**2 - 60 * s**3 + 30 * s**4) / duration
+        a[j] = length * (60 * s - 180 * s**2 + 120 * s**3) / duration**2
+    return motion(q, v, a, rate=400.0)
+
+
+@one_blas_thread()
+def observed(model: TorqueModel, item: Motion, value: Array, noise: float, seed: int = 0) -> Observations:
+    """Rows of a motion, unfiltered, with white noise, in blocks of 200 samples; without prepared data."""
+    w = model.regressor(item)
+    u = np.einsum("jpn,p->jn", w, value)
+    sigma = noise * np.sqrt(np.mean(u**2, axis=1, keepdims=True))
+    u = u + sigma * np.random.default_rng(seed).standard_normal(u.shape)
+    columns, starts = np.arange(len(value)), np.array([*range(0, u.shape[1], 200), u.shape[1]])
+    joints = tuple(
+        JointRows(columns, np.vstack([rows, torque]), starts, np.diff(starts).astype(float))
+        for rows, torque in zip(w, u, strict=True)
+    )
+    return Observations(model, PreparedData((), ()), joints, np.zeros(len(starts) - 1, dtype=np.intp), ())
+
+
+def truth(model: TorqueModel) -> Array:
+    return parameters(model, model.robot.standard_parameters(), (0.08, 0.05))
+
+
+def smallest(estimate: ConsistentEstimate) -> float:
+    bodies = estimate.standard[: 10 * estimate.model.robot.n].reshape(-1, 10)
+    return min(smallest_eigenvalue_share(body) for body in bodies)
+
+
+def base_of(estimate: ConsistentEstimate) -> Array:
+    term = estimate.model.rigid_body
+    return (term.base.grouping @ estimate.standard)[term.kept]

@@ -38,6 +38,9 @@ def test_packing_keeps_matrices_and_their_inner_product(seed):
     np.testing.assert_allclose(unpack(pack(a)), a, rtol=1e-14)
     np.testing.assert_allclose(np.sum(pack(a) * pack(b)), np.sum(a * b), rtol=1e-12)
     np.testing.assert_allclose(unpacking() @ pack(a)[0], a[0].ravel(), rtol=1e-14)
+    small = a[:, :2, :2]
+    np.testing.assert_allclose(pack(small), np.array([small[:, 0, 0], 2**0.5 * small[:, 0, 1], small[:, 1, 1]]).T)
+    np.testing.assert_allclose(unpack(pack(small)), small, rtol=1e-14)
 
 
 def test_the_linear_map_is_pinocchios_pseudo_inertia():

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.errors import UsageError
-from scara_ident.estimation.consistent.cones import Affine, Cones
+from scara_ident.estimation.consistent.constraints import Cone
 from scara_ident.model.terms.constraints import BrakingPolynomial
 
 Array = NDArray[np.float64]
@@ -36,14 +36,14 @@ class Certificate:
 
     Attributes
     ----------
-    cones : Cones
+    cones : tuple of Cone
     auxiliary : int
         Number of auxiliary unknowns.
     unit : ndarray
         Parameter per coefficient.
     """
 
-    cones: Cones
+    cones: tuple[Cone, ...]
     auxiliary: int
     unit: Array
 
@@ -74,29 +74,69 @@ def certificate(polynomial: BrakingPolynomial, shape: Shape, margin: float = MAR
     finite = np.isfinite(polynomial.speed)
     powers = np.array(polynomial.powers)
     unit = _torque(polynomial) / _speed(polynomial) ** powers
-    size = len(powers)
-    # Coefficients of 1, t, t^2, t^3 as functions of the unknowns.
-    spread = np.zeros((4, size))
-    spread[powers, np.arange(size)] = 1.0
-    low = Affine(spread, np.array([-margin, 0.0, 0.0, 0.0]))
+    # Coefficients of 1, t, t^2, t^3 as functions of the unknowns, of the friction and of what it leaves of the limit.
+    spread = np.zeros((4, len(powers)))
+    spread[powers, np.arange(len(powers))] = 1.0
     top = polynomial.limit / _torque(polynomial)
-    high = Affine(-spread, np.array([top - margin, 0.0, 0.0, 0.0]))
+    sides = [(spread, np.array([-margin, 0.0, 0.0, 0.0]))]
+    if finite and np.isfinite(top):
+        sides.append((-spread, np.array([top - margin, 0.0, 0.0, 0.0])))
+    label = f"friction of {polynomial.joint}"
     if shape == "lubricated":
         if not finite:
             raise UsageError(
                 f"{polynomial.joint}: the lubricated shape of friction needs a velocity limit and the URDF gives "
                 "none; give one (option speed) or use 'dissipative'"
             )
-        return Certificate(Cones.linear(_lubricated(low, high if np.isfinite(top) else None)), 0, unit)
-    sides = [low, high] if finite and np.isfinite(top) else [low]
+        (low, start), *high = sides
+        matrix = np.vstack([_LUBRICATED @ low, *(side.sum(axis=0) for side, _ in high)])
+        offset = np.concatenate([_LUBRICATED @ start, *([end.sum()] for _, end in high)])
+        return Certificate((_linear(matrix, offset, label),), 0, unit)
     degree = int(powers.max())
-    parts = [_nonnegative(side, degree, finite, k, len(sides)) for k, side in enumerate(sides)]
-    auxiliary = 0 if degree < 2 else _AUXILIARY * len(sides)
-    return Certificate(Cones.stacked(parts, size + auxiliary), auxiliary, unit)
+    if degree < 2:
+        ends = np.array([[1.0, 0.0, 0.0, 0.0], [float(finite), 1.0, 0.0, 0.0]])
+        linear = [_linear(ends @ matrix, ends @ offset, label) for matrix, offset in sides]
+        return Certificate(tuple(linear), 0, unit)
+    squares = _ON_INTERVAL if finite else _ON_HALF_LINE[degree]
+    unknowns = len(powers) + 2 * len(sides)
+    cones = []
+    for k, (matrix, offset) in enumerate(sides):
+        wide = np.zeros((6, unknowns))
+        wide[:4, : len(powers)] = matrix
+        wide[[4, 5], len(powers) + 2 * k + np.arange(2)] = 1.0
+        for table in squares:
+            kind: Literal["semidefinite", "nonnegative"] = "semidefinite" if len(table) == 3 else "nonnegative"
+            cones.append(Cone(kind, table @ wide, table[:, :4] @ offset, label))
+    return Certificate(tuple(cones), 2 * len(sides), unit)
 
 
-# A certificate of degree 2 or 3 has six numbers for four coefficients.
-_AUXILIARY = 2
+# Each sum of squares as a packed 2x2 matrix, in rows on (c0, c1, c2, c3, e, f) with free numbers e and f.
+_ROOT = np.sqrt(2.0)
+# t [a b; b g] + (1 - t) [c0 e; e f] with a = c0 + c1 - 2 e, b = (c2 + 2 e - f) / 2 and g = c3 + f.
+_ON_INTERVAL = (
+    np.array([[1, 0, 0, 0, 0, 0], [0, 0, 0, 0, _ROOT, 0], [0, 0, 0, 0, 0, 1]]),
+    np.array([[1, 1, 0, 0, -2, 0], [0, 0, 1 / _ROOT, 0, _ROOT, -1 / _ROOT], [0, 0, 0, 1, 0, 1]]),
+)
+_ON_HALF_LINE = {
+    # [c0 e; e c2] + t (c1 - 2 e): a matrix in place of the number would have to be singular.
+    2: (
+        np.array([[1, 0, 0, 0, 0, 0], [0, 0, 0, 0, _ROOT, 0], [0, 0, 1, 0, 0, 0]]),
+        np.array([[0.0, 1.0, 0.0, 0.0, -2.0, 0.0]]),
+    ),
+    # [c0 e; e c2 - 2 f] + t [c1 - 2 e, f; f, c3].
+    3: (
+        np.array([[1, 0, 0, 0, 0, 0], [0, 0, 0, 0, _ROOT, 0], [0, 0, 1, 0, 0, -2]]),
+        np.array([[0, 1, 0, 0, -2, 0], [0, 0, 0, 0, 0, _ROOT], [0, 0, 0, 1, 0, 0]]),
+    ),
+}
+# At least 0 at rest, concave, and not falling at the limit: the second derivative is linear, so its ends decide, and
+# then the slope falls, so its end decides.
+_LUBRICATED = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -2.0, 0.0], [0.0, 0.0, -2.0, -6.0], [0.0, 1.0, 2.0, 3.0]])
+
+
+def _linear(matrix: Array, offset: Array, label: str) -> Cone:
+    kept = np.any(matrix != 0.0, axis=1)
+    return Cone("nonnegative", matrix[kept], offset[kept], label)
 
 
 def _speed(polynomial: BrakingPolynomial) -> float:
@@ -105,77 +145,6 @@ def _speed(polynomial: BrakingPolynomial) -> float:
 
 def _torque(polynomial: BrakingPolynomial) -> float:
     return polynomial.limit if np.isfinite(polynomial.limit) else 1.0
-
-
-def _lubricated(low: Affine, high: Affine | None) -> Affine:
-    # Concave: the second derivative is linear, so its ends decide; then the slope falls, so its end decides.
-    c = low.matrix
-    rows = [
-        c[0],
-        -2.0 * c[2],
-        -2.0 * c[2] - 6.0 * c[3],
-        c[1] + 2.0 * c[2] + 3.0 * c[3],
-    ]
-    offset = [low.offset[0], 0.0, 0.0, 0.0]
-    if high is not None:
-        rows.append(high.matrix.sum(axis=0))
-        offset.append(high.offset[0])
-    kept = [k for k, row in enumerate(rows) if np.any(row)]
-    return Affine(np.array(rows)[kept], np.array(offset)[kept])
-
-
-def _nonnegative(side: Affine, degree: int, finite: bool, place: int, sides: int) -> Cones:
-    """Conditions under which a polynomial with these coefficients is at least 0."""
-    c = side
-    size = c.matrix.shape[1]
-    if degree < 2:
-        ends = np.array([[1.0, 0, 0, 0], [1.0, 1.0, 0, 0]] if finite else [[1.0, 0, 0, 0], [0, 1.0, 0, 0]])
-        rows = Affine(ends @ c.matrix, ends @ c.offset)
-        kept = np.any(rows.matrix != 0.0, axis=1)
-        return Cones.linear(Affine(rows.matrix[kept], rows.offset[kept]))
-    unknowns = size + _AUXILIARY * sides
-    wide = c.widened(unknowns)
-    free = np.zeros((2, unknowns))
-    free[[0, 1], size + _AUXILIARY * place + np.arange(2)] = 1.0
-    c0, c1, c2, c3 = (_row(wide, k) for k in range(4))
-    e, f = (_Row(free[k], 0.0) for k in range(2))
-    if finite:
-        # t [a b; b g] + (1 - t) [d e; e f], with e and f free and the rest from the coefficients.
-        d = c0
-        a = c1 - e * 2.0 + d
-        g = c3 + f
-        b = (c2 - f + e * 2.0) * 0.5
-        return Cones(Affine.none(unknowns), _rows([d, e, f, a, b, g]), Affine.none(unknowns))
-    if degree == 2:
-        # [d e; e f] + t k with a number k: a matrix would have to be singular.
-        return Cones(_rows([c1 - e * 2.0]), _rows([c0, e, c2]), Affine.none(unknowns))
-    # [d e; e h] + t [a b; b g], with e and b (here f) free.
-    return Cones(Affine.none(unknowns), _rows([c0, e, c2 - f * 2.0, c1 - e * 2.0, f, c3]), Affine.none(unknowns))
-
-
-@dataclass(frozen=True, eq=False)
-class _Row:
-    """One affine function, with the arithmetic that the certificates are written in."""
-
-    row: Array
-    offset: float
-
-    def __add__(self, other: _Row) -> _Row:
-        return _Row(self.row + other.row, self.offset + other.offset)
-
-    def __sub__(self, other: _Row) -> _Row:
-        return _Row(self.row - other.row, self.offset - other.offset)
-
-    def __mul__(self, factor: float) -> _Row:
-        return _Row(factor * self.row, factor * self.offset)
-
-
-def _row(affine: Affine, k: int) -> _Row:
-    return _Row(affine.matrix[k], float(affine.offset[k]))
-
-
-def _rows(rows: list[_Row]) -> Affine:
-    return Affine(np.array([r.row for r in rows]), np.array([r.offset for r in rows]))
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import RobotError
-from scara_ident.estimation.consistent.shapes import visual_boxes
 from scara_ident.robot.robot import load_robot
+from scara_ident.robot.visual_boxes import visual_boxes
 from tests.estimation.consistent.arms import ur5, wrist_model
 
 BOX = '<visual><origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/><geometry><box size="0.4 0.2 0.1"/></geometry></visual>'

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scara_ident.errors import UsageError
-from scara_ident.estimation.consistent.cones import Cones
-from scara_ident.estimation.consistent.friction_certificate import (
+from scara_ident.estimation.consistent.constraints import Cone
+from scara_ident.estimation.consistent.friction import (
     certificate,
     friction_faults,
     negative_ranges,
@@ -20,18 +20,20 @@ def polynomial(speed: float, limit: float, powers: tuple[int, ...] = (0, 1, 2, 3
     return BrakingPolynomial("elbow", tuple(range(len(powers))), powers, speed, limit)
 
 
-def slack(cones: Cones, coefficients: np.ndarray, auxiliary: int) -> float:
+def slack(cones: tuple[Cone, ...], coefficients: np.ndarray, auxiliary: int) -> float:
     """Largest amount by which all cones can be fulfilled with some auxiliary unknowns."""
     import cvxpy as cp
 
     free, margin = cp.Variable(auxiliary), cp.Variable()
     x = cp.hstack([coefficients, free]) if auxiliary else coefficients
     constraints = [margin <= 1.0]
-    if len(cones.nonnegative):
-        constraints.append(cones.nonnegative.matrix @ x + cones.nonnegative.offset >= margin)
-    for k in range(0, len(cones.small), 3):
-        d, e, f = (cones.small.matrix[k + i] @ x + cones.small.offset[k + i] for i in range(3))
-        constraints.append(cp.norm(cp.hstack([d - f, 2 * e])) <= d + f - 2 * margin)
+    for cone in cones:
+        value = cone.matrix @ x + cone.offset
+        if cone.kind == "nonnegative":
+            constraints.append(value >= margin)
+        else:
+            first, product, second = value[0], np.sqrt(2.0) * value[1], value[2]
+            constraints.append(cp.norm(cp.hstack([first - second, product])) <= first + second - 2 * margin)
     problem = cp.Problem(cp.Maximize(margin), constraints)
     problem.solve(cp.CLARABEL)
     return float(margin.value)
