@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
 from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import PreparedStretch
 from scara_ident.threads import side_by_side
 
@@ -81,10 +82,11 @@ class CandidateColumns:
     observations: Observations
     _rows: dict[Key, Rows] = field(default_factory=dict, repr=False)
     _raw: dict[Key, tuple[Rows, ...]] = field(default_factory=dict, repr=False)
+    _signals: dict[Motion, Signals] = field(default_factory=dict, repr=False)
 
     def beside(self, observations: Observations) -> CandidateColumns:
         """Return the same columns beside other torques on the same motion."""
-        return CandidateColumns(observations, self._rows, self._raw)
+        return CandidateColumns(observations, self._rows, self._raw, self._signals)
 
     def rows(self, scene: Scene, candidates: Sequence[Candidate]) -> list[Rows]:
         """Return the columns of candidates within the bands, on the rows of each joint that they act on."""
@@ -113,7 +115,7 @@ class CandidateColumns:
         if not wanted:
             return
         stretches = self.observations.data.stretches
-        made = side_by_side(lambda part: _on_stretch(scene, wanted, part, keep=keep), stretches)
+        made = side_by_side(lambda part: _on_stretch(self._signals_of(scene, part), wanted, part, keep=keep), stretches)
         for k, candidate in enumerate(wanted):
             key = _key(scene, candidate)
             parts = [rows[k] for rows, _ in made]
@@ -121,6 +123,13 @@ class CandidateColumns:
             self._rows[key] = {j: np.concatenate([part[j] for part in used], axis=1) for j in parts[0]}
             if keep:
                 self._raw[key] = tuple(raws[k] for _, raws in made)
+
+    def _signals_of(self, scene: Scene, part: PreparedStretch) -> Signals:
+        """Return the signals of a stretch; those of the last estimate are kept with all that was made of them."""
+        held = self._signals.get(part.motion)
+        if held is None or held.scene is not scene:
+            held = self._signals[part.motion] = Signals(scene, part.motion)
+        return held
 
     def forget_all_but(self, *scenes: Scene) -> None:
         """Forget columns that follow other estimates than those of some scenes."""
@@ -140,10 +149,10 @@ def _key(scene: Scene, candidate: Candidate) -> Key:
 
 
 def _on_stretch(
-    scene: Scene, candidates: Sequence[Candidate], part: PreparedStretch, *, keep: bool
+    signals: Signals, candidates: Sequence[Candidate], part: PreparedStretch, *, keep: bool
 ) -> tuple[list[Rows], list[Rows]]:
     """Return every candidate's columns within the bands and, if they are to be kept, as they are."""
-    signals = Signals(scene, part.motion)
+    scene = signals.scene
     kept: list[Rows] = [{} for _ in candidates]
     unfiltered: list[Rows] = [{} for _ in candidates]
     waiting: dict[int, list[tuple[int, Array]]] = {}

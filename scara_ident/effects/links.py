@@ -20,16 +20,16 @@ Array = NDArray[np.float64]
 
 # Where a robot's gravity is zero this is how large it is once the base tilts.
 STANDARD_GRAVITY = 9.81
-# Shifts of a joint by which its torque is differentiated: rad or m, and share of the largest speed.
-SHIFT = 1e-5
-SPEED_SHIFT = 1e-4
+# Steps that differentiate the torque by position (rad or m) and, as a share of the largest speed or 1, by velocity.
+POSITION_STEP = 1e-5
+SPEED_STEP = 1e-4
 
-_SHARED: WeakKeyDictionary[Signals, dict[Hashable, Array]] = WeakKeyDictionary()
+_SHARED: WeakKeyDictionary[Signals | Scene, dict[Hashable, Array]] = WeakKeyDictionary()
 
 
-def shared(signals: Signals, key: Hashable, make: Callable[[], Array]) -> Array:
-    """Return what several members of a family need of one stretch of motion, made once."""
-    held = _SHARED.setdefault(signals, {})
+def shared(owner: Signals | Scene, key: Hashable, make: Callable[[], Array]) -> Array:
+    """Return what several members of a family need of one stretch of motion, or of a scene, made once."""
+    held = _SHARED.setdefault(owner, {})
     if key not in held:
         held[key] = make()
     return held[key]
@@ -127,7 +127,30 @@ def rigid_torque(scene: Scene, motion: Motion, q: Array, v: Array, a: Array) -> 
     """Return what `Signals.rigid` gives, at other positions, velocities and accelerations, shape (n, N)."""
     term = scene.model.rigid_body
     moved = Motion(motion.name, motion.trajectory, motion.time, q, v, a, None, motion.rate)
-    return np.asarray(np.einsum("jpn,p->jn", term.regressor(moved), scene.value[scene.model.place(term)]))
+    return term.torque(moved, scene.value[scene.model.place(term)])
+
+
+def rigid_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
+    """Return the derivatives of all rigid-body torques by one joint's position, velocity and acceleration, each (n, N)."""
+
+    def make() -> Array:
+        scene, motion = signals.scene, signals.motion
+        state = (motion.q, motion.v, motion.a)
+        steps = (POSITION_STEP, SPEED_STEP * max(float(np.max(np.abs(motion.v))), 1.0))
+        found = []
+        for k, step in enumerate(steps):
+            up, down = [part.copy() for part in state], [part.copy() for part in state]
+            up[k][joint] += step
+            down[k][joint] -= step
+            found.append((rigid_torque(scene, motion, *up) - rigid_torque(scene, motion, *down)) / (2.0 * step))
+        # Torque is linear in acceleration.
+        pushed = motion.a.copy()
+        pushed[joint] += 1.0
+        found.append(rigid_torque(scene, motion, motion.q, motion.v, pushed) - signals.rigid)
+        return np.stack(found)
+
+    by_q, by_v, by_a = shared(signals, ("slopes", joint), make)
+    return by_q, by_v, by_a
 
 
 def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Array:
@@ -147,39 +170,30 @@ def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Ar
     ndarray, shape (n, N)
         Recorded side.
     """
-    scene, motion = signals.scene, signals.motion
-    way, speed = (float(np.max(np.abs(part))) for part in lag[:2])
-    usual = float(np.max(np.abs(motion.v)))
-    # Torque is linear in acceleration, so that only position and speed bound the step.
-    step = min(SHIFT / way if way else 1.0, SPEED_SHIFT * usual / speed if speed and usual else np.inf)
-    moved = [part.copy() for part in (motion.q, motion.v, motion.a)]
-    for part, change in zip(moved, lag, strict=True):
-        part[joint] -= step * change
-    result = (rigid_torque(scene, motion, *moved) - signals.rigid) / step
-    result[joint] += scene.robot.row_scale[joint] * scene.armature(joint) * lag[2]
+    by_q, by_v, by_a = rigid_slopes(signals, joint)
+    result = -(by_q * lag[0] + by_v * lag[1] + by_a * lag[2])
+    result[joint] += signals.scene.robot.row_scale[joint] * signals.scene.armature(joint) * lag[2]
     return np.asarray(result)
 
 
 def link_inertia(signals: Signals, joint: int) -> Array:
     """Return the inertia that a joint moves without its rotor, the other joints held, at the joint, shape (N,)."""
-
-    def make() -> Array:
-        scene, motion = signals.scene, signals.motion
-        pushed = motion.a.copy()
-        pushed[joint] += 1.0
-        change = rigid_torque(scene, motion, motion.q, motion.v, pushed)[joint] - signals.rigid[joint]
-        return np.asarray(change / scene.robot.row_scale[joint] - scene.armature(joint))
-
-    return shared(signals, ("link inertia", joint), make)
+    scene = signals.scene
+    by_a = rigid_slopes(signals, joint)[2][joint]
+    return np.asarray(by_a / scene.robot.row_scale[joint] - scene.armature(joint))
 
 
 def usual_link_inertia(scene: Scene, joint: int) -> float:
     """Return the mean of `link_inertia` over poses within a turn or a metre, at the joint; negative where misjudged."""
     robot = scene.robot
-    reach = np.where(robot.prismatic, 1.0, np.pi)[:, None]
-    q = reach * np.random.default_rng(0).uniform(-1.0, 1.0, (robot.n, 40))
-    rest, pushed = np.zeros_like(q), np.zeros_like(q)
-    pushed[joint] = 1.0
-    motion = Motion("poses", "poses", np.arange(40.0), q, rest, rest, None, 1.0)
-    change = rigid_torque(scene, motion, q, rest, pushed) - rigid_torque(scene, motion, q, rest, rest)
-    return float(np.mean(change[joint]) / robot.row_scale[joint] - scene.armature(joint))
+
+    def make() -> Array:
+        reach = np.where(robot.prismatic, 1.0, np.pi)[:, None]
+        q = reach * np.random.default_rng(0).uniform(-1.0, 1.0, (robot.n, 40))
+        rest, pushed = np.zeros_like(q), np.zeros_like(q)
+        pushed[joint] = 1.0
+        motion = Motion("poses", "poses", np.arange(40.0), q, rest, rest, None, 1.0)
+        change = rigid_torque(scene, motion, q, rest, pushed) - rigid_torque(scene, motion, q, rest, rest)
+        return np.array(np.mean(change[joint]) / robot.row_scale[joint] - scene.armature(joint))
+
+    return float(shared(scene, ("usual link inertia", joint), make))

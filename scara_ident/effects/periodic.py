@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scara_ident.effects.effect import DOUBT, SpectralLine, View
 from scara_ident.effects.friction import friction_slope
-from scara_ident.effects.links import rigid_torque, shared
+from scara_ident.effects.links import rigid_slopes
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine
@@ -216,23 +216,7 @@ def _seen(signals: Signals, joint: int, order: float) -> NDArray[np.bool_]:
 
 def _slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
     """Derivatives of all recorded torques by one joint's position, velocity and acceleration, each (n, N)."""
-
-    def make() -> Array:
-        scene, motion = signals.scene, signals.motion
-        state = (motion.q, motion.v, motion.a)
-        steps = (POSITION_STEP, SPEED_STEP * max(float(np.max(np.abs(motion.v))), 1.0), 1.0)
-        found = []
-        for k, step in enumerate(steps):
-            up, down = [part.copy() for part in state], [part.copy() for part in state]
-            up[k][joint] += step
-            if k == 2:
-                # Torque is linear in acceleration.
-                found.append(rigid_torque(scene, motion, *up) - signals.rigid)
-                continue
-            down[k][joint] -= step
-            found.append((rigid_torque(scene, motion, *up) - rigid_torque(scene, motion, *down)) / (2.0 * step))
-        found[1][joint] += friction_slope(signals, joint)
-        return np.stack(found)
-
-    by_q, by_v, by_a = shared(signals, ("slopes", joint), make)
-    return by_q, by_v, by_a
+    by_q, by_v, by_a = rigid_slopes(signals, joint)
+    with_friction = by_v.copy()
+    with_friction[joint] += friction_slope(signals, joint)
+    return by_q, with_friction, by_a

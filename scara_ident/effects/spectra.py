@@ -247,11 +247,16 @@ def noise_floor(
     to_mean = 0.5 * degrees / float(gammaincinv(0.5 * degrees, 0.5))
     floor = np.empty_like(power)
     grid = np.arange(0, len(power), stride)
-    for k in grid:
-        below = power[max(0, k - reach) : max(0, k - guard) : stride]
-        above = power[k + guard + 1 : k + reach + 1 : stride]
-        around = np.concatenate([below, above])
-        floor[k] = np.median(around) * to_mean if len(around) else np.nan
+    below, above = np.arange(-reach, -guard, stride), np.arange(guard + 1, reach + 1, stride)
+    inner = (grid >= reach) & (grid < len(power) - reach)
+    around = np.concatenate([below, above])
+    if np.any(inner) and len(around):
+        floor[grid[inner]] = np.median(power[grid[inner][:, None] + around], axis=1) * to_mean
+    for k in grid[~inner | (len(around) == 0)]:
+        near = np.concatenate(
+            [power[max(0, k - reach) : max(0, k - guard) : stride], power[k + above[k + above < len(power)]]]
+        )
+        floor[k] = np.median(near) * to_mean if len(near) else np.nan
     held = np.isfinite(floor[grid])
     return np.interp(np.arange(len(power)), grid[held], floor[grid][held]) if np.any(held) else np.zeros_like(power)
 

@@ -16,6 +16,8 @@ from scara_ident.model.terms.term import Column, Filled
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
+# Samples at a time where columns are not kept: few enough for the cache.
+CHUNK = 4096
 # The SCARA of Indri et al. 2002 and its P_d (equation 2), told by what the reduction finds.
 _SCARA_LEADS = ("I1zz", "mx2", "my2", "I2zz", "Ia2")
 _SCARA_MEANINGS = ("I1z + m2 l1^2 + Jm1/tau1^2", "m2 s2x", "m2 s2y", "I2z", "Jm2/tau2^2")
@@ -72,6 +74,19 @@ class RigidBody(Filled):
         for joint, scale in enumerate(robot.row_scale):
             if scale != 1.0:
                 np.multiply(rows[joint], scale, out=rows[joint])
+
+    def torque(self, motion: Motion, value: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the torque of parameters ``value`` (p,) on a motion, shape (n, N), without keeping any column."""
+        active = [np.flatnonzero(row) for row in self.pattern]
+        buffers = [np.empty((len(own), min(CHUNK, motion.samples))) for own in active]
+        result = np.empty((self.robot.n, motion.samples))
+        for start in range(0, motion.samples, CHUNK):
+            part = motion.part(start, start + CHUNK)
+            rows = [buffer[:, : part.samples] for buffer in buffers]
+            self.fill(part, rows)
+            for joint, own in enumerate(active):
+                result[joint, start : start + CHUNK] = value[own] @ rows[joint]
+        return result
 
 
 @lru_cache(maxsize=16)
