@@ -10,6 +10,7 @@ from scara_ident.cli.console import (
     RecordingArguments,
     RobotOption,
     VerboseOption,
+    check_report,
     output_console,
     print_json,
     progress,
@@ -28,13 +29,13 @@ def compare(
     verbose: VerboseOption = False,
 ) -> None:
     """Set every trajectory's parameters against every trajectory."""
-    from scara_ident.files import check_output, write_json, written_together
+    from scara_ident.files import write_json, written_together
     from scara_ident.identification.compare import compare as run
     from scara_ident.recording.recording import read_recordings
     from scara_ident.report.comparison import comparison_dict
     from scara_ident.robot.robot import load_robot
 
-    check_output(output)
+    check_report(output, "comparison")
     arm = load_robot(robot)
     with progress() as step:
         step("reading the recordings")

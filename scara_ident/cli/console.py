@@ -22,6 +22,7 @@ from scara_ident.model import MODELS
 
 if TYPE_CHECKING:
     from scara_ident.recording.recording import Recording
+    from scara_ident.report.html.section import Kind
 
 # Of a pipe or a file, which have no width of their own.
 PIPE_WIDTH = 80
@@ -136,6 +137,17 @@ def progress() -> Iterator[Callable[[str], None]]:
         return
     with console.status("starting") as status:
         yield lambda step: status.update(step)
+
+
+def check_report(output: Path | None, kind: Kind) -> None:
+    """Refuse, before the work, a folder that cannot be written into and a report that cannot be made."""
+    from scara_ident.files import check_output
+
+    check_output(output)
+    if output is not None:
+        from scara_ident.report.html.section import added_sections
+
+        added_sections(kind)
 
 
 def table(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:

@@ -14,6 +14,7 @@ from scara_ident.cli.console import (
     RecordingArguments,
     RobotOption,
     VerboseOption,
+    check_report,
     output_console,
     print_json,
     progress,
@@ -56,12 +57,12 @@ def diagnose(
     """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
     from scara_ident.diagnosis import diagnose as run
     from scara_ident.effects import effects_named
-    from scara_ident.files import check_output, write_json, write_text, written_together
+    from scara_ident.files import write_json, write_text, written_together
     from scara_ident.recording.recording import read_recordings
     from scara_ident.report.diagnosis import diagnosis_dict, diagnosis_markdown
     from scara_ident.robot.robot import load_robot
 
-    check_output(output)
+    check_report(output, "diagnosis")
     arm = load_robot(robot)
     with progress() as step:
         step("reading the recordings")
@@ -98,13 +99,14 @@ def diagnose(
         rows.add_row(row["label"], f"{row['gain']:.1%}", f"{row['p_value']:.0e}", row["why"])
     console.print(rows)
     if output is not None:
-        from scara_ident.report.html import diagnosis_report
+        from scara_ident.report.html import DiagnosisContext, diagnosis_report
         from scara_ident.report.pictures import diagnosis_pictures, remove_stale
 
+        context = DiagnosisContext(result)
         with written_together(output) as place:
-            pictures = diagnosis_pictures(place, result, training)
+            pictures = diagnosis_pictures(place, context)
             write_text(place / "diagnosis.md", diagnosis_markdown(result, pictures))
-            diagnosis_report(place / "report.html", result, training, held_out)
+            diagnosis_report(place / "report.html", context)
             write_json(place / "diagnosis.json", content)
         remove_stale(output, [name for _, name in pictures])
         names = ("diagnosis.json", "diagnosis.md", *(name for _, name in pictures), "report.html")

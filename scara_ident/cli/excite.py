@@ -7,7 +7,16 @@ from typing import Annotated, Literal
 
 import typer
 
-from scara_ident.cli.console import JsonOption, ModelOption, RobotOption, output_console, print_json, progress, table
+from scara_ident.cli.console import (
+    JsonOption,
+    ModelOption,
+    RobotOption,
+    check_report,
+    output_console,
+    print_json,
+    progress,
+    table,
+)
 
 
 def excite(
@@ -71,21 +80,21 @@ def excite(
         excitation_dict,
         limits_of,
         write_joint_trajectory,
-        write_preview,
         write_trajectory,
     )
     from scara_ident.excitation.criteria import criterion_of
     from scara_ident.excitation.design import SAMPLES, check_size
     from scara_ident.excitation.known import read_parameters
     from scara_ident.excitation.output import check_rate, file_names
-    from scara_ident.files import check_output, write_json, written_together
+    from scara_ident.files import write_json, written_together
     from scara_ident.identification.identify import known_information
     from scara_ident.model.model import build_model
     from scara_ident.recording.recording import read_recordings
     from scara_ident.report.html import excitation_report
+    from scara_ident.report.pictures import design_picture
     from scara_ident.robot.robot import load_robot
 
-    check_output(output)
+    check_report(output, "excitation")
     arm = load_robot(robot)
     equation = build_model(arm, model)
     goal = criterion_of(criterion, equation, wanted or ())
@@ -144,7 +153,7 @@ def excite(
         ):
             write_trajectory(trajectory, folder / csv, rate)
             write_joint_trajectory(trajectory, folder / yaml)
-        write_preview(design, folder / "excitation.png")
+        design_picture(folder / "excitation.png", design)
         motions = [design.motion(k, PAPER_SAMPLES / duration) for k in range(trajectories)]
         excitation_report(folder / "report.html", content, arm, motions)
         write_json(folder / "excitation.json", content)

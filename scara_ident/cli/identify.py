@@ -16,6 +16,7 @@ from scara_ident.cli.console import (
     RecordingArguments,
     RobotOption,
     VerboseOption,
+    check_report,
     number,
     output_console,
     print_json,
@@ -44,14 +45,14 @@ def identify(
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
     from scara_ident.estimation.consistent.options import ConsistentOptions
-    from scara_ident.files import check_output, write_json, write_whole, written_together
+    from scara_ident.files import write_json, written_together
     from scara_ident.identification.identify import identified_arm
     from scara_ident.identification.identify import identify as run
     from scara_ident.recording.recording import read_recordings
     from scara_ident.report.identification import identification_dict, sentences
     from scara_ident.robot.robot import load_robot
 
-    check_output(output)
+    check_report(output, "identification")
     arm = load_robot(robot)
     with progress() as step:
         step("reading the recordings")
@@ -103,18 +104,19 @@ def identify(
         console.print(sentence, markup=False)
     if output is not None:
         from scara_ident.export.robots import export_mjcf, export_urdf
-        from scara_ident.report.figure import torque_figure
-        from scara_ident.report.html import identification_report
+        from scara_ident.report.html import IdentificationContext, identification_report
+        from scara_ident.report.pictures import torque_picture
 
         arm_found = identified_arm(result)
+        context = IdentificationContext(result)
         urdf, mjcf = f"{arm.name}_identified.urdf", f"{arm.name}_identified.xml"
         with written_together(output) as place:
             if arm_found is not None:
                 notes = [export_urdf(arm_found, place / urdf), export_mjcf(arm_found, place / mjcf)]
                 for note in dict.fromkeys(chain.from_iterable(notes)):
                     console.print(f"note: {note}", markup=False, style="dim")
-            write_whole(place / "torque.png", lambda path: torque_figure(path, result, (*training, *held_out)))
-            identification_report(place / "report.html", result, training, held_out)
+            torque_picture(place / "torque.png", context)
+            identification_report(place / "report.html", context)
             write_json(place / "identification.json", content)
         names = ("identification.json", "report.html", "torque.png", *((urdf, mjcf) if arm_found is not None else ()))
         written = ", ".join(str(output / name) for name in names)

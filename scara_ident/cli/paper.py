@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from scara_ident.cli.console import OutputOption, output_console, table
+from scara_ident.cli.console import OutputOption, check_report, output_console, table
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from scara_ident.paper.report import PaperReport
 
 # Printed line by line; of the others only the count and what differs.
 _IN_FULL = ("Table 1", "Limits", "Torque rms from Table 5")
@@ -12,10 +18,9 @@ _IN_FULL = ("Table 1", "Limits", "Torque rms from Table 5")
 
 def paper(output: OutputOption = None) -> None:
     """Set the printed tables of the paper (Indri et al., 2002) beside what the program computes."""
-    from scara_ident.files import check_output, write_json
     from scara_ident.paper import check_paper
 
-    check_output(output)
+    check_report(output, "paper")
     report = check_paper()
     console = output_console()
     for section in report.sections:
@@ -45,16 +50,14 @@ def paper(output: OutputOption = None) -> None:
             )
         console.print(rows)
     if output is not None:
-        write_json(output / "paper.json", report.to_dict())
-        console.print(f"written: {output / 'paper.json'}", markup=False, soft_wrap=True)
+        _write(output, report, console)
 
 
 def paper_in_short(output: Path) -> None:
-    """Count what agrees, section by section, and write ``paper.json``."""
-    from scara_ident.files import check_output, write_json
+    """Count what agrees, section by section, and write ``paper.json`` with its report."""
     from scara_ident.paper import check_paper
 
-    check_output(output)
+    check_report(output, "paper")
     report = check_paper()
     rows = table("printed against computed", "of the paper", "agree", "judged", right=("agree", "judged"))
     for section in report.sections:
@@ -63,8 +66,18 @@ def paper_in_short(output: Path) -> None:
     console = output_console()
     console.print(rows)
     console.print("Every value, and why some differ: scara-ident paper", markup=False)
-    write_json(output / "paper.json", report.to_dict())
-    console.print(f"written: {output / 'paper.json'}", markup=False, soft_wrap=True)
+    _write(output, report, console)
+
+
+def _write(output: Path, report: PaperReport, console: Console) -> None:
+    from scara_ident.files import write_json, written_together
+    from scara_ident.report.html import paper_report
+
+    with written_together(output) as place:
+        paper_report(place / "report.html", report)
+        write_json(place / "paper.json", report.to_dict())
+    written = ", ".join(str(output / name) for name in ("paper.json", "report.html"))
+    console.print(f"written: {written}", markup=False, soft_wrap=True)
 
 
 def _number(value: float | None) -> str:

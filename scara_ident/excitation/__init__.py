@@ -5,7 +5,6 @@ from scara_ident.excitation.curves import Basis, ExcitationTrajectory, make_basi
 from scara_ident.excitation.design import Design, default_harmonics, design_excitation, information_of
 from scara_ident.excitation.limits import InfeasibleLimits, Limits, limits_of, nominal_parameters
 from scara_ident.excitation.output import excitation_dict, write_joint_trajectory, write_trajectory
-from scara_ident.excitation.preview import preview_figure, write_preview
 from scara_ident.excitation.search import Effort, Progress
 from scara_ident.excitation.verification import Reached
 
@@ -30,8 +29,6 @@ __all__ = [
     "limits_of",
     "make_basis",
     "nominal_parameters",
-    "preview_figure",
     "write_joint_trajectory",
-    "write_preview",
     "write_trajectory",
 ]

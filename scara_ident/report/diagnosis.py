@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.diagnose import Diagnosis
-from scara_ident.diagnosis.model_selection import Unexplained, joint_errors
+from scara_ident.diagnosis.model_selection import Unexplained, rms_of
 from scara_ident.effects import Parameter
-from scara_ident.estimation.observations import Evidence
+from scara_ident.estimation.estimate import joint_errors
+from scara_ident.estimation.observations import Observations
 from scara_ident.model.terms.friction import Friction
 
 Array = NDArray[np.float64]
@@ -70,11 +71,11 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
         ),
         "recordings": {
             kind: {
-                item.recording: {
-                    "before": dict(zip(joints, _rms(diagnosis.before.value, [item]), strict=True)),
-                    "after": dict(zip(joints, _rms(diagnosis.after.value, [later]), strict=True)),
+                item.name: {
+                    "before": dict(zip(joints, rms_of(diagnosis.before.value, item), strict=True)),
+                    "after": dict(zip(joints, rms_of(diagnosis.after.value, later), strict=True)),
                 }
-                for item, later in zip(before, after, strict=True)
+                for item, later in zip(before.each, after.each, strict=True)
             }
             for kind, before, after in (
                 ("training", diagnosis.training_before, diagnosis.training_after),
@@ -148,18 +149,14 @@ def _unexplained(diagnosis: Diagnosis) -> dict[str, Any] | None:
     }
 
 
-def _rms(value: Array, evidence: Sequence[Evidence]) -> list[float | None]:
-    return [error.rms if error else None for error in joint_errors(value, evidence)]
-
-
 def _before_after(
-    joints: Sequence[str], before: Array, old: Sequence[Evidence], after: Array, new: Sequence[Evidence]
+    joints: Sequence[str], before: Array, old: Observations, after: Array, new: Observations
 ) -> dict[str, dict[str, float | None]]:
-    if not old:
+    if not old.data.recordings:
         return {"before": {}, "after": {}}
     result: dict[str, dict[str, float | None]] = {}
-    for name, value, evidence in (("before", before, old), ("after", after, new)):
-        errors = joint_errors(value, evidence)
+    for name, value, observations in (("before", before, old), ("after", after, new)):
+        errors = joint_errors(value, observations)
         pairs = list(zip(joints, errors, strict=True))
         result[name] = {joint: error.rms if error else None for joint, error in pairs}
         result[f"{name}_relative"] = {joint: error.relative if error else None for joint, error in pairs}
@@ -210,17 +207,17 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         if effect.confounded_with:
             others = ", ".join(confounder.label for confounder in effect.confounded_with)
             found.append(f"These recordings cannot tell it from: {others}.")
-    kind = "held-out" if diagnosis.validation_before else "training"
-    old = diagnosis.validation_before or diagnosis.training_before
-    new = diagnosis.validation_after or diagnosis.training_after
+    kind, old, new = "held-out", diagnosis.validation_before, diagnosis.validation_after
+    if not old.data.recordings:
+        kind, old, new = "training", diagnosis.training_before, diagnosis.training_after
     if diagnosis.effects:
         changes = [
             f"{joint} {a:.3g} to {b:.3g} {diagnosis.robot.torque_unit(j)}"
             for j, (joint, a, b) in enumerate(
                 zip(
                     diagnosis.robot.joints,
-                    _rms(diagnosis.before.value, old),
-                    _rms(diagnosis.after.value, new),
+                    rms_of(diagnosis.before.value, old),
+                    rms_of(diagnosis.after.value, new),
                     strict=True,
                 )
             )

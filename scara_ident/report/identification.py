@@ -8,7 +8,7 @@ from typing import Any
 from scara_ident.estimation import JointError
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, links
 from scara_ident.estimation.estimate import PAPER_SAMPLES
-from scara_ident.estimation.observations import Evidence
+from scara_ident.estimation.observations import Observations
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
 from scara_ident.robot.robot import Robot
 
@@ -22,7 +22,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         "robot": robot.name,
         "model": identification.model.name,
         "method": estimate.method,
-        "samples": sum(item.samples for item in identification.training),
+        "samples": identification.training.samples,
         "parameters": [
             {
                 "name": column.name,
@@ -52,7 +52,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
             for trajectory, sigma in identification.noise.items()
         },
         "left_out": {
-            kind: {item.recording: _left_out(robot, item) for item in items}
+            kind: {item.name: _left_out(robot, item) for item in items.each}
             for kind, items in (("training", identification.training), ("validation", identification.validation))
         },
         "summary": list(sentences(identification)),
@@ -85,7 +85,7 @@ def _error(error: JointError | None) -> dict[str, float | None]:
     }
 
 
-def _left_out(robot: Robot, item: Evidence) -> dict[str, Any]:
+def _left_out(robot: Robot, item: Observations) -> dict[str, Any]:
     return {
         "ends_s": item.left_out_ends,
         "at_rest_share": dict(zip(robot.joints, item.left_out_rest, strict=True)),

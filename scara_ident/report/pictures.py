@@ -1,64 +1,70 @@
-"""The figures of a diagnosis as PNG files beside its Markdown: residuals over what explains them, before and after."""
+"""The pictures beside the reports: torque of an identification, effects of a diagnosis, motion of a design."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from scara_ident.diagnosis import Diagnosis
-from scara_ident.files import write_whole
-from scara_ident.recording.recording import Recording
-from scara_ident.report.html.chapters import chapters
-from scara_ident.report.html.plot import (
-    Band,
-    Density,
-    Dots,
-    Figure,
-    Grid,
-    Layer,
-    Level,
-    Line,
-    Mark,
-    Matrix,
-    Panel,
-    Plot,
-    Region,
-)
+from scara_ident.excitation.design import Design
+from scara_ident.excitation.tool import tool_motion, tool_of
+from scara_ident.report.drawing import draw
+from scara_ident.report.html.diagnosis import DiagnosisContext
+from scara_ident.report.html.identification import IdentificationContext
 from scara_ident.report.html.remainder import remainder_group
 from scara_ident.report.html.story import chapter_group, moment_group
-from scara_ident.report.html.traces import traces
+from scara_ident.report.html.torque import torque_plot
+from scara_ident.report.plot import DASHES, Dots, Figure, Layer, Line, Panel, Plot, single, style
 from scara_ident.threads import one_blas_thread
 
-COLORS = {
-    "blue": "#0072b2",
-    "vermillion": "#d55e00",
-    "green": "#009e73",
-    "orange": "#e69f00",
-    "sky": "#56b4e9",
-    "purple": "#cc79a7",
-    "black": "#1b1f24",
-    "grey": "#9aa3ad",
-}
-WIDTH = 10.0
-DPI = 110
+Array = NDArray[np.float64]
+
+# Recordings shown, at the most; the first held-out ones before the fitted ones.
+MOST_RECORDINGS = 4
+# Pixels of the page that the torque of a joint has.
+HEIGHT = 170
+# Points of a designed motion.
+POINTS = 3000
 
 
-def diagnosis_pictures(
-    folder: Path, diagnosis: Diagnosis, recordings: Sequence[Recording]
-) -> tuple[tuple[str, str], ...]:
+def torque_picture(path: Path, context: IdentificationContext) -> None:
+    """Draw measured, predicted and residual torque over time, a column per recording and a row per joint.
+
+    Parameters
+    ----------
+    path : Path
+        PNG file.
+    context : IdentificationContext
+
+    Raises
+    ------
+    ScaraIdentError
+        If the file cannot be written.
+    """
+    found = context.identification
+    robot = found.model.robot
+    rows: list[list[Figure]] = []
+    for j, joint in enumerate(robot.joints):
+        rows.append([])
+        for name, traces in context.parts[:MOST_RECORDINGS]:
+            plot = torque_plot(robot, traces, j, found.bands[j])
+            # Residual and torque over one axis: axes are what takes the time.
+            panel = Panel(plot.panels[0].label, [layer for each in plot.panels for layer in each.layers], HEIGHT)
+            rows[-1].append(single("torque", f"{name}, {joint}", "", replace(plot, panels=(panel,))))
+    draw(path, "Measured and predicted torque", rows)
+
+
+def diagnosis_pictures(folder: Path, context: DiagnosisContext) -> tuple[tuple[str, str], ...]:
     """Draw every effect found, and what no effect accounts for.
 
     Parameters
     ----------
     folder : Path
         Where the PNG files are written.
-    diagnosis : Diagnosis
-    recordings : sequence of Recording
-        Those that every choice was made on, as they were given.
+    context : DiagnosisContext
 
     Returns
     -------
@@ -70,126 +76,22 @@ def diagnosis_pictures(
     ScaraIdentError
         If a file cannot be written.
     """
-    robot, search = diagnosis.robot, diagnosis.search
+    robot, remainder = context.diagnosis.robot, context.diagnosis.unexplained
     found: list[tuple[str, str]] = []
     with one_blas_thread():
-        for effect, chapter in chapters(diagnosis, recordings):
+        for effect, chapter in context.chapters:
             title = effect.effect if effect.joint is None else f"{effect.effect} on {effect.joint}"
-            name = f"effect_{chapter.number}.png"
-            above, below = chapter_group(robot, chapter).figures, moment_group(robot, chapter).figures
-            _write(folder / name, title, above, below)
-            found.append((title, name))
-        if diagnosis.unexplained is not None:
-            left = [traces(diagnosis.after.model, diagnosis.after.value, r, search.bands) for r in search.recordings]
-            group = remainder_group(robot, diagnosis.unexplained, list(chain.from_iterable(left)))
-            if group is not None:
-                title = f"what no effect accounts for on {diagnosis.unexplained.joint}"
-                _write(folder / "unexplained.png", title, group.figures, ())
-                found.append((title, "unexplained.png"))
+            found.append((title, f"effect_{chapter.number}.png"))
+            draw(
+                folder / found[-1][1],
+                title,
+                [chapter_group(robot, chapter).figures, moment_group(robot, chapter).figures],
+            )
+        group = None if remainder is None else remainder_group(robot, remainder, context.sets["training"])
+        if remainder is not None and group is not None:
+            found.append((f"what no effect accounts for on {remainder.joint}", "unexplained.png"))
+            draw(folder / "unexplained.png", found[-1][0], [group.figures])
     return tuple(found)
-
-
-def _write(path: Path, title: str, above: Sequence[Figure], below: Sequence[Figure]) -> None:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    heights = ([3.9] if above else []) + [2.6] * len(below)
-    figure = pyplot.figure(figsize=(WIDTH, sum(heights) + 0.4), layout="constrained")
-    figure.suptitle(title, fontsize=11)
-    strips = np.atleast_1d(figure.subfigures(len(heights), 1, height_ratios=heights))
-    if above:
-        for part, each in zip(np.atleast_1d(strips[0].subfigures(1, len(above))), above, strict=True):
-            _draw(part, each)
-    for part, each in zip(strips[1 if above else 0 :], below, strict=True):
-        _draw(part, each)
-    write_whole(path, lambda place: figure.savefig(place, dpi=DPI))
-    pyplot.close(figure)
-
-
-def _draw(part: Any, figure: Figure) -> None:
-    (drawing,) = figure.variants.values()
-    part.suptitle(figure.title, fontsize=9)
-    if isinstance(drawing, Matrix):
-        _draw_matrix(part, drawing)
-        return
-    axes = np.atleast_1d(part.subplots(len(drawing.panels), 1, sharex=True))
-    for axis, panel in zip(axes, drawing.panels, strict=True):
-        _draw_panel(axis, panel, drawing)
-    axes[-1].set_xlabel(drawing.x_label, fontsize=8)
-    handles: dict[str, Any] = {}
-    for axis in axes:
-        handles |= dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
-    part.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=2, fontsize=7, frameon=False)
-
-
-def _draw_panel(axis: Any, panel: Panel, plot: Plot) -> None:
-    if panel.log:
-        axis.set_yscale("log")
-    if plot.log:
-        axis.set_xscale("log")
-    fitted = [layer for layer in panel.layers if getattr(layer, "fit", True)]
-    for layer in fitted:
-        _draw_layer(axis, layer)
-    if plot.limits is not None:
-        axis.set_xlim(*plot.limits)
-    if panel.limits is not None:
-        axis.set_ylim(*panel.limits)
-    # Limits are found only when asked for; from here on they stay.
-    axis.autoscale_view()
-    axis.autoscale(False)
-    for layer in panel.layers:
-        if layer not in fitted:
-            _draw_layer(axis, layer)
-    if not panel.log:
-        axis.axhline(0.0, color="0.5", lw=0.5, zorder=0)
-    axis.set_ylabel(panel.label, fontsize=8)
-    axis.tick_params(labelsize=7)
-    axis.grid(color="0.92", lw=0.6)
-    axis.set_axisbelow(True)
-
-
-def _along(x: Any) -> Any:
-    return x.start + x.step * np.arange(x.count) if isinstance(x, Grid) else np.asarray(x, dtype=float)
-
-
-def _draw_layer(axis: Any, layer: Layer) -> None:
-    name = getattr(layer, "name", "") or None
-    color = COLORS[str(getattr(layer, "color", "black"))]
-    if isinstance(layer, Line):
-        dash: Any = (0, tuple(float(x) for x in layer.dash.split())) if layer.dash else "-"
-        axis.plot(_along(layer.x), np.asarray(layer.y), color=color, lw=0.8 * layer.width, ls=dash, label=name)
-    elif isinstance(layer, Band):
-        axis.fill_between(_along(layer.x), layer.low, layer.high, color=color, alpha=0.22, lw=0.0, label=name)
-    elif isinstance(layer, Dots):
-        axis.errorbar(layer.x, layer.y, yerr=layer.bar, fmt="o", ms=layer.radius, color=color, label=name)
-    elif isinstance(layer, Density):
-        counts = np.log1p(layer.counts.T)
-        shade = np.zeros((*counts.shape, 4))
-        shade[..., :3] = [int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
-        shade[..., 3] = 0.85 * counts / max(float(counts.max()), 1e-12)
-        axis.imshow(shade, extent=(*layer.x, *layer.y), origin="lower", aspect="auto", interpolation="nearest")
-    elif isinstance(layer, Region):
-        axis.axvspan(*layer.x, ymax=layer.share, color=color, alpha=layer.opacity, lw=0.0, label=name)
-    elif isinstance(layer, Level):
-        axis.axhline(layer.y, color=color, lw=0.8, ls="--", label=name)
-    elif isinstance(layer, Mark):
-        axis.axvline(layer.x, color=color, lw=0.8, ls="--")
-
-
-def _draw_matrix(part: Any, matrix: Matrix) -> None:
-    axis = part.subplots()
-    from matplotlib.colors import LinearSegmentedColormap
-
-    colours = LinearSegmentedColormap.from_list("signs", [COLORS["vermillion"], "white", COLORS["blue"]])
-    image = axis.imshow(matrix.values, cmap=colours, vmin=-matrix.most, vmax=matrix.most, aspect="auto")
-    for set_ticks, labels in ((axis.set_xticks, matrix.columns), (axis.set_yticks, matrix.rows)):
-        every = max(1, len(labels) // 4)
-        set_ticks(range(0, len(labels), every), list(labels)[::every], fontsize=7)
-    axis.set_xlabel(matrix.column_label, fontsize=8)
-    axis.set_ylabel(matrix.row_label, fontsize=8)
-    part.colorbar(image, ax=axis).ax.tick_params(labelsize=7)
 
 
 def remove_stale(folder: Path, written: Sequence[str]) -> None:
@@ -204,3 +106,87 @@ def remove_stale(folder: Path, written: Sequence[str]) -> None:
     for old in (*folder.glob("effect_*.png"), folder / "unexplained.png"):
         if old.name not in written:
             old.unlink(missing_ok=True)
+
+
+def design_picture(path: Path, design: Design) -> None:
+    """Draw a design.
+
+    Joint positions in time, velocity over position of every joint with its limits, the tool's path in the two
+    directions in which it reaches farthest, and every parameter's std per unit of torque noise: with all parameters
+    estimated, beside that with all others known, or beside what was known before.
+
+    Parameters
+    ----------
+    path : Path
+        PNG, SVG or PDF file.
+    design : Design
+
+    Raises
+    ------
+    ScaraIdentError
+        If the file cannot be written or the suffix is of no picture.
+    """
+    names = ", ".join(each.name for each in design.trajectories)
+    title = (
+        f"{design.model.robot.name}: {names} - ln det {design.log_det:.2f}, "
+        f"cond of the regressor {np.sqrt(design.condition):.3g} ({design.model.name} model)"
+    )
+    draw(path, title, [[_motion(design), _phases(design)], [_path(design)], [_parameters(design)]])
+
+
+def _motion(design: Design) -> Figure:
+    time = np.linspace(0.0, design.trajectories[0].duration, POINTS)
+    layers: list[Layer] = [
+        Line(time, q, style(j)[0], trajectory.joints[j] if k == 0 else "", 1.5, DASHES[k % len(DASHES)])
+        for k, trajectory in enumerate(design.trajectories)
+        for j, q in enumerate(trajectory.at(time)[0])
+    ]
+    return single("motion", "Motion", "", Plot("time [s]", (Panel("position [rad or m]", layers, 260),)))
+
+
+def _phases(design: Design) -> Figure:
+    limits, time = design.limits, np.linspace(0.0, design.trajectories[0].duration, POINTS)
+    half = 0.5 * (limits.upper - limits.lower)
+    box = Line([-1.0, 1.0, 1.0, -1.0, -1.0], [-1.0, -1.0, 1.0, 1.0, -1.0], "grey", "", 1.2, "5 3", path=True)
+    layers: list[Layer] = [box]
+    for trajectory in design.trajectories:
+        for j, (q, v) in enumerate(zip(*trajectory.at(time)[:2], strict=True)):
+            place = (q - limits.centre[j]) / half[j]
+            layers.append(Line(place, v / limits.velocity[j], style(j)[0], "", 1.0, path=True))
+    panel = Panel("velocity, share of the limit", layers, 260)
+    return single("phases", "Phase portraits and limits", "", Plot("position, share of the range", (panel,)))
+
+
+def _path(design: Design) -> Figure:
+    tool = design.limits.tool or tool_of(design.model.robot)
+    time = np.linspace(0.0, design.trajectories[0].duration, POINTS)
+    paths = [tool_motion(tool, *each.at(time)).position for each in design.trajectories]
+    reach = np.ptp(np.concatenate(paths, axis=1), axis=1)
+    first, second = sorted(np.argsort(reach, kind="stable")[1:])
+    layers: list[Layer] = []
+    for k, path in enumerate(paths):
+        layers.append(Line(path[first], path[second], "blue", "", 1.0, DASHES[k % len(DASHES)], path=True))
+        layers.append(Dots(path[first, :1], path[second, :1], "blue", radius=5.0))
+    plot = Plot(f"{'xyz'[first]} [m]", (Panel(f"{'xyz'[second]} [m]", layers, 300),), equal=True)
+    return single("path", f"Path of {tool.name} (dot: start)", "", plot)
+
+
+def _parameters(design: Design) -> Figure:
+    together = design.std()
+    if design.prior is None:
+        size = np.linalg.norm(design.information.regressor_factor, axis=0)
+        other = np.divide(1.0, size, out=np.full(len(size), np.inf), where=size > 0.0)
+        labels = ("all parameters estimated", "all others known")
+    else:
+        variance = np.diag(design.prior.inverse()).copy()
+        variance[design.prior.solve().undetermined] = np.inf
+        other = np.sqrt(variance)
+        labels = ("after", "before")
+    places = np.arange(float(len(together)))
+    layers: list[Layer] = [
+        Dots(places, np.where(np.isfinite(values), values, np.nan), color, label, radius=size)
+        for values, label, color, size in ((other, labels[1], "sky", 6.0), (together, labels[0], "blue", 4.0))
+    ]
+    unit = "" if np.any(design.weights != 1.0) else " per unit of torque noise"
+    panel = Panel("std [the parameter's unit]", layers, 260, log=True)
+    return single("std", f"Parameters: std{unit}", "", Plot("", (panel,), names=design.model.names))

@@ -8,7 +8,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from scara_ident.report import figure as figure_module
+from scara_ident.report import pictures
 
 
 def refuse(constant: str) -> None:
@@ -151,7 +151,7 @@ def test_an_earlier_result_survives_a_run_that_fails(command, folder: Path, tmp_
         path.write_bytes(b"half")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(figure_module, "torque_figure", full)
+    monkeypatch.setattr(pictures, "torque_picture", full)
     result = command("identify", folder / "OJD_1.parquet", "--band", "15", "--output", tmp_path)
     assert result.status == 1
     assert "No space left" in result.err

@@ -13,7 +13,6 @@ from scara_ident.excitation import (
     design_excitation,
     excitation_dict,
     write_joint_trajectory,
-    write_preview,
     write_trajectory,
 )
 from scara_ident.excitation.curves import make_basis
@@ -122,10 +121,3 @@ def test_friction_that_is_known_counts_in_the_torque():
     content = excitation_dict(made)
     assert content["criterion"] == {"name": "cond", "parameters": ["P_d1", "P_d2", "P_d4", "P_d5"]}
     assert any("the friction that was given" in line for line in content["notes"])
-
-
-def test_the_preview_is_a_picture(made, tmp_path):
-    write_preview(made, tmp_path / "new" / "preview.png")
-    assert (tmp_path / "new" / "preview.png").read_bytes().startswith(b"\x89PNG")
-    with pytest.raises(ScaraIdentError, match="cannot be written"):
-        write_preview(made, tmp_path / "preview.docx")

@@ -72,7 +72,7 @@ def test_what_is_left_is_near_the_noise_floor(content):
 
 def test_the_error_of_one_recording_is_the_root_of_its_share(content, result):
     errors = [content["recordings"]["training"][name]["after"]["joint1"] for name in ("A_1", "A_2", "B_1", "B_2")]
-    counts = [item.joint(0).rows for item in result.training_after]
+    counts = [item.by_joint[0].rows for item in result.training_after.each]
     pooled = np.sqrt(np.average(np.square(errors), weights=counts))
     assert content["training"]["after"]["joint1"] == pytest.approx(pooled, rel=1e-6)
 

@@ -1,27 +1,31 @@
-"""The figures beside the Markdown of a diagnosis: which there are, and that they show what they should."""
+"""The pictures beside the reports: which there are, and that they show what they should."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.effects import View
 from scara_ident.effects.position import Spring
-from scara_ident.motion.motion import Motion
+from scara_ident.errors import ScaraIdentError
+from scara_ident.excitation import Effort, design_excitation
+from scara_ident.model.model import build_model
 from scara_ident.report.diagnosis import diagnosis_markdown
-from scara_ident.report.html import diagnosis_report
-from scara_ident.report.html.chapters import Chapter
+from scara_ident.report.drawing import COLORS
+from scara_ident.report.html import DiagnosisContext, IdentificationContext, diagnosis_report
 from scara_ident.report.html.remainder import signal_of
-from scara_ident.report.html.story import SIGNALS, chapter_group
-from scara_ident.report.html.torque import torque_group
-from scara_ident.report.html.traces import Trace
-from scara_ident.report.pictures import COLORS, diagnosis_pictures, remove_stale
+from scara_ident.report.pictures import (
+    MOST_RECORDINGS,
+    design_picture,
+    diagnosis_pictures,
+    remove_stale,
+    torque_picture,
+)
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, with_torque
+from tests.report.simulated import made, run
 
 
 def _share(path: Path, color: str) -> float:
@@ -45,8 +49,8 @@ def with_remainder():
 
 
 def test_an_effect_is_drawn_before_and_after_and_stands_in_the_story(with_spring, tmp_path):
-    runs, found = with_spring
-    pictures = diagnosis_pictures(tmp_path, found, runs)
+    _, found = with_spring
+    pictures = diagnosis_pictures(tmp_path, DiagnosisContext(found))
     assert pictures == (("spring on joint2", "effect_1.png"),)
     assert [path.name for path in tmp_path.iterdir()] == ["effect_1.png"]
     # Before, after, and what is measured of the effect; a stroke of the legend alone has not half as many pixels.
@@ -58,10 +62,12 @@ def test_an_effect_is_drawn_before_and_after_and_stands_in_the_story(with_spring
 
 
 def test_a_remainder_is_drawn_over_what_it_depends_on(with_remainder, tmp_path):
-    runs, found = with_remainder
-    assert diagnosis_pictures(tmp_path, found, runs) == (("what no effect accounts for on joint2", "unexplained.png"),)
+    _, found = with_remainder
+    assert diagnosis_pictures(tmp_path, DiagnosisContext(found)) == (
+        ("what no effect accounts for on joint2", "unexplained.png"),
+    )
     assert _share(tmp_path / "unexplained.png", "vermillion") > 2e-4
-    diagnosis_report(tmp_path / "report.html", found, runs)
+    diagnosis_report(tmp_path / "report.html", DiagnosisContext(found))
     assert 'data-figure="remainder-0"' in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
@@ -72,53 +78,46 @@ def test_every_signal_that_the_screening_names_can_be_drawn(with_remainder):
     assert [name for name in sorted(names) if signal_of(found.robot, name, 1) is None] == []
 
 
-def _trace(residual: np.ndarray, used: np.ndarray) -> Trace:
-    time = np.arange(residual.shape[1]) / 250.0
-    omega = np.array([[0.7], [0.9]])
-    q, v = np.sin(omega * time), omega * np.cos(omega * time)
-    motion = Motion("X", "X", time, q, v, -(omega**2) * q, residual, 250.0)
-    zero = np.zeros_like(q)
-    return Trace("X", 0.0, motion, residual, zero, zero, zero, zero, used, (1, 1), 1)
-
-
-def test_after_a_reversal_the_distance_over_which_the_effect_acts_is_shown():
-    residual = np.random.default_rng(0).standard_normal((2, 20000))
-    trace = _trace(residual, np.ones(residual.shape, dtype=bool))
-    for distance in (0.02, 1e-6):
-        view = View("reversal", along=True)
-        chapter = Chapter(1, "presliding", 0, [trace], [trace], BANDS, "joint1", view, distance=distance)
-        plot = chapter_group(load_robot(), chapter).figures[0].variants[()]
-        low, high = plot.limits
-        assert low == 0.0
-        assert 4.0 * distance < high < 0.5
-        # However short the distance, there is something to see.
-        assert np.any(np.isfinite(plot.panels[-1].layers[1].y))
-
-
-@pytest.mark.parametrize("signal", [*SIGNALS, "own", "order", "frequency"])
-def test_every_view_has_a_figure_and_an_effect_that_names_none_is_shown_over_its_own_torque(signal: str):
-    rng = np.random.default_rng(0)
-    noise = rng.standard_normal((2, 20000))
-    before = _trace(noise, np.ones(noise.shape, dtype=bool))
-    after = replace(before, predicted=0.1 * rng.standard_normal(noise.shape))
-    chapter = Chapter(1, "mine", 0, [before], [after], BANDS, "joint1", View(signal))
-    names = [figure.name for figure in chapter_group(load_robot(), chapter).figures]
-    assert names == ([] if signal == "own" else ["effect-1-view"]) + ["effect-1-own"]
-
-
-def test_a_residual_that_is_not_used_does_not_set_the_scale():
-    residual = np.full((2, 4000), 0.01)
-    residual[:, 1000:1500] = 5.0
-    used = residual < 1.0
-    group = torque_group(load_robot(), [("X", [_trace(residual, used)])], (None, None))
-    layers = {layer.name: layer for layer in group.figures[0].variants[0, 0].panels[1].layers}
-    assert not layers["residual, not used"].fit
-    assert np.nanmax(layers["residual"].y) == pytest.approx(0.01)
-    assert np.nanmax(layers["residual, not used"].y) == pytest.approx(5.0)
-
-
 def test_pictures_of_an_earlier_diagnosis_do_not_stay(tmp_path: Path) -> None:
     for name in ("effect_1.png", "effect_2.png", "unexplained.png", "mine.png"):
         (tmp_path / name).write_bytes(b"png")
     remove_stale(tmp_path, ["effect_1.png"])
     assert sorted(path.name for path in tmp_path.iterdir()) == ["effect_1.png", "mine.png"]
+
+
+def test_held_out_runs_are_drawn_first_and_not_too_many(tmp_path: Path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    said: list[str] = []
+    original = Figure.savefig
+
+    def spy(self: Figure, *args, **kwargs):
+        said.extend(text.get_text() for text in self.texts)
+        return original(self, *args, **kwargs)
+
+    monkeypatch.setattr(Figure, "savefig", spy)
+    fit, held = [run(f"OJD_{k}", k, seconds=6.0) for k in range(1, 5)], [run("CI_1", 9, seconds=6.0)]
+    torque_picture(tmp_path / "torque.png", IdentificationContext(made(fit, held)))
+    assert said[1:3] == ["CI_1 (held out), joint1", "OJD_1 (fitted), joint1"]
+    assert sum("joint2" in text for text in said) == MOST_RECORDINGS
+    for color in ("blue", "vermillion", "green"):
+        assert _share(tmp_path / "torque.png", color) > 2e-4
+
+
+def test_a_joint_at_rest_is_drawn_too(tmp_path: Path):
+    fit = [run("OJD_1", 1, still=True, seconds=6.0)]
+    torque_picture(tmp_path / "torque.png", IdentificationContext(made(fit)))
+    assert _share(tmp_path / "torque.png", "blue") > 2e-4
+
+
+def test_a_design_is_a_picture(tmp_path: Path):
+    effort = Effort(starts=1, rounds=0, processes=1)
+    design = design_excitation(
+        build_model(load_robot()), duration=4.0, harmonics=6, samples=400, trajectories=2, effort=effort
+    )
+    design_picture(tmp_path / "new" / "preview.png", design)
+    for color in ("blue", "vermillion", "sky"):
+        assert _share(tmp_path / "new" / "preview.png", color) > 2e-4
+    with pytest.raises(ScaraIdentError, match="cannot be written"):
+        design_picture(tmp_path / "preview.docx", design)
+    assert [path.name for path in tmp_path.iterdir()] == ["new"]

@@ -1,8 +1,17 @@
 """Reports as single HTML files that need no network."""
 
 from scara_ident.report.html.comparison import comparison_report
-from scara_ident.report.html.diagnosis import diagnosis_report
+from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
 from scara_ident.report.html.excitation import excitation_report
-from scara_ident.report.html.identification import identification_report
+from scara_ident.report.html.identification import IdentificationContext, identification_report
+from scara_ident.report.html.paper import paper_report
 
-__all__ = ["comparison_report", "diagnosis_report", "excitation_report", "identification_report"]
+__all__ = [
+    "DiagnosisContext",
+    "IdentificationContext",
+    "comparison_report",
+    "diagnosis_report",
+    "excitation_report",
+    "identification_report",
+    "paper_report",
+]

@@ -2,51 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from scara_ident.report.html.page import Block, Cell, bar, chance, escape, folded, paragraph, table, tag
+from scara_ident.report.html.blocks import Block, Cell, Folded, Paragraph, Table, Tag, chance
 
 # Candidates shown at once, the best first; the others unfold.
 SHOWN_CANDIDATES = 10
+HEAD = ("candidate, and why", "gain", "p", "helps in", "decision")
 
 
 def candidate_blocks(content: dict[str, Any]) -> list[Block]:
     """Return the ranked table of the content of ``diagnosis.json``."""
-    rows: list[list[Cell | str]] = []
     most = max((abs(row["gain"]) for row in (*content["effects"], *content["candidates"])), default=0.0) or 1.0
+    rows: list[list[Cell | str]] = []
     for effect in content["effects"]:
         title = effect["effect"] if effect["joint"] is None else f"{effect['effect']} of {effect['joint']}"
         # On few rows the gain can come out a little above the whole.
         gain = min(1.0, effect["gain"])
         why = f"removes {gain:.1%} of the squared residual at that point on data that it was not fitted to"
-        rows.append(_candidate(title, why, gain, effect["p_value"], effect["helps_in"], most, accepted=True))
-    for row in content["candidates"]:
-        good = row["decision"] == "accepted"
-        rows.append(
-            _candidate(row["label"], row["why"], row["gain"], row["p_value"], row["helps_in"], most, accepted=good)
-        )
-    head = ("candidate, and why", "gain", "p", "helps in", "decision")
-    blocks: list[Block] = [
-        paragraph(
-            "First the effects found, in the order in which they came in; then what else was tried beside them, best member of every family. "
-            "Gain: share of the squared residual removed on data not fitted to; p is corrected for all that was tried; helps in: trajectories, of those that excite it."
-        ),
-        table(head, rows[:SHOWN_CANDIDATES], numeric=(2,)),
-    ]
-    if len(rows) > SHOWN_CANDIDATES:
-        rest = table(head, rows[SHOWN_CANDIDATES:], numeric=(2,))
-        blocks.append(folded(f"{len(rows) - SHOWN_CANDIDATES} more candidates", rest))
-    return blocks
+        rows.append(_candidate({**effect, "label": title, "why": why, "gain": gain, "decision": "accepted"}, most))
+    rows += [_candidate(row, most) for row in content["candidates"]]
+    words = (
+        "First the effects found, in the order in which they came in; then what else was tried beside them, best member of every family. "
+        "Gain: share of the squared residual removed on data not fitted to; p is corrected for all that was tried; helps in: trajectories, of those that excite it."
+    )
+    blocks: list[Block] = [Paragraph(words), Table(HEAD, rows[:SHOWN_CANDIDATES], (2,))]
+    more = rows[SHOWN_CANDIDATES:]
+    return [*blocks, Folded(f"{len(more)} more candidates", Table(HEAD, more, (2,)))] if more else blocks
 
 
-def _candidate(
-    title: str, why: str, gain: float, p_value: float, votes: Sequence[int], most: float, *, accepted: bool
-) -> list[Cell | str]:
+def _candidate(row: Mapping[str, Any], most: float) -> list[Cell | str]:
+    helps, voting = row["helps_in"]
     return [
-        Cell(f"<b>{escape(title)}</b><small>{escape(why)}</small>", "why"),
-        Cell(f"{bar(gain / most)} {gain:.1%}", "unit"),
-        chance(p_value),
-        f"{votes[0]} of {votes[1]}",
-        Cell(tag("found", "good") if accepted else tag("rejected")),
+        Cell(kind="why", title=row["label"], note=row["why"]),
+        Cell(f"{row['gain']:.1%}", "unit", bar=row["gain"] / most),
+        chance(row["p_value"]),
+        f"{helps} of {voting}",
+        Cell(tag=Tag("found", "good") if row["decision"] == "accepted" else Tag("rejected")),
     ]

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.diagnose import Diagnosis, FoundEffect
-from scara_ident.diagnosis.search import is_delay
+from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.effects.effect import OWN, View
-from scara_ident.estimation import Estimate
-from scara_ident.recording.recording import Recording
-from scara_ident.report.html.traces import Trace, traces
+from scara_ident.report.traces import Trace, traces
 
 Array = NDArray[np.float64]
 
@@ -61,7 +60,7 @@ class Chapter:
         if self.corrected:
             return None
         return [
-            after.predicted[self.joint] - before.predicted[self.joint]
+            before.residual[self.joint] - after.residual[self.joint]
             for before, after in zip(self.before, self.after, strict=True)
         ]
 
@@ -79,25 +78,16 @@ class Chapter:
         return found
 
 
-def chapters(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> list[tuple[FoundEffect, Chapter]]:
-    """Return the effects in the order in which they came in, each with the residuals before and after.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    recordings : sequence of Recording
-        Those that every choice was made on, as they were given.
-    """
+def chapters(diagnosis: Diagnosis) -> list[tuple[FoundEffect, Chapter]]:
+    """Return the effects in the order in which they came in, each with the residuals before and after."""
     search = diagnosis.search
-    corrected: Sequence[Recording] = recordings
-    before = _all_traces(search.start, corrected, search.bands)
+    before = list(chain.from_iterable(traces(search.uncorrected, search.start.value)))
     found: list[tuple[FoundEffect, Chapter]] = []
     for step in search.steps:
         candidate = step.decision.candidate
         name, joint, view = candidate.effect.name, candidate.joint(search.scene), candidate.effect.view
-        if is_delay(candidate):
-            corrected = search.recordings
-        after = _all_traces(step.estimate, corrected, search.bands)
+        observations = observed_at_every_sample(replace(search.step, scene=step.scene, chosen=step.chosen))
+        after = list(chain.from_iterable(traces(replace(observations, data=step.data), step.value)))
         effect = diagnosis.effects[len(found)] if len(found) < len(diagnosis.effects) else None
         # Otherwise a correction too small to be called an effect.
         if effect is not None and (effect.effect, effect.joint) == (name, joint):
@@ -111,16 +101,12 @@ def chapters(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> list[tupl
                 search.bands,
                 joint,
                 view,
-                is_delay(candidate),
+                candidate.corrects_data,
                 None if acts is None else acts.value,
             )
             found.append((effect, chapter))
         before = after
     return found
-
-
-def _all_traces(estimate: Estimate, recordings: Sequence[Recording], bands: Sequence[float | None]) -> list[Trace]:
-    return [part for recording in recordings for part in traces(estimate.model, estimate.value, recording, bands)]
 
 
 def _shown_joint(effect: FoundEffect, diagnosis: Diagnosis) -> int:

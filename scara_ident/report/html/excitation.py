@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,25 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.motion.motion import Motion
-from scara_ident.report.html.page import (
+from scara_ident.report.html.blocks import (
     Arm,
     Beside,
     Block,
     Cell,
     Group,
-    Page,
-    Section,
+    Paragraph,
+    Table,
+    Tag,
     count,
-    escape,
     listing,
+    name,
     number,
-    paragraph,
     superscripts,
-    table,
-    tag,
-    track,
 )
-from scara_ident.report.html.plot import Figure, Grid, Layer, Level, Line, Mark, Panel, Plot, single
+from scara_ident.report.html.page import Page, parts
+from scara_ident.report.html.section import NamedSection, Section
+from scara_ident.report.plot import Figure, Grid, Layer, Level, Line, Mark, Panel, Plot, single
 from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -38,6 +39,62 @@ FRAME_RATE = 25.0
 MOST_FRAMES = 750
 # Points at which a motion is drawn, at the most.
 MOST_POINTS = 4000
+
+
+@dataclass(frozen=True, eq=False)
+class ExcitationContext:
+    """What the sections of an excitation draw from.
+
+    Attributes
+    ----------
+    content : mapping
+        The content of ``excitation.json``.
+    robot : Robot
+    motions : sequence of Motion
+        The trajectories; torque, where there is one, is what the design expects.
+    """
+
+    content: Mapping[str, Any]
+    robot: Robot
+    motions: Sequence[Motion]
+
+    @property
+    def limits(self) -> list[tuple[str, Mapping[str, Any]]]:
+        """Name of every limit with its bound, what is reached of it, the share and the unit."""
+        return list(_bounded(self.content.get("limits") or {}))
+
+
+def _motion(k: int, context: ExcitationContext) -> list[Block]:
+    """One trajectory: the arm in its plane, what the data will cover, and signals over time."""
+    robot, motion = context.robot, context.motions[k]
+    bounds = {limit: float(each["bound"]) for limit, each in context.limits if each.get("bound") is not None}
+    figures = [_joint_figure(robot, motion, j, k, bounds) for j in range(robot.n)]
+    covers = [_cover_figure(robot, motion, j, k, bounds) for j in range(robot.n)]
+    torque = "" if motion.torque is None else " The torque is what the design foresees."
+    cover = Group(f"cover-group-{k}", covers, (), "two" if robot.n > 2 else "")
+    return [
+        Beside((arm_in_plane(robot, motion, f"arm-{k}"), cover)),
+        Paragraph(f"Over time; dashed: the limits.{torque}"),
+        Group(f"motion-group-{k}", figures, (), "two"),
+    ]
+
+
+def _limits(context: ExcitationContext) -> list[Block]:
+    """What the motion reaches of each limit."""
+    rows: list[list[Cell | str]] = []
+    for limit, each in context.limits:
+        share = each.get("share")
+        tag = Tag("broken", "bad") if (share or 0.0) > 1.0 else None
+        used = Cell("" if share is None else f"{share:.0%}", track=share, tag=tag)
+        unit = superscripts(str(each.get("unit", "")))
+        rows.append([name(limit), number(each.get("reached")), number(each.get("bound")), unit, used])
+    words = Paragraph("What the motion reaches of each limit, between its samples too.")
+    return [words, Table(("limit", "reached", "bound", "unit", "used"), rows, (1, 2))] if rows else []
+
+
+def _notes(context: ExcitationContext) -> list[Block]:
+    """What the design rests on."""
+    return [listing(context.content["notes"])] if context.content.get("notes") else []
 
 
 def excitation_report(path: Path, content: Mapping[str, Any], robot: Robot, motions: Sequence[Motion]) -> None:
@@ -57,32 +114,17 @@ def excitation_report(path: Path, content: Mapping[str, Any], robot: Robot, moti
     ScaraIdentError
         If the file cannot be written.
     """
-    excitation_page(content, robot, motions).write(path)
-
-
-def excitation_page(content: Mapping[str, Any], robot: Robot, motions: Sequence[Motion]) -> Page:
-    """Assemble the report of designed trajectories."""
-    limits = list(_limits(content.get("limits") or {}))
-    broken = [name for name, limit in limits if (limit.get("share") or 0.0) > 1.0]
-    verdict = list(content.get("summary") or ())
-    if not verdict:
-        verdict = [
-            f"J_d {number(content.get('log_det'), 4)}, J_k {number(content.get('condition'))} in {number(content.get('duration'))} s."
-        ]
-        verdict.append(f"Broken limits: {', '.join(broken)}." if broken else "All limits hold.")
-    bounds = {name: float(limit["bound"]) for name, limit in limits if limit.get("bound") is not None}
-    sections = [
-        Section(
-            f"motion-{k}",
-            "Motion" if len(motions) == 1 else f"Motion {motion.name}",
-            _motion_blocks(robot, motion, k, bounds),
-        )
+    context = ExcitationContext(content, robot, motions)
+    broken = [limit for limit, each in context.limits if (each.get("share") or 0.0) > 1.0]
+    criteria = f"J_d {number(content.get('log_det'), 4)}, J_k {number(content.get('condition'))}"
+    verdict = list(content.get("summary") or ()) or [
+        f"{criteria} in {number(content.get('duration'))} s.",
+        f"Broken limits: {', '.join(broken)}." if broken else "All limits hold.",
+    ]
+    sections: list[Section] = [
+        NamedSection(f"motion-{k}", "Motion" if len(motions) == 1 else f"Motion {motion.name}", partial(_motion, k))
         for k, motion in enumerate(motions)
     ]
-    if limits:
-        sections.append(Section("limits", "Limits", _limit_blocks(limits)))
-    if content.get("notes"):
-        sections.append(Section("notes", "Notes", (listing(content["notes"]),)))
     trajectories = count(len(motions), "trajectory").replace("trajectorys", "trajectories")
     subtitle = f"{trajectories} of {content.get('duration') or 0.0:g} s for {count(robot.n, 'joint')}"
     if content.get("harmonics"):
@@ -90,26 +132,13 @@ def excitation_page(content: Mapping[str, Any], robot: Robot, motions: Sequence[
     if content.get("model"):
         subtitle += f"; parameters of the {content['model']} model"
     if content.get("log_det") is not None:
-        subtitle += (
-            f"; J_d (information) {number(content['log_det'], 4)}, J_k (condition) {number(content.get('condition'))}"
-        )
-    return Page(f"Excitation of {robot.name}", subtitle, verdict, sections, bool(broken))
-
-
-def _motion_blocks(robot: Robot, motion: Motion, place: int, bounds: Mapping[str, float]) -> list[Block]:
-    figures = [_joint_figure(robot, motion, j, place, bounds) for j in range(robot.n)]
-    covers = [_cover_figure(robot, motion, j, place, bounds) for j in range(robot.n)]
-    torque = "" if motion.torque is None else " The torque is what the design foresees."
-    return [
-        Beside(
-            (
-                arm_in_plane(robot, motion, f"arm-{place}"),
-                Group(f"cover-group-{place}", covers, (), "two" if robot.n > 2 else ""),
-            )
-        ),
-        paragraph(f"Over time; dashed: the limits.{torque}"),
-        Group(f"motion-group-{place}", figures, (), "two"),
-    ]
+        subtitle += f"; {criteria.replace('J_d', 'J_d (information)').replace('J_k', 'J_k (condition)')}"
+    found = parts(
+        "excitation",
+        (*sections, NamedSection("limits", "Limits", _limits), NamedSection("notes", "Notes", _notes)),
+        context,
+    )
+    Page(f"Excitation of {robot.name}", subtitle, verdict, found, bool(broken)).write(path)
 
 
 def _joint_figure(robot: Robot, motion: Motion, j: int, place: int, bounds: Mapping[str, float]) -> Figure:
@@ -213,32 +242,10 @@ def joint_points(robot: Robot, q: Array) -> Array:
     return np.array(frames)
 
 
-def _limits(limits: Mapping[str, Any], name: str = "") -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _bounded(limits: Mapping[str, Any], name: str = "") -> Iterator[tuple[str, Mapping[str, Any]]]:
     if "bound" in limits:
         yield name, limits
         return
     for key, item in limits.items():
         if isinstance(item, Mapping):
-            yield from _limits(item, f"{name}.{key}" if name else key)
-
-
-def _limit_blocks(limits: Sequence[tuple[str, Mapping[str, Any]]]) -> list[Block]:
-    rows: list[list[Cell | str]] = []
-    for name, limit in limits:
-        share = limit.get("share")
-        words = "" if share is None else f"{track(share)}{share:.0%}"
-        if share is not None and share > 1.0:
-            words += " " + tag("broken", "bad")
-        rows.append(
-            [
-                Cell(escape(name), "name"),
-                number(limit.get("reached")),
-                number(limit.get("bound")),
-                superscripts(str(limit.get("unit", ""))),
-                Cell(words),
-            ]
-        )
-    return [
-        paragraph("What the motion reaches of each limit, between its samples too."),
-        table(("limit", "reached", "bound", "unit", "used"), rows, numeric=(1, 2)),
-    ]
+            yield from _bounded(item, f"{name}.{key}" if name else key)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scara_ident.diagnosis.acceptance import FAMILY_ERROR, Decision
-from scara_ident.diagnosis.candidate_tests import WEAK
+from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.report.diagnosis import best_by_label
 
@@ -36,7 +35,7 @@ def next_experiments(diagnosis: Diagnosis) -> list[str]:
             found.append(f"To tell {_label(effect.effect, effect.joint)} from {others}: {experiment[effect.effect]}.")
     if not diagnosis.fit_after:
         found.append("To know the noise floor: record every trajectory at least twice.")
-    if not diagnosis.validation_before:
+    if not diagnosis.validation_before.data.recordings:
         found.append(
             "To trust the result: record a trajectory that takes no part in the diagnosis and give it with --validate."
         )
@@ -44,7 +43,7 @@ def next_experiments(diagnosis: Diagnosis) -> list[str]:
     for decision in best_by_label(diagnosis.search.decisions):
         if decision.accepted:
             continue
-        if decision.examination.outside < WEAK:
+        if decision.examination.outside < search.step.criteria.least_outside:
             hidden.append(decision)
         elif decision.gain > 0.0 and _significant(decision, diagnosis) and _possible(decision, diagnosis):
             faint.append(decision)
@@ -74,7 +73,7 @@ def _significant(decision: Decision, diagnosis: Diagnosis) -> bool:
     effect, member, scene = decision.candidate.effect, decision.candidate.member, diagnosis.search.scene
     if not effect.corrects_data(member) and effect.negligible(scene, member, decision.examination.value) is not None:
         return False
-    return decision.examination.p_value * diagnosis.search.tried < FAMILY_ERROR
+    return decision.examination.p_value * diagnosis.search.tried < diagnosis.search.step.criteria.family_error
 
 
 def _possible(decision: Decision, diagnosis: Diagnosis) -> bool:

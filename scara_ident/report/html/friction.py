@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from scara_ident.estimation import Estimate
 from scara_ident.model.terms import Friction
-from scara_ident.report.html.bins import binned_means, middle_range
-from scara_ident.report.html.page import Group
-from scara_ident.report.html.plot import Band, Dots, Figure, Layer, Line, Panel, Plot, Region, single
-from scara_ident.report.html.traces import Trace, kept
+from scara_ident.report.bins import binned_means, middle_range
+from scara_ident.report.html.blocks import Group
+from scara_ident.report.plot import Band, Dots, Figure, Layer, Line, Panel, Plot, Region, single
+from scara_ident.report.traces import Trace, kept
 
 Array = NDArray[np.float64]
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 
-from scara_ident.diagnosis.model_selection import joint_errors
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.identification.identify import Identification, undetermined
-from scara_ident.recording.recording import Recording
+from scara_ident.report.html.blocks import Block, Heading, Paragraph, count, listing
 from scara_ident.report.html.friction import friction_group
-from scara_ident.report.html.page import Block, Page, Section, count, heading, listing, paragraph
+from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.parameters import (
     cheap_history,
     convergence_group,
@@ -21,9 +21,10 @@ from scara_ident.report.html.parameters import (
     strongest_pairs,
 )
 from scara_ident.report.html.residual import residual_blocks
+from scara_ident.report.html.section import NamedSection, Section
 from scara_ident.report.html.torque import error_table, torque_group
-from scara_ident.report.html.traces import traces
 from scara_ident.report.identification import sentences
+from scara_ident.report.traces import Trace, traces
 from scara_ident.threads import one_blas_thread
 
 # Joints whose errors the first sentence lists; of more it gives the range.
@@ -38,101 +39,135 @@ STD_WORDS = {
 }
 
 
-def identification_report(
-    path: Path, identification: Identification, recordings: Sequence[Recording], validation: Sequence[Recording] = ()
-) -> None:
+@dataclass(frozen=True, eq=False)
+class IdentificationContext:
+    """What the sections of an identification draw from."""
+
+    identification: Identification
+
+    @cached_property
+    def parts(self) -> list[tuple[str, tuple[Trace, ...]]]:
+        """Traces of every recording by its name and role, those held out first."""
+        return [(f"{found[0].recording} ({role})", found) for role, group in self._traces.items() for found in group]
+
+    @property
+    def sets(self) -> dict[str, list[Trace]]:
+        """Traces of the fitted and of the held-out recordings."""
+        return {role: list(chain.from_iterable(self._traces[role])) for role in ("fitted", "held out")}
+
+    @cached_property
+    def _traces(self) -> dict[str, list[tuple[Trace, ...]]]:
+        found, value = self.identification, self.identification.estimate.value
+        return {"held out": traces(found.validation, value), "fitted": traces(found.training, value)}
+
+
+def _prediction(context: IdentificationContext) -> list[Block]:
+    """Errors by recording and joint, and torque over time."""
+    found = context.identification
+    robot, names = found.model.robot, [name for name, _ in context.parts]
+    errors = [found.estimate.errors(item) for item in (*found.validation.each, *found.training.each)]
+    bands = ", ".join(
+        f"{joint} {'unfiltered' if band is None else f'{band:.3g} Hz'}"
+        for joint, band in zip(robot.joints, found.bands, strict=True)
+    )
+    return [
+        Paragraph(
+            f"Rms residual within the band ({bands}), and as a share of the rms torque: the darker, the larger. A click on a number shows it below."
+        ),
+        error_table(robot, names, errors),
+        torque_group(robot, context.parts, found.bands),
+    ]
+
+
+def _parameters(context: IdentificationContext) -> list[Block]:
+    """Parameters, their correlation, and the links of an arm that has them."""
+    estimate = context.identification.estimate
+    pairs = strongest_pairs(estimate)
+    blocks: list[Block] = [
+        Paragraph(f"Standard deviations from {STD_WORDS.get(estimate.std_kind, estimate.std_kind)}. {SYMBOLS}"),
+        parameter_table(estimate),
+        Heading("Correlation"),
+        *([Paragraph(f"Strongest: {', '.join(pairs)}.")] if pairs else []),
+        correlation_group(estimate),
+    ]
+    if isinstance(estimate, ConsistentEstimate):
+        words = (
+            "Mass, centre of mass and inertia about it, in the axes of the link. Torque tells their combinations in the table above, "
+            "not each number: the rest is as near to the URDF as the data allow."
+        )
+        blocks += [Heading("Links of an arm with these parameters"), Paragraph(words), link_table(estimate)]
+    return blocks
+
+
+def _friction_curves(context: IdentificationContext) -> list[Block]:
+    """Friction over velocity; nothing where the model has none."""
+    group = friction_group(context.identification.estimate, context.sets["fitted"])
+    words = "Where the strip below is dark the data hold many samples; beyond it the curve is an extrapolation. The dots are the measured torque less everything but friction, over velocity, ± 2 standard errors."
+    return [] if group is None else [Paragraph(words), group]
+
+
+def _residual(context: IdentificationContext) -> list[Block]:
+    """What is left, over signals, frequency, motor angle and lag."""
+    return residual_blocks(context.identification.model.robot, context.sets, context.identification.bands)
+
+
+def _convergence(context: IdentificationContext) -> list[Block]:
+    """How the recursive estimate settled."""
+    found = context.identification
+    history = found.history or cheap_history(found.training)
+    words = "The recursive estimate as samples come in, with two standard deviations for white residuals, which are too small where residuals are correlated; dashed: the final value, dotted: where a recording ends."
+    if found.estimate.method not in ("ols", "rls"):
+        words += f" The recursion is least squares; the method {found.estimate.method} ends elsewhere."
+    return [Paragraph(words), convergence_group(found.estimate, history, found.training)]
+
+
+def _notes(context: IdentificationContext) -> list[Block]:
+    """What there is to know of the data."""
+    return [listing(context.identification.notes)] if context.identification.notes else []
+
+
+SECTIONS: tuple[Section, ...] = (
+    NamedSection("prediction", "Prediction", _prediction),
+    NamedSection("parameters", "Parameters", _parameters),
+    NamedSection("friction", "Friction", _friction_curves),
+    NamedSection("residual", "Residual", _residual),
+    NamedSection("convergence", "Convergence", _convergence),
+    NamedSection("notes", "Notes on the data", _notes),
+)
+
+
+def identification_report(path: Path, context: IdentificationContext) -> None:
     """Write the report of an identification as one HTML file.
 
     Parameters
     ----------
     path : Path
-    identification : Identification
-    recordings, validation : sequence of Recording
-        Those that were fitted and those that were held out.
+    context : IdentificationContext
 
     Raises
     ------
     ScaraIdentError
         If the file cannot be written.
     """
+    identification = context.identification
     # Many small matrices: threads of BLAS would only wait for each other.
     with one_blas_thread():
-        page = identification_page(identification, recordings, validation)
-    page.write(path)
-
-
-def identification_page(
-    identification: Identification, recordings: Sequence[Recording], validation: Sequence[Recording] = ()
-) -> Page:
-    """Assemble the report of an identification."""
-    estimate = identification.estimate
-    robot = identification.model.robot
-    bands = identification.bands
-    kept, fitted = (
-        [traces(estimate.model, estimate.value, recording, bands) for recording in group]
-        for group in (validation, recordings)
-    )
-    parts = [
-        *((f"{recording.name} (held out)", found) for recording, found in zip(validation, kept, strict=True)),
-        *((f"{recording.name} (fitted)", found) for recording, found in zip(recordings, fitted, strict=True)),
-    ]
-    errors = [estimate.errors(item) for item in (*identification.validation, *identification.training)]
-    sets = {"fitted": list(chain.from_iterable(fitted)), "held out": list(chain.from_iterable(kept))}
-    band_words = ", ".join(
-        f"{joint} {'unfiltered' if band is None else f'{band:.3g} Hz'}"
-        for joint, band in zip(robot.joints, bands, strict=True)
-    )
-    sections = [
-        Section(
-            "prediction",
-            "Prediction",
-            (
-                paragraph(
-                    f"Rms residual within the band ({band_words}), and as a share of the rms torque: the darker, the larger. A click on a number shows it below."
-                ),
-                error_table(robot, [name for name, _ in parts], errors),
-                torque_group(robot, parts, bands),
-            ),
-        ),
-        Section("parameters", "Parameters", _parameter_blocks(identification)),
-        Section("residual", "Residual", residual_blocks(robot, sets, bands)),
-    ]
-    friction = friction_group(estimate, sets["fitted"])
-    if friction is not None:
-        words = "Where the strip below is dark the data hold many samples; beyond it the curve is an extrapolation. The dots are the measured torque less everything but friction, over velocity, ± 2 standard errors."
-        sections.insert(2, Section("friction", "Friction", (paragraph(words), friction)))
-    history = identification.history or cheap_history(estimate, identification.training)
-    words = "The recursive estimate as samples come in, with two standard deviations for white residuals, which are too small where residuals are correlated; dashed: the final value, dotted: where a recording ends."
-    if estimate.method not in ("ols", "rls"):
-        words += f" The recursion is least squares; the method {estimate.method} ends elsewhere."
-    sections.append(
-        Section(
-            "convergence",
-            "Convergence",
-            (paragraph(words), convergence_group(estimate, history, identification.training)),
-        )
-    )
-    if identification.notes:
-        sections.append(Section("notes", "Notes on the data", (listing(identification.notes),)))
-    samples = sum(item.samples for item in identification.training)
+        found = parts("identification", SECTIONS, context)
+    fitted, held_out = identification.training, identification.validation
     subtitle = (
-        f"{identification.model.name} model, {len(estimate.model.columns)} parameters, {estimate.method}; "
-        f"{count(len(recordings), 'recording')}, {samples} samples fitted, {count(len(validation), 'recording')} held out; "
+        f"{identification.model.name} model, {len(identification.model.columns)} parameters, {identification.estimate.method}; "
+        f"{count(len(fitted.data.recordings), 'recording')}, {fitted.samples} samples fitted, {count(len(held_out.data.recordings), 'recording')} held out; "
         f"J_d (information) {identification.log_det:.2f}, J_k (condition) {identification.condition:.3g}"
     )
-    return Page(
-        f"Identification of {robot.name}",
-        subtitle,
-        (_headline(identification), *sentences(identification)),
-        sections,
-        bool(undetermined(identification)),
-    )
+    verdict = (_headline(identification), *sentences(identification))
+    title = f"Identification of {identification.model.robot.name}"
+    Page(title, subtitle, verdict, found, bool(undetermined(identification))).write(path)
 
 
 def _headline(identification: Identification) -> str:
     """How well the parameters predict, over all recordings held out, or else over those fitted."""
-    held_out = identification.validation
-    errors = joint_errors(identification.estimate.value, held_out or identification.training)
+    held_out = bool(identification.validation.data.recordings)
+    errors = identification.estimate.errors(identification.validation if held_out else identification.training)
     robot = identification.model.robot
     shares = [
         (error.relative, joint) for joint, error in zip(robot.joints, errors, strict=True) if error and error.relative
@@ -144,29 +179,3 @@ def _headline(identification: Identification) -> str:
         (least, best), (most, worst) = min(shares), max(shares)
         return f"{what} to within {least:.1%} ({best}) to {most:.1%} ({worst}) of the torque, rms."
     return f"{what} to within {' and '.join(f'{share:.1%} of the torque of {joint}' for share, joint in shares)}, rms."
-
-
-def _parameter_blocks(identification: Identification) -> list[Block]:
-    estimate = identification.estimate
-    blocks: list[Block] = [
-        paragraph(f"Standard deviations from {STD_WORDS.get(estimate.std_kind, estimate.std_kind)}. {SYMBOLS}"),
-        parameter_table(estimate),
-        heading("Correlation"),
-    ]
-    pairs = strongest_pairs(estimate)
-    if pairs:
-        blocks.append(paragraph(f"Strongest: {', '.join(pairs)}."))
-    blocks.append(correlation_group(estimate))
-    if isinstance(estimate, ConsistentEstimate):
-        blocks += [
-            heading("Links of an arm with these parameters"),
-            paragraph(
-                "Mass, centre of mass and inertia about it, in the axes of the link. Torque tells their combinations in the table above, "
-                "not each number: the rest is as near to the URDF as the data allow."
-            ),
-            link_table(estimate),
-        ]
-    return blocks
-
-
-__all__ = ["identification_page", "identification_report"]

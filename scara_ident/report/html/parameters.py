@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from scara_ident.estimation import Estimate, History, rls
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, links
-from scara_ident.estimation.information import merge
-from scara_ident.estimation.observations import Evidence
-from scara_ident.report.html.page import Cell, Group, Selector, Text, bar, escape, number, superscripts, table, tag
-from scara_ident.report.html.plot import Band, Drawing, Figure, Layer, Level, Line, Mark, Matrix, Panel, Plot, single
+from scara_ident.estimation.observations import Observations
+from scara_ident.report.html.blocks import Cell, Group, Selector, Table, Tag, name, number, superscripts
+from scara_ident.report.plot import Band, Drawing, Figure, Layer, Level, Line, Mark, Matrix, Panel, Plot, single
 from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -29,34 +28,24 @@ NO_INERTIA = 1e-9
 PER_PAGE = 12
 
 
-def parameter_table(estimate: Estimate) -> Text:
+def parameter_table(estimate: Estimate) -> Table:
     """Return the parameters with 95 % intervals, relative standard deviations and meanings."""
     rows: list[list[Cell | str]] = []
     for k, column in enumerate(estimate.model.columns):
         value, std = float(estimate.value[k]), float(estimate.std[k])
         if estimate.undetermined[k]:
-            interval, share = Cell(tag("undetermined", "bad")), Cell("")
+            interval, share = Cell(tag=Tag("undetermined", "bad")), Cell()
         else:
             relative = std / abs(value) if value else np.inf
             weak = relative > 0.5
             interval = Cell(f"{digits(value - 1.96 * std, std)} … {digits(value + 1.96 * std, std)}", "num")
             percent = 100.0 * relative
             words = "over 1000 %" if relative >= 10.0 else f"{percent:.0f} %" if percent >= 10.0 else f"{percent:.2g} %"
-            share = Cell(
-                f"{bar(relative, weak=weak)} {escape(words)}{' ' + tag('not told from 0', 'bad') if weak else ''}",
-                "unit",
-            )
-        rows.append(
-            [
-                Cell(escape(column.name), "name"),
-                Cell(digits(value, std), "num"),
-                interval,
-                Cell(escape(superscripts(column.unit)), "unit"),
-                share,
-                Cell(escape(superscripts(column.meaning)), "words"),
-            ]
-        )
-    return table(("name", "value", "95 % interval", "unit", "std / value", "meaning"), rows, numeric=(1, 2))
+            tag = Tag("not told from 0", "bad") if weak else None
+            share = Cell(words, "unit", bar=relative, weak=weak, tag=tag)
+        unit, meaning = Cell(superscripts(column.unit), "unit"), Cell(superscripts(column.meaning), "words")
+        rows.append([name(column.name), digits(value, std), interval, unit, share, meaning])
+    return Table(("name", "value", "95 % interval", "unit", "std / value", "meaning"), rows, (1, 2))
 
 
 def digits(value: float, std: float) -> str:
@@ -72,22 +61,18 @@ def _unsigned_zero(text: str) -> str:
     return text.lstrip("-") if float(text) == 0.0 else text
 
 
-def link_table(estimate: ConsistentEstimate) -> Text:
+def link_table(estimate: ConsistentEstimate) -> Table:
     """Return mass, centre of mass and inertia of every identified link."""
     rows: list[list[Cell | str]] = []
     for link in links(estimate):
-        largest = max(abs(x) for x in link.inertia)
+        least = NO_INERTIA * max(abs(x) for x in link.inertia)
+        com = (_unsigned_zero(f"{x:.3f}") for x in link.com)
         rows.append(
-            [
-                Cell(escape(link.name), "name"),
-                number(link.mass),
-                *(_unsigned_zero(f"{x:.3f}") for x in link.com),
-                *("0" if abs(x) < NO_INERTIA * largest else number(x) for x in link.inertia),
-            ]
+            [name(link.name), number(link.mass), *com, *("0" if abs(x) < least else number(x) for x in link.inertia)]
         )
     head = ["link", "mass [kg]", *(f"{axis} [m]" for axis in "xyz")]
     head += [f"I{axes} [kg m²]" for axes in ("xx", "xy", "xz", "yy", "yz", "zz")]
-    return table(head, rows, numeric=range(1, len(head)))
+    return Table(head, rows, range(1, len(head)))
 
 
 def correlation_group(estimate: Estimate) -> Group:
@@ -123,23 +108,22 @@ def strongest_pairs(estimate: Estimate, most: int = 4, least: float = 0.9) -> li
     ]
 
 
-def cheap_history(estimate: Estimate, evidence: Sequence[Evidence]) -> History:
+def cheap_history(observations: Observations) -> History:
     """Return the course of a recursive estimate in few steps."""
-    total = sum(len(item.blocks) for item in evidence)
-    size = max(1, -(-total // MOST_STEPS))
-    coarse = []
-    for item in evidence:
-        blocks = [item.blocks[k : k + size] for k in range(0, len(item.blocks), size)]
-        joints = range(len(item.unfiltered))
-        merged = tuple(tuple(merge(block[j] for block in group) for j in joints) for group in blocks)
-        coarse.append(replace(item, blocks=merged))
+    size = max(1, -(-observations.blocks // MOST_STEPS))
+    edges = np.append(np.arange(0, observations.blocks, size), observations.blocks)
+    joints = tuple(
+        replace(joint, starts=joint.starts[edges], counts=np.add.reduceat(joint.counts, edges[:-1]))
+        for joint in observations.joints
+    )
     with one_blas_thread():
-        return rls(estimate.model, coarse)[1]
+        return rls(replace(observations, joints=joints, owner=observations.owner[edges[:-1]]))[1]
 
 
-def convergence_group(estimate: Estimate, history: History, evidence: Sequence[Evidence]) -> Group:
+def convergence_group(estimate: Estimate, history: History, observations: Observations) -> Group:
     """Return for every parameter how the recursive estimate settled."""
-    ends = np.cumsum([sum(merge(block).rows for block in item.blocks) for item in evidence]) / estimate.model.robot.n
+    counts = np.mean([joint.counts for joint in observations.joints], axis=0)
+    ends = np.cumsum(np.bincount(observations.owner, counts))
     marks: list[Layer] = [Mark(float(end), "grey") for end in ends[:-1]] if len(ends) <= MOST_MARKS else []
     plots: dict[str, Plot] = {}
     for k, column in enumerate(estimate.model.columns):

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.model_selection import Unexplained
-from scara_ident.report.html.bins import binned_means, middle_range
-from scara_ident.report.html.page import Group
-from scara_ident.report.html.plot import Figure, Matrix, rounded, single
+from scara_ident.report.bins import binned_means, middle_range
+from scara_ident.report.html.blocks import Group
 from scara_ident.report.html.residual import scatter
-from scara_ident.report.html.traces import Trace, kept
+from scara_ident.report.plot import Figure, Matrix, rounded, single
+from scara_ident.report.traces import Trace, kept
 from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]

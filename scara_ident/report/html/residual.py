@@ -8,11 +8,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.report.html.bins import MEAN_BINS, binned_means, density, middle_range
-from scara_ident.report.html.page import Block, Group, Selector, heading, paragraph
-from scara_ident.report.html.plot import Band, Density, Drawing, Figure, Layer, Level, Line, Mark, Panel, Plot, Region
-from scara_ident.report.html.spectra import ORDER_WORDS, autocorrelation, orders, spectrum
-from scara_ident.report.html.traces import Trace, kept
+from scara_ident.report.bins import MEAN_BINS, binned_means, density, middle_range
+from scara_ident.report.html.blocks import Block, Group, Heading, Paragraph, Selector
+from scara_ident.report.plot import Band, Density, Drawing, Figure, Layer, Level, Line, Mark, Panel, Plot, Region
+from scara_ident.report.spectra import ORDER_WORDS, autocorrelation, orders, spectrum
+from scara_ident.report.traces import Trace, kept
 from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -42,13 +42,13 @@ def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None], pre
         else ""
     )
     return [
-        heading("Against signals"),
-        paragraph(
+        Heading("Against signals"),
+        Paragraph(
             "Blue: how many samples lie where. Vermillion: their mean over the signal, with two standard errors; where it leaves zero, "
             f"the model lacks something that depends on the signal.{motor}"
         ),
         _signals_group(robot, sets, prefix),
-        heading("By frequency, motor angle and lag"),
+        Heading("By frequency, motor angle and lag"),
         _spectra_group(robot, sets, bands, prefix),
     ]
 

@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.report.html.bins import binned_means, middle_range, tail_means
+from scara_ident.report.bins import binned_means, middle_range, tail_means
+from scara_ident.report.html.blocks import Group
 from scara_ident.report.html.chapters import Chapter
-from scara_ident.report.html.page import Group
-from scara_ident.report.html.plot import Band, Figure, Layer, Line, Panel, Plot, single
-from scara_ident.report.html.spectra import ORDER_WORDS, orders, spectrum
 from scara_ident.report.html.torque import banded, unused_regions
-from scara_ident.report.html.traces import Trace, kept
+from scara_ident.report.plot import Band, Figure, Layer, Line, Panel, Plot, single
+from scara_ident.report.spectra import ORDER_WORDS, orders, spectrum
+from scara_ident.report.traces import Trace, kept
 from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]

@@ -205,7 +205,8 @@ const Plot = (() => {
   function draw(host, spec, state, wanted) {
     const width = Math.max(200, Math.round(wanted || host.clientWidth || 640));
     if (spec.kind === "matrix") return drawMatrix(host, spec, width);
-    const small = Boolean(spec.small), left = small ? 60 : LEFT, bottom = small ? 34 : BOTTOM;
+    const small = Boolean(spec.small), left = small ? 60 : LEFT, {names} = spec.x;
+    const bottom = names ? Math.min(120, 30 + 5.5 * Math.max(...names.map((name) => name.length))) : small ? 34 : BOTTOM;
     const inner = width - left - RIGHT;
     const logX = Boolean(spec.x.log);
     if (!spec.prepared) {
@@ -248,13 +249,17 @@ const Plot = (() => {
         body += `<line class="grid" x1="${left}" x2="${left + inner}" y1="${py}" y2="${py}"/>`;
         if (label) body += `<text class="tick" x="${left - 6}" y="${py}" dy=".32em" text-anchor="end">${words(v)}</text>`;
       }
-      const xTicks = (logX ? logTicks : linearTicks)(x0, x1, inner / (small ? 48 : 72)).filter(([v]) => v >= x0 && v <= x1);
+      // Names stand at whole numbers, as many as fit.
+      const every = names && Math.ceil((12 * (x1 - x0)) / inner);
+      const ticksX = names ? names.map((_, i) => [i, i % every === 0]) : (logX ? logTicks : linearTicks)(x0, x1, inner / (small ? 48 : 72));
+      const xTicks = ticksX.filter(([v]) => v >= x0 && v <= x1);
       const xWords = logX ? (v) => number(10 ** v, 3) : tickWords(xTicks);
       const lowest = panel === spec.panels[spec.panels.length - 1];
       for (const [v, label] of xTicks) {
         const px = sx(v).toFixed(1);
         body += `<line class="grid" x1="${px}" x2="${px}" y1="${top}" y2="${top + height}"/>`;
-        if (lowest && label) body += `<text class="tick" x="${px}" y="${top + height + 15}" text-anchor="middle">${xWords(v)}</text>`;
+        if (lowest && label && names) body += `<text class="tick" transform="translate(${px} ${top + height + 8}) rotate(-60)" text-anchor="end" dy=".32em">${escape(names[v])}</text>`;
+        else if (lowest && label) body += `<text class="tick" x="${px}" y="${top + height + 15}" text-anchor="middle">${xWords(v)}</text>`;
       }
       if (y0 < 0 && y1 > 0 && !panel.log) body += `<line class="zero" x1="${left}" x2="${left + inner}" y1="${sy(0).toFixed(1)}" y2="${sy(0).toFixed(1)}"/>`;
       body += `<clipPath id="${clip}"><rect x="${left}" y="${top}" width="${inner}" height="${height}"/></clipPath><g clip-path="url(#${clip})">`;

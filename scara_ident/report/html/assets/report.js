@@ -256,7 +256,8 @@
     let began = null;
     const step = (now) => {
       if (began === null) return;
-      show(Math.floor((now - began) / 1000 / period) % frames.length);
+      // The time of a frame may lie before that of the click that asked for it.
+      show(Math.floor(Math.max(0, now - began) / 1000 / period) % frames.length);
       requestAnimationFrame(step);
     };
     slider.max = frames.length - 1;

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.report.html.traces import Trace
+from scara_ident.report.traces import Trace
 from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]

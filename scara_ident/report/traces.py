@@ -1,4 +1,7 @@
-"""Measured and predicted torque of a recording, sample by sample, with the signals that a residual may follow."""
+"""Torque of a recording, recorded, predicted and left over, sample by sample: all that a report draws over time.
+
+Motion and columns are those of the observations; nothing else in the report computes a torque or a residual.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.effects.effect import EffectTerm
+from scara_ident.estimation.observations import Observations
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
-from scara_ident.motion.motion import Motion, Stretch, low_pass, motion_of, stretches, torque_of
-from scara_ident.motion.prepared import position_cuts, row_step, standstill, trim_of
-from scara_ident.recording.recording import Recording
+from scara_ident.motion.motion import Motion, low_pass
+from scara_ident.motion.prepared import PreparedStretch
 
 Array = NDArray[np.float64]
 
@@ -31,6 +34,9 @@ class Trace:
         With the recorded torque.
     measured, predicted : ndarray
         Both within the band.
+    residual : ndarray
+        Recorded less predicted torque, faded out towards rest, then within the band: the rows of the estimate, which
+        near rest is not quite the difference of the two above.
     raw_predicted : ndarray
         From the same motion, without the low-pass of torques.
     load : ndarray
@@ -53,6 +59,7 @@ class Trace:
     motion: Motion
     measured: Array
     predicted: Array
+    residual: Array
     raw_predicted: Array
     load: Array
     friction: Array
@@ -72,9 +79,10 @@ class Trace:
         return slice(self.trim, max(self.trim, self.motion.samples - self.trim))
 
     @property
-    def residual(self) -> Array:
-        """Measured minus predicted torque within the band."""
-        return self.measured - self.predicted
+    def recorded(self) -> Array:
+        """Torque as recorded."""
+        assert self.motion.torque is not None
+        return self.motion.torque
 
     @property
     def raw_residual(self) -> Array:
@@ -86,57 +94,81 @@ class Trace:
         step = self.step[joint]
         return np.asarray(signal[::step][self.used[joint, ::step]])
 
-    @property
-    def recorded(self) -> Array:
-        """Torque as recorded."""
-        assert self.motion.torque is not None
-        return self.motion.torque
-
 
 def kept(traces: Sequence[Trace], signals: Sequence[Array], joint: int) -> Array:
     """Gather signals, one per trace, over the samples of a joint that the estimate uses; see `Trace.kept`."""
     return np.concatenate([trace.kept(signal, joint) for trace, signal in zip(traces, signals, strict=True)])
 
 
-def traces(model: TorqueModel, value: Array, recording: Recording, bands: Sequence[float | None]) -> tuple[Trace, ...]:
-    """Predict the torque of a recording, part by part.
+def traces(observations: Observations, value: Array) -> list[tuple[Trace, ...]]:
+    """Predict the torque of recordings, stretch by stretch.
 
     Parameters
     ----------
-    model : TorqueModel
+    observations : Observations
+        With the columns at every sample.
     value : ndarray, shape (p,)
-        Its parameters.
-    recording : Recording
-        With effort.
-    bands : sequence of float or None, one per joint
-        Low-pass on both sides of each joint's equation, Hz.
+        Parameters of their model.
+
+    Returns
+    -------
+    list of tuple of Trace
+        Per recording.
     """
-    start = float(recording.time[0])
-    return tuple(_trace(model, value, part, bands, start) for part in stretches(recording))
+    columns = [joint.columns for joint in observations.joints]
+    return [
+        tuple(
+            _trace(observations.model, value, part, columns, raw, float(item.recording.time[0]))
+            for part, raw in zip(item.stretches, raws, strict=True)
+        )
+        for item, raws in zip(observations.data.recordings, observations.raw, strict=True)
+    ]
 
 
-def _trace(model: TorqueModel, value: Array, part: Stretch, bands: Sequence[float | None], start: float) -> Trace:
-    torque = torque_of(part)
-    motion = motion_of(part, position_cuts(part.rate, bands))
-    total, load, friction = (np.zeros_like(motion.q) for _ in range(3))
-    own: list[tuple[str, str | None, Array]] = []
+def _trace(
+    model: TorqueModel,
+    value: Array,
+    part: PreparedStretch,
+    columns: Sequence[NDArray[np.intp]],
+    raw: Sequence[Array],
+    start: float,
+) -> Trace:
+    total, load, friction = (np.zeros_like(part.torque) for _ in range(3))
+    effects: list[tuple[str, str | None, Array]] = []
     for term in model.terms:
-        share = np.einsum("jpn,p->jn", term.regressor(motion), value[model.place(term)])
+        place = model.place(term)
+        share = np.zeros_like(total)
+        for j, (own, rows) in enumerate(zip(columns, raw, strict=True)):
+            acts = (own >= place.start) & (own < place.stop)
+            share[j] = value[own[acts]] @ rows[acts]
         total += share
         if term is model.rigid_body:
             load += share
         elif isinstance(term, Friction):
             friction += share
         elif isinstance(term, EffectTerm):
-            own.append((term.name, term.joint, share))
+            effects.append((term.name, term.joint, _banded(part, share)))
+    left = part.torque - total
+    residual = np.array([part.smooth(j, row) for j, row in enumerate(left)])
+    for j, row in enumerate(left) if part.usable else ():
+        # The filter at the rows of the estimate leaves out what is beyond eight times the band.
+        residual[j, part.kept[j]] = part.rows(j, row[None])[0] / np.sqrt(part.steps[j])
+    return Trace(
+        part.name,
+        start,
+        part.motion,
+        measured=_banded(part, part.torque),
+        predicted=_banded(part, total),
+        residual=residual,
+        raw_predicted=total,
+        load=load,
+        friction=friction,
+        used=part.used & part.usable,
+        step=part.steps,
+        trim=part.trim,
+        effects=tuple(effects),
+    )
 
-    def banded(rows: Array) -> Array:
-        return np.array([low_pass(row, part.rate, band) for row, band in zip(rows, bands, strict=True)])
 
-    measured, predicted = banded(torque), banded(total)
-    effects = tuple((name, joint, banded(share)) for name, joint, share in own)
-    used = ~standstill(part, motion, bands)
-    trim = trim_of(part, bands)
-    used[:, :trim] = used[:, -trim:] = False
-    steps = tuple(row_step(part.rate, band) for band in bands)
-    return Trace(part.name, start, motion, measured, predicted, total, load, friction, used, steps, trim, effects)
+def _banded(part: PreparedStretch, rows: Array) -> Array:
+    return np.array([low_pass(row, part.rate, band) for row, band in zip(rows, part.bands, strict=True)])

@@ -1,11 +1,11 @@
-"""What a figure is made of: layers on panels over one x axis, and how arrays are packed for the page."""
+"""What a figure is made of: layers on panels over one x axis; the page and the pictures draw the same."""
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Protocol
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,17 @@ Array = NDArray[np.float64]
 MOST_PLAIN = 400
 _NO_VALUE = -32768
 _LARGEST = 32767
+# Colours and dashes that tell many lines apart.
+COLORS = ("blue", "vermillion", "green", "orange", "purple", "black")
+DASHES = ("", "7 3", "2 3")
+# What the script calls them; other fields go by their own names.
+_SHORT = {"color": "c", "width": "w", "dash": "d", "opacity": "o", "radius": "r", "bar": "e", "low": "lo", "high": "hi"}
+_ARRAYS = ("x", "y", "low", "high", "bar")
+
+
+def style(k: int) -> tuple[str, str]:
+    """Return the colour and the dash of the k-th of many lines."""
+    return COLORS[k % len(COLORS)], DASHES[k // len(COLORS) % len(DASHES)]
 
 
 def packed(values: ArrayLike) -> Any:
@@ -50,26 +61,40 @@ class Grid:
     step: float
     count: int
 
+    def values(self) -> Array:
+        """Return every x, shape (count,)."""
+        return self.start + self.step * np.arange(float(self.count))
+
 
 Along = Grid | ArrayLike
 
 
-def _along(x: Along) -> Any:
-    return {"from": x.start, "step": x.step, "count": x.count} if isinstance(x, Grid) else packed(x)
-
-
-class Layer(Protocol):
+@dataclass(frozen=True, eq=False)
+class Layer:
     """Something drawn on a panel."""
 
+    kind: ClassVar[str]
+
     def spec(self) -> dict[str, Any]:
-        """Return what the page draws."""
-        ...
+        """Return what the page draws; a field with its default is left out."""
+        spec: dict[str, Any] = {"t": self.kind}
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if each.default is value:
+                continue
+            if isinstance(value, Grid):
+                value = {"from": value.start, "step": value.step, "count": value.count}
+            elif each.name in _ARRAYS and np.ndim(value):
+                value = packed(value)
+            spec[_SHORT.get(each.name, each.name)] = value
+        return spec
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class Line(Layer):
     """A line; of any length, no peak is lost. x grows unless ``path``, which draws any curve."""
 
+    kind = "line"
     x: Along
     y: ArrayLike
     color: str
@@ -79,22 +104,39 @@ class Line:
     path: bool = False
     fit: bool = True
 
-    def spec(self) -> dict[str, Any]:
-        """Return what the page draws."""
-        spec: dict[str, Any] = {"t": "line", "x": _along(self.x), "y": packed(self.y), "c": self.color, "w": self.width}
-        if self.dash:
-            spec["d"] = self.dash
-        if self.path:
-            spec["path"] = True
-        if not self.fit:
-            spec["fit"] = False
-        return _named(spec, self.name)
+    def thinned(self, bucket: int) -> Line:
+        """Return the line with the lowest and the highest of every ``bucket`` samples of its grid only."""
+        if bucket < 2 or not isinstance(self.x, Grid):
+            return self
+        values, step = envelope(np.asarray(self.y, dtype=float), bucket), 0.5 * bucket * self.x.step
+        # Two values stand for a bucket, at its quarter and at its three quarters.
+        return replace(self, x=Grid(self.x.start + 0.5 * (step - self.x.step), step, len(values)), y=values)
+
+
+def envelope(signal: Array, bucket: int) -> Array:
+    """Return the lowest and highest of every ``bucket`` samples, in the order in which they came.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (N,)
+    bucket : int
+
+    Returns
+    -------
+    ndarray, shape (2 ceil(N / bucket),)
+    """
+    missing = (-len(signal)) % bucket
+    rows = np.pad(signal, (0, missing), mode="edge").reshape(-1, bucket)
+    low, high = rows.min(axis=1), rows.max(axis=1)
+    rises = rows.argmin(axis=1) <= rows.argmax(axis=1)
+    return np.column_stack([np.where(rises, low, high), np.where(rises, high, low)]).ravel()
 
 
 @dataclass(frozen=True, eq=False)
-class Band:
+class Band(Layer):
     """The area between two lines."""
 
+    kind = "band"
     x: Along
     low: ArrayLike
     high: ArrayLike
@@ -102,18 +144,12 @@ class Band:
     name: str = ""
     fit: bool = True
 
-    def spec(self) -> dict[str, Any]:
-        """Return what the page draws."""
-        spec = {"t": "band", "x": _along(self.x), "lo": packed(self.low), "hi": packed(self.high), "c": self.color}
-        if not self.fit:
-            spec["fit"] = False
-        return _named(spec, self.name)
-
 
 @dataclass(frozen=True, eq=False)
-class Dots:
+class Dots(Layer):
     """Points, with bars of half length ``bar`` where it is given."""
 
+    kind = "dots"
     x: ArrayLike
     y: ArrayLike
     color: str
@@ -121,18 +157,12 @@ class Dots:
     bar: ArrayLike | None = None
     radius: float = 2.4
 
-    def spec(self) -> dict[str, Any]:
-        """Return what the page draws."""
-        spec = {"t": "dots", "x": packed(self.x), "y": packed(self.y), "c": self.color, "r": self.radius}
-        if self.bar is not None:
-            spec["e"] = packed(self.bar)
-        return _named(spec, self.name)
-
 
 @dataclass(frozen=True, eq=False)
-class Density:
+class Density(Layer):
     """How many samples lie where, shape (nx, ny), between ``x`` and ``y`` limits; drawn on a logarithmic scale."""
 
+    kind = "density"
     counts: Array
     x: tuple[float, float]
     y: tuple[float, float]
@@ -143,26 +173,16 @@ class Density:
         """Return what the page draws."""
         strength = np.log1p(self.counts) / max(float(np.log1p(np.max(self.counts, initial=1.0))), 1e-12)
         image = np.rint(255.0 * strength).astype(np.uint8)
-        return _named(
-            {
-                "t": "density",
-                "x0": self.x[0],
-                "x1": self.x[1],
-                "y0": self.y[0],
-                "y1": self.y[1],
-                "nx": image.shape[0],
-                "ny": image.shape[1],
-                "z": base64.b64encode(image.tobytes()).decode("ascii"),
-                "c": self.color,
-            },
-            self.name,
-        )
+        (x0, x1), (y0, y1), (nx, ny) = self.x, self.y, image.shape
+        spec = {"t": self.kind, "x0": x0, "x1": x1, "y0": y0, "y1": y1, "nx": nx, "ny": ny, "c": self.color}
+        return {**spec, "z": base64.b64encode(image.tobytes()).decode("ascii"), "name": self.name}
 
 
-@dataclass(frozen=True)
-class Region:
+@dataclass(frozen=True, eq=False)
+class Region(Layer):
     """A range of x, over the lower ``share`` of the panel's height."""
 
+    kind = "region"
     x: tuple[float, float]
     color: str
     name: str = ""
@@ -171,41 +191,30 @@ class Region:
 
     def spec(self) -> dict[str, Any]:
         """Return what the page draws."""
-        spec = {"t": "region", "x0": self.x[0], "x1": self.x[1], "c": self.color, "o": self.opacity}
-        if self.share < 1.0:
-            spec["share"] = self.share
-        return _named(spec, self.name)
+        spec = super().spec()
+        del spec["x"]
+        return {**spec, "x0": self.x[0], "x1": self.x[1]}
 
 
-@dataclass(frozen=True)
-class Level:
+@dataclass(frozen=True, eq=False)
+class Level(Layer):
     """A dashed line at one value of y."""
 
+    kind = "h"
     y: float
     color: str
     name: str = ""
     fit: bool = True
 
-    def spec(self) -> dict[str, Any]:
-        """Return what the page draws."""
-        return _named({"t": "h", "y": self.y, "c": self.color, "fit": self.fit}, self.name)
 
-
-@dataclass(frozen=True)
-class Mark:
+@dataclass(frozen=True, eq=False)
+class Mark(Layer):
     """A dashed line at one value of x with words beside it."""
 
+    kind = "v"
     x: float
     color: str
     label: str = ""
-
-    def spec(self) -> dict[str, Any]:
-        """Return what the page draws."""
-        return {"t": "v", "x": self.x, "c": self.color, "label": self.label}
-
-
-def _named(spec: dict[str, Any], name: str) -> dict[str, Any]:
-    return {**spec, "name": name} if name else spec
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,21 +229,26 @@ class Panel:
 
     def spec(self) -> dict[str, Any]:
         """Return what the page draws."""
-        spec: dict[str, Any] = {
-            "label": self.label,
-            "height": self.height,
-            "layers": [layer.spec() for layer in self.layers],
-        }
-        if self.limits is not None:
-            spec["range"] = list(self.limits)
-        if self.log:
-            spec["log"] = True
-        return spec
+        layers = [layer.spec() for layer in self.layers]
+        spec: dict[str, Any] = {"label": self.label, "height": self.height, "layers": layers}
+        return spec | _axis(self.limits, self.log)
 
 
 @dataclass(frozen=True, eq=False)
 class Plot:
-    """Panels over one x axis. ``equal`` gives both axes the same scale."""
+    """Panels over one x axis.
+
+    Attributes
+    ----------
+    x_label : str
+    panels : sequence of Panel
+    limits : tuple of float, optional
+    log, small : bool
+    equal : bool
+        Both axes have the same scale.
+    names : sequence of str
+        What stands at x = 0, 1, .... instead of numbers.
+    """
 
     x_label: str
     panels: Sequence[Panel]
@@ -242,16 +256,17 @@ class Plot:
     log: bool = False
     small: bool = False
     equal: bool = False
+    names: Sequence[str] = ()
 
     def spec(self) -> dict[str, Any]:
         """Return what the page draws."""
-        x: dict[str, Any] = {"label": self.x_label}
-        if self.limits is not None:
-            x["range"] = list(self.limits)
-        if self.log:
-            x["log"] = True
+        x = {"label": self.x_label} | _axis(self.limits, self.log) | ({"names": list(self.names)} if self.names else {})
         spec: dict[str, Any] = {"x": x, "panels": [panel.spec() for panel in self.panels]}
         return {**spec, **{key: True for key in ("small", "equal") if getattr(self, key)}}
+
+
+def _axis(limits: tuple[float, float] | None, log: bool) -> dict[str, Any]:
+    return ({} if limits is None else {"range": list(limits)}) | ({"log": True} if log else {})
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,12 +282,11 @@ class Matrix:
 
     def spec(self) -> dict[str, Any]:
         """Return what the page draws."""
-        values = [[None if not np.isfinite(x) else rounded(float(x)) for x in row] for row in self.values]
         return {
             "kind": "matrix",
             "rows": list(self.rows),
             "columns": list(self.columns),
-            "z": values,
+            "z": [[rounded(float(x)) for x in row] for row in self.values],
             "most": self.most,
             "rowLabel": self.row_label,
             "columnLabel": self.column_label,
@@ -306,11 +320,16 @@ class Figure:
     by: tuple[int, ...] = ()
     quiet: bool = False
 
+    @property
+    def matrix(self) -> bool:
+        """Whether it is a heat map, which cannot be zoomed."""
+        return all(isinstance(drawing, Matrix) for drawing in self.variants.values())
+
     def spec(self) -> dict[str, Any]:
         """Return what the page draws."""
-        variants = {}
-        for key, drawing in self.variants.items():
-            variants[",".join(map(str, key))] = {**drawing.spec(), "label": self.title}
+        variants = {
+            ",".join(map(str, key)): {**drawing.spec(), "label": self.title} for key, drawing in self.variants.items()
+        }
         return {"by": list(self.by), "variants": variants}
 
 

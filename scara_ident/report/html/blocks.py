@@ -1,0 +1,210 @@
+"""What a section is made of: words, tables, groups of figures. Templates draw them and escape what they hold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from scara_ident.report.plot import Array, Figure
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """Plain words."""
+
+    kind: ClassVar[str] = "paragraph"
+    text: str
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading within a section."""
+
+    kind: ClassVar[str] = "heading"
+    text: str
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A list of plain words."""
+
+    kind: ClassVar[str] = "listing"
+    items: tuple[str, ...]
+
+
+def listing(items: Iterable[str]) -> Listing:
+    """Return a list of plain words."""
+    return Listing(tuple(items))
+
+
+@dataclass(frozen=True)
+class Tag:
+    """A small label; ``mood`` is ``good``, ``bad`` or ``plain``."""
+
+    text: str
+    mood: str = "plain"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of a table.
+
+    Attributes
+    ----------
+    text : str
+    kind : str
+        ``num``, ``name``, ``unit``, ``words`` or ``why``, as the style sheet has them.
+    strength : float or None
+        From -1 to 1: the colour of a heat map.
+    title, note : str
+        Bold before the text, small after it.
+    bar : float or None
+        A bar before the text: a share of what the style sheet gives to the whole.
+    weak : bool
+        The bar warns.
+    track : float or None
+        A bar on the whole that it is a share of, vermillion where it is more.
+    tag : Tag or None
+    choose : tuple or None
+        Group of figures and what a click on the text chooses there.
+    """
+
+    text: str = ""
+    kind: str = ""
+    strength: float | None = None
+    title: str = ""
+    note: str = ""
+    bar: float | None = None
+    weak: bool = False
+    track: float | None = None
+    tag: Tag | None = None
+    choose: tuple[str, tuple[int, ...]] | None = None
+
+
+def name(text: str) -> Cell:
+    """Return the cell that names a row."""
+    return Cell(text, "name")
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table; columns in ``numeric`` are set to the right."""
+
+    kind: ClassVar[str] = "table"
+    head: Sequence[str]
+    rows: Sequence[Sequence[Cell | str]]
+    numeric: Sequence[int] = ()
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The colours of a table that is a heat map, between words for its two ends."""
+
+    kind: ClassVar[str] = "scale"
+    low: str
+    high: str
+    two_sided: bool = False
+
+
+@dataclass(frozen=True)
+class Selector:
+    """A choice among options, shared by the figures of a group."""
+
+    label: str
+    options: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Figures side by side, with the selectors that they share.
+
+    Attributes
+    ----------
+    name : str
+        Unique on the page.
+    figures : sequence of Figure
+    selectors : sequence of Selector
+    columns : str
+        "" for one, ``two`` or ``three`` on a wide screen.
+    """
+
+    kind: ClassVar[str] = "group"
+    name: str
+    figures: Sequence[Figure]
+    selectors: Sequence[Selector] = ()
+    columns: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """The moving arm: positions of its joints in a plane, shape (frames, points, 2), every ``period`` seconds.
+
+    Attributes
+    ----------
+    name : str
+        Unique on the page.
+    frames : ndarray
+        m.
+    period : float
+        s.
+    axes : tuple of str
+        Names of the plane's axes.
+    """
+
+    kind: ClassVar[str] = "arm"
+    name: str
+    frames: Array
+    period: float
+    axes: tuple[str, str] = ("x", "y")
+
+    def spec(self) -> dict[str, Any]:
+        """Return what the page draws."""
+        low, high = self.frames.min(axis=(0, 1)).tolist(), self.frames.max(axis=(0, 1)).tolist()
+        frames = [[[round(float(x), 4) for x in point] for point in frame] for frame in self.frames]
+        return {"frames": frames, "period": self.period, "low": low, "high": high, "axes": self.axes}
+
+
+@dataclass(frozen=True, eq=False)
+class Folded:
+    """A block that is shown on demand."""
+
+    kind: ClassVar[str] = "folded"
+    title: str
+    inside: Block
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Two blocks side by side on a wide screen."""
+
+    kind: ClassVar[str] = "beside"
+    blocks: tuple[Block, Block]
+
+
+Block = Paragraph | Heading | Listing | Table | Scale | Group | Arm | Folded | Beside
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a value with so many significant digits, zeros at the end included; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{value:#.{digits}g}".rstrip(".")
+
+
+def chance(probability: float) -> str:
+    """Return a probability in few digits."""
+    if probability < 1e-99:
+        return "< 1e-99"
+    return f"{probability:.2g}" if probability >= 1e-3 else f"{probability:.0e}"
+
+
+def count(size: int, noun: str) -> str:
+    """Return how many of something there are, such as ``1 recording``."""
+    return f"{size} {noun}" if size == 1 else f"{size} {noun}s"
+
+
+def superscripts(unit: str) -> str:
+    """Return a unit or formula with its exponents raised."""
+    return unit.replace("^2", "²").replace("^3", "³")

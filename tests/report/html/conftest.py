@@ -1,0 +1,171 @@
+"""A page of every kind, and a browser to look at it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis import diagnose
+from scara_ident.effects.position import Spring
+from scara_ident.files import plain
+from scara_ident.identification.compare import compare
+from scara_ident.motion.motion import Motion
+from scara_ident.paper import check_paper
+from scara_ident.report.comparison import comparison_dict
+from scara_ident.report.html import (
+    DiagnosisContext,
+    IdentificationContext,
+    comparison_report,
+    diagnosis_report,
+    excitation_report,
+    identification_report,
+    paper_report,
+)
+from scara_ident.robot.robot import load_robot
+from tests.arms import noisy, recorded_torque, recording, sines
+from tests.report.simulated import made, run
+
+
+@pytest.fixture(scope="session")
+def result():
+    return made([run("OJD_1", 1), run("OJD_2", 2)], [run("CI_1", 3, start=4.0)], bands=[15.0, 15.0])
+
+
+@pytest.fixture(scope="session")
+def identified(result, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("identified") / "report.html"
+    identification_report(path, IdentificationContext(result))
+    return path
+
+
+def _with_spring(name: str, motion: int, seed: int):
+    """A run of several sines with a spring of 0.05 N m/rad on joint 1, which one sine could not tell from inertia."""
+    robot = load_robot()
+    time = np.arange(4000) / 250.0
+    q, v, a = sines(np.random.default_rng(motion), time, 2)
+    torque = recorded_torque(robot, q, v, a, [(0.1, 0.05, 0.0, 0.0, 0.0)] * 2)
+    torque[0] += 0.05 * (q[0] - 0.4)
+    return noisy(recording(robot, name, time, q, torque), np.random.default_rng(seed), (0.01, 0.005))
+
+
+@pytest.fixture(scope="session")
+def diagnosed(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("diagnosed") / "report.html"
+    fit = [_with_spring(f"{name}_{k}", motion, 10 * motion + k) for motion, name in enumerate("ABC") for k in (1, 2)]
+    held_out = [_with_spring("D_1", 7, 77)]
+    found = diagnose(load_robot(), "complete", fit, held_out, bands=[15.0, 15.0], catalogue=(Spring(),))
+    assert [(effect.effect, effect.joint) for effect in found.effects] == [("spring", "joint1")]
+    diagnosis_report(path, DiagnosisContext(found))
+    return path
+
+
+@pytest.fixture(scope="session")
+def compared(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("compared") / "report.html"
+    content = comparison_dict(compare(load_robot(), [run("A_1", 1), run("A_2", 2), run("B_1", 3, start=5.0)]))
+    comparison_report(path, json.loads(json.dumps(plain(content))))
+    return path
+
+
+def _designed() -> Motion:
+    time = np.linspace(0.0, 10.0, 2001)
+    omega = 2.0 * np.pi * np.array([[0.2], [0.3]])
+    return Motion("X", "X", time, np.sin(omega * time), omega * np.cos(omega * time), -(omega**2) * np.sin(omega * time), None, 200.0)  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def excited(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("excited") / "report.html"
+    limits = {"joint1.velocity": {"bound": 1.0, "reached": 1.2566, "unit": "rad/s", "share": 1.2566}}
+    content = {"log_det": 70.0, "condition": 2e5, "duration": 10.0, "limits": limits}
+    excitation_report(path, content, load_robot(), [_designed()])
+    return path
+
+
+@pytest.fixture(scope="session")
+def printed(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("printed") / "report.html"
+    paper_report(path, check_paper())
+    return path
+
+
+@pytest.fixture(scope="session")
+def pages(identified, diagnosed, compared, excited, printed) -> dict[str, Path]:
+    return {
+        "identification": identified,
+        "diagnosis": diagnosed,
+        "comparison": compared,
+        "excitation": excited,
+        "paper": printed,
+    }
+
+
+@pytest.fixture(scope="session")
+def big(tmp_path_factory) -> Path:
+    """Ten recordings of 25 s at 1 kHz, with one sample of the first far off."""
+    path = tmp_path_factory.mktemp("big") / "report.html"
+    slow = run("OJD_1", 1, seconds=25.0)
+    time = np.arange(25000) / 1000.0
+    robot = load_robot()
+    fast = [np.array([np.interp(time, slow.time, row) for row in signal]) for signal in (slow.position, slow.effort)]
+    fast[0] = np.array([np.convolve(np.pad(row, 40, "edge"), np.hanning(83)[1:-1] / np.hanning(83).sum(), "valid") for row in fast[0]])  # fmt: skip
+    first = recording(robot, "OJD_1", time, *fast)
+    effort = first.effort.copy()
+    effort[0, 12345] = 9.0
+    group = [replace(first, effort=effort), *(replace(first, name=f"OJD_{k}", repetition=k) for k in range(2, 11))]
+    identification_report(path, IdentificationContext(made(group, bands=[15.0, 15.0])))
+    return path
+
+
+ARGUMENTS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+@pytest.fixture(scope="session")
+def browser():
+    chromium = Path("/usr/bin/chromium")
+    if not chromium.exists():
+        pytest.skip("needs Debian's chromium (apt-get install chromium), which is not here")
+    api = pytest.importorskip("playwright.sync_api", reason="needs the Python package playwright")
+    with api.sync_playwright() as playwright:
+        program = playwright.chromium.launch(executable_path=str(chromium), args=ARGUMENTS)
+        yield program
+        program.close()
+
+
+@pytest.fixture
+def opened(browser):
+    """Open a page; at the end nothing may have been said on the console and nothing asked of a network."""
+    contexts, said, asked = [], [], []
+
+    def open_(path: Path, **options):
+        context = browser.new_context(**{"viewport": {"width": 1180, "height": 900}, **options})
+        contexts.append(context)
+        page = context.new_page()
+        page.on("console", lambda message: said.append(message.text) if message.type in ("error", "warning") else None)
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(path.as_uri())
+        page.wait_for_selector("html[data-ready=true]", timeout=20_000)
+        return page
+
+    yield open_
+    for context in contexts:
+        context.close()
+    assert said == []
+    assert all(url.startswith(("file:", "data:")) for url in asked)
+
+
+# Figures without anything drawn in them, or with numbers that are none.

@@ -1,0 +1,40 @@
+"""The page of a diagnosis."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.report.html.document import data_of, document
+
+
+def test_a_diagnosis_tells_the_story_from_effect_to_gain(diagnosed):
+    found = document(diagnosed)
+    assert found.sections[:7] == ["gain", "story", "next", "left", "torque-section", "candidates", "limits"]
+    assert {"effect-1-view", "effect-1-own", "effect-1-time", "torque"} <= set(found.figures)
+    assert "1. spring on joint1" in found.words
+    assert "Explained: the model lacked spring on joint1" in found.words
+
+
+def test_the_residual_before_follows_what_the_effect_adds(diagnosed):
+    """On the added-variable plot the slope of the residual is 1 before and 0 after."""
+    data = data_of(diagnosed)
+    layers = data["figures"]["effect-1-own"]["variants"][""]["panels"][0]["layers"]
+    lines = {layer["name"]: layer for layer in layers if layer["t"] == "line"}
+    slopes = {}
+    for name in ("residual before", "residual after"):
+        pairs = [(x, y) for x, y in zip(lines[name]["x"], lines[name]["y"], strict=True) if y is not None]
+        slopes[name] = np.polyfit(*np.array(pairs).T, 1)[0]
+    assert slopes["residual before"] == pytest.approx(1.0, abs=0.2)
+    assert slopes["residual after"] == pytest.approx(0.0, abs=0.2)
+
+
+def test_above_the_residual_stands_the_law_of_the_effect_and_what_is_measured_of_it(diagnosed):
+    """The spring of 0.05 N m/rad is a line of that slope, although the base model had bent to stand for it."""
+    data = data_of(diagnosed)
+    panels = data["figures"]["effect-1-view"]["variants"][""]["panels"]
+    assert [panel["label"] for panel in panels] == ["torque [N m]", "residual [N m]"]
+    for name in ("the effect as found", "measured less the rest of the model"):
+        (layer,) = [layer for layer in panels[0]["layers"] if layer.get("name") == name]
+        pairs = [(x, y) for x, y in zip(layer["x"], layer["y"], strict=True) if y is not None]
+        assert np.polyfit(*np.array(pairs).T, 1)[0] == pytest.approx(0.05, abs=0.01)

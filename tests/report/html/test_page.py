@@ -1,0 +1,66 @@
+"""What is in the file of every kind of page."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from scara_ident.errors import ScaraIdentError
+from scara_ident.report.html import IdentificationContext, identification_report
+from tests.report.html.document import data_of, document
+from tests.report.simulated import made, run
+
+PAGES = ("identification", "diagnosis", "comparison", "excitation", "paper")
+
+
+@pytest.mark.parametrize("kind", PAGES)
+def test_a_page_is_closed_html_that_loads_nothing(pages, kind):
+    found = document(pages[kind])
+    assert found.wrong == []
+    assert found.open == []
+    assert len(set(found.identities)) == len(found.identities)
+    assert all(target.startswith("#") or target == "data:," for target in found.loads)
+    text = pages[kind].read_text(encoding="utf-8")
+    assert not re.search(r"https?://|url\((?!#)|@import|fetch\(|XMLHttpRequest|\bimport\(", text)
+
+
+@pytest.mark.parametrize("kind", PAGES)
+def test_every_figure_of_a_page_has_its_data_and_every_data_its_figure(pages, kind):
+    found = document(pages[kind])
+    data = data_of(pages[kind])
+    assert sorted(data["figures"]) == sorted(found.figures)
+    assert len(found.figures) >= 2 or kind == "paper"
+
+
+def test_every_axis_of_a_figure_has_its_unit(pages):
+    for kind in PAGES:
+        data = data_of(pages[kind])
+        for name, figure in data["figures"].items():
+            for plot in figure["variants"].values():
+                if plot.get("kind") == "matrix":
+                    continue
+                labels = [plot["x"]["label"], *(panel["label"] for panel in plot["panels"])]
+                bare = [label for label in labels if "[" not in label]
+                assert set(bare) <= {"samples", "correlation"}, (kind, name)
+
+
+def test_a_name_cannot_break_out_of_the_page(tmp_path):
+    nasty = run("</script><img src=x onerror=alert(1)>_1", 1)
+    identification_report(tmp_path / "report.html", IdentificationContext(made([nasty])))
+    found = document(tmp_path / "report.html")
+    assert found.wrong == []
+    assert "x" not in found.loads
+    assert nasty.name in found.words
+
+
+def test_a_report_that_cannot_be_written_leaves_nothing(tmp_path, result):
+    blocked = tmp_path / "file"
+    blocked.write_text("here")
+    with pytest.raises(ScaraIdentError, match="cannot be written"):
+        identification_report(blocked / "report.html", IdentificationContext(result))
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_ten_recordings_of_25_s_stay_below_10_mb(big):
+    assert big.stat().st_size <= 10e6

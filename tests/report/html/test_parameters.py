@@ -1,0 +1,25 @@
+"""Parameters, their correlation and how they settled."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from scara_ident.report.html.parameters import cheap_history, convergence_group
+
+
+def test_many_parameters_settle_in_pages(result):
+    history = result.history or cheap_history(result.training)
+    columns = tuple(replace(result.model.columns[0], name=f"p{k}") for k in range(30))
+    many = SimpleNamespace(
+        model=SimpleNamespace(columns=columns, robot=result.model.robot), value=np.repeat(result.estimate.value[:1], 30)
+    )
+    wide = SimpleNamespace(
+        samples=history.samples, value=np.repeat(history.value[:, :1], 30, 1), std=np.repeat(history.std[:, :1], 30, 1)
+    )
+    group = convergence_group(many, wide, result.training)
+    assert [selector.options for selector in group.selectors] == [("p0 … p11", "p12 … p23", "p24 … p29")]
+    shown = [plot.panels[0].label for figure in group.figures for plot in figure.variants.values()]
+    assert sorted(label.split(" ")[0] for label in shown) == sorted(f"p{k}" for k in range(30))
