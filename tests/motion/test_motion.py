@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -96,25 +96,19 @@ def test_no_cut_off_leaves_the_signal_alone():
     assert low_pass(signal, RATE, None) is signal
 
 
-@settings(deadline=None, max_examples=25)
-@given(
-    count=st.integers(200, 3000),
-    cut=st.floats(4.0, 30.0),
-    step=st.integers(1, 8),
-    seed=st.integers(0, 2**16),
-)
+@settings(deadline=None, max_examples=60)
+@given(count=st.integers(4, 3000), cut=st.floats(2.0, 100.0), step=st.integers(1, 8), seed=st.integers(0, 2**16))
 def test_the_low_pass_at_kept_samples_is_the_low_pass(count: int, cut: float, step: int, seed: int):
     rate = 500.0
-    # A stretch shorter than the filter's memory is continued by a guess, which depends on the padding.
-    assume(count * cut / rate > 6.0)
     step = min(step, row_step(rate, cut))
     walk = np.cumsum(np.random.default_rng(seed).standard_normal((2, count)), axis=1)
-    whole = low_pass(walk, rate, cut)[:, ::step]
     kept = low_pass_every(walk, rate, cut, step)
-    assert kept.shape == whole.shape
-    assert_allclose(kept, whole, rtol=0, atol=3e-6 * np.ptp(walk))
-    inner = slice(len(kept[0]) // 4, -(len(kept[0]) // 4))
-    assert_allclose(kept[:, inner], whole[:, inner], rtol=0, atol=1e-7 * np.ptp(walk))
+    assert_allclose(kept, low_pass(walk, rate, cut, step)[:, ::step], rtol=0, atol=1e-12 * np.ptp(walk))
+    # However the signal is continued, away from its ends the filter is the same.
+    inner = slice(int(2 * rate / cut), count - int(2 * rate / cut))
+    assert_allclose(
+        low_pass(walk, rate, cut, step)[:, inner], low_pass(walk, rate, cut)[:, inner], rtol=0, atol=1e-6 * np.ptp(walk)
+    )
 
 
 def test_without_a_band_every_sample_is_itself():
