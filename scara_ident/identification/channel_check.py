@@ -186,7 +186,10 @@ def _pushing(estimate: Estimate, observations: Observations) -> NDArray[np.bool_
     result = np.zeros(robot.n, dtype=bool)
     for j, rows in enumerate(observations.joints):
         own = np.flatnonzero(friction[rows.columns])
-        if not len(own):
+        places = rows.columns[own]
+        covariance = estimate.covariance[np.ix_(places, places)]
+        # Of a joint that stands still friction is not determined.
+        if not len(own) or not np.all(np.isfinite(covariance)):
             continue
         power, passed = np.zeros(len(own)), 0.0
         for item, raws in zip(observations.data.recordings, observations.raw, strict=True):
@@ -194,8 +197,7 @@ def _pushing(estimate: Estimate, observations: Observations) -> NDArray[np.bool_
             drive = robot.drive_sign[j] * part.motion.v[j]
             power += raw[j][own] @ drive
             passed += float(np.sum(np.abs(part.torque[j] * drive)))
-        places = rows.columns[own]
         value = float(power @ estimate.value[places])
-        std = float(np.sqrt(power @ estimate.covariance[np.ix_(places, places)] @ power))
+        std = float(np.sqrt(power @ covariance @ power))
         result[j] = value < -PUSHING * passed and value < -PUSHING_STD * std
     return result
