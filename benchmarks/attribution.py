@@ -23,12 +23,13 @@ from virtual_sets import KINDS, simulate_set, tasks
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.model_selection import joint_errors
-from scara_ident.diagnosis.search import model_with
+from scara_ident.diagnosis.selection_step import model_with
 from scara_ident.effects import CATALOGUE, Member
 from scara_ident.effects.measurement import shifted
+from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.least_squares import wls
-from scara_ident.estimation.observations import gather_all
+from scara_ident.estimation.observations import observe
+from scara_ident.motion.prepared import prepare
 
 
 def one_set(task: tuple[str, int]) -> dict:
@@ -96,9 +97,10 @@ def true_model_error(result, training, held_out, effects) -> list[float] | None:
             partner = 1 - joint
         chosen.append(Candidate(family, Member(joint, nonlinear, partner)))
     model = model_with(scene, chosen)
-    fit = wls(model, gather_all(model, [shifted(item, delay) for item in training], bands))
-    tested = gather_all(model, [shifted(item, delay) for item in held_out], bands)
-    return [error.rms for error in joint_errors(fit.value, tested)]
+    fitted, tested = (
+        observe(model, prepare([shifted(item, delay) for item in items], bands)) for items in (training, held_out)
+    )
+    return [error.rms for error in joint_errors(wls(fitted).value, tested)]
 
 
 def main() -> None:

@@ -36,13 +36,14 @@ from campaign_tables import (
     printed,
     shares,
     sigma_of,
+    unfiltered,
 )
 from numpy.typing import NDArray
 
-from scara_ident.estimation.information import merge
-from scara_ident.estimation.observations import Evidence, gather_all
-from scara_ident.identification.compare import Comparison, compare
+from scara_ident.estimation.observations import observe
+from scara_ident.identification.compare import compare
 from scara_ident.model.model import build_model
+from scara_ident.motion.prepared import prepare
 from scara_ident.paper import REDUCED, TRAJECTORIES
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation import CATALOGUE, Effect, ReferenceMotion, VirtualArm, parse_effect, simulate, virtual_arm
@@ -95,13 +96,13 @@ def scene(task: tuple[str, float], names: Sequence[str], bands: Sequence[float |
         bands = [None if band is None else factor * band for band in bands]
     recordings = repetitions(arm, names, effects, 1, noisy=False, seed=seed)
     model = build_model(arm.robot, "complete")
-    evidence = gather_all(model, recordings, bands)
+    recorded = [unfiltered(item) for item in observe(model, prepare(recordings, bands)).each]
     shape = (DRAWS, len(names), arm.robot.n, len(model.columns))
     draws = np.random.default_rng(seed).standard_normal(shape)
     found: dict[str, Any] = {"name": name, "factor": factor, "effects": [effect.as_dict() for effect in effects]}
     # Table 1's sigma is the scatter between runs; whether the tables use one run or the mean of six is not said.
     for reading, share in READINGS.items():
-        tables = drawn_tables(evidence, share * sigma_of(names), draws)
+        tables = drawn_tables(recorded, share * sigma_of(names), draws)
         apart = distances(tables, printed(names))
         found[reading] = {
             "distance": {key: float(np.median(value)) for key, value in apart.items()},
@@ -193,38 +194,17 @@ def campaign(
         if used != method:
             raise RuntimeError(f"asked for {method}, compare used {used}")
         bands = result.bands
-        evidence = gather_all(result.model, recordings, bands)
+        observations = observe(result.model, prepare(recordings, bands))
+        places = [[k for k, item in enumerate(recordings) if item.trajectory == name] for name in names]
+        each = [observations.of(own) for own in places]
         found[f"{model} {method}"] = result
-        found[f"{model} {method} errors"] = unfiltered_errors(result, evidence)
+        # On the torque as recorded, shape (t, t, n).
+        found[f"{model} {method} errors"] = np.array(
+            [[item.unfiltered_rms(summary.estimate.value) for summary in result.trajectories] for item in each]
+        )
         if model == "complete":
-            found["torque_rms"] = np.array(
-                [
-                    [
-                        merge(item.unfiltered[j] for item in evidence if item.trajectory == name).torque_rms
-                        for j in range(2)
-                    ]
-                    for name in names
-                ]
-            )
+            found["torque_rms"] = np.array([item.unfiltered_rms(np.zeros(item.parameters)) for item in each])
     return found
-
-
-def unfiltered_errors(result: Comparison, evidence: Sequence[Evidence]) -> Array:
-    """Return the errors of a comparison on the torque as recorded, shape (t, t, n)."""
-    return np.array(
-        [
-            [
-                [
-                    merge(item.unfiltered[j] for item in evidence if item.trajectory == row.name).rms(
-                        column.estimate.value
-                    )
-                    for j in range(result.model.robot.n)
-                ]
-                for column in result.trajectories
-            ]
-            for row in result.trajectories
-        ]
-    )
 
 
 def report(

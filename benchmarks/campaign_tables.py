@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.estimation.information import merge
-from scara_ident.estimation.observations import Evidence
+from scara_ident.estimation.information import Information, merge
+from scara_ident.estimation.observations import Observations
 from scara_ident.model.model import build_model
 from scara_ident.paper import REDUCED, TABLE_1, TABLE_2, TABLE_4, TABLE_5, TORQUE_RMS, TRAJECTORIES
 from scara_ident.simulation import virtual_arm
@@ -68,13 +68,25 @@ def sigma_of(names: Sequence[str]) -> Array:
     return np.array(TABLE_1.sigma).T[[TRAJECTORIES.index(name) for name in names]]
 
 
-def drawn_tables(evidence: Sequence[Evidence], sigma: Array, draws: Array) -> Tables:
+def unfiltered(observations: Observations) -> tuple[Information, ...]:
+    """Return what each joint's equation says at every sample that is used, nothing of it filtered."""
+    found = []
+    for j, rows in enumerate(observations.joints):
+        own = Information.empty(len(rows.columns))
+        for item, raws in zip(observations.data.recordings, observations.raw, strict=True):
+            for part, raw in zip(item.stretches, raws, strict=True):
+                own = own.absorb_columns(np.vstack([raw[j], part.torque[j]])[:, part.used[j]])
+        found.append(own.embed(rows.columns, observations.parameters))
+    return tuple(found)
+
+
+def drawn_tables(recorded: Sequence[Sequence[Information]], sigma: Array, draws: Array) -> Tables:
     """Make Tables 2, 4 and 5 as the paper did, once per draw of the noise.
 
     Parameters
     ----------
-    evidence : sequence of Evidence
-        One noise-free recording per trajectory, complete model.
+    recorded : sequence of sequence of Information
+        By trajectory and joint, from one noise-free recording each, see `unfiltered`; complete model.
     sigma : ndarray, shape (t, n)
         Standard deviation of the torque, white.
     draws : ndarray, shape (d, t, n, p)
@@ -90,10 +102,10 @@ def drawn_tables(evidence: Sequence[Evidence], sigma: Array, draws: Array) -> Ta
     kept = [names.index(name) for name in REDUCED]
     errors, values = {}, {}
     for model, columns in (("complete", list(range(size))), ("reduced", kept)):
-        mean = np.zeros((len(evidence), size))
-        noise = np.zeros((len(draws), len(evidence), size))
-        for k, item in enumerate(evidence):
-            parts = [part.select(columns) for part in item.unfiltered]
+        mean = np.zeros((len(recorded), size))
+        noise = np.zeros((len(draws), len(recorded), size))
+        for k, item in enumerate(recorded):
+            parts = [part.select(columns) for part in item]
             pooled = merge(parts)
             mean[k, columns] = pooled.solve().value
             for j, part in enumerate(parts):
@@ -102,19 +114,19 @@ def drawn_tables(evidence: Sequence[Evidence], sigma: Array, draws: Array) -> Ta
                 rows = part.regressor_factor
                 noise[:, k, columns] += scale * draws[:, k, j, : len(rows)] @ rows @ pooled.inverse()
         values[model] = mean + noise
-        errors[model] = np.zeros((len(draws), len(evidence), len(evidence), joints))
-        for i, item in enumerate(evidence):
+        errors[model] = np.zeros((len(draws), len(recorded), len(recorded), joints))
+        for i, item in enumerate(recorded):
             # On its own rows least squares does not err by what noise did to it: it fits that noise.
             used = values[model].copy()
             used[:, i] = mean[i]
-            for j, part in enumerate(item.unfiltered):
+            for j, part in enumerate(item):
                 left = used @ part.factor[:, :-1].T - part.factor[:, -1]
                 errors[model][:, i, :, j] = np.sqrt(np.sum(left**2, axis=-1) / part.rows + sigma[i, j] ** 2)
-    pooled = [merge(item.unfiltered) for item in evidence]
+    pooled = [merge(item) for item in recorded]
     return Tables(
         np.array([item.log_det() + size * np.log(PAPER_SAMPLES * joints / item.rows) for item in pooled]),
         np.array([item.condition() for item in pooled]),
-        np.hypot([[part.torque_rms for part in item.unfiltered] for item in evidence], sigma),
+        np.hypot([[part.torque_rms for part in item] for item in recorded], sigma),
         errors["complete"],
         errors["reduced"],
         np.swapaxes(values["reduced"][:, :, kept], 1, 2),

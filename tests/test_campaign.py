@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from scara_ident.estimation.information import Information
-from scara_ident.estimation.observations import Evidence
+from scara_ident.estimation.information import Information, merge
+from scara_ident.estimation.observations import observe
 from scara_ident.model.model import build_model
+from scara_ident.motion.prepared import prepare
 from scara_ident.paper import REDUCED, TRAJECTORIES
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import CATALOGUE
@@ -23,13 +24,6 @@ BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 def campaign(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     return pytest.importorskip("campaign", reason="benchmarks are not part of an installed package")
-
-
-def made_evidence(rng: np.random.Generator, size: int, rows: int) -> tuple[Evidence, list[np.ndarray]]:
-    regressors = [rng.normal(size=(rows, size)) for _ in range(2)]
-    truth = np.ones(size)
-    parts = tuple(Information.empty(size).absorb(w, w @ truth) for w in regressors)
-    return Evidence("a_1", "a", rows, (parts,), parts, (1, 1), 0.0, (0.0, 0.0)), regressors
 
 
 def test_every_conclusion_of_the_paper_follows_from_its_own_tables(campaign: ModuleType) -> None:
@@ -74,7 +68,8 @@ def test_printed_tables_are_at_distance_zero_and_a_factor_ten_at_one(campaign: M
 def test_drawn_noise_spreads_parameters_as_least_squares_on_2500_samples(campaign: ModuleType) -> None:
     model = build_model(load_robot(), "complete")
     rng, size, rows = np.random.default_rng(1), len(model.columns), 5000
-    item, regressors = made_evidence(rng, size, rows)
+    regressors = [rng.normal(size=(rows, size)) for _ in range(2)]
+    item = [Information.empty(size).absorb(w, w @ np.ones(size)) for w in regressors]
     sigma = np.array([[0.5, 0.1]])
     tables = campaign.drawn_tables([item], sigma, rng.standard_normal((4000, 1, 2, size)))
     kept = [model.names.index(name) for name in REDUCED]
@@ -122,8 +117,8 @@ def test_encoder_steps_alone_make_the_inertia_of_l2_negative(campaign: ModuleTyp
     found = {}
     for steps in (0.0, 2000.0):
         runs = campaign.repetitions(replace(arm, encoder_steps=np.full(2, steps)), ["L2"], (), 1, noisy=False)
-        (evidence,) = campaign.gather_all(model, runs, (13.7, 10.9))
-        found[steps] = campaign.merge(evidence.unfiltered).solve().value[model.names.index("P_d4")]
+        rows = campaign.unfiltered(observe(model, prepare(runs, (13.7, 10.9))))
+        found[steps] = merge(rows).solve().value[model.names.index("P_d4")]
     # Table 5, column OJD, is what the arm is made of.
     assert found[0.0] == pytest.approx(0.758, rel=0.03)
     assert found[2000.0] < -0.5

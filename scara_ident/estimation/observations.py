@@ -57,12 +57,13 @@ class JointRows:
 
     def part(self, blocks: NDArray[np.intp]) -> JointRows:
         """Return some of the blocks, in their order."""
+        if np.array_equal(blocks, np.arange(len(self.counts))):
+            return self
         sizes = np.diff(self.starts)[blocks]
         rows = [np.arange(self.starts[b], self.starts[b + 1]) for b in blocks]
         chosen = np.concatenate(rows) if rows else np.zeros(0, dtype=np.intp)
-        whole = len(chosen) == self.table.shape[1]
-        table = self.table if whole else self.table[:, chosen]
-        return JointRows(self.columns, table, np.concatenate([[0], np.cumsum(sizes)]), self.counts[blocks])
+        starts = np.concatenate([[0], np.cumsum(sizes)])
+        return JointRows(self.columns, self.table[:, chosen], starts, self.counts[blocks])
 
     def faded(self, shares: Array) -> JointRows:
         """Return the rows with each block weighted to count for a share of its samples, shares of shape (blocks,)."""

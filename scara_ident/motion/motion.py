@@ -26,6 +26,8 @@ MOST_SAMPLES = 60_000
 UNIFORM_TOLERANCE = 1e-3
 # The filter's memory in periods of its cut-off: 4 of them leave under 1e-4 of a step.
 MEMORY_PERIODS = 4.0
+# A low-passed signal has nothing beyond this many times its cut-off, where the filter would leave 6e-8.
+HIGHEST = 8.0
 # Signals that are transformed together: more of them leave the cache.
 ROWS_AT_ONCE = 8
 
@@ -182,7 +184,7 @@ def torque_of(stretch: Stretch) -> Array:
     return stretch.torque
 
 
-def low_pass(signal: Array, rate: float, cut: float | None) -> Array:
+def low_pass(signal: Array, rate: float, cut: float | None, step: int = 1) -> Array:
     """Low-pass a signal without phase.
 
     Parameters
@@ -192,6 +194,8 @@ def low_pass(signal: Array, rate: float, cut: float | None) -> Array:
         Samples per second.
     cut : float or None
         Frequency in Hz where half the amplitude is left; None leaves the signal as it is.
+    step : int, optional
+        Of `low_pass_every`, to continue the signal to the same length, so that both agree to rounding.
 
     Returns
     -------
@@ -199,14 +203,14 @@ def low_pass(signal: Array, rate: float, cut: float | None) -> Array:
     """
     if cut is None:
         return signal
-    return _filtered(signal, rate, cut, (0,))[0]
+    return _filtered(signal, rate, cut, (0,), HIGHEST * cut, step)[0]
 
 
 def low_pass_every(signal: Array, rate: float, cut: float | None, step: int) -> Array:
     """Return every ``step``-th sample of `low_pass`, from the first on, without computing the others.
 
     The spectrum is folded at the lower rate, which is what leaving out samples does to it, so that the result is the
-    same to rounding as long as the filter leaves nothing beyond eight times its cut-off.
+    same to rounding if `low_pass` is told the step.
 
     Parameters
     ----------
@@ -228,10 +232,12 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int) -> 
     reach = min(count - 1, int(np.ceil(MEMORY_PERIODS * rate / cut)) + 1)
     # The first sample must fall on the lower grid.
     lead = -(-reach // step) * step
-    closed = step * _fast_length(-(-(lead + count + reach) // step))
+    closed = _closed_length(count, reach, step)
     low = closed // step
-    frequency = np.arange(min(closed // 2, int(8.0 * cut * closed / rate)) + 1) * (rate / closed)
+    frequency = np.arange(min(closed // 2, int(HIGHEST * cut * closed / rate)) + 1) * (rate / closed)
     gain = 1.0 / (1.0 + (frequency / cut) ** 8)
+    # Half the rate is its own mirror image.
+    gain[2 * np.arange(len(frequency)) == closed] *= 0.5
     result = np.empty((signal.shape[0], kept))
     whole = np.arange(count + 2 * reach, dtype=float)
     buffer = np.zeros((min(ROWS_AT_ONCE, len(signal)), closed))
@@ -286,7 +292,10 @@ def differentiate(signal: Array, rate: float, cut: float | None) -> tuple[Array,
     return smooth, first, second
 
 
-def _filtered(signal: Array, rate: float, cut: float | None, orders: Sequence[int]) -> list[Array]:
+def _filtered(
+    signal: Array, rate: float, cut: float | None, orders: Sequence[int], highest: float = np.inf, step: int = 1
+) -> list[Array]:
+    """Return derivatives of a low-passed signal, with nothing beyond the highest frequency, Hz."""
     count = signal.shape[-1]
     periods = rate / cut if cut is not None else 32.0
     reach = min(count - 1, int(np.ceil(MEMORY_PERIODS * periods)) + 1)
@@ -303,10 +312,11 @@ def _filtered(signal: Array, rate: float, cut: float | None, orders: Sequence[in
         fade = np.sin(0.5 * np.pi * np.arange(reach) / reach) ** 2
         flat[..., :reach] *= fade
         flat[..., -reach:] *= fade[::-1]
-    closed = _fast_length(length)
+    closed = _closed_length(count, reach, step)
     spectrum = np.fft.rfft(_close(flat, closed), axis=-1)
     frequency = np.arange(closed // 2 + 1) * (rate / closed)
     gain = np.ones_like(frequency) if cut is None else 1.0 / (1.0 + (frequency / cut) ** 8)
+    gain[frequency > highest] = 0.0
     keep = slice(reach, reach + count)
     results = []
     for order in orders:
@@ -324,6 +334,12 @@ def _close(signal: Array, length: int) -> Array:
     # The ends are zero, so zeros continue the signal.
     missing = length - signal.shape[-1]
     return signal if missing == 0 else np.concatenate([signal, np.zeros((*signal.shape[:-1], missing))], axis=-1)
+
+
+def _closed_length(count: int, reach: int, step: int) -> int:
+    """Return how long a signal is, continued at both ends, that is transformed fast and falls on every step-th sample."""
+    lead = -(-reach // step) * step
+    return step * _fast_length(-(-(lead + count + reach) // step))
 
 
 def _fast_length(length: int) -> int:

@@ -162,7 +162,7 @@ class PreparedStretch:
 
     def smooth(self, joint: int, signal: Array) -> Array:
         """Return a signal of a joint's equation, shape (..., N), faded out towards rest and within the joint's band."""
-        return low_pass(self.fade[joint] * signal, self.rate, self.bands[joint])
+        return low_pass(self.fade[joint] * signal, self.rate, self.bands[joint], self.steps[joint])
 
     @cached_property
     def smooth_torque(self) -> Array:

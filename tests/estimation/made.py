@@ -1,17 +1,18 @@
-"""Evidence made of linear rows, without a robot's motion."""
+"""Observations made of linear rows, without a robot's motion."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.estimation.information import Information
-from scara_ident.estimation.observations import Evidence
+from scara_ident.estimation.observations import JointRows, Observations
 from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.motion.prepared import PreparedData, PreparedRecording, prepare
 from scara_ident.robot.robot import load_robot
-from tests.arms import Link, write_urdf
+from tests.arms import Link, recording, write_urdf
 
 Array = NDArray[np.float64]
 
@@ -22,16 +23,45 @@ def two_joint_model(folder: Path) -> TorqueModel:
     return build_model(load_robot(write_urdf(folder / "arm.urdf", links)), "basic")
 
 
-def evidence(name: str, w: Array, u: Array, length: int) -> Evidence:
+def linear(model: TorqueModel, name: str, w: Array, u: Array, length: int) -> Observations:
     """Rows of every joint, ``w`` of shape (n, N, p) and ``u`` of shape (n, N), in blocks of ``length`` samples."""
-    n, count, p = w.shape
-    bounds = [*range(0, count, length), count]
-    empty = Information.empty(p)
-    blocks = tuple(
-        tuple(empty.absorb(w[j, a:b], u[j, a:b]) for j in range(n)) for a, b in zip(bounds, bounds[1:], strict=False)
+    starts = np.array([*range(0, u.shape[1], length), u.shape[1]])
+    raw = tuple(w[j][:, own].T for j, own in enumerate(model.active))
+    joints = tuple(
+        JointRows(own, np.vstack([columns, torque]), starts, np.diff(starts).astype(float))
+        for own, columns, torque in zip(model.active, raw, u, strict=True)
     )
-    unfiltered = tuple(empty.absorb(w[j], u[j]) for j in range(n))
-    return Evidence(name, name.rpartition("_")[0], count, blocks, unfiltered, (1,) * n, 0.0, (0.0,) * n)
+    data = PreparedData((_prepared(model, name, u),), (None,) * len(u))
+    return Observations(model, data, joints, np.zeros(len(starts) - 1, dtype=np.intp), ((raw,),))
+
+
+def _prepared(model: TorqueModel, name: str, u: Array) -> PreparedRecording:
+    """A recording of nothing but torque, of which every sample is used."""
+    time = np.arange(u.shape[1]) / 1000.0
+    (made,) = prepare([recording(model.robot, name, time, np.zeros_like(u), u)]).recordings
+    for part in made.stretches:
+        vars(part).update(trim=0, rest=np.zeros(u.shape, dtype=bool), used=np.ones(u.shape, dtype=bool))
+    return made
+
+
+def together(items: Sequence[Observations]) -> Observations:
+    """Return the observations of several recordings as those of one set of data."""
+    data = PreparedData(tuple(one for item in items for one in item.data.recordings), items[0].data.bands)
+    joints = []
+    for rows in zip(*(item.joints for item in items), strict=True):
+        ends = np.cumsum([0, *(part.table.shape[1] for part in rows)])
+        starts = [part.starts[:-1] + end for part, end in zip(rows, ends[:-1], strict=True)]
+        joints.append(
+            JointRows(
+                rows[0].columns,
+                np.concatenate([part.table for part in rows], axis=1),
+                np.concatenate([*starts, ends[-1:]]),
+                np.concatenate([part.counts for part in rows]),
+            )
+        )
+    firsts = np.cumsum([0, *(len(item.data.recordings) for item in items)])
+    owner = np.concatenate([item.owner + first for item, first in zip(items, firsts[:-1], strict=True)])
+    return Observations(items[0].model, data, tuple(joints), owner, tuple(raw for item in items for raw in item.raw))
 
 
 def rows(rng: np.random.Generator, model: TorqueModel, count: int) -> Array:

@@ -10,6 +10,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from scara_ident.estimation.bands import binned_power, choose_bands
 from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from tests.arms import PLANAR_2R, recorded_torque, recording, write_urdf
@@ -64,7 +65,7 @@ def crossing(model: TorqueModel, clean: Recording, noise: np.ndarray, edges: np.
 def test_the_band_ends_where_noise_overtakes_motion(model: TorqueModel, clean: Recording, sigma: float):
     rng = np.random.default_rng(1)
     noise = sigma * rng.standard_normal(clean.position.shape)
-    found = choose_bands(model, [replace(clean, position=clean.position + noise)])
+    found = choose_bands(model, prepare([replace(clean, position=clean.position + noise)]))
     expected = crossing(model, clean, noise, np.geomspace(0.5, 250.0, 30))
     ratio = np.array(found.bands) / expected
     assert np.all((ratio > 0.6) & (ratio < 1.7)), (found.bands, expected)
@@ -76,7 +77,7 @@ def test_less_noise_gives_a_wider_band(model: TorqueModel, clean: Recording):
     bands = []
     for sigma in (1e-5, 3e-4, 3e-3):
         noise = sigma * np.random.default_rng(1).standard_normal(clean.position.shape)
-        bands.append(choose_bands(model, [replace(clean, position=clean.position + noise)]).bands)
+        bands.append(choose_bands(model, prepare([replace(clean, position=clean.position + noise)])).bands)
     assert np.all(np.diff(bands, axis=0) < 0)
 
 
@@ -86,13 +87,13 @@ def test_a_bump_of_position_noise_at_8_to_15_hz_is_stayed_below(model: TorqueMod
     sections = butter(4, [8.0, 15.0], btype="bandpass", fs=RATE, output="sos")
     bump = sosfiltfilt(sections, rng.standard_normal(clean.position.shape), axis=1)
     bump *= 1.5e-3 / np.std(bump)
-    found = choose_bands(model, [replace(clean, position=clean.position + bump)])
+    found = choose_bands(model, prepare([replace(clean, position=clean.position + bump)]))
     assert max(found.bands) <= 10.0
     assert min(found.bands) >= 2.0
 
 
 def test_without_noise_the_band_is_wide(model: TorqueModel, clean: Recording):
-    assert min(choose_bands(model, [clean]).bands) >= 20.0
+    assert min(choose_bands(model, prepare([clean])).bands) >= 20.0
 
 
 def test_a_joint_that_stands_still_gets_a_band_and_leaves_the_other_alone(model: TorqueModel, clean: Recording):
@@ -109,7 +110,7 @@ def test_a_joint_that_stands_still_gets_a_band_and_leaves_the_other_alone(model:
         FRICTION,
     )
     torque[1] += 0.05 * rng.standard_normal(torque.shape[1])
-    found = choose_bands(model, [replace(clean, position=position, effort=torque)])
+    found = choose_bands(model, prepare([replace(clean, position=position, effort=torque)]))
     assert all(0.4 < band <= 0.2 * RATE for band in found.bands)
     assert found.explained[0] > 0.9
 
@@ -125,7 +126,7 @@ def test_torque_that_has_nothing_to_do_with_motion_is_said(model: TorqueModel, c
     rng = np.random.default_rng(4)
     assert clean.effort is not None
     torque = np.array([clean.effort[0], 5.0 * rng.standard_normal(clean.effort.shape[1])])
-    found = choose_bands(model, [replace(clean, effort=torque)])
+    found = choose_bands(model, prepare([replace(clean, effort=torque)]))
     (note,) = found.notes
     assert note.startswith("j2: its motion explains under half of its torque at every frequency")
     assert found.explained[1] == 0.0
@@ -146,7 +147,7 @@ def test_the_order_of_recordings_does_not_matter(model: TorqueModel, clean: Reco
         )
         for k, part in enumerate((slice(0, 5000), slice(5000, 10000)))
     ]
-    forth, back = choose_bands(model, halves), choose_bands(model, halves[::-1])
+    forth, back = choose_bands(model, prepare(halves)), choose_bands(model, prepare(halves[::-1]))
     np.testing.assert_allclose(forth.bands, back.bands, rtol=1e-9)
 
 

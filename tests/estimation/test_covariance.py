@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from scara_ident.estimation.covariance import block_covariance
-from scara_ident.estimation.information import Information, merge
-
-Block = tuple[Information, ...]
+from scara_ident.estimation.covariance import Covariance, block_covariance
+from scara_ident.estimation.information import merge
+from scara_ident.estimation.observations import JointRows
 
 
 def white(rng: np.random.Generator, count: int) -> np.ndarray:
@@ -33,9 +32,19 @@ def smooth_columns(rng: np.random.Generator, count: int, p: int) -> np.ndarray:
     )
 
 
-def blocks_of(w: np.ndarray, u: np.ndarray, length: int) -> list[Block]:
-    bounds = np.arange(0, len(u) + 1, length)
-    return [(Information.empty(w.shape[1]).absorb(w[a:b], u[a:b]),) for a, b in zip(bounds, bounds[1:], strict=False)]
+def joint_rows(w: np.ndarray, u: np.ndarray, length: int) -> JointRows:
+    """Rows of one joint, w of shape (N, p), in blocks of equal length."""
+    starts = np.arange(0, len(u) + 1, length)
+    return JointRows(np.arange(w.shape[1]), np.vstack([w.T, u]), starts, np.diff(starts).astype(float))
+
+
+def estimated(*joints: JointRows, ends: tuple[int, ...] = ()) -> tuple[np.ndarray, Covariance]:
+    """Estimate and covariance from rows of all joints; a recording ends before each of the blocks ``ends``."""
+    parameters = joints[0].columns.size
+    rows = merge(joint.information(parameters) for joint in joints)
+    value = rows.solve().value
+    owner = np.searchsorted(np.array(ends, dtype=int), np.arange(len(joints[0].counts)), side="right")
+    return value, block_covariance(rows.inverse(), value, joints, owner, np.ones(len(joints)))
 
 
 def spread_and_reported(
@@ -46,14 +55,11 @@ def spread_and_reported(
     values, stds, kind = [], [], ""
     for _ in range(draws):
         u = w @ np.arange(1.0, p + 1) + 0.1 * noise(rng, count)
-        blocks = blocks_of(w, u, length)
-        all_rows = merge(block[0] for block in blocks)
-        value = all_rows.solve().value
-        found = block_covariance(all_rows.inverse(), value, [blocks])
+        value, found = estimated(joint_rows(w, u, length))
         values.append(value)
         stds.append(np.sqrt(np.diag(found.matrix)))
         kind = found.kind
-        assert found.blocks == len(blocks)
+        assert found.blocks == count // length
     return np.std(values, axis=0, ddof=1), np.sqrt(np.mean(np.square(stds), axis=0)), kind
 
 
@@ -84,12 +90,10 @@ def test_several_recordings_count_like_one_and_their_ends_are_not_neighbours():
     rng = np.random.default_rng(2)
     w = smooth_columns(rng, 6000, 3)
     u = w @ np.ones(3) + 0.1 * coloured(rng, 6000)
-    blocks = blocks_of(w, u, 150)
-    rows = merge(block[0] for block in blocks)
-    value, inverse = rows.solve().value, rows.inverse()
-    one = block_covariance(inverse, value, [blocks])
-    two = block_covariance(inverse, value, [blocks[:20], blocks[20:]])
-    swapped = block_covariance(inverse, value, [blocks[20:], blocks[:20]])
+    rows = joint_rows(w, u, 150)
+    _, one = estimated(rows)
+    _, two = estimated(rows, ends=(20,))
+    _, swapped = estimated(rows.part(np.roll(np.arange(40), 20)), ends=(20,))
     assert two.blocks == one.blocks == 40
     np.testing.assert_allclose(two.matrix, swapped.matrix, rtol=1e-9)
     np.testing.assert_allclose(np.diag(two.matrix), np.diag(one.matrix), rtol=0.3)
@@ -103,9 +107,7 @@ def test_units_of_parameters_scale_their_std(length: int):
     unit = np.array([1e-4, 1.0, 1e5, 30.0])
     found = []
     for columns in (w, w * unit):
-        blocks = blocks_of(columns, u, length)
-        rows = merge(block[0] for block in blocks)
-        found.append(block_covariance(rows.inverse(), rows.solve().value, [blocks]).matrix)
+        found.append(estimated(joint_rows(columns, u, length))[1].matrix)
     np.testing.assert_allclose(found[1] * np.outer(unit, unit), found[0], rtol=1e-6, atol=1e-9 * np.max(found[0]))
 
 
@@ -113,9 +115,7 @@ def test_units_of_parameters_scale_their_std(length: int):
 def test_the_covariance_is_symmetric_and_not_negative(length: int):
     rng = np.random.default_rng(4)
     w = smooth_columns(rng, 6000, 4)
-    blocks = blocks_of(w, w @ np.ones(4) + 0.1 * coloured(rng, 6000), length)
-    rows = merge(block[0] for block in blocks)
-    matrix = block_covariance(rows.inverse(), rows.solve().value, [blocks]).matrix
+    matrix = estimated(joint_rows(w, w @ np.ones(4) + 0.1 * coloured(rng, 6000), length))[1].matrix
     np.testing.assert_allclose(matrix, matrix.T, rtol=1e-10)
     assert np.linalg.eigvalsh(matrix)[0] > -1e-14 * np.trace(matrix)
 
@@ -128,12 +128,9 @@ def test_joints_of_different_noise_are_both_honest():
     for _ in range(120):
         u = [wide[j] @ np.ones(4) + size * rng.standard_normal(3000) for j, size in enumerate((0.01, 1.0))]
         # Six blocks for four parameters: pooled, with one size of noise per joint.
-        parts = [blocks_of(wide[j], u[j], 500) for j in (0, 1)]
-        blocks = [(a[0], b[0]) for a, b in zip(*parts, strict=True)]
-        rows = merge(part for block in blocks for part in block)
-        found = block_covariance(rows.inverse(), rows.solve().value, [blocks])
+        value, found = estimated(*(joint_rows(wide[j], u[j], 500) for j in (0, 1)))
         assert found.kind == "pooled block"
-        values.append(rows.solve().value)
+        values.append(value)
         pooled.append(np.diag(found.matrix))
     np.testing.assert_allclose(np.sqrt(np.mean(pooled, axis=0)), np.std(values, axis=0, ddof=1), rtol=0.3)
 
@@ -147,19 +144,14 @@ def test_what_one_block_alone_tells_is_not_reported_as_certain():
         w[:, 0] = 0.0
         w[3000:3150, 0] = 1.0
         u = w @ np.ones(3) + 0.1 * white(rng, 6000)
-        blocks = blocks_of(w, u, 150)
-        rows = merge(block[0] for block in blocks)
-        found = block_covariance(rows.inverse(), rows.solve().value, [blocks])
-        values.append(rows.solve().value)
+        value, found = estimated(joint_rows(w, u, 150))
+        values.append(value)
         reported.append(np.diag(found.matrix))
     np.testing.assert_allclose(np.sqrt(np.mean(reported, axis=0)), np.std(values, axis=0, ddof=1), rtol=0.3)
 
 
 def test_a_fit_without_redundancy_is_infinitely_unsure():
-    w, u = np.eye(3), np.ones(3)
-    blocks = blocks_of(w, u, 3)
-    rows = blocks[0][0]
-    found = block_covariance(rows.inverse(), rows.solve().value, [blocks])
+    _, found = estimated(joint_rows(np.eye(3), np.ones(3), 3))
     assert np.all(np.diag(found.matrix) == np.inf)
 
 
@@ -170,9 +162,7 @@ def test_what_is_undetermined_does_not_disturb_the_others():
     wide = np.insert(w, 1, 0.0, axis=1)
     found = []
     for columns in (w, wide):
-        blocks = blocks_of(columns, u, 150)
-        rows = merge(block[0] for block in blocks)
-        found.append(block_covariance(rows.inverse(), rows.solve().value, [blocks]).matrix)
+        found.append(estimated(joint_rows(columns, u, 150))[1].matrix)
     np.testing.assert_allclose(found[1][np.ix_([0, 2, 3], [0, 2, 3])], found[0], rtol=1e-9)
 
 
@@ -188,3 +178,25 @@ def test_noise_that_reaches_into_the_next_block_is_counted():
     spread, reported, kind = spread_and_reported(coloured, count=1800, length=30, draws=200)
     assert kind == "block"
     np.testing.assert_allclose(np.mean(reported / spread), 1.0, atol=0.08)
+
+
+def test_it_is_the_sandwich_of_bias_reduced_scores_and_their_neighbours():
+    """Dense, as Bell and McCaffrey (2002) and Newey and West (1987) write it; two joints of different weight."""
+    rng = np.random.default_rng(7)
+    w = [smooth_columns(rng, 600, 3) for _ in range(2)]
+    joints = [joint_rows(x, x @ np.ones(3) + coloured(rng, 600), 50) for x in w]
+    weights = np.array([2.0, 0.5])
+    rows = merge(joint.information(3).scaled(weight) for joint, weight in zip(joints, weights, strict=True))
+    value, inverse, owner = rows.solve().value, rows.inverse(), np.repeat([0, 1], 6)
+    scores = np.zeros((12, 3))
+    for b in range(12):
+        part = slice(50 * b, 50 * b + 50)
+        x = np.vstack([weight * columns[part] for columns, weight in zip(w, weights, strict=True)])
+        torque = np.concatenate([weight * joint.table[-1, part] for joint, weight in zip(joints, weights, strict=True)])
+        size, turn = np.linalg.eigh(np.eye(100) - x @ inverse @ x.T)
+        scores[b] = x.T @ (turn / np.sqrt(size)) @ turn.T @ (torque - x @ value)
+    cross = sum(np.outer(scores[b + 1], scores[b]) for b in range(11) if b != 5)
+    expected = inverse @ (scores.T @ scores + 0.5 * (cross + cross.T)) @ inverse
+    found = block_covariance(inverse, value, joints, owner, weights)
+    assert found.kind == "block"
+    np.testing.assert_allclose(found.matrix, expected, rtol=1e-8, atol=1e-10 * np.max(np.abs(expected)))

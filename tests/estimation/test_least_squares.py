@@ -10,11 +10,12 @@ from numpy.testing import assert_allclose
 
 from scara_ident.errors import EstimationError
 from scara_ident.estimation import ols, wls
-from scara_ident.estimation.estimate import joint_error, paper_criteria, pooled_information
-from scara_ident.estimation.information import Information
+from scara_ident.estimation.information import joint_noise
+from scara_ident.estimation.least_squares import weighted_value
+from scara_ident.estimation.observations import observe
 from scara_ident.model.model import TorqueModel
-from tests.diagnosis.made import residual_noise
-from tests.estimation.made import evidence, rows, two_joint_model
+from scara_ident.motion.prepared import prepare
+from tests.estimation.made import linear, rows, together, two_joint_model
 
 NOISE = np.array([0.5, 0.01])
 
@@ -33,10 +34,10 @@ def made(model: TorqueModel, seed: int = 0, count: int = 4000) -> tuple[np.ndarr
 
 def test_ols_is_numpys_least_squares_over_all_recordings_and_joints(model: TorqueModel):
     w, u, _ = made(model)
-    parts = [evidence("a_1", w[:, :1500], u[:, :1500], 100), evidence("a_2", w[:, 1500:], u[:, 1500:], 130)]
+    parts = [linear(model, "a_1", w[:, :1500], u[:, :1500], 100), linear(model, "a_2", w[:, 1500:], u[:, 1500:], 130)]
     expected = np.linalg.lstsq(w.reshape(-1, w.shape[2]), u.ravel(), rcond=None)[0]
     for given in (parts, parts[::-1]):
-        found = ols(model, given)
+        found = ols(together(given))
         assert_allclose(found.value, expected, rtol=1e-10)
         assert found.method == "ols"
         assert found.std_kind == "block"
@@ -50,7 +51,7 @@ def test_wls_divides_each_joints_rows_by_its_noise_once(model: TorqueModel):
     w, u, _ = made(model)
     scaled_w, scaled_u = w / NOISE[:, None, None], u / NOISE[:, None]
     expected = np.linalg.lstsq(scaled_w.reshape(-1, w.shape[2]), scaled_u.ravel(), rcond=None)[0]
-    found = wls(model, [evidence("a_1", w, u, 100)], NOISE)
+    found = wls(linear(model, "a_1", w, u, 100), NOISE)
     assert_allclose(found.value, expected, rtol=1e-10)
     assert found.method == "wls"
 
@@ -58,9 +59,9 @@ def test_wls_divides_each_joints_rows_by_its_noise_once(model: TorqueModel):
 def test_wls_without_given_noise_finds_it_in_the_residual(model: TorqueModel):
     rng = np.random.default_rng(0)
     w, sigma = rows(rng, model, 4000), np.array([0.05, 0.01])
-    given = [evidence("a_1", w, w.sum(axis=2) + sigma[:, None] * rng.standard_normal((2, 4000)), 100)]
-    assert_allclose(residual_noise(ols(model, given), given), sigma, rtol=0.05)
-    one, other = wls(model, given), wls(model, given, sigma)
+    given = linear(model, "a_1", w, w.sum(axis=2) + sigma[:, None] * rng.standard_normal((2, 4000)), 100)
+    assert_allclose(joint_noise(given.by_joint), sigma, rtol=0.05)
+    one, other = wls(given), wls(given, sigma)
     assert np.all(np.abs(one.value - other.value) < 0.2 * other.std + 1e-12)
 
 
@@ -68,9 +69,9 @@ def test_wls_gains_on_ols_where_joints_differ_in_noise(model: TorqueModel):
     errors = {"ols": [], "wls": []}
     for seed in range(12):
         w, u, truth = made(model, seed, 1500)
-        given = [evidence("a_1", w, u, 50)]
-        errors["ols"].append(ols(model, given).value - truth)
-        errors["wls"].append(wls(model, given).value - truth)
+        given = linear(model, "a_1", w, u, 50)
+        errors["ols"].append(ols(given).value - truth)
+        errors["wls"].append(wls(given).value - truth)
     rms = {name: np.sqrt(np.mean(np.square(error), axis=0)) for name, error in errors.items()}
     shared = np.flatnonzero(model.pattern.all(axis=0))
     assert shared.size
@@ -81,14 +82,14 @@ def test_wls_of_an_exact_fit_is_the_truth(model: TorqueModel):
     rng = np.random.default_rng(0)
     w = rows(rng, model, 500)
     truth = np.arange(1.0, w.shape[2] + 1)
-    assert_allclose(wls(model, [evidence("a_1", w, w @ truth, 100)]).value, truth, rtol=1e-8)
+    assert_allclose(wls(linear(model, "a_1", w, w @ truth, 100)).value, truth, rtol=1e-8)
 
 
 @pytest.mark.parametrize("noise", [np.array([0.0, 1.0]), np.array([1.0, np.nan]), np.array([-1.0, 1.0])])
 def test_wls_refuses_noise_that_is_none(model: TorqueModel, noise: np.ndarray):
     w, u, _ = made(model, count=300)
     with pytest.raises(EstimationError, match="noise of joint"):
-        wls(model, [evidence("a_1", w, u, 100)], noise)
+        wls(linear(model, "a_1", w, u, 100), noise)
 
 
 @pytest.mark.parametrize(("method", "sigma"), [(ols, (0.02, 0.008)), (wls, (0.02, 0.008)), (wls, (0.5, 0.01))])
@@ -97,7 +98,7 @@ def test_reported_std_is_the_spread_of_estimates(model: TorqueModel, method, sig
     values, stds = [], []
     for seed in range(60):
         u = w.sum(axis=2) + np.array(sigma)[:, None] * np.random.default_rng(seed).standard_normal((2, 3000))
-        found = method(model, [evidence("a_1", w, u, 75)])
+        found = method(linear(model, "a_1", w, u, 75))
         values.append(found.value)
         stds.append(found.std)
     spread = np.std(values, axis=0, ddof=1)
@@ -110,7 +111,7 @@ def test_an_undetermined_parameter_has_infinite_std_and_the_others_keep_theirs(m
     dead = names.index("a12")
     u = u - w[:, :, dead] * truth[dead]
     w[:, :, dead] = 0.0
-    found = ols(model, [evidence("a_1", w, u, 100)])
+    found = ols(linear(model, "a_1", w, u, 100))
     assert [name for name, open_ in zip(names, found.undetermined, strict=True) if open_] == ["a12"]
     assert found.std[dead] == np.inf
     assert np.all(np.isfinite(np.delete(found.std, dead)))
@@ -119,49 +120,23 @@ def test_an_undetermined_parameter_has_infinite_std_and_the_others_keep_theirs(m
     assert_allclose(found.value[alive], expected, rtol=1e-9)
 
 
-def test_errors_are_rms_of_the_residual_and_its_share_of_the_torque(model: TorqueModel):
+def test_the_value_alone_is_that_of_wls(model: TorqueModel):
     w, u, _ = made(model)
-    item = evidence("a_1", w, u, 100)
-    found = ols(model, [item])
-    for j, error in enumerate(found.errors(item)):
-        residual = u[j] - w[j] @ found.value
-        assert error is not None
-        assert error.rms == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-10)
-        assert error.relative == pytest.approx(np.sqrt(np.mean(residual**2) / np.mean(u[j] ** 2)), rel=1e-10)
-        assert error.rms_unfiltered == pytest.approx(error.rms, rel=1e-10)
-
-
-def test_a_joint_without_rows_has_no_error_and_one_without_torque_no_share():
-    empty, zero = Information.empty(2), Information.empty(2).absorb(np.eye(2), np.zeros(2))
-    assert joint_error(empty, empty, np.ones(2)) is None
-    error = joint_error(zero, zero, np.ones(2))
-    assert error is not None
-    assert (error.rms, error.relative, error.relative_unfiltered) == (1.0, None, None)
-
-
-def test_the_papers_criteria_count_2500_samples_whatever_the_length(model: TorqueModel):
-    w = rows(np.random.default_rng(0), model, 2500)
-    u = np.zeros(w.shape[:2])
-    once = evidence("a_1", w, u, 100)
-    stacked = w.reshape(-1, w.shape[2])
-    log_det, condition = paper_criteria(pooled_information([once], np.ones(2)), [once])
-    assert log_det == pytest.approx(np.linalg.slogdet(stacked.T @ stacked)[1], rel=1e-9)
-    assert condition == pytest.approx(np.linalg.cond(stacked) ** 2, rel=1e-7)
-    twice = [once, evidence("a_2", w, u, 100)]
-    again = paper_criteria(pooled_information(twice, np.ones(2)), twice)
-    assert again == pytest.approx((log_det, condition), rel=1e-9)
+    given = linear(model, "a_1", w, u, 100)
+    np.testing.assert_array_equal(weighted_value(given), wls(given).value)
 
 
 def test_nothing_to_estimate_from_is_an_error(model: TorqueModel):
+    nothing = observe(model, prepare([]))
     with pytest.raises(EstimationError, match="no recording"):
-        ols(model, [])
+        ols(nothing)
     with pytest.raises(EstimationError, match="no recording"):
-        wls(model, [])
+        wls(nothing)
 
 
 def test_the_order_of_magnitude_of_units_does_not_change_the_estimate(model: TorqueModel, tmp_path: Path):
     w, u, _ = made(model)
     unit = 10.0 ** np.random.default_rng(0).uniform(-4, 4, w.shape[2])
-    one, other = ols(model, [evidence("a_1", w, u, 100)]), ols(model, [evidence("a_1", w * unit, u, 100)])
+    one, other = ols(linear(model, "a_1", w, u, 100)), ols(linear(model, "a_1", w * unit, u, 100))
     assert_allclose(other.value * unit, one.value, rtol=1e-9)
     assert_allclose(other.std * unit, one.std, rtol=1e-6)

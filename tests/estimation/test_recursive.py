@@ -9,8 +9,10 @@ from numpy.testing import assert_allclose
 from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation import ols, rls
 from scara_ident.estimation.information import Information
+from scara_ident.estimation.observations import observe
 from scara_ident.model.model import TorqueModel
-from tests.estimation.made import evidence, rows, two_joint_model
+from scara_ident.motion.prepared import prepare
+from tests.estimation.made import linear, rows, together, two_joint_model
 
 
 @pytest.fixture(scope="module")
@@ -39,9 +41,10 @@ def textbook(
 
 def test_without_prior_and_forgetting_the_last_estimate_is_ols(model: TorqueModel):
     w, u = made(model)
-    given = [evidence("a_1", w[:, :900], u[:, :900], 50), evidence("a_2", w[:, 900:], u[:, 900:], 70)]
-    found, history = rls(model, given)
-    batch = ols(model, given)
+    parts = [linear(model, "a_1", w[:, :900], u[:, :900], 50), linear(model, "a_2", w[:, 900:], u[:, 900:], 70)]
+    given = together(parts)
+    found, history = rls(given)
+    batch = ols(given)
     assert found.method == "rls"
     assert_allclose(found.value, batch.value, rtol=1e-10)
     assert_allclose(history.value[-1], batch.value, rtol=1e-10)
@@ -56,7 +59,7 @@ def test_with_a_prior_it_is_the_textbook_recursion(model: TorqueModel):
     rng = np.random.default_rng(5)
     mean, std = rng.standard_normal(p), rng.uniform(0.2, 3.0, p)
     expected, covariance = textbook(w, u, mean, np.diag(std**2))
-    found, history = rls(model, [evidence("a_1", w, u, 1)], prior=Information.prior(mean, std))
+    found, history = rls(linear(model, "a_1", w, u, 1), prior=Information.prior(mean, std))
     assert_allclose(found.value, expected, rtol=1e-9)
     assert_allclose(history.value[-1], expected, rtol=1e-9)
     assert_allclose(found.information.inverse(), covariance, rtol=1e-8)
@@ -69,7 +72,7 @@ def test_with_prior_and_forgetting_it_is_the_textbook_recursion(model: TorqueMod
     p = w.shape[2]
     mean, std = np.zeros(p), np.full(p, 2.0)
     expected, covariance = textbook(w, u, mean, np.diag(std**2), forgetting=0.99)
-    found, history = rls(model, [evidence("a_1", w, u, 1)], prior=Information.prior(mean, std), forgetting=0.99)
+    found, history = rls(linear(model, "a_1", w, u, 1), prior=Information.prior(mean, std), forgetting=0.99)
     assert_allclose(history.value[-1], expected, rtol=1e-8)
     assert_allclose(found.value, expected, rtol=1e-8)
     assert_allclose(found.information.inverse(), covariance, rtol=1e-8)
@@ -80,9 +83,9 @@ def test_forgetting_follows_a_parameter_that_changed(model: TorqueModel):
     truth = np.arange(1.0, w.shape[2] + 1)
     changed = truth + 5.0
     u[:, 1000:] += 5.0 * w[:, 1000:].sum(axis=2)
-    given = [evidence("a_1", w, u, 20)]
-    held, _ = rls(model, given)
-    followed, history = rls(model, given, forgetting=0.98)
+    given = linear(model, "a_1", w, u, 20)
+    held, _ = rls(given)
+    followed, history = rls(given, forgetting=0.98)
     assert np.all(np.abs(held.value - changed) > 0.5)
     assert_allclose(followed.value, changed, atol=0.1)
     assert_allclose(history.value[-1], followed.value, rtol=1e-9)
@@ -91,7 +94,7 @@ def test_forgetting_follows_a_parameter_that_changed(model: TorqueModel):
 
 def test_old_blocks_weigh_less_the_older_they_are(model: TorqueModel):
     w, u = made(model, count=100)
-    found, _ = rls(model, [evidence("a_1", w, u, 10)], forgetting=0.95)
+    found, _ = rls(linear(model, "a_1", w, u, 10), forgetting=0.95)
     weight = 0.95 ** (100.0 - 10.0 * (np.arange(100) // 10 + 1))
     expected = np.einsum("jkp,k,jkq->pq", w, weight, w)
     assert_allclose(found.information.regressor_factor.T @ found.information.regressor_factor, expected, atol=1e-10)
@@ -100,7 +103,7 @@ def test_old_blocks_weigh_less_the_older_they_are(model: TorqueModel):
 
 def test_the_history_of_jd_never_falls_and_begins_at_minus_infinity(model: TorqueModel):
     w, u = made(model, count=400)
-    _, history = rls(model, [evidence("a_1", w, u, 2)])
+    _, history = rls(linear(model, "a_1", w, u, 2))
     assert history.log_det[0] == -np.inf
     assert np.isnan(history.value[0]).any()
     known = np.isfinite(history.log_det)
@@ -113,7 +116,7 @@ def test_the_history_of_jd_never_falls_and_begins_at_minus_infinity(model: Torqu
 
 def test_the_history_of_std_falls_to_the_white_formula(model: TorqueModel):
     w, u = made(model)
-    found, history = rls(model, [evidence("a_1", w, u, 50)])
+    found, history = rls(linear(model, "a_1", w, u, 50))
     stacked = w.reshape(-1, w.shape[2])
     residual = u.ravel() - stacked @ found.value
     expected = np.sqrt(residual @ residual / (len(residual) - w.shape[2]) * np.diag(np.linalg.inv(stacked.T @ stacked)))
@@ -127,12 +130,12 @@ def test_a_parameter_only_the_prior_knows_keeps_the_priors_std(model: TorqueMode
     w[:, :, dead] = 0.0
     mean, std = np.zeros(w.shape[2]), np.full(w.shape[2], np.inf)
     mean[dead], std[dead] = 3.0, 0.7
-    found, _ = rls(model, [evidence("a_1", w, u, 20)], prior=Information.prior(mean, std))
+    found, _ = rls(linear(model, "a_1", w, u, 20), prior=Information.prior(mean, std))
     assert found.value[dead] == pytest.approx(3.0)
     assert not found.undetermined[dead]
     assert found.std[dead] == pytest.approx(0.7, rel=1e-9)
     # The others are as unsure as their data make them.
-    free, _ = rls(model, [evidence("a_1", w, u, 20)])
+    free, _ = rls(linear(model, "a_1", w, u, 20))
     others = np.arange(w.shape[2]) != dead
     assert_allclose(found.std[others], free.std[others], rtol=1e-6)
 
@@ -141,9 +144,9 @@ def test_a_parameter_only_the_prior_knows_keeps_the_priors_std(model: TorqueMode
 def test_forgetting_is_a_factor_up_to_one(model: TorqueModel, forgetting: float):
     w, u = made(model, count=20)
     with pytest.raises(UsageError, match="expected a factor per sample"):
-        rls(model, [evidence("a_1", w, u, 10)], forgetting=forgetting)
+        rls(linear(model, "a_1", w, u, 10), forgetting=forgetting)
 
 
 def test_nothing_to_estimate_from_is_an_error(model: TorqueModel):
     with pytest.raises(EstimationError, match="no recording"):
-        rls(model, [])
+        rls(observe(model, prepare([])))

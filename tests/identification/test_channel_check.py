@@ -9,9 +9,11 @@ import pytest
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.errors import RecordingError
-from scara_ident.identification.channel_check import mapping_faults
+from scara_ident.estimation.observations import observe
+from scara_ident.identification.channel_check import ChannelFault, channel_faults
 from scara_ident.identification.identify import identify
 from scara_ident.model.model import build_model
+from scara_ident.motion.prepared import prepare
 from scara_ident.paper import OJD, OJK
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation import sampled, simulate, virtual_arm
@@ -41,9 +43,12 @@ def exchanged(recording: Recording, *signals: str) -> Recording:
     return replace(recording, **new)
 
 
+def faults_of(recordings: list[Recording]) -> tuple[ChannelFault, ...]:
+    return channel_faults(observe(build_model(virtual_arm().robot, "complete"), prepare(recordings, BANDS)))
+
+
 def found(recordings: list[Recording]) -> list[tuple[str, tuple[str, ...], bool]]:
-    faults = mapping_faults(build_model(virtual_arm().robot, "complete"), recordings, BANDS)
-    return [(fault.signal, fault.joints, fault.exchanged) for fault in faults]
+    return [(fault.signal, fault.joints, fault.exchanged) for fault in faults_of(recordings)]
 
 
 def test_nothing_is_said_of_channels_that_are_right(recordings: tuple[Recording, ...]) -> None:
@@ -93,8 +98,7 @@ def test_diagnose_refuses_and_identify_says_it(recordings: tuple[Recording, ...]
 
 
 def test_the_share_left_is_what_it_says(recordings: tuple[Recording, ...]) -> None:
-    model = build_model(virtual_arm().robot, "complete")
-    (fault,) = mapping_faults(model, [exchanged(item, "effort") for item in recordings], BANDS)
+    (fault,) = faults_of([exchanged(item, "effort") for item in recordings])
     assert fault.mended < 0.05 < 0.3 < fault.error
     assert f"{100 * fault.mended:.2g} %" in str(fault)
     assert np.isfinite(fault.error)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import UsageError
-from scara_ident.estimation.information import merge
-from scara_ident.estimation.observations import gather_all
+from scara_ident.estimation.observations import observe
 from scara_ident.identification.compare import compare
+from scara_ident.motion.prepared import prepare
 from scara_ident.report.comparison import comparison_dict, comparison_sentences
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, NOISE, complete, exact_runs, with_torque
@@ -25,11 +25,10 @@ def test_errors_are_those_of_the_rows_predicted_by_hand(clean):
     runs = exact_runs(3)
     model = complete()
     for i, name in enumerate("ABC"):
-        evidence = gather_all(model, [run for run in runs if run.trajectory == name], BANDS)
+        rows = observe(model, prepare([run for run in runs if run.trajectory == name], BANDS)).by_joint
         for k, summary in enumerate(clean.trajectories):
             for j in range(2):
-                rows = merge(item.joint(j) for item in evidence)
-                assert clean.errors[i, k, j] == pytest.approx(rows.rms(summary.estimate.value), rel=1e-9)
+                assert clean.errors[i, k, j] == pytest.approx(rows[j].rms(summary.estimate.value), rel=1e-9)
 
 
 def test_a_trajectorys_own_parameters_predict_it_best(clean):

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.estimation import ols
-from scara_ident.estimation.observations import gather
+from scara_ident.estimation.observations import observe
 from scara_ident.identification.identify import (
     Identification,
     identify,
@@ -19,6 +19,7 @@ from scara_ident.identification.identify import (
     undetermined,
     worst_validation,
 )
+from scara_ident.motion.prepared import prepare
 from scara_ident.paper import OJD, table5_parameters
 from scara_ident.recording.audit import Finding
 from scara_ident.recording.recording import Recording
@@ -124,7 +125,7 @@ def test_reported_std_is_the_spread_over_noisy_repetitions(
     for _ in range(draws):
         made = noisy(clean, rng, SIGMA)
         if method == "ols":
-            estimate = ols(fitted.model, [gather(fitted.model, made, bands)])
+            estimate = ols(observe(fitted.model, prepare([made], bands)))
         else:
             made = replace(made, time=made.time[:5000], position=made.position[:, :5000], effort=made.effort[:, :5000])
             estimate = identify(robot, [made], model=fitted.model, method=method, bands=bands).estimate

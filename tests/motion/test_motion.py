@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from scara_ident.errors import RecordingError
-from scara_ident.motion.motion import differentiate, low_pass, motion_of, stretches, torque_of
+from scara_ident.motion.motion import differentiate, low_pass, low_pass_every, motion_of, stretches, torque_of
+from scara_ident.motion.prepared import row_step
 from scara_ident.recording.recording import Recording
 
 RATE = 1000.0
@@ -50,7 +51,7 @@ def test_derivatives_without_a_filter_are_exact_but_for_a_few_samples_at_the_end
 
 
 def test_two_periods_of_the_cut_off_from_the_ends_the_error_is_small():
-    """What END_PERIODS in the evidence and its tripled position filter rely on."""
+    """What END_PERIODS of prepared stretches and their tripled position filter rely on."""
     time = np.arange(4000) / RATE
     for cut in (20.0, 50.0):
         made = differentiate(sine(1.0, time)[0][None], RATE, cut)
@@ -93,6 +94,26 @@ def test_half_the_amplitude_is_left_at_the_cut_off(cut: float, ratio: float):
 def test_no_cut_off_leaves_the_signal_alone():
     signal = np.random.default_rng(0).standard_normal((2, 50))
     assert low_pass(signal, RATE, None) is signal
+
+
+@settings(deadline=None, max_examples=60)
+@given(count=st.integers(4, 3000), cut=st.floats(2.0, 100.0), step=st.integers(1, 8), seed=st.integers(0, 2**16))
+def test_the_low_pass_at_kept_samples_is_the_low_pass(count: int, cut: float, step: int, seed: int):
+    rate = 500.0
+    step = min(step, row_step(rate, cut))
+    walk = np.cumsum(np.random.default_rng(seed).standard_normal((2, count)), axis=1)
+    kept = low_pass_every(walk, rate, cut, step)
+    assert_allclose(kept, low_pass(walk, rate, cut, step)[:, ::step], rtol=0, atol=1e-12 * np.ptp(walk))
+    # However the signal is continued, away from its ends the filter is the same.
+    inner = slice(int(2 * rate / cut), count - int(2 * rate / cut))
+    assert_allclose(
+        low_pass(walk, rate, cut, step)[:, inner], low_pass(walk, rate, cut)[:, inner], rtol=0, atol=1e-6 * np.ptp(walk)
+    )
+
+
+def test_without_a_band_every_sample_is_itself():
+    signal = np.arange(20.0)[None]
+    assert_array_equal(low_pass_every(signal, 100.0, None, 3), signal[:, ::3])
 
 
 @pytest.mark.parametrize("cut", [None, 1.0, 20.0])

@@ -1,118 +1,108 @@
-"""Rows within a band: what is filtered, kept, left out and cut into blocks."""
+"""Recordings within a band: what is filtered, kept, left out and cut into blocks, and that nothing is made twice."""
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from scara_ident.motion.motion import low_pass, low_pass_every, stretches
+import scara_ident.motion.motion
+import scara_ident.motion.prepared
+from scara_ident.errors import RecordingError
+from scara_ident.identification.identify import identify
+from scara_ident.motion.motion import low_pass, stretches
 from scara_ident.motion.prepared import (
     BLOCK_SECONDS,
-    active_rows,
-    band_blocks,
+    PreparedStretch,
     fading,
     position_cuts,
-    raw_rows,
+    prepare,
     row_step,
-    rows_of,
-    standstill,
-    trim_of,
 )
-from tests.diagnosis.made import BANDS, RATE, complete, exact_runs
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import Robot, load_robot
+from tests.arms import PLANAR_2R, swing, write_urdf
 
-MODEL = complete()
-
-
-@settings(deadline=None, max_examples=25)
-@given(
-    count=st.integers(200, 3000),
-    cut=st.floats(4.0, 30.0),
-    step=st.integers(1, 8),
-    seed=st.integers(0, 2**16),
-)
-def test_the_low_pass_at_kept_samples_is_the_low_pass(count: int, cut: float, step: int, seed: int):
-    rate = 500.0
-    # A stretch shorter than the filter's memory is continued by a guess, which depends on the padding.
-    assume(count * cut / rate > 6.0)
-    step = min(step, row_step(rate, cut))
-    walk = np.cumsum(np.random.default_rng(seed).standard_normal((2, count)), axis=1)
-    whole = low_pass(walk, rate, cut)[:, ::step]
-    kept = low_pass_every(walk, rate, cut, step)
-    assert kept.shape == whole.shape
-    assert_allclose(kept, whole, rtol=0, atol=3e-6 * np.ptp(walk))
-    inner = slice(len(kept[0]) // 4, -(len(kept[0]) // 4))
-    assert_allclose(kept[:, inner], whole[:, inner], rtol=0, atol=1e-7 * np.ptp(walk))
-
-
-def test_without_a_band_every_sample_is_itself():
-    signal = np.arange(20.0)[None]
-    assert_array_equal(low_pass_every(signal, 100.0, None, 3), signal[:, ::3])
+RATE = 500.0
+BANDS = (10.0, 10.0)
 
 
 @pytest.fixture(scope="module")
-def stretch():
-    (part,) = stretches(exact_runs()[0])
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    return load_robot(write_urdf(tmp_path_factory.mktemp("arm") / "arm.urdf", PLANAR_2R))
+
+
+@pytest.fixture(scope="module")
+def run(robot: Robot) -> Recording:
+    return swing(robot)
+
+
+def only(recording: Recording, bands: tuple[float | None, ...] = BANDS) -> PreparedStretch:
+    (part,) = prepare([recording], bands).stretches
     return part
 
 
-def test_banded_rows_are_the_low_pass_of_raw_ones(stretch):
-    rows = rows_of(MODEL, stretch, BANDS)
-    motion, raw = raw_rows(MODEL, stretch, BANDS)
-    for j, active in enumerate(active_rows(MODEL)):
-        assert_array_equal(rows.raw[j], raw[j])
-        faded = fading(rows.rest, RATE, BANDS)[j] * raw[j][active]
-        assert_allclose(rows.banded[j][active], low_pass(faded, RATE, BANDS[j]), atol=1e-12)
-        idle = np.setdiff1d(np.arange(len(raw[j])), active)
-        assert not np.any(raw[j][idle])
-        assert not np.any(rows.banded[j][idle])
-    assert_array_equal(motion.q, rows.motion.q)
-    assert_array_equal(raw[1][-1], exact_runs()[0].effort[1])
+def test_rows_are_the_low_pass_at_the_kept_samples_weighted_to_stand_for_all(run: Recording):
+    part = only(run, (6.0, 12.0))
+    signals = np.random.default_rng(0).standard_normal((3, part.samples)).cumsum(axis=1)
+    for j, band in enumerate((6.0, 12.0)):
+        smooth = low_pass(part.fade[j] * signals, RATE, band, part.steps[j])
+        assert_allclose(part.smooth(j, signals), smooth, rtol=0, atol=1e-11)
+        expected = np.sqrt(part.steps[j]) * smooth[:, part.kept[j]]
+        assert_allclose(part.rows(j, signals), expected, rtol=0, atol=1e-11 * np.max(np.abs(smooth)))
+        assert_allclose(part.smooth_torque[j], part.smooth(j, run.effort[j]), atol=1e-12)
 
 
-def test_blocks_hold_the_kept_samples_once_and_weighted(stretch):
-    motion, raw = raw_rows(MODEL, stretch, BANDS)
-    rest = standstill(stretch, motion, BANDS)
-    blocks = band_blocks(MODEL, stretch, raw, rest, BANDS)
-    banded = rows_of(MODEL, stretch, BANDS).banded
-    trim, step = trim_of(stretch, BANDS), row_step(RATE, BANDS[0])
+def test_without_a_band_every_used_sample_is_a_row_as_it_is(run: Recording):
+    part = only(run, (None, None))
+    assert part.steps == (1, 1)
     for j in range(2):
-        places = np.arange(0, len(stretch.time), step)
-        places = places[(places >= trim) & (places < len(stretch.time) - trim) & ~rest[j][places]]
-        table = np.vstack([block[j] for block in blocks])
-        assert len(table) == len(places)
-        assert_allclose(table, np.sqrt(step) * banded[j][:, places].T, atol=1e-6 * np.max(np.abs(banded[j])))
-    lengths = [len(block[0]) * step / RATE for block in blocks]
-    assert max(lengths) < 2.0 * BLOCK_SECONDS
-    assert len(blocks) > 10
+        assert_array_equal(part.kept[j], np.flatnonzero(part.used[j]))
+        assert_array_equal(part.rows(j, part.torque[j : j + 1])[0], (part.fade[j] * run.effort[j])[part.used[j]])
 
 
-def test_a_mask_leaves_out_rows_of_its_joint_only(stretch):
-    _, raw = raw_rows(MODEL, stretch, BANDS)
-    rest = np.zeros((2, len(stretch.time)), dtype=bool)
-    full = band_blocks(MODEL, stretch, raw, rest, BANDS)
-    rest[0, 1000:2000] = True
-    part = band_blocks(MODEL, stretch, raw, rest, BANDS)
-    count = [[sum(len(block[j]) for block in blocks) for j in range(2)] for blocks in (full, part)]
+def test_blocks_hold_the_kept_samples_once(run: Recording):
+    part = only(run)
+    step = row_step(RATE, BANDS[0])
+    assert step > 1
+    for j in range(2):
+        places = np.arange(0, part.samples, step)
+        assert_array_equal(part.kept[j], places[part.used[j][places]])
+        starts = part.block_starts(j)
+        assert (starts[0], starts[-1]) == (0, len(part.kept[j]))
+        for (a, b), (first, last) in zip(
+            zip(starts[:-1], starts[1:], strict=True), zip(part.blocks[:-1], part.blocks[1:], strict=True), strict=True
+        ):
+            inside = part.kept[j][a:b]
+            assert np.all((inside >= first) & (inside < last))
+    assert (part.blocks[0], part.blocks[-1]) == (part.trim, part.samples - part.trim)
+    assert np.max(np.diff(part.blocks)) / RATE < 2.0 * BLOCK_SECONDS
+    assert len(part.blocks) > 10
+
+
+def test_rest_leaves_out_rows_of_its_joint_only(run: Recording):
+    full, part = only(run), only(run)
+    nowhere = np.zeros((2, full.samples), dtype=bool)
+    vars(full)["rest"] = nowhere
+    vars(part)["rest"] = nowhere.copy()
+    part.rest[0, 1000:2000] = True
+    count = [[len(kept) for kept in item.kept] for item in (full, part)]
     assert count[0][0] - count[1][0] == pytest.approx(1000 / row_step(RATE, BANDS[0]), abs=1)
     assert count[0][1] == count[1][1]
 
 
-def test_a_joint_that_stops_is_left_out_there_and_no_more():
-    run = exact_runs()[0]
+def test_a_joint_that_stops_is_left_out_there_and_no_more(run: Recording):
     position = run.position.copy()
-    position[1, 1000:1500] = position[1, 1000]
-    position[1, 1500:] += position[1, 1000] - position[1, 1500]
-    (part,) = stretches(replace(run, position=position))
-    motion, _ = raw_rows(MODEL, part, BANDS)
-    rest = standstill(part, motion, BANDS)
-    assert rest[1, 1050:1450].all()
-    assert rest[1].mean() < 0.35
-    assert not rest[0, 1050:1450].all()
+    position[1, 2000:3000] = position[1, 2000]
+    position[1, 3000:] += position[1, 2000] - position[1, 3000]
+    part = only(replace(run, position=position))
+    assert part.rest[1, 2100:2900].all()
+    assert part.rest[1].mean() < 0.35
+    assert not part.rest[0, 2100:2900].all()
+    assert not part.used[1, 2100:2900].any()
 
 
 def test_the_weight_is_zero_at_rest_one_away_from_it_and_has_no_step():
@@ -127,21 +117,23 @@ def test_the_weight_is_zero_at_rest_one_away_from_it_and_has_no_step():
     assert np.all(weight[1] == 1.0)
 
 
-def test_what_happens_at_rest_does_not_reach_the_rows():
+def test_what_happens_at_rest_does_not_reach_the_rows(run: Recording):
     """A torque that friction takes up at rest, whatever it is, leaves the equation where the joint moves as it was."""
-    run = exact_runs()[0]
-    (part,) = stretches(run)
-    clean = rows_of(MODEL, part, BANDS)
+    clean = only(run)
     assert run.effort is not None
-    shaken = run.effort + np.where(clean.rest, 5.0, 0.0)
-    (other,) = stretches(replace(run, effort=shaken))
     assert np.any(clean.rest)
-    for before, after in zip(clean.banded, rows_of(MODEL, other, BANDS).banded, strict=True):
-        assert_array_equal(before, after)
+    shaken = only(replace(run, effort=run.effort + np.where(clean.rest, 5.0, 0.0)))
+    assert_allclose(shaken.smooth_torque, clean.smooth_torque, atol=1e-12)
+    for j in range(2):
+        before, after = (clean.rows(j, item.torque[j : j + 1]) for item in (clean, shaken))
+        assert_allclose(after, before, atol=1e-12)
 
 
-def test_positions_pass_a_wider_filter_than_rows_where_the_rate_allows():
+def test_positions_pass_a_wider_filter_than_rows_where_the_rate_allows(run: Recording):
     assert position_cuts(1000.0, [10.0, None, 200.0]) == [30.0, None, None]
+    part = only(run, (4.0, 8.0))
+    for j, cut in enumerate((12.0, 24.0)):
+        assert_allclose(part.motion.q[j], low_pass(run.position[j], RATE, cut), atol=1e-13)
 
 
 def test_a_row_stands_for_two_and_a_half_per_period():
@@ -150,7 +142,100 @@ def test_a_row_stands_for_two_and_a_half_per_period():
     assert row_step(100.0, 90.0) == 1
 
 
-def test_the_slowest_band_decides_what_is_cut_at_the_ends(stretch):
-    assert trim_of(stretch, [None, 5.0]) == 50
-    assert trim_of(stretch, [20.0, 5.0]) == 50
-    assert trim_of(stretch, [None, None]) == 20
+def test_the_slowest_band_decides_what_is_cut_at_the_ends(run: Recording):
+    assert only(run, (None, 5.0)).trim == 100
+    assert only(run, (20.0, 5.0)).trim == 100
+    assert only(run, (None, None)).trim == 20
+    part = only(run, (20.0, 5.0))
+    assert not part.used[:, :100].any()
+    assert not part.used[:, -100:].any()
+    assert part.used[:, 100:-100].mean() > 0.8
+
+
+def test_a_stretch_shorter_than_its_ends_has_nothing_to_use(robot: Robot):
+    part = only(swing(robot, seconds=0.3), (5.0, 5.0))
+    assert not part.usable
+    assert not part.used.any()
+
+
+def test_a_gap_makes_two_stretches_of_one_recording(run: Recording):
+    keep = (run.time < 3.0) | (run.time > 3.5)
+    cut = replace(run, time=run.time[keep], position=run.position[:, keep], effort=run.effort[:, keep])
+    (item,) = prepare([cut], BANDS).recordings
+    assert [part.samples for part in item.stretches] == [1500, np.count_nonzero(run.time > 3.5)]
+    assert item.longest is item.stretches[1]
+    assert {part.name for part in item.stretches} == {"swing_1"}
+
+
+def test_recordings_are_prepared_in_their_order_and_known_by_their_trajectory(robot: Robot):
+    runs = [swing(robot, name, seconds=4.0) for name in ("b_1", "a_1", "b_2")]
+    data = prepare(runs, BANDS)
+    assert data.trajectories == ("b", "a")
+    assert data.sources == tuple(runs)
+    assert [item.name for item in data.of([2, 0]).recordings] == ["b_2", "b_1"]
+    assert data.bands == BANDS
+    assert prepare(runs).bands == (None, None)
+    assert prepare([], BANDS).bands == BANDS
+    assert prepare([], BANDS).stretches == ()
+
+
+def test_a_torque_is_needed_only_where_it_is_asked_for(run: Recording):
+    part = only(replace(run, effort=None))
+    assert len(part.kept[0]) > 0
+    with pytest.raises(RecordingError, match="swing_1: no effort was recorded"):
+        part.smooth_torque  # noqa: B018
+
+
+def test_another_torque_on_the_same_motion(run: Recording):
+    (item,) = prepare([run], BANDS).recordings
+    (before,) = item.stretches
+    other = item.with_torque([2.0 * before.torque])
+    (after,) = other.stretches
+    assert_allclose(after.smooth_torque, 2.0 * before.smooth_torque)
+    assert_array_equal(after.motion.a, before.motion.a)
+    assert_array_equal(before.torque, run.effort)
+    with pytest.raises(ValueError):
+        item.with_torque([])
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> Counter:
+    """How often recordings are cut, and how often each joint is differentiated at each cut-off."""
+    count: Counter = Counter()
+    differentiate = scara_ident.motion.motion.differentiate
+
+    def cut(recording):
+        count[recording.name] += 1
+        return stretches(recording)
+
+    def filtered(signal, rate, cut):
+        count[signal.ctypes.data, cut] += 1
+        return differentiate(signal, rate, cut)
+
+    monkeypatch.setattr(scara_ident.motion.prepared, "stretches", cut)
+    monkeypatch.setattr(scara_ident.motion.motion, "differentiate", filtered)
+    return count
+
+
+def test_other_bands_share_what_does_not_depend_on_them(counted: Counter, run: Recording):
+    data = prepare([run], (6.0, 12.0))
+    _ = [part.motion for other in ((6.0, 12.0), (6.0, 8.0), (3.0, 12.0)) for part in data.at(other).stretches]
+    assert data.recordings[0].at((6.0, 12.0)) is data.recordings[0]
+    assert max(counted.values()) == 1
+    # One cut, and two cut-offs for each of the joints.
+    assert len(counted) == 1 + 2 + 2
+
+
+def test_an_identification_cuts_each_recording_once_and_filters_each_joint_once_per_cut_off(
+    counted: Counter, robot: Robot
+):
+    names = ("a_1", "a_2", "b_1")
+    runs = [swing(robot, name, seed) for seed, name in enumerate(names)]
+    held_out = swing(robot, "c_1", 9)
+    result = identify(robot, runs, model="basic", method="wls", validation=[held_out])
+    result.training_errors()
+    result.validation_errors()
+    assert {name: counted[name] for name in (*names, "c_1")} == dict.fromkeys((*names, "c_1"), 1)
+    assert max(counted.values()) == 1
+    cuts = {key[1] for key in counted if isinstance(key, tuple)}
+    assert set(position_cuts(RATE, result.bands)) <= cuts
