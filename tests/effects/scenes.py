@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
 from scara_ident.estimation.least_squares import wls
-from scara_ident.estimation.observations import gather_all
+from scara_ident.estimation.observations import observe
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.model.terms import RigidBody
 from scara_ident.motion.motion import Motion
+from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 from scara_ident.simulation import ReferenceMotion, VirtualArm, sampled
@@ -68,14 +69,14 @@ def fit(
     rounds: int = 2,
 ) -> tuple[Scene, Array, Array]:  # fmt: skip
     """Fit an effect beside the base model; scene, its coefficients and their covariance."""
-    bands = (band,) * model.robot.n
-    base = wls(model, gather_all(model, recordings, bands))
+    data = prepare(recordings, (band,) * model.robot.n)
+    base = wls(observe(model, data))
     start = {item.name: float(item.time[0]) for item in recordings}
     scene = scene_of(model.robot, base.value, name=model.name, start=start, rate=recordings[0].rate, band=band)
     p = len(model.columns)
     for _ in range(rounds):
         wide = TorqueModel(model.name, model.robot, (*model.terms, EffectTerm(effect, member, scene)))
-        found = wls(wide, gather_all(wide, recordings, bands))
+        found = wls(observe(wide, data))
         scene = replace(scene, value=found.value[:p])
     return scene, found.value[p:], np.asarray(found.covariance)[p:, p:]
 
