@@ -184,7 +184,9 @@ def _spacing(scene: Scene, candidate: Candidate, k: int) -> float:
         return widths[k] / candidate.member.nonlinear[k] if parameter.logarithmic else widths[k]
     own = candidate.member
     # Joints scan other values, some of which are very near to each other.
-    others = (item for item in candidate.effect.members(scene) if (item.joint, item.partner) == (own.joint, own.partner))
+    others = (
+        item for item in candidate.effect.members(scene) if (item.joint, item.partner) == (own.joint, own.partner)
+    )
     grid = np.array(sorted({member.nonlinear[k] for member in others}))
     if parameter.logarithmic:
         return float(np.min(np.diff(np.log(grid)))) if len(grid) > 1 else float(np.log(2.0))

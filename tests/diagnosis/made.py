@@ -115,8 +115,7 @@ def fitted(recordings: Sequence[Recording], bands=BANDS) -> Estimate:
 
 def residuals_of(value: Array, recordings: Sequence[Recording], bands=BANDS) -> Residuals:
     """What parameters of the complete model leave of recordings."""
-    seen = observed(recordings, bands)
-    return Residuals(seen.data, seen.predicted(value))
+    return observed(recordings, bands).residuals(value)
 
 
 def step_beside(
