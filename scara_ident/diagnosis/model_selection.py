@@ -111,9 +111,7 @@ def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[s
     task.progress("testing what is left")
     training = observed_at_every_sample(found.step)
     after = wls(training)
-    first = found.uncorrected
-    before = Residuals(first.data, first.predicted(found.start.value))
-    left = Residuals(training.data, training.predicted(after.value))
+    before, left = found.uncorrected.residuals(found.start.value), training.residuals(after.value)
     fit_after, dependences = lack_of_fit(left), screen(task.model, left)
     unexplained = _unexplained(fit_after, dependences, task.criteria)
     return Outcome(found, after, training, left, lack_of_fit(before), fit_after, dependences, unexplained)

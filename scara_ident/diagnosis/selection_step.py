@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.acceptance import Decision, decide
-from scara_ident.diagnosis.candidate_tests import FittedModel, examine
+from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
 from scara_ident.diagnosis.criteria import SelectionCriteria
+from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.effects import Scene
 from scara_ident.estimation.observations import JointRows, Observations
 from scara_ident.model.model import TorqueModel
@@ -174,7 +175,7 @@ def _line(scene: Scene, candidate: Candidate, round_: int) -> list[Candidate]:
 
 
 def _spacing(scene: Scene, candidate: Candidate, k: int) -> float:
-    """Distance to the next scan point of a nonlinear parameter, in its logarithm where it is scanned so.
+    """Distance to the next scan point of a nonlinear parameter of a joint, in its logarithm where it is scanned so.
 
     A family that knows how far apart values must be to be told apart says so by ``resolution``.
     """
@@ -182,7 +183,12 @@ def _spacing(scene: Scene, candidate: Candidate, k: int) -> float:
     widths = candidate.effect.resolution(scene, candidate.member)
     if widths is not None:
         return widths[k] / candidate.member.nonlinear[k] if parameter.logarithmic else widths[k]
-    grid = np.array(sorted({member.nonlinear[k] for member in candidate.effect.members(scene)}))
+    own = candidate.member
+    # Joints scan other values, some of which are very near to each other.
+    others = (
+        item for item in candidate.effect.members(scene) if (item.joint, item.partner) == (own.joint, own.partner)
+    )
+    grid = np.array(sorted({member.nonlinear[k] for member in others}))
     if parameter.logarithmic:
         return float(np.min(np.diff(np.log(grid)))) if len(grid) > 1 else float(np.log(2.0))
     return float(np.min(np.diff(grid))) if len(grid) > 1 else 0.1 * (parameter.upper - parameter.lower)

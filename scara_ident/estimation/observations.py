@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from scara_ident.errors import RecordingError
 from scara_ident.estimation.information import Information
+from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
 from scara_ident.threads import side_by_side
@@ -204,6 +205,10 @@ class Observations:
             for recording in self.raw
             for raw in recording
         )
+
+    def residuals(self, value: Array) -> Residuals:
+        """Return what parameters leave of the recorded torque at every sample."""
+        return Residuals(self.data, self.predicted(value))
 
     def _stretches(self) -> Iterator[tuple[PreparedStretch, Raw]]:
         """Give the stretches that are long enough, with their columns."""

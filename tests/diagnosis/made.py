@@ -9,14 +9,18 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.table import Table
-from scara_ident.effects import Scene
-from scara_ident.estimation import Estimate
-from scara_ident.estimation.information import merge
-from scara_ident.estimation.least_squares import wls
-from scara_ident.estimation.observations import Evidence, gather_all
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.fitted_model import FittedModel
+from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search
+from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.effects import Effect
+from scara_ident.estimation import Estimate, wls
+from scara_ident.estimation.observations import JointRows, Observations, observe
+from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.motion import motion_of, stretches
+from scara_ident.motion.prepared import prepare
 from scara_ident.paper import table5_parameters
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
@@ -99,42 +103,41 @@ def complete() -> TorqueModel:
     return build_model(load_robot(), "complete")
 
 
-def fitted(model: TorqueModel, recordings: Sequence[Recording], bands=BANDS):
-    """Return the weighted estimate of a model."""
-    return wls(model, gather_all(model, recordings, bands))
+def observed(recordings: Sequence[Recording], bands=BANDS) -> Observations:
+    """The complete model's rows on recordings."""
+    return observe(complete(), prepare(recordings, bands))
 
 
-def scene_of(model: TorqueModel, recordings: Sequence[Recording], bands=BANDS) -> Scene:
-    """Return the scene with the estimate of the recordings."""
-    return Scene(
-        model=model,
-        value=fitted(model, recordings, bands).value,
-        duration=max(float(np.ptp(item.time)) for item in recordings),
-        rate=RATE,
-        band=max(bands),
-        travel=np.ptp(recordings[0].position, axis=1),
-        speed=np.full(model.robot.n, 2.0),
-        start={item.name: float(item.time[0]) for item in recordings},
-    )
+def fitted(recordings: Sequence[Recording], bands=BANDS) -> Estimate:
+    """The weighted estimate of the complete model."""
+    return wls(observed(recordings, bands))
 
 
-def table_of(columns: Array, torque: Array, recordings: int = 4, block: int = 40) -> Table:
-    """One joint's rows, cut into recordings of equal length, each its own fold."""
+def residuals_of(value: Array, recordings: Sequence[Recording], bands=BANDS) -> Residuals:
+    """What parameters of the complete model leave of recordings."""
+    return observed(recordings, bands).residuals(value)
+
+
+def step_beside(
+    recordings: Sequence[Recording], chosen: Sequence[Candidate] = (), weights: Array | None = None, bands=BANDS
+) -> SelectionStep:
+    """The complete model with effects, fitted to recordings, as candidates are tried beside it."""
+    seen = observed(recordings, bands)
+    start = wls(seen)
+    scene = scene_of(seen.model, start.value, seen)
+    weights = start.weights if weights is None else weights
+    return SelectionStep(scene, CandidateColumns(seen), tuple(chosen), weights, 10, CRITERIA)
+
+
+def searched(recordings: Sequence[Recording], *catalogue: Effect, bands=BANDS) -> Search:
+    """What the search finds beside the complete model."""
+    return search(SearchTask(complete(), catalogue), CandidateColumns(observed(recordings, bands)))
+
+
+def model_of(columns: Array, torque: Array, recordings: int = 4, block: int = 40) -> FittedModel:
+    """A model of one joint's columns (N, m), the rows cut into recordings of equal length, each its own fold."""
     count = len(torque)
-    starts = np.arange(0, count, block)
-    owner = starts * recordings // count
-    return Table(
-        columns,
-        torque,
-        np.zeros(count, dtype=np.intp),
-        starts,
-        owner,
-        tuple(f"T{k}" for k in range(recordings)),
-        owner,
-    )
-
-
-def residual_noise(estimate: Estimate, evidence: Sequence[Evidence]) -> Array:
-    """Rms residual of each joint within the band, shape (n,)."""
-    joints = range(estimate.model.robot.n)
-    return np.array([merge(item.joint(j) for item in evidence).rms(estimate.value) for j in joints])
+    starts = np.append(np.arange(0, count, block), count)
+    owner = starts[:-1] * recordings // count
+    rows = JointRows(np.arange(columns.shape[1]), np.vstack([columns.T, torque]), starts, np.diff(starts).astype(float))
+    return FittedModel((rows,), columns.shape[1], owner, owner, np.ones(1))

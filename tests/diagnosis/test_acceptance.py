@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.acceptance import FAMILY_ERROR, decide
+from scara_ident.diagnosis.acceptance import Decision, decide
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.effects import Member
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import TimeDelay
@@ -29,11 +30,16 @@ GOOD = Examination(
     fold_gains=(0.2, 0.2, 0.2, None),
     contribution=1.0,
     model_value=SCENE.value,
+    left=np.ones(4),
 )
 
 
+def decided(candidate: Candidate, item: Examination, tried: int) -> Decision:
+    return decide(candidate, item, SCENE, tried, CRITERIA)
+
+
 def test_a_good_candidate_comes_in_and_its_gain_is_that_of_its_joint():
-    decision = decide(SPRING, GOOD, SCENE, 100)
+    decision = decided(SPRING, GOOD, 100)
     assert decision.accepted
     assert decision.gain == pytest.approx(0.4)
     assert "40.0%" in decision.why
@@ -45,7 +51,7 @@ def test_a_good_candidate_comes_in_and_its_gain_is_that_of_its_joint():
     [
         ({"outside": 1e-9}, "absorbs"),
         ({"outside": 1e-4}, "lies outside the model"),
-        ({"p_value": 2.0 * FAMILY_ERROR / 100}, "not significant"),
+        ({"p_value": 2.0 * CRITERIA.family_error / 100}, "not significant"),
         ({"value": np.array([-0.05, 0.0])}, "push away"),
         ({"held_out": 0.02}, "below the detection limit"),
         ({"held_out": -0.5}, "below the detection limit: removes 0.0%"),
@@ -53,7 +59,7 @@ def test_a_good_candidate_comes_in_and_its_gain_is_that_of_its_joint():
     ],
 )
 def test_each_failed_condition_is_said_in_words(change: dict, why: str):
-    decision = decide(SPRING, replace(GOOD, **change), SCENE, 100)
+    decision = decided(SPRING, replace(GOOD, **change), 100)
     assert not decision.accepted
     assert why in decision.why
 
@@ -62,26 +68,45 @@ def test_a_coefficient_within_two_deviations_of_what_is_possible_is_possible():
     loss = Candidate(TransmissionLoss(), Member(1, (0.05,)))
     for value, accepted in ((-0.019, True), (-0.021, False)):
         item = replace(GOOD, value=np.array([value]), covariance=np.array([[1e-4]]))
-        decision = decide(loss, item, SCENE, 10)
+        decision = decided(loss, item, 10)
         assert decision.accepted is accepted
     assert "cannot give energy" in decision.why
 
 
 def test_the_p_value_is_corrected_for_what_was_tried():
     item = replace(GOOD, p_value=1e-4)
-    assert decide(SPRING, item, SCENE, 50).accepted
-    assert not decide(SPRING, item, SCENE, 200).accepted
+    assert decided(SPRING, item, 50).accepted
+    assert not decided(SPRING, item, 200).accepted
 
 
 def test_a_joints_own_delay_of_less_than_a_sample_is_not_an_effect():
     delay = Candidate(TimeDelay(), Member(0))
     for value, accepted in ((0.5 / SCENE.rate, False), (4.0 / SCENE.rate, True)):
         item = replace(GOOD, value=np.array([value]), covariance=np.array([[1e-10]]))
-        decision = decide(delay, item, SCENE, 10)
+        decision = decided(delay, item, 10)
         assert decision.accepted is accepted, decision.why
 
 
 def test_an_effect_of_all_joints_has_the_gain_of_all():
     delay = Candidate(TimeDelay(), Member(None))
     item = replace(GOOD, value=np.array([0.003]), covariance=np.array([[1e-8]]))
-    assert decide(delay, item, SCENE, 10).gain == pytest.approx(0.2)
+    assert decided(delay, item, 10).gain == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"least_outside": 0.6}, "lies outside the model"),
+        ({"family_error": 1e-11}, "not significant"),
+        ({"least_gain": 0.5}, "below the detection limit: removes 40.0% of the squared residual, 50% is asked"),
+    ],
+)
+def test_the_numbers_are_those_of_the_criteria(change: dict, why: str):
+    decision = decide(SPRING, GOOD, SCENE, 100, replace(CRITERIA, **change))
+    assert not decision.accepted
+    assert why in decision.why
+
+
+def test_votes_are_asked_as_the_criteria_say():
+    item = replace(GOOD, fold_gains=(0.5, -0.1, 0.2, None))
+    assert decide(SPRING, item, SCENE, 100, replace(CRITERIA, least_votes=0.6)).accepted

@@ -6,11 +6,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
+from scipy.stats import f
 
-from scara_ident.diagnosis.candidate_tests import ABSORBED, examine, left_over
-from tests.diagnosis.made import table_of
+from scara_ident.diagnosis.candidate_tests import Examination, examine
+from scara_ident.diagnosis.candidates import Rows
+from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.fitted_model import FittedModel
+from scara_ident.estimation.observations import JointRows
+from tests.diagnosis.made import model_of
 
 ROWS = 1600
+
+
+def examined(columns: np.ndarray, torque: np.ndarray, model, *groups, block: int = 40) -> list[Examination]:
+    """Examine groups of the columns (N, k) of one joint beside the model of others."""
+    fitted = model_of(columns[:, list(model)], torque, block=block)
+    return examine(fitted, [{0: columns[:, group].T} for group in groups])
 
 
 def slow(rng: np.random.Generator, count: int, rows: int = ROWS) -> np.ndarray:
@@ -26,8 +37,7 @@ def test_the_p_value_is_uniform_where_nothing_is_missing(memory: float):
     for _ in range(300):
         columns = slow(rng, 5)
         noise = lfilter([1.0], [1.0, -memory], rng.standard_normal(ROWS))
-        table = table_of(columns, columns[:, :3] @ [1.0, -2.0, 0.5] + noise)
-        found.append(examine(table, range(3), [[3, 4]])[0].p_value)
+        found.append(examined(columns, columns[:, :3] @ [1.0, -2.0, 0.5] + noise, range(3), [3, 4])[0].p_value)
     p = np.sort(found)
     # Kolmogorov and Smirnov's distance; 0.094 is its 1 % quantile for 300 values.
     distance = np.max(np.abs(p - (np.arange(300) + 0.5) / 300))
@@ -42,7 +52,7 @@ def test_a_textbook_test_would_call_correlated_noise_an_effect():
     for _ in range(100):
         columns = slow(rng, 5)
         noise = lfilter([1.0], [1.0, -0.8], rng.standard_normal(ROWS))
-        low += examine(table_of(columns, noise, block=1), range(3), [[3, 4]])[0].p_value < 0.05
+        low += examined(columns, noise, range(3), [3, 4], block=1)[0].p_value < 0.05
     assert low > 20
 
 
@@ -50,7 +60,7 @@ def test_value_gain_and_contribution_are_those_of_the_joint_fit():
     rng = np.random.default_rng(2)
     columns = slow(rng, 6)
     torque = columns @ [1.0, -2.0, 0.5, 0.3, -0.2, 0.0] + rng.standard_normal(ROWS)
-    found = examine(table_of(columns, torque), [0, 1, 2], [[3, 4], [5]])
+    found = examined(columns, torque, range(3), [3, 4], [5])
     for result, group in zip(found, ([3, 4], [5]), strict=True):
         joined = np.linalg.lstsq(columns[:, [0, 1, 2, *group]], torque)[0]
         alone = np.linalg.lstsq(columns[:, :3], torque)[0]
@@ -68,7 +78,7 @@ def test_the_standard_deviation_is_the_scatter_of_repeated_estimates():
     found = []
     for _ in range(200):
         noise = lfilter([1.0], [1.0, -0.8], rng.standard_normal(ROWS))
-        found.append(examine(table_of(columns, noise), range(3), [[3]])[0])
+        found.append(examined(columns, noise, range(3), [3])[0])
     scatter = np.std([item.value[0] for item in found])
     told = np.sqrt(np.mean([item.covariance[0, 0] for item in found]))
     assert told == pytest.approx(scatter, rel=0.2)
@@ -79,8 +89,8 @@ def test_what_the_model_spans_is_absorbed_and_says_nothing():
     own = slow(rng, 3)
     columns = np.column_stack([own, own @ [1.0, 2.0, 3.0], own @ [1e-6, 0.0, 1e-6]])
     torque = rng.standard_normal(ROWS)
-    for result in examine(table_of(columns, torque), range(3), [[3], [4], [3, 4]]):
-        assert result.outside < ABSORBED
+    for result in examined(columns, torque, range(3), [3], [4], [3, 4]):
+        assert result.outside < CRITERIA.absorbed
         assert (result.p_value, result.gain, result.held_out, result.votes) == (1.0, 0.0, 0.0, (0, 0))
         assert np.all(result.value == 0.0)
         assert np.all(np.isinf(result.covariance))
@@ -90,15 +100,15 @@ def test_the_share_outside_the_model_is_the_sine_of_the_angle_squared():
     model, other = np.zeros(ROWS), np.zeros(ROWS)
     model[::2], other[1::2] = 1.0, 1.0
     candidate = np.cos(0.3) * model + np.sin(0.3) * other
-    table = table_of(np.column_stack([model, candidate]), np.random.default_rng(5).standard_normal(ROWS))
-    assert examine(table, [0], [[1]])[0].outside == pytest.approx(np.sin(0.3) ** 2)
+    torque = np.random.default_rng(5).standard_normal(ROWS)
+    assert examined(np.column_stack([model, candidate]), torque, [0], [1])[0].outside == pytest.approx(np.sin(0.3) ** 2)
 
 
 def test_the_gain_held_out_is_that_of_leaving_one_trajectory_out():
     rng = np.random.default_rng(6)
     columns = slow(rng, 4)
     torque = columns @ [1.0, 0.0, 2.0, 0.4] + rng.standard_normal(ROWS)
-    result = examine(table_of(columns, torque), [0, 1, 2], [[3]])[0]
+    result = examined(columns, torque, range(3), [3])[0]
     clean = [x - columns[:, :3] @ np.linalg.lstsq(columns[:, :3], x)[0] for x in (columns[:, 3], torque)]
     saved, gains = 0.0, []
     for fold in np.split(np.arange(ROWS), 4):
@@ -119,7 +129,7 @@ def test_a_trajectory_that_does_not_excite_a_candidate_abstains():
     columns[800:1200, 2] = 0.0
     columns[:, :2] = rng.standard_normal((ROWS, 2))
     torque = columns @ [1.0, 2.0, 1.0] + 0.5 * rng.standard_normal(ROWS)
-    result = examine(table_of(columns, torque), [0, 1], [[2]])[0]
+    result = examined(columns, torque, [0, 1], [2])[0]
     assert result.fold_gains[2] is None
     assert result.votes == (3, 3)
 
@@ -130,13 +140,13 @@ def test_what_helps_in_one_trajectory_and_harms_in_the_others_gains_nothing_held
     torque = 0.1 * rng.standard_normal(ROWS)
     torque[:400] += columns[:400, 2]
     torque[400:] -= 0.3 * columns[400:, 2]
-    result = examine(table_of(columns, torque), [0, 1], [[2]])[0]
+    result = examined(columns, torque, [0, 1], [2])[0]
     assert result.held_out < 0.0
 
 
 def test_nothing_is_found_in_torque_that_the_model_explains_exactly():
     columns = slow(np.random.default_rng(9), 3)
-    result = examine(table_of(columns, np.zeros(ROWS)), [0, 1], [[2]])[0]
+    result = examined(columns, np.zeros(ROWS), [0, 1], [2])[0]
     assert (result.p_value, result.gain) == (1.0, 0.0)
 
 
@@ -145,15 +155,172 @@ def test_units_of_columns_change_nothing():
     columns = slow(rng, 5)
     torque = columns @ [1.0, 0.0, 2.0, 0.1, 0.1] + rng.standard_normal(ROWS)
     unit = np.array([1e6, 1.0, 1e-6, 1e-7, 1e5])
-    one = examine(table_of(columns, torque), range(3), [[3, 4]])[0]
-    two = examine(table_of(columns * unit, torque), range(3), [[3, 4]])[0]
+    one = examined(columns, torque, range(3), [3, 4])[0]
+    two = examined(columns * unit, torque, range(3), [3, 4])[0]
     assert_allclose(two.value * unit[3:], one.value, rtol=1e-6)
     assert_allclose([two.p_value, two.gain, two.held_out], [one.p_value, one.gain, one.held_out], rtol=1e-6)
 
 
-def test_what_is_left_over_is_the_residual_of_every_block():
+def test_what_is_left_is_the_residual_of_every_block():
     rng = np.random.default_rng(11)
-    columns = slow(rng, 3)
+    columns = slow(rng, 4)
     torque = rng.standard_normal(ROWS)
-    rest = torque - columns @ np.linalg.lstsq(columns, torque)[0]
-    assert_allclose(left_over(table_of(columns, torque)), np.sum(rest.reshape(-1, 40) ** 2, axis=1), rtol=1e-8)
+    for width, left in (
+        (3, model_of(columns[:, :3], torque).squares),
+        (4, examined(columns, torque, range(3), [3])[0].left),
+    ):
+        rest = torque - columns[:, :width] @ np.linalg.lstsq(columns[:, :width], torque)[0]
+        assert_allclose(left, np.sum(rest.reshape(-1, 40) ** 2, axis=1), rtol=1e-8)
+
+
+def made(seed: int) -> tuple[FittedModel, list[Rows]]:
+    """Rows of three joints in blocks of any length, none among them, and candidates on one joint, two and all.
+
+    The model's last column is the sum of two others. Of the last three candidates one is the model's but for a little,
+    one wholly, and one in one of its two columns.
+    """
+    rng = np.random.default_rng(seed)
+    acting = ([0, 1, 3, 5], [1, 2, 3, 5], [2, 4, 5])
+    owner = np.sort(np.concatenate([np.arange(4), rng.integers(0, 4, 32)]))
+    value, carried, size = rng.standard_normal(6), rng.standard_normal(6), 10.0 ** rng.uniform(-3, 3, 7)
+    candidates: list[Rows] = [{} for _ in range(7)]
+    joints = []
+    for j, own in enumerate(acting):
+        counts = rng.integers(0, 30, len(owner))
+        counts[rng.permutation(len(owner))[:9]] = 0
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        columns = np.zeros((6, starts[-1]))
+        columns[own] = lfilter([1.0], [1.0, -0.9], rng.standard_normal((len(own), starts[-1])))
+        columns[5] = columns[1] + columns[2]
+        torque = value @ columns + lfilter([1.0], [1.0, -0.5], rng.standard_normal(starts[-1]))
+        for k, (places, width) in enumerate([([0], 1), ([1, 2], 2), *[(range(3), width) for width in (1, 3, 1, 1, 2)]]):
+            if j in places:
+                other = rng.standard_normal((width, starts[-1]))
+                known = carried @ columns
+                rows = {
+                    4: known + 1e-2 * np.std(known) * other,
+                    5: known[None],
+                    6: np.array([known, other[0]][:width]),
+                }.get(k, other)
+                candidates[k][j] = size[k] * rows
+        joints.append(JointRows(np.array(own), np.vstack([columns[own], torque]), starts, counts.astype(float)))
+    return FittedModel(tuple(joints), 6, owner, owner, rng.uniform(0.3, 3.0, 3)), candidates
+
+
+def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
+    """The same examination from dense rows of all joints, the model projected out of them."""
+    width = len(next(iter(candidate.values())))
+    dense, block = [], []
+    for j, (rows, weight) in enumerate(zip(model.joints, model.weights, strict=True)):
+        wide = np.zeros((rows.table.shape[1], model.parameters + width + 1))
+        wide[:, rows.columns] = rows.table[:-1].T
+        wide[:, model.parameters : -1] = candidate[j].T if j in candidate else 0.0
+        wide[:, -1] = rows.table[-1]
+        dense.append(weight * wide)
+        block.append(np.repeat(np.arange(len(model.owner)), np.diff(rows.starts)))
+    rows, place = np.vstack(dense), np.concatenate(block)
+    own, blocks = rows[:, : model.parameters], len(model.owner)
+
+    def beside(target: np.ndarray) -> np.ndarray:
+        return target - own @ np.linalg.lstsq(own, target, rcond=1e-12)[0]
+
+    x, e = beside(rows[:, model.parameters : -1]), beside(rows[:, -1])
+    share = np.sum(x**2, axis=0) / np.sum(rows[:, model.parameters : -1] ** 2, axis=0)
+    x[:, share < CRITERIA.absorbed] = 0.0
+    outside = float(np.max(np.where(share < CRITERIA.absorbed, 0.0, share)))
+    free = np.flatnonzero(np.any(x, axis=0))
+
+    def by_block(values: np.ndarray) -> np.ndarray:
+        return np.array([np.sum(values[place == b], axis=0) for b in range(blocks)])
+
+    def without(kept: np.ndarray) -> np.ndarray:
+        found = np.zeros(width)
+        found[free] = np.linalg.lstsq(x[np.ix_(kept, free)], e[kept])[0]
+        return found
+
+    value = without(np.ones(len(e), dtype=bool))
+    left = e - x @ value
+    # Scores of blocks, neighbours of one recording with half the weight.
+    scores = by_block(x * left[:, None])
+    meat = scores.T @ scores
+    for b in range(1, blocks):
+        if model.owner[b] == model.owner[b - 1]:
+            cross = np.outer(scores[b], scores[b - 1])
+            meat += 0.5 * (cross + cross.T)
+    freedom = max(1.0, blocks - model.parameters / 2.0 - width)
+    inverse = np.zeros((width, width))
+    inverse[np.ix_(free, free)] = np.linalg.inv(x[:, free].T @ x[:, free])
+    covariance = blocks / freedom * inverse @ meat @ inverse
+    inner = covariance[np.ix_(free, free)]
+    p_value = (
+        float(f.sf(value[free] @ np.linalg.solve(inner, value[free]) / width, width, freedom)) if len(free) else 1.0
+    )
+    gains: list[float | None] = []
+    saved = 0.0
+    power = by_block(np.sum(x**2, axis=1))
+    in_fold = [np.sum(power[model.fold == fold]) for fold in range(model.folds)]
+    for fold in range(model.folds):
+        mine = np.isin(place, np.flatnonzero(model.fold == fold))
+        if not len(free) or in_fold[fold] < CRITERIA.abstains * np.mean(in_fold):
+            gains.append(None)
+            continue
+        saving = np.sum(e[mine] ** 2) - np.sum((e[mine] - x[mine] @ without(~mine)) ** 2)
+        gains.append(float(saving / np.sum(e[mine] ** 2)))
+        saved += saving
+    before, after = np.sum(e**2), np.sum(left**2)
+    torque = rows[:, -1] - rows[:, model.parameters : -1] @ value
+    return Examination(
+        value,
+        covariance if len(free) else np.full((width, width), np.inf),
+        p_value,
+        outside,
+        float(1.0 - after / before),
+        float(saved / before),
+        tuple(gains),
+        float(before - after),
+        own @ np.linalg.lstsq(own, torque, rcond=1e-12)[0],
+        by_block(left**2),
+    )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_it_is_what_all_rows_of_all_joints_say(seed: int):
+    model, candidates = made(seed)
+    assert all(np.any(np.diff(rows.starts) == 0) for rows in model.joints)
+    found = examine(model, candidates)
+    assert [item.outside < CRITERIA.absorbed for item in found] == [False] * 5 + [True, False]
+    assert found[4].outside < 1e-3
+    for item, candidate in zip(found, candidates, strict=True):
+        dense = by_all_rows(model, candidate)
+        size = np.sqrt(np.diag(dense.covariance))
+        with np.errstate(invalid="ignore"):
+            assert_allclose(item.value, dense.value, rtol=1e-9, atol=1e-9 * np.min(size))
+            assert_allclose(item.covariance, dense.covariance, rtol=1e-8, atol=1e-9 * np.max(dense.covariance))
+        assert_allclose(item.p_value, dense.p_value, rtol=1e-7)
+        assert item.outside == pytest.approx(dense.outside, rel=1e-9)
+        for name in ("gain", "held_out", "contribution"):
+            assert getattr(item, name) == pytest.approx(getattr(dense, name), rel=1e-9, abs=1e-9), name
+        assert [gain is None for gain in item.fold_gains] == [gain is None for gain in dense.fold_gains]
+        assert [x for x in item.fold_gains if x is not None] == pytest.approx(
+            [x for x in dense.fold_gains if x is not None], rel=1e-8, abs=1e-9
+        )
+        assert_allclose(item.left, dense.left, rtol=1e-9, atol=1e-9 * np.mean(dense.left))
+        fitted = [
+            weight * (item.model_value[rows.columns] @ rows.table[:-1])
+            for rows, weight in zip(model.joints, model.weights, strict=True)
+        ]
+        assert_allclose(
+            np.concatenate(fitted), dense.model_value, rtol=0, atol=1e-9 * np.max(np.abs(dense.model_value))
+        )
+
+
+def test_candidates_are_examined_alike_alone_and_in_company():
+    """More of them than have their products made together."""
+    model, candidates = made(0)
+    company = examine(model, candidates * 30)
+    for place in (0, 100, 200):
+        (alone,) = examine(model, [(candidates * 30)[place]])
+        assert_allclose(company[place].value, alone.value, rtol=1e-9)
+        assert company[place].p_value == pytest.approx(alone.p_value, rel=1e-9)
+        assert company[place].held_out == pytest.approx(alone.held_out, rel=1e-9)
+    assert examine(model, []) == []

@@ -1,16 +1,27 @@
-"""Candidates by name, and a bank against its members one by one."""
+"""Candidates by name, and their columns against those of the model that has them as terms."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.testing import assert_array_equal
+from dataclasses import replace
 
-from scara_ident.diagnosis.candidates import Bank, Candidate
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, with_columns
+from scara_ident.diagnosis.search import scene_of as scene_on
 from scara_ident.effects import CATALOGUE, Member
 from scara_ident.effects.friction import FrictionCoupling, Stribeck
+from scara_ident.effects.gear import TransmissionLoss
+from scara_ident.effects.position import Spring
 from scara_ident.effects.tilt import BaseTilt
+from scara_ident.estimation import wls
+from scara_ident.estimation.observations import Observations, observe
+from scara_ident.model.model import TorqueModel
+from scara_ident.motion.motion import stretches
 from scara_ident.robot.robot import load_robot
-from tests.effects.scenes import moving, scene_of
+from tests.diagnosis.made import exact_runs, observed
+from tests.effects.scenes import scene_of
 
 ROBOT = load_robot()
 SCENE = scene_of(ROBOT)
@@ -23,7 +34,7 @@ def test_a_candidate_is_called_by_effect_and_joints():
     assert Candidate(FrictionCoupling(), coupling).label(SCENE) == "friction_coupling of joint1 by joint2"
 
 
-def test_other_knobs_change_neither_joint_nor_label():
+def test_other_nonlinear_parameters_change_neither_joint_nor_label():
     one = Candidate(Stribeck(), Member(1, (0.1,)))
     other = one.at([np.float64(0.2)])
     assert other.member.nonlinear == (0.2,)
@@ -31,7 +42,7 @@ def test_other_knobs_change_neither_joint_nor_label():
     assert (other.joint(SCENE), other.label(SCENE)) == ("joint2", one.label(SCENE))
 
 
-def test_members_of_the_catalogue_that_differ_in_more_than_knobs_have_their_own_labels():
+def test_members_of_the_catalogue_that_differ_in_more_than_these_have_their_own_labels():
     kinds: dict[str, set] = {}
     for effect in CATALOGUE:
         for member in effect.members(SCENE):
@@ -41,19 +52,78 @@ def test_members_of_the_catalogue_that_differ_in_more_than_knobs_have_their_own_
     assert len(kinds) > 20
 
 
-def test_a_bank_is_its_members_side_by_side():
-    candidates = tuple(Candidate(effect, member) for effect in CATALOGUE for member in effect.members(SCENE)[:2])
-    bank = Bank(SCENE, candidates)
-    item = moving(ROBOT, 1.0)
-    whole = bank.regressor(item)
-    assert whole.shape == (2, len(bank.columns), item.samples)
-    for candidate, place in zip(candidates, bank.places, strict=True):
-        alone = candidate.term(SCENE).regressor(item)
-        assert_array_equal(whole[:, place], alone)
-    assert not np.any(whole[~bank.pattern])
+@pytest.fixture(scope="module")
+def gapped() -> Observations:
+    """Recordings of which one has gaps, and between two of them too little to use."""
+    first, *others = exact_runs()[:3]
+    kept = np.ones(len(first.time), dtype=bool)
+    kept[1000:1010] = kept[1030:1040] = False
+    cut = replace(first, time=first.time[kept], position=first.position[:, kept], effort=first.effort[:, kept])
+    assert len(stretches(cut)) == 3
+    found = observed([cut, *others])
+    assert [part.usable for part in found.data.stretches[:3]] == [True, False, True]
+    return found
 
 
-def test_an_empty_bank_has_no_columns():
-    bank = Bank(SCENE, ())
-    assert bank.pattern.shape == (2, 0)
-    assert bank.regressor(moving(ROBOT, 0.5)).shape[1] == 0
+def test_columns_of_the_catalogue_are_those_of_the_model_with_them_as_terms(gapped: Observations):
+    scene = scene_on(gapped.model, wls(gapped).value, gapped)
+    candidates = [Candidate(effect, member) for effect in CATALOGUE for member in effect.members(scene)[:2]]
+    assert len(candidates) > 30
+    columns = CandidateColumns(gapped)
+    joints = with_columns(gapped, columns.rows(scene, candidates))
+    terms = tuple(item.term(scene) for item in candidates)
+    wide = observe(TorqueModel("wide", ROBOT, (*gapped.model.terms, *terms)), gapped.data)
+    for one, other in zip(joints, wide.joints, strict=True):
+        assert_array_equal(one.columns, other.columns)
+        assert_array_equal(one.starts, other.starts)
+        assert_array_equal(one.counts, other.counts)
+        size = np.maximum(np.max(np.abs(other.table), axis=1, keepdims=True), 1e-12)
+        assert_allclose(one.table / size, other.table / size, rtol=0, atol=1e-12)
+
+
+def test_the_predicted_torque_is_that_of_the_model_with_them_as_terms(gapped: Observations):
+    value = wls(gapped).value
+    scene = scene_on(gapped.model, value, gapped)
+    chosen = [Candidate(Spring(), Member(0)), Candidate(TransmissionLoss(), Member(1, (0.1,)))]
+    model = TorqueModel("wide", ROBOT, (*gapped.model.terms, *(item.term(scene) for item in chosen)))
+    given = np.concatenate([value, np.linspace(0.1, 0.2, len(model.columns) - len(value))])
+    told = CandidateColumns(gapped).predicted(scene, chosen, given)
+    assert len(told) == len(gapped.data.stretches)
+    for torque, part in zip(told, gapped.data.stretches, strict=True):
+        assert_allclose(torque, np.einsum("npk,p->nk", model.regressor(part.motion), given), atol=1e-12)
+
+
+def test_columns_are_made_once_and_again_only_where_they_follow_the_estimate(monkeypatch: pytest.MonkeyPatch):
+    seen = observed(exact_runs()[:2])
+    scene = scene_on(seen.model, wls(seen).value, seen)
+    other = replace(scene, value=1.1 * scene.value)
+    made = []
+    for effect in (Stribeck, TransmissionLoss):
+        whole = effect.regressor
+        monkeypatch.setattr(
+            effect, "regressor", lambda *given, name=effect.name, whole=whole: made.append(name) or whole(*given)
+        )
+    columns = CandidateColumns(seen)
+    candidates = [Candidate(Stribeck(), Member(1, (0.1,))), Candidate(TransmissionLoss(), Member(1, (0.1,)))]
+    first = columns.rows(scene, candidates)
+    again = columns.rows(scene, candidates)
+    assert sorted(made) == ["stribeck"] * 2 + ["transmission_loss"] * 2
+    assert all(one is same for one, same in zip(first, again, strict=True))
+    later = columns.rows(other, candidates)
+    assert sorted(made[4:]) == ["transmission_loss"] * 2
+    assert later[0] is first[0]
+    assert np.max(np.abs(later[1][1] - first[1][1])) > 0.0
+    columns.forget_all_but(scene)
+    assert columns.rows(scene, candidates)[1] is first[1]
+    assert len(made) == 6
+    columns.rows(other, candidates)
+    assert len(made) == 8
+    # Beside another torque the motion is the same, and so are the columns.
+    assert columns.beside(seen).rows(scene, candidates)[0] is first[0]
+
+
+def test_without_candidates_the_rows_are_those_of_the_model():
+    seen = observed(exact_runs()[:1])
+    for one, other in zip(with_columns(seen, []), seen.joints, strict=True):
+        assert_array_equal(one.table, other.table)
+    assert CandidateColumns(seen).rows(scene_on(seen.model, wls(seen).value, seen), []) == []

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.diagnosis.confounding import confounders
-from scara_ident.diagnosis.search import search
 from scara_ident.effects import Coefficient, Effect
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.position import Spring
-from tests.diagnosis.made import BANDS, complete, exact_runs, with_torque
+from tests.diagnosis.made import exact_runs, searched, with_torque
 
 MIDDLE = 1.57
 STIFFNESS = 0.3
@@ -35,8 +34,8 @@ class Pendulum(Effect):
 def groups(size: float, added) -> dict[str, dict[str, float]]:
     """Each effect found with its confounders and their gain as a share of its own."""
     runs = with_torque(exact_runs(size=size), 0, added)
-    result = search(complete(), runs, BANDS, catalogue=(Spring(), Pendulum(), AsymmetricFriction()))
-    found = confounders(result, result.steps[-1].estimate.weights)
+    result = searched(runs, Spring(), Pendulum(), AsymmetricFriction())
+    found = confounders(result.step, result.decisions)
     return {
         item.label(result.scene): {confounder.label: confounder.gain / confounder.found_gain for confounder in others}
         for item, others in zip(result.chosen, found, strict=True)

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.model_selection import joint_rms
+from scara_ident.diagnosis.model_selection import rms_of
 from scara_ident.effects import CATALOGUE, Coefficient, Effect
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
@@ -65,8 +65,8 @@ def test_a_spring_is_found_with_its_stiffness_and_lowers_the_error_held_out(spri
     assert effect.p_value < 1e-6
     assert effect.votes == (2, 2)
     assert effect.before["joint1"] > 2.0 * effect.after["joint1"]
-    old = joint_rms(spring.before.value, spring.validation_before)
-    new = joint_rms(spring.after.value, spring.validation_after)
+    old = rms_of(spring.before.value, spring.validation_before)
+    new = rms_of(spring.after.value, spring.validation_after)
     assert new[0] < 0.6 * old[0]
     assert new[1] == pytest.approx(old[1], rel=0.2)
 
@@ -83,9 +83,7 @@ def test_recordings_held_out_take_no_part(spring):
     assert_array_equal(result.after.value, spring.after.value)
     assert [effect.parameters for effect in result.effects] == [effect.parameters for effect in spring.effects]
     assert (result.verdict, result.search.bands) == (spring.verdict, spring.search.bands)
-    assert joint_rms(result.after.value, result.validation_after) != joint_rms(
-        spring.after.value, spring.validation_after
-    )
+    assert rms_of(result.after.value, result.validation_after) != rms_of(spring.after.value, spring.validation_after)
 
 
 def test_the_band_is_not_chosen_on_recordings_held_out():
@@ -139,7 +137,7 @@ def test_less_than_a_sample_of_delay_is_a_note_and_not_an_effect():
     assert result.effects == ()
     assert result.verdict == "complete"
     assert any("less than one sample" in note for note in result.notes)
-    assert result.search.delay[0] == pytest.approx(0.4 / RATE, abs=2e-4)
+    assert result.search.correction.value[0] == pytest.approx(0.4 / RATE, abs=2e-4)
 
 
 def test_a_longer_delay_is_an_effect_and_is_corrected_in_what_is_held_out():
@@ -148,8 +146,8 @@ def test_a_longer_delay_is_an_effect_and_is_corrected_in_what_is_held_out():
     (effect,) = result.effects
     assert (effect.effect, effect.joint) == ("time_delay", None)
     assert effect.parameters["delay"].value == pytest.approx(0.005, abs=1e-3)
-    old = joint_rms(result.before.value, result.validation_before)
-    assert joint_rms(result.after.value, result.validation_after)[0] < 0.8 * old[0]
+    old = rms_of(result.before.value, result.validation_before)
+    assert rms_of(result.after.value, result.validation_after)[0] < 0.8 * old[0]
 
 
 def test_a_model_can_be_given_and_progress_is_told():

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.effect_parameters import physical_parameters
-from scara_ident.diagnosis.table import tabulate, tabulate_candidates
+from scara_ident.diagnosis.effect_parameters import parameters_beside, physical_parameters
 from scara_ident.effects import Member
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.position import Spring
+from scara_ident.estimation.observations import Observations
 from tests.arms import noisy
-from tests.diagnosis.made import BANDS, NOISE, complete, exact_runs, scene_of, with_torque
+from tests.diagnosis.made import NOISE, complete, exact_runs, observed, step_beside, with_torque
 
-MODEL = complete()
+Array = NDArray[np.float64]
+
 AMPLITUDE, VELOCITY, STIFFNESS, REST = 0.06, 0.5, 0.05, 0.4
 WEIGHTS = 1.0 / np.array(NOISE)
 
@@ -30,27 +34,40 @@ def stribeck_runs():
 def test_the_deviation_of_a_nonlinear_parameter_is_its_scatter_over_noise():
     """Every repetition finds the parameter by search over a grid and a parabola, not by the derivative."""
     runs = stribeck_runs()
-    scene = scene_of(MODEL, runs)
-    chosen = [Candidate(Stribeck(), Member(0, (VELOCITY,)))]
-    told = physical_parameters(scene, runs, BANDS, WEIGHTS, chosen)[0]
+    chosen = Candidate(Stribeck(), Member(0, (VELOCITY,)))
+    step = step_beside(runs, [chosen], WEIGHTS)
+    (told,) = physical_parameters(step)
 
-    base = tabulate(MODEL, runs, BANDS).weighted(WEIGHTS)
+    def rows(observations: Observations, candidates: Sequence[Candidate] = ()) -> tuple[Array, Array]:
+        """Weighted rows of both joints: the model's columns and the torque, and the candidates' columns."""
+        own, added = [], []
+        for j, joint in enumerate(observations.joints):
+            wide = np.zeros((joint.table.shape[1], observations.parameters + 1))
+            wide[:, joint.columns], wide[:, -1] = joint.table[:-1].T, joint.table[-1]
+            own.append(WEIGHTS[j] * wide)
+            none = np.zeros((1, len(wide)))
+            added.append(
+                WEIGHTS[j] * np.vstack([item.get(j, none) for item in step.columns.rows(step.scene, candidates)]).T
+                if candidates
+                else none.T
+            )
+        return np.vstack(own), np.vstack(added)
+
     grid = np.linspace(0.35, 0.65, 25)
-    columns, _ = tabulate_candidates(scene, [chosen[0].at([x]) for x in grid], runs, BANDS)
-    q = np.linalg.qr(base.columns)[0]
-    columns = columns * WEIGHTS[base.joint][:, None]
+    base, columns = rows(step.observations, [chosen.at([x]) for x in grid])
+    q = np.linalg.qr(base[:, :-1])[0]
     columns -= q @ (q.T @ columns)
     size = np.sum(columns**2, axis=0)
     rng = np.random.default_rng(0)
     velocity, amplitude = [], []
     for _ in range(60):
-        rows = tabulate(MODEL, [noisy(run, rng, NOISE) for run in runs], BANDS).weighted(WEIGHTS)
-        saved = (columns.T @ rows.torque) ** 2 / size
+        torque = rows(observed([noisy(run, rng, NOISE) for run in runs]))[0][:, -1]
+        saved = (columns.T @ torque) ** 2 / size
         k = int(np.clip(np.argmax(saved), 1, len(grid) - 2))
         a, b, c = saved[k - 1 : k + 2]
         shift = 0.5 * (a - c) / (a - 2.0 * b + c)
         velocity.append(grid[k] + shift * (grid[1] - grid[0]))
-        amplitude.append(float(np.interp(velocity[-1], grid, columns.T @ rows.torque / size)))
+        amplitude.append(float(np.interp(velocity[-1], grid, columns.T @ torque / size)))
     # What is added to the runs has the noise of the runs themselves, so its scatter is theirs.
     assert told["velocity"].std == pytest.approx(np.std(velocity), rel=0.4)
     assert told["amplitude"].std == pytest.approx(np.std(amplitude), rel=0.4)
@@ -59,11 +76,10 @@ def test_the_deviation_of_a_nonlinear_parameter_is_its_scatter_over_noise():
 
 
 def test_several_effects_get_their_own_parameters():
-    direction = MODEL.robot.drive_sign[1]
+    direction = complete().robot.drive_sign[1]
     runs = with_torque(stribeck_runs(), 1, lambda motion: direction * STIFFNESS * (motion.q[1] - REST))
-    scene = scene_of(MODEL, runs)
     chosen = [Candidate(Spring(), Member(1)), Candidate(Stribeck(), Member(0, (VELOCITY,)))]
-    spring, stribeck = physical_parameters(scene, runs, BANDS, WEIGHTS, chosen)
+    spring, stribeck = physical_parameters(step_beside(runs, chosen, WEIGHTS))
     assert set(spring) == {"stiffness", "rest_position"}
     assert abs(spring["stiffness"].value - STIFFNESS) < 4.0 * spring["stiffness"].std
     assert set(stribeck) == {"amplitude", "velocity"}
@@ -74,8 +90,18 @@ def test_several_effects_get_their_own_parameters():
 
 
 def test_a_parameter_that_only_serves_the_columns_is_not_reported():
-    runs = exact_runs()
-    found = physical_parameters(
-        scene_of(MODEL, runs), runs, BANDS, WEIGHTS, [Candidate(TransmissionLoss(), Member(1, (0.1,)))]
-    )
-    assert set(found[0]) == {"loss_coefficient"}
+    chosen = [Candidate(TransmissionLoss(), Member(1, (0.1,)))]
+    (found,) = physical_parameters(step_beside(exact_runs(), chosen, WEIGHTS))
+    assert set(found) == {"loss_coefficient"}
+
+
+def test_beside_a_model_the_parameters_are_those_of_the_model_that_has_the_effect():
+    """Where they come from block scores of the effect alone, with what the model spans projected out."""
+    runs = stribeck_runs()
+    candidate = Candidate(Stribeck(), Member(0, (VELOCITY,)))
+    beside = parameters_beside(step_beside(runs, (), WEIGHTS), candidate)
+    (whole,) = physical_parameters(step_beside(runs, [candidate], WEIGHTS))
+    assert beside["amplitude"].value == pytest.approx(whole["amplitude"].value, rel=1e-9)
+    assert beside["amplitude"].std == pytest.approx(whole["amplitude"].std, rel=0.15)
+    spring = parameters_beside(step_beside(runs, (), WEIGHTS), Candidate(Spring(), Member(1)))
+    assert abs(spring["stiffness"].value) < 4.0 * spring["stiffness"].std

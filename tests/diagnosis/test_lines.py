@@ -8,16 +8,15 @@ import pytest
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.effects.periodic import TorqueRipple, Vibration
 from scara_ident.effects.position import Spring
-from tests.diagnosis.made import complete, exact_runs, scene_of, with_torque
+from tests.diagnosis.made import exact_runs, residuals_of, step_beside, with_torque
 
-MODEL = complete()
 WIDE = (40.0, 40.0)
 PERIODIC = (TorqueRipple(), Vibration(), Spring())
 
 
 def candidates(runs, catalogue=PERIODIC):
-    scene = scene_of(MODEL, exact_runs(), WIDE)
-    return line_candidates(scene, MODEL, scene.value, runs, WIDE, catalogue)
+    scene = step_beside(exact_runs(), bands=WIDE).scene
+    return line_candidates(scene, residuals_of(scene.value, runs, WIDE), catalogue)
 
 
 def test_noise_has_no_line():

@@ -9,17 +9,16 @@ import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.effect_parameters import physical_parameters
-from scara_ident.diagnosis.nonlinear_fit import ARMATURE_STD, linearise, tune
-from scara_ident.diagnosis.table import tabulate
+from scara_ident.diagnosis.nonlinear_fit import ARMATURE_STD, Linearised, linearise, tune
+from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Member
 from scara_ident.effects.elasticity import Backlash
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.position import Spring
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
-from tests.diagnosis.made import BANDS, NOISE, complete, exact_runs, fitted, multisine, scene_of, with_torque
+from tests.diagnosis.made import NOISE, exact_runs, multisine, step_beside, with_torque
 
-MODEL = complete()
 WEIGHTS = 1.0 / np.array(NOISE)
 AMPLITUDE, VELOCITY, STIFFNESS = 0.06, 0.3, 0.05
 
@@ -42,45 +41,59 @@ def loss_runs(loss: float, rotor: float):
     )
 
 
-def tuned(runs, chosen):
-    base = tabulate(MODEL, runs, BANDS)
-    scene = replace(scene_of(MODEL, runs), value=fitted(MODEL, runs).value)
-    return tune(scene, runs, BANDS, base, WEIGHTS, chosen)
+def linear(step: SelectionStep, **change) -> Linearised:
+    """The linear model of a step, or of one that differs from it."""
+    step = replace(step, **change)
+    return linearise(step.scene, step.columns, step.weights, step.chosen)
+
+
+def dense(state: Linearised) -> np.ndarray:
+    """All columns on the rows of all joints."""
+    tables = []
+    for rows in state.joints:
+        wide = np.zeros((rows.table.shape[1], state.information.parameters))
+        wide[:, rows.columns] = rows.table[:-1].T
+        tables.append(wide)
+    return np.vstack(tables)
+
+
+def tuned(runs, *chosen: Candidate) -> SelectionStep:
+    """The step with its effects tuned."""
+    step = step_beside(runs, chosen, WEIGHTS)
+    scene, found = tune(step.scene, step.columns, WEIGHTS, chosen)
+    return replace(step, scene=scene, chosen=found)
 
 
 @pytest.mark.parametrize("start", [0.2, 0.42])
 def test_it_finds_what_a_search_finds_from_either_side(start: float) -> None:
     runs = runs_with_two_effects()
     chosen = [Candidate(Stribeck(), Member(0, (start,))), Candidate(Spring(), Member(1))]
-    scene, (stribeck, spring) = tuned(runs, chosen)
+    step = tuned(runs, *chosen)
+    stribeck, spring = step.chosen
     assert spring == chosen[1]
-    base = tabulate(MODEL, runs, BANDS)
     grid = np.linspace(0.24, 0.36, 49)
-    errors = [linearise(scene, runs, BANDS, base, WEIGHTS, [stribeck.at([value]), spring]).error for value in grid]
+    errors = [linear(step, chosen=(stribeck.at([value]), spring)).error for value in grid]
     assert stribeck.member.nonlinear[0] == pytest.approx(grid[int(np.argmin(errors))], abs=1.5 * (grid[1] - grid[0]))
-    told = physical_parameters(scene, runs, BANDS, WEIGHTS, [stribeck, spring])
+    told = physical_parameters(step)
     assert abs(told[0]["velocity"].value - VELOCITY) < 4.0 * told[0]["velocity"].std
     assert abs(told[1]["stiffness"].value - STIFFNESS) < 4.0 * told[1]["stiffness"].std
 
 
 def test_a_large_loss_shows_the_rotor_behind_the_gear() -> None:
     runs = loss_runs(0.3, 1.15)
-    scene, chosen = tuned(runs, [Candidate(TransmissionLoss(), Member(0, (0.2,)))])
+    step = tuned(runs, Candidate(TransmissionLoss(), Member(0, (0.2,))))
+    scene = step.scene
     assert scene.armatures[0] / scene.nominal_armature(0) == pytest.approx(1.15, abs=0.02)
-    loss = physical_parameters(scene, runs, BANDS, WEIGHTS, chosen)[0]["loss_coefficient"]
+    loss = physical_parameters(step)[0]["loss_coefficient"]
     assert loss.value == pytest.approx(0.3, abs=max(0.01, 4.0 * loss.std))
     # With the nominal rotor it would be wrong by far more than it could be.
-    nominal = replace(scene, armatures={})
-    base = tabulate(MODEL, runs, BANDS)
-    biased = linearise(nominal, runs, BANDS, base, WEIGHTS, chosen).value[-1]
+    biased = linear(step, scene=replace(scene, armatures={})).value[-1]
     assert abs(biased - 0.3) > 8.0 * loss.std
 
 
 def test_where_data_say_nothing_the_armature_stays_nominal_and_as_unsure_as_it_was() -> None:
-    runs = exact_runs()
-    candidate = Candidate(TransmissionLoss(), Member(0, (0.05,)))
-    scene = replace(scene_of(MODEL, runs), value=fitted(MODEL, runs).value)
-    state = linearise(scene, runs, BANDS, tabulate(MODEL, runs, BANDS), WEIGHTS, [candidate])
+    step = step_beside(exact_runs(), [Candidate(TransmissionLoss(), Member(0, (0.05,)))], WEIGHTS)
+    scene, state = step.scene, linear(step)
     (armature,) = [item for item in state.unknowns if item.owner is None]
     assert armature.nominal == armature.value == scene.nominal_armature(0)
     assert armature.spread == pytest.approx(ARMATURE_STD * armature.nominal)
@@ -94,34 +107,57 @@ def test_a_backlash_shows_the_rotor_though_its_flights_begin_and_end_at_samples(
     arm = replace(arm, rotor_inertia=arm.rotor_inertia * np.array([1.05, 1.0]), torque_noise=np.array(NOISE))
     effects = [parse_effect("backlash:joint1:width=0.0011")]
     runs = tuple(simulate(arm, multisine(f"F{k}", k, 9.0), effects=effects, seed=k).recording for k in (1, 2))
-    scene, chosen = tuned(runs, [Candidate(Backlash(), Member(0, (0.0012,)))])
+    step = tuned(runs, Candidate(Backlash(), Member(0, (0.0012,))))
+    scene = step.scene
     assert scene.armatures[0] / scene.nominal_armature(0) == pytest.approx(1.05, abs=0.01)
-    width = physical_parameters(scene, runs, BANDS, WEIGHTS, chosen)[0]["width"].value
+    width = physical_parameters(step)[0]["width"].value
     assert width == pytest.approx(0.0011, rel=0.1)
 
 
 def test_without_effects_there_is_nothing_to_tune() -> None:
-    runs = exact_runs()
-    scene = scene_of(MODEL, runs)
-    assert tune(scene, runs, BANDS, tabulate(MODEL, runs, BANDS), WEIGHTS, []) == (scene, [])
+    step = step_beside(exact_runs())
+    assert tune(step.scene, step.columns, WEIGHTS, []) == (step.scene, ())
 
 
 def test_the_derivatives_are_those_of_the_predicted_torque() -> None:
-    runs = loss_runs(0.3, 1.0)[:1]
-    scene = replace(scene_of(MODEL, runs), value=fitted(MODEL, runs).value)
-    base = tabulate(MODEL, runs, BANDS)
-    chosen = [Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.3,)))]
-    state = linearise(scene, runs, BANDS, base, WEIGHTS, chosen)
+    chosen = (Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.3,))))
+    step = step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS)
+    scene, state = step.scene, linear(step)
 
     def predicted(velocity: float, share: float, armature: float) -> np.ndarray:
         other = replace(scene, armatures={0: armature})
-        moved = [chosen[0].at([velocity]), chosen[1].at([share])]
-        return linearise(other, runs, BANDS, base, WEIGHTS, moved).table.columns @ state.value
+        moved = linear(step, scene=other, chosen=(chosen[0].at([velocity]), chosen[1].at([share])))
+        return dense(moved)[:, : state.linear] @ state.value
 
+    derivatives = dense(state)[:, state.linear :]
     at = [0.2, 0.3, scene.nominal_armature(0)]
     for k, value in enumerate(at):
         up, down = ([x * (1.0 + sign * 1e-4 * (i == k)) for i, x in enumerate(at)] for sign in (1.0, -1.0))
         numeric = (predicted(*up) - predicted(*down)) / (2e-4 * value)
         # The load's absolute value has kinks, at which steps of different length differ, and an armature's is long.
         bound = 5e-2 if k == 2 else 2e-3
-        assert np.linalg.norm(state.derivatives[:, k] - numeric) < bound * np.linalg.norm(numeric)
+        assert np.linalg.norm(derivatives[:, k] - numeric) < bound * np.linalg.norm(numeric)
+
+
+def test_the_solution_is_that_of_all_weighted_rows_with_those_of_the_priors() -> None:
+    """From triangular factors, and once more from dense rows."""
+    chosen = (Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.3,))))
+    state = linear(step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS))
+    size = np.repeat(WEIGHTS, [rows.table.shape[1] for rows in state.joints])
+    torque = size * np.concatenate([rows.table[-1] for rows in state.joints])
+    rows = size[:, None] * dense(state)
+    own = rows[:, : state.linear]
+    assert own @ state.value == pytest.approx(own @ np.linalg.lstsq(own, torque)[0], abs=1e-8 * np.max(np.abs(torque)))
+    left = torque - own @ state.value
+    assert state.variance == pytest.approx(np.mean(left**2), rel=1e-9)
+    prior = state.prior.factor
+    columns = np.vstack([rows, prior[:, :-1]])
+    scale = np.linalg.norm(columns, axis=0)
+    scale[scale == 0.0] = 1.0
+    best = np.linalg.lstsq(columns / scale, np.concatenate([torque, prior[:, -1]]), rcond=1e-9)[0] / scale
+    change, std = state.solve()
+    assert change == pytest.approx(best[state.linear :], rel=1e-6)
+    inverse = np.linalg.pinv((columns / scale).T @ (columns / scale), rcond=1e-18, hermitian=True) / np.outer(
+        scale, scale
+    )
+    assert std[state.linear :] == pytest.approx(np.sqrt(state.variance * np.diag(inverse))[state.linear :], rel=1e-5)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.screening import screen
-from tests.diagnosis.made import BANDS, complete, exact_runs, fitted, with_torque
+from tests.diagnosis.made import complete, exact_runs, fitted, residuals_of, with_torque
 
 MODEL = complete()
 
 
 def screened(runs):
-    return screen(MODEL, fitted(MODEL, exact_runs()).value, runs, BANDS)
+    return screen(MODEL, residuals_of(fitted(exact_runs()).value, runs))
 
 
 def test_nothing_is_found_in_noise():
@@ -62,7 +62,7 @@ def test_what_repeats_in_one_trajectory_only_is_not_called_a_dependence():
 def test_one_trajectory_is_judged_by_its_parts():
     runs = exact_runs(1, 4)
     planted = with_torque(runs, 1, lambda motion: 0.02 * np.sin(6.0 * motion.q[1]))
-    found = screen(MODEL, fitted(MODEL, runs).value, planted, BANDS)
+    found = screen(MODEL, residuals_of(fitted(runs).value, planted))
     assert "position of joint2" in found[0].signals
     assert found[0].explained > 0.5
 

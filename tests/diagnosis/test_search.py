@@ -5,20 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.search import Beside, best_of_each, model_with, refine, search
-from scara_ident.diagnosis.table import tabulate
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.model_selection import rms_of
+from scara_ident.diagnosis.search import SearchTask, _backward, columns_at_hand, corrected, scene_of, search
 from scara_ident.effects import Member
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
+from scara_ident.estimation import wls
 from tests.diagnosis.made import (
-    BANDS,
     complete,
     exact_runs,
     fitted,
-    residual_noise,
-    scene_of,
+    observed,
+    searched,
+    step_beside,
     virtual_runs,
     with_torque,
 )
@@ -36,8 +37,8 @@ def asymmetry(motion, difference: float = 0.03):
 
 
 def test_nothing_comes_in_where_nothing_is_missing():
-    result = search(MODEL, exact_runs(), BANDS, catalogue=SMALL)
-    assert (result.chosen, result.steps, result.delay) == ((), (), None)
+    result = searched(exact_runs(), *SMALL)
+    assert (result.chosen, result.steps, result.correction) == ((), (), None)
     assert result.model is result.scene.model
     assert not any(decision.accepted for decision in result.decisions)
     assert result.tried == len(result.decisions)
@@ -45,73 +46,99 @@ def test_nothing_comes_in_where_nothing_is_missing():
 
 def test_two_planted_effects_come_in_and_nothing_else():
     runs = with_torque(with_torque(exact_runs(), 1, spring), 0, asymmetry)
-    result = search(MODEL, runs, BANDS, catalogue=SMALL)
+    result = searched(runs, *SMALL)
     assert {item.label(result.scene) for item in result.chosen} == {"spring of joint2", "asymmetric_friction of joint1"}
     assert [step.decision.candidate for step in result.steps] == list(result.chosen)
     assert len(result.model.columns) == len(MODEL.columns) + 2
-    clean = fitted(MODEL, exact_runs())
+    clean = fitted(exact_runs())
     assert np.max(np.abs(result.scene.value - clean.value)[:5] / clean.std[:5]) < 4.0
 
 
 def test_the_error_falls_with_every_step_to_that_of_the_clean_recordings():
     runs = with_torque(with_torque(exact_runs(), 1, spring), 0, asymmetry)
-    result = search(MODEL, runs, BANDS, catalogue=SMALL)
-    errors = [residual_noise(step.estimate, step.evidence) for step in result.steps]
-    start = residual_noise(result.start, result.start_evidence)
+    result = searched(runs, *SMALL)
+    errors = [np.array(step.rms) for step in result.steps]
+    start = np.array(rms_of(result.start.value, result.uncorrected))
     # The sum over joints in equal weight falls; a joint that fits worse only because it weighs less may grow a little.
     sizes = [np.sum((error / errors[-1]) ** 2) for error in (start, *errors)]
     assert sizes[0] > 2.0 * sizes[1] > 2.0 * sizes[2]
-    clean = search(MODEL, exact_runs(), BANDS, catalogue=SMALL)
-    assert errors[1] == pytest.approx(residual_noise(clean.start, clean.start_evidence), rel=0.02)
-
-
-def test_refinement_finds_a_nonlinear_parameter_between_scan_points():
-    runs = with_torque(
-        exact_runs(), 0, lambda motion: 0.08 * np.sign(motion.v[0]) * np.exp(-((motion.v[0] / 0.43) ** 2))
-    )
-    scene = scene_of(MODEL, runs)
-    beside = Beside(scene, tuple(runs), BANDS, tabulate(MODEL, runs, BANDS), fitted(MODEL, runs).weights, 10)
-    rough = beside.judge_new([Candidate(Stribeck(), member) for member in Stribeck().members(scene)])
-    leader = max(rough, key=lambda item: item.examination.gain)
-    (fine,) = refine(beside, [leader])
-    assert fine.examination.gain >= leader.examination.gain
-    assert fine.candidate.member.nonlinear[0] == pytest.approx(0.43, rel=0.1)
-    assert fine.candidate.member.joint == 0
+    clean = searched(exact_runs(), *SMALL)
+    assert errors[1] == pytest.approx(rms_of(clean.start.value, clean.uncorrected), rel=0.02)
 
 
 def test_a_delay_is_corrected_in_the_data():
     late = [shifted(run, -0.004) for run in exact_runs()]
-    result = search(MODEL, late, BANDS, catalogue=SMALL)
-    assert result.delay is not None
-    assert result.delay[0] == pytest.approx(0.004, abs=2e-4)
+    result = searched(late, *SMALL)
+    assert result.correction is not None
+    assert result.correction.value[0] == pytest.approx(0.004, abs=2e-4)
+    assert 0.0 < result.correction.std[0] < 2e-4
     assert result.chosen == ()
-    clean = fitted(MODEL, exact_runs())
-    corrected = fitted(MODEL, result.recordings)
-    assert np.max(np.abs(corrected.value - clean.value) / clean.std) < 1.0
+    clean = fitted(exact_runs())
+    mended = wls(result.step.observations)
+    assert np.max(np.abs(mended.value - clean.value) / clean.std) < 1.0
+    # The columns are those of the same motion; only the torque is another.
+    whole = fitted([shifted(run, result.correction.value[0]) for run in late])
+    assert np.max(np.abs(mended.value - whole.value) / clean.std) < 0.1
+    for before, after in zip(result.uncorrected.data.stretches, result.data.stretches, strict=True):
+        assert after.stretch.position is before.stretch.position
 
 
 def test_weights_of_the_fit_make_joints_equal():
-    result = search(MODEL, virtual_runs(), BANDS, catalogue=(Spring(),))
-    weighted = result.start.weights * residual_noise(result.start, result.start_evidence)
+    result = searched(virtual_runs(), Spring())
+    weighted = result.start.weights * rms_of(result.start.value, result.uncorrected)
     assert weighted[0] == pytest.approx(weighted[1], rel=0.01)
 
 
-def test_the_best_of_each_prefers_what_may_come_in():
+def test_what_is_left_out_by_its_label_is_not_tried():
     runs = with_torque(exact_runs(), 1, spring)
-    scene = scene_of(MODEL, runs)
-    beside = Beside(scene, tuple(runs), BANDS, tabulate(MODEL, runs, BANDS), fitted(MODEL, runs).weights, 10)
-    decisions = beside.judge_new([Candidate(Stribeck(), Member(1, (x,))) for x in (0.1, 0.5)])
-    decisions += beside.judge_new([Candidate(Spring(), Member(j)) for j in range(2)])
-    best = best_of_each(decisions)
-    assert set(best) == {"stribeck of joint2", "spring of joint1", "spring of joint2"}
-    assert best["spring of joint2"].accepted
-    assert not best["spring of joint1"].accepted
-    assert best["stribeck of joint2"].gain == max(item.gain for item in decisions[:2])
+    columns = CandidateColumns(observed(runs))
+    result = search(SearchTask(MODEL, SMALL), columns, without=("spring of joint2",))
+    labels = {decision.label for decision in result.decisions}
+    assert "spring of joint1" in labels
+    assert "spring of joint2" not in labels
+    assert "spring of joint2" not in {item.label(result.scene) for item in result.chosen}
 
 
-def test_nothing_to_judge_gives_no_decision():
+def test_a_search_on_columns_that_are_known_finds_the_same():
+    runs = with_torque(exact_runs(), 1, spring)
+    columns = CandidateColumns(observed(runs))
+    first = search(SearchTask(MODEL, SMALL), columns)
+    again = search(SearchTask(MODEL, SMALL), columns)
+    assert again.chosen == first.chosen
+    assert np.array_equal(again.scene.value, first.scene.value)
+
+
+def test_an_effect_that_the_others_make_superfluous_is_dropped():
+    """Backwards every effect is judged beside the others; one that nothing was planted for does not stay."""
+    runs = with_torque(with_torque(exact_runs(), 1, spring), 0, asymmetry)
+    extra = Candidate(Stribeck(), Member(0, (0.5,)))
+    step = step_beside(runs, (Candidate(Spring(), Member(1)), extra, Candidate(AsymmetricFriction(), Member(0))))
+    kept = _backward(step)
+    assert kept == (step.chosen[0], step.chosen[2])
+
+
+def test_the_scene_is_how_far_the_recordings_reach():
     runs = exact_runs()
-    scene = scene_of(MODEL, runs)
-    beside = Beside(scene, tuple(runs), BANDS, tabulate(MODEL, runs, BANDS), np.ones(2), 1)
-    assert beside.judge_new([]) == []
-    assert model_with(scene, []) is scene.model
+    seen = observed(runs)
+    scene = scene_of(MODEL, fitted(runs).value, seen)
+    assert scene.duration == max(run.time[-1] - run.time[0] for run in runs)
+    assert scene.start == {run.name: run.time[0] for run in runs}
+    assert scene.travel == pytest.approx(np.max([np.ptp(run.position, axis=1) for run in runs], axis=0))
+    assert scene.speed == pytest.approx(
+        np.max([np.max(np.abs(p.motion.v), axis=1) for p in seen.data.stretches], axis=0)
+    )
+    assert (scene.rate, scene.band) == (pytest.approx(250.0), 11.0)
+    assert scene_of(MODEL, scene.value, observed(runs, (None, None))).band == pytest.approx(0.45 * 250.0)
+    for part in seen.data.stretches:
+        for held, made in zip(columns_at_hand(seen)[part.motion], MODEL.joint_columns(part.motion), strict=True):
+            assert np.array_equal(held, made)
+
+
+def test_corrected_torque_is_that_of_the_recording_corrected():
+    late = [shifted(run, -0.004) for run in exact_runs()[:2]]
+    candidate = Candidate(TimeDelay(), Member(None))
+    mended = corrected(observed(late).data, candidate, np.array([0.004]))
+    for part, run in zip(mended.stretches, late, strict=True):
+        whole = candidate.effect.corrected(run, candidate.member, np.array([0.004]))
+        inside = slice(20, -20)
+        assert np.max(np.abs(part.torque - whole.effort)[:, inside]) < 1e-3 * np.ptp(run.effort)

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from scara_ident.cli.main import app
-from scara_ident.diagnosis import acceptance, candidate_tests, confounding
-from scara_ident.diagnosis.search import MOST_EFFECTS
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.effects import CATALOGUE
 from scara_ident.effects.aliases import HIDDEN
 from scara_ident.model.base_parameters import find_base_parameters
@@ -152,12 +151,12 @@ def test_the_diagnosis_page_lists_every_alias_and_the_limits_of_the_program() ->
     page = (DOCS / "diagnosis.md").read_text(encoding="utf-8")
     assert [alias.effect for alias in HIDDEN if f"`{alias.effect}`" not in page] == []
     for said in (
-        f"| lies outside the model | at least {candidate_tests.WEAK:.0e} ",
-        f"| significant | p times candidates tried below {100 * acceptance.FAMILY_ERROR:g} % |",
-        f"| gain on data not fitted to | at least {100 * acceptance.LEAST_GAIN:g} % ",
-        f"| helps in | at least {100 * acceptance.LEAST_VOTES:g} % ",
-        f"At most {MOST_EFFECTS} effects",
-        f"at least {100 * confounding.LEAST_SHARE:g} % of what it removes",
+        f"| lies outside the model | at least {CRITERIA.least_outside:.0e} ",
+        f"| significant | p times candidates tried below {100 * CRITERIA.family_error:g} % |",
+        f"| gain on data not fitted to | at least {100 * CRITERIA.least_gain:g} % ",
+        f"| helps in | at least {100 * CRITERIA.least_votes:g} % ",
+        f"At most {CRITERIA.most_effects} effects",
+        f"at least {100 * CRITERIA.least_share:g} % of what it removes",
     ):
         assert said in " ".join(page.split()), said
-    assert confounding.STANDARD_ERRORS == 2.0
+    assert CRITERIA.alike == 2.0

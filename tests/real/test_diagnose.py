@@ -59,8 +59,8 @@ def test_emps_friction_differs_by_direction():
         read_recordings([shared_path("data", "emps", "validation_pulses.parquet")], robot),
     )
 
-    def relative(estimate, evidence) -> float:
-        error = estimate.errors(evidence[0])[0]
+    def relative(estimate, observations) -> float:
+        (error,) = estimate.errors(observations.each[0])
         return error.relative
 
     assert "asymmetric_friction" in {effect.effect for effect in result.effects}

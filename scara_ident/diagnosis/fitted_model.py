@@ -1,0 +1,177 @@
+"""A model fitted to rows, and the products of columns tried beside it, block of time by block of time.
+
+The model's columns are made orthonormal by the triangular factor of all rows, Z; a candidate's columns C leave
+``X = C - Z S`` with ``S = Z' C``, and the torque leaves ``e``. Every statistic follows from the small products ``X' X`` and
+``X' e`` of each block, which need no row of X: ``X_b' X_b = C_b' C_b - C_b' Z_b S - S' Z_b' C_b + S' Z_b' Z_b S``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.diagnosis.candidates import Rows
+from scara_ident.estimation.information import orthonormal, weighted
+from scara_ident.estimation.observations import JointRows
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FittedModel:
+    """A model fitted to the rows that candidates are tried beside.
+
+    Attributes
+    ----------
+    joints : tuple of JointRows
+        Rows of the model with the effects in it; blocks without any row are left out.
+    parameters : int
+        Columns of the model.
+    owner, fold : ndarray of int, shape (blocks,)
+        Recording and fold of each block.
+    weights : ndarray, shape (n,)
+        Weight of each joint's rows.
+    """
+
+    joints: tuple[JointRows, ...]
+    parameters: int
+    owner: NDArray[np.intp]
+    fold: NDArray[np.intp]
+    weights: Array
+
+    @cached_property
+    def root(self) -> Array:
+        """Sums of columns that are orthonormal on all weighted rows, shape (m, r)."""
+        whole = weighted([rows.information(self.parameters) for rows in self.joints], self.weights)
+        return orthonormal(whole.regressor_factor)
+
+    @cached_property
+    def basis(self) -> tuple[Array, ...]:
+        """The orthonormal columns on each joint's weighted rows, shape (r, N)."""
+        return tuple(
+            weight * (self.root[rows.columns].T @ rows.table[:-1])
+            for rows, weight in zip(self.joints, self.weights, strict=True)
+        )
+
+    @cached_property
+    def projected(self) -> Array:
+        """The torque in the orthonormal columns, shape (r,)."""
+        parts = zip(self.joints, self.basis, self.weights, strict=True)
+        return np.asarray(np.sum([weight * (basis @ rows.table[-1]) for rows, basis, weight in parts], axis=0))
+
+    @cached_property
+    def residual(self) -> tuple[Array, ...]:
+        """Weighted residual of each joint's rows, shape (N,)."""
+        return tuple(
+            weight * rows.table[-1] - self.projected @ basis
+            for rows, basis, weight in zip(self.joints, self.basis, self.weights, strict=True)
+        )
+
+    @cached_property
+    def in_blocks(self) -> tuple[NDArray[np.intp], ...]:
+        """Rows of each joint by block, shape (blocks, m); where a block has fewer, the number of all rows."""
+        found = []
+        for rows in self.joints:
+            sizes = np.diff(rows.starts)
+            place = np.arange(int(sizes.max(initial=1)))
+            found.append(np.where(place < sizes[:, None], rows.starts[:-1, None] + place, rows.table.shape[1]))
+        return tuple(found)
+
+    @cached_property
+    def basis_blocks(self) -> tuple[Array, ...]:
+        """The orthonormal columns by block, shape (blocks, m, r), zero where a block has no row."""
+        return tuple(
+            np.ascontiguousarray(_by_block(basis, places).transpose(0, 2, 1))
+            for basis, places in zip(self.basis, self.in_blocks, strict=True)
+        )
+
+    @cached_property
+    def squares(self) -> Array:
+        """Weighted squared residual of every block, shape (blocks,)."""
+        parts = zip(self.residual, self.in_blocks, strict=True)
+        return np.asarray(np.sum([np.sum(_by_block(error, places) ** 2, axis=-1) for error, places in parts], axis=0))
+
+    @cached_property
+    def basis_products(self) -> Array:
+        """Products of the orthonormal columns in every block, shape (blocks, r, r)."""
+        return np.asarray(np.sum([basis.transpose(0, 2, 1) @ basis for basis in self.basis_blocks], axis=0))
+
+    @cached_property
+    def basis_scores(self) -> Array:
+        """Products of the orthonormal columns with the residual in every block, shape (blocks, r)."""
+        parts = zip(self.basis_blocks, self.residual, self.in_blocks, strict=True)
+        found = [np.einsum("bmr,bm->br", basis, _by_block(error, places)) for basis, error, places in parts]
+        return np.asarray(np.sum(found, axis=0))
+
+    @property
+    def folds(self) -> int:
+        """Number of folds."""
+        return int(self.fold.max(initial=-1)) + 1
+
+
+def _by_block(signals: Array, places: NDArray[np.intp]) -> Array:
+    """Return signals, shape (..., N), by block: (blocks, ..., m), zero where a block has no row."""
+    padded = np.concatenate([signals, np.zeros((*signals.shape[:-1], 1))], axis=-1)
+    found = padded[..., places]
+    return found if signals.ndim == 1 else np.moveaxis(found, -2, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Of g candidates with k columns each, block by block.
+
+    Attributes
+    ----------
+    sums : ndarray, shape (g, k, r)
+        Their columns in the orthonormal ones of the model.
+    sizes : ndarray, shape (g, k)
+        Weighted squares of their columns.
+    columns : ndarray, shape (g, blocks, k, k)
+        Products of what lies outside the model.
+    scores : ndarray, shape (g, blocks, k)
+        Products of that with the residual.
+    """
+
+    sums: Array
+    sizes: Array
+    columns: Array
+    scores: Array
+
+
+def products_of(model: FittedModel, candidates: Sequence[Rows]) -> Products:
+    """Return the products of candidates, which have as many columns each, beside a model.
+
+    Parameters
+    ----------
+    model : FittedModel
+    candidates : sequence of mapping of int to ndarray, shape (k, N)
+        Columns of each on the rows of every joint that it acts on.
+    """
+    g, k = len(candidates), len(next(iter(candidates[0].values())))
+    blocks, r = len(model.owner), model.root.shape[1]
+    inner, outer = np.zeros((blocks, g, k, k)), np.zeros((blocks, g, k, r))
+    scores = np.zeros((blocks, g, k))
+    for j, (places, weight) in enumerate(zip(model.in_blocks, model.weights, strict=True)):
+        own = [i for i, candidate in enumerate(candidates) if j in candidate]
+        if not own:
+            continue
+        columns = weight * np.concatenate([candidates[i][j] for i in own])
+        part = np.ascontiguousarray(_by_block(columns, places))
+        each = part.reshape(blocks, len(own), k, -1)
+        inner[:, own] += each @ each.transpose(0, 1, 3, 2)
+        outer[:, own] += (part @ model.basis_blocks[j]).reshape(blocks, len(own), k, r)
+        error = _by_block(model.residual[j], places)
+        scores[:, own] += (part @ error[:, :, None]).reshape(blocks, len(own), k)
+    sums = np.sum(outer, axis=0)
+    # S' (Z_b' Z_b S / 2 - Z_b' C_b) and its transpose are what the model takes from the products.
+    half = 0.5 * (sums.reshape(g * k, r) @ model.basis_products).reshape(blocks, g, k, r) - outer
+    change = half @ sums.transpose(0, 2, 1)
+    inner += change + change.transpose(0, 1, 3, 2)
+    scores -= (model.basis_scores @ sums.reshape(g * k, r).T).reshape(blocks, g, k)
+    outside = np.diagonal(np.sum(inner, axis=0), axis1=1, axis2=2)
+    sizes = np.sum(sums**2, axis=2) + outside
+    return Products(sums, sizes, inner.transpose(1, 0, 2, 3), scores.transpose(1, 0, 2))

@@ -1,0 +1,167 @@
+"""Candidates tried beside a model: what is judged, refined, left out, and on which folds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.selection_step import (
+    PARTS,
+    best_of_each,
+    folds_of,
+    model_with,
+    observed_at_every_sample,
+)
+from scara_ident.diagnosis.selection_step import observed as observed_with
+from scara_ident.effects import Member
+from scara_ident.effects.friction import Stribeck
+from scara_ident.effects.gear import TransmissionLoss
+from scara_ident.effects.position import Spring
+from scara_ident.estimation import wls
+from scara_ident.estimation.information import weighted
+from scara_ident.estimation.observations import observe
+from scara_ident.motion.prepared import prepare
+from tests.diagnosis.made import BANDS, exact_runs, observed, step_beside, with_torque
+
+VELOCITY = 0.43
+CHOSEN = (Candidate(Spring(), Member(0)), Candidate(TransmissionLoss(), Member(1, (0.1,))))
+
+
+def spring_runs():
+    return with_torque(exact_runs(), 1, lambda motion: 0.05 * motion.q[1])
+
+
+def test_refinement_finds_a_nonlinear_parameter_between_scan_points():
+    runs = with_torque(
+        exact_runs(), 0, lambda motion: 0.08 * np.sign(motion.v[0]) * np.exp(-((motion.v[0] / VELOCITY) ** 2))
+    )
+    step = step_beside(runs)
+    nearest = min(Stribeck().members(step.scene), key=lambda member: abs(np.log(member.nonlinear[0] / VELOCITY)))
+    (leader,) = step.judge([Candidate(Stribeck(), replace(nearest, joint=0))])
+    # The other joint's scan is all but the same; the next scan point is one of the own joint's.
+    assert step.scene.speed[0] == pytest.approx(step.scene.speed[1], rel=1e-3)
+    (fine,) = step.refine([leader])
+    assert fine.examination.gain > 2.0 * leader.examination.gain
+    assert fine.candidate.member.nonlinear[0] == pytest.approx(VELOCITY, rel=0.1)
+    assert fine.candidate.member.joint == 0
+
+
+def test_several_are_refined_as_each_alone():
+    step = step_beside(exact_runs())
+    leaders = step.judge(
+        [Candidate(Stribeck(), Member(0, (0.1,))), CHOSEN[0], Candidate(Stribeck(), Member(1, (0.3,)))]
+    )
+    together = step.refine(leaders)
+    alone = [step.refine([leader])[0] for leader in leaders]
+    assert [item.candidate for item in together] == [item.candidate for item in alone]
+    # Without nonlinear parameters there is nothing to refine.
+    assert together[1] is leaders[1]
+
+
+def test_the_best_of_each_prefers_what_may_come_in():
+    step = step_beside(spring_runs())
+    decisions = step.judge([Candidate(Stribeck(), Member(1, (x,))) for x in (0.1, 0.5)])
+    decisions += step.judge([Candidate(Spring(), Member(j)) for j in range(2)])
+    best = best_of_each(decisions)
+    assert set(best) == {"stribeck of joint2", "spring of joint1", "spring of joint2"}
+    assert best["spring of joint2"].accepted
+    assert not best["spring of joint1"].accepted
+    assert best["stribeck of joint2"].gain == max(item.gain for item in decisions[:2])
+    poor = replace(best["spring of joint2"], gain=-1.0)
+    assert best_of_each([replace(poor, accepted=False, gain=1.0), poor])[poor.label] is poor
+
+
+def test_nothing_to_judge_gives_no_decision():
+    step = step_beside(exact_runs())
+    assert step.judge([]) == []
+    assert step.refine([]) == []
+    assert model_with(step.scene, []) is step.scene.model
+
+
+def test_what_is_in_the_model_already_is_absorbed_and_without_it_is_not():
+    step = step_beside(spring_runs(), CHOSEN)
+    (beside,) = step.judge([CHOSEN[1]])
+    assert not beside.accepted
+    assert "absorbs" in beside.why
+    rest = step.without(0)
+    assert rest.chosen == CHOSEN[1:]
+    assert step.without(1).chosen == CHOSEN[:1]
+    (apart,) = step.without(1).judge([CHOSEN[1]])
+    assert apart.examination.outside > 1e-4
+
+
+def test_what_a_candidate_removes_is_the_difference_of_the_two_models():
+    step = step_beside(spring_runs(), CHOSEN[:1])
+    candidate = Candidate(Spring(), Member(1))
+    (decision,) = step.judge([candidate])
+    both = replace(step, chosen=(*step.chosen, candidate))
+    before, after = (np.sum(item.model.squares) for item in (step, both))
+    assert decision.examination.gain == pytest.approx(1.0 - after / before, rel=1e-9)
+    assert_allclose(decision.examination.left, both.model.squares, rtol=1e-8)
+
+
+def test_the_fitted_model_is_the_weighted_fit_of_the_model_with_effects_as_terms():
+    step = step_beside(spring_runs(), CHOSEN)
+    wide = observe(model_with(step.scene, CHOSEN), step.observations.data)
+    assert step.model.parameters == wide.parameters
+    whole = weighted(wide.by_joint, step.weights)
+    assert np.sum(step.model.squares) == pytest.approx(whole.residual_sum(), rel=1e-9)
+    for one, other in zip(step.model.joints, wide.joints, strict=True):
+        assert_allclose(one.table, other.table, rtol=0, atol=1e-9)
+
+
+def test_weights_of_the_fit_make_joints_equal():
+    step = step_beside(exact_runs())
+    power = [np.mean(residual**2) for residual in step.model.residual]
+    assert power[0] == pytest.approx(power[1], rel=0.02)
+    plain = [np.mean((residual / w) ** 2) for residual, w in zip(step.model.residual, step.weights, strict=True)]
+    assert plain[0] > 3.0 * plain[1]
+
+
+def test_observations_with_effects_are_those_of_the_model_that_has_them():
+    step = step_beside(exact_runs()[:2], CHOSEN)
+    wide = observe(model_with(step.scene, CHOSEN), step.observations.data)
+    found = observed_at_every_sample(step)
+    assert found.model.names == wide.model.names
+    assert_allclose(wls(found).value, wls(wide).value, rtol=1e-9)
+    assert_allclose(wls(observed_with(step)).value, wls(wide).value, rtol=1e-9)
+    value = wls(wide).value
+    assert_allclose(found.unfiltered_rms(value), wide.unfiltered_rms(value), rtol=1e-9)
+    for one, other in zip(found.predicted(value), wide.predicted(value), strict=True):
+        assert_allclose(one, other, rtol=0, atol=1e-12)
+
+
+def test_trajectories_are_the_folds():
+    seen = observed(exact_runs())
+    assert_array_equal(np.unique(seen.owner), range(4))
+    assert np.all(np.diff(seen.owner) >= 0)
+    assert_array_equal(folds_of(seen.data, seen.owner), seen.owner // 2)
+
+
+def test_parts_of_the_only_trajectory_are_its_folds():
+    seen = observed(exact_runs()[:1])
+    fold = folds_of(seen.data, seen.owner)
+    assert_array_equal(np.unique(fold), range(PARTS))
+    assert np.all(np.diff(fold) >= 0)
+    assert np.ptp(np.bincount(fold)) <= 1
+    # Fewer blocks than parts leave parts empty, not folds out of range.
+    assert folds_of(seen.data, seen.owner[:2]).max() < PARTS
+
+
+def test_blocks_without_any_row_are_left_out():
+    first, second = exact_runs()[:2]
+    position = first.position.copy()
+    position[:, 1000:1600] = position[:, 1000:1001]
+    position[:, 1600:] += position[:, 1000:1001] - position[:, 1600:1601]
+    seen = observe(observed([second]).model, prepare([replace(first, position=position), second], BANDS))
+    rows = sum(np.diff(joint.starts) for joint in seen.joints)
+    assert np.any(rows == 0)
+    step = step_beside([replace(first, position=position), second])
+    assert len(step.model.owner) == np.count_nonzero(rows)
+    assert all(len(joint.starts) == np.count_nonzero(rows) + 1 for joint in step.model.joints)
+    assert [joint.table.shape for joint in step.model.joints] == [joint.table.shape for joint in seen.joints]
+    assert_allclose(np.sum(step.model.squares), weighted(seen.by_joint, step.weights).residual_sum(), rtol=1e-9)
