@@ -230,8 +230,7 @@ def test_what_the_audits_found_is_noted(robot: Robot, clean: Recording):
 def test_progress_names_the_steps(robot: Robot, clean: Recording):
     steps: list[str] = []
     identify(robot, [clean], progress=steps.append)
-    assert steps[:3] == ["choosing the bands", "absorbing the recordings", "estimating"]
-    assert steps[3:] == ["checking whether such an arm can exist"]
+    assert steps == ["choosing the bands", "absorbing the recordings", "estimating"]
 
 
 def test_a_recording_cannot_be_fitted_and_held_out(robot: Robot, clean: Recording, tmp_path: Path):

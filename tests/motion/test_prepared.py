@@ -13,6 +13,7 @@ import scara_ident.motion.motion
 import scara_ident.motion.prepared
 from scara_ident.errors import RecordingError
 from scara_ident.identification.identify import identify
+from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import low_pass, stretches
 from scara_ident.motion.prepared import (
     BLOCK_SECONDS,
@@ -200,7 +201,7 @@ def test_another_torque_on_the_same_motion(run: Recording):
 
 @pytest.fixture
 def counted(monkeypatch: pytest.MonkeyPatch) -> Counter:
-    """How often recordings are cut, and how often each joint is differentiated at each cut-off."""
+    """How often recordings are cut, each joint is differentiated at each cut-off, and a motion becomes columns."""
     count: Counter = Counter()
     differentiate = scara_ident.motion.motion.differentiate
 
@@ -212,6 +213,13 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter:
         count[signal.ctypes.data, cut] += 1
         return differentiate(signal, rate, cut)
 
+    joint_columns = TorqueModel.joint_columns
+
+    def columns(model, motion):
+        count[motion] += 1
+        return joint_columns(model, motion)
+
+    monkeypatch.setattr(TorqueModel, "joint_columns", columns)
     monkeypatch.setattr(scara_ident.motion.prepared, "stretches", cut)
     monkeypatch.setattr(scara_ident.motion.motion, "differentiate", filtered)
     return count
@@ -226,9 +234,7 @@ def test_other_bands_share_what_does_not_depend_on_them(counted: Counter, run: R
     assert len(counted) == 1 + 2 + 2
 
 
-def test_an_identification_cuts_each_recording_once_and_filters_each_joint_once_per_cut_off(
-    counted: Counter, robot: Robot
-):
+def test_an_identification_makes_stretches_once_and_motion_and_columns_once_per_cut_off(counted: Counter, robot: Robot):
     names = ("a_1", "a_2", "b_1")
     runs = [swing(robot, name, seed) for seed, name in enumerate(names)]
     held_out = swing(robot, "c_1", 9)
