@@ -22,7 +22,7 @@ from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
-from scara_ident.motion.prepared import PreparedData, PreparedRecording
+from scara_ident.motion.prepared import PreparedData
 
 Array = NDArray[np.float64]
 
@@ -247,14 +247,9 @@ def columns_at_hand(observations: Observations) -> dict[Motion, tuple[Array, ...
 
 def corrected(data: PreparedData, candidate: Candidate, value: Array) -> PreparedData:
     """Return recordings without an effect that is taken out of them."""
-
-    def mended(item: PreparedRecording) -> PreparedRecording:
-        effect, member = candidate.effect, candidate.member
-        return item.with_torque(
-            [effect.corrected_torque(part.torque, part.rate, member, value) for part in item.stretches]
-        )
-
-    return replace(data, recordings=tuple(mended(item) for item in data.recordings))
+    effect, member = candidate.effect, candidate.member
+    mended = (item.with_effort_of(effect.corrected(item.recording, member, value)) for item in data.recordings)
+    return replace(data, recordings=tuple(mended))
 
 
 def _choose(step: SelectionStep, decisions: Sequence[Decision]) -> Decision | None:

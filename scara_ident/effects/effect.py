@@ -232,10 +232,6 @@ class Effect(ABC):
         """Return a recording without the effect."""
         return recording
 
-    def corrected_torque(self, torque: Array, rate: float, member: Member, value: Array) -> Array:
-        """Return uniform samples of torque, shape (n, N), without the effect."""
-        return torque
-
     def settled(self, value: Array) -> bool:
         """Whether a further correction of the data is too small to be made."""
         return True

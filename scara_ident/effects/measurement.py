@@ -141,13 +141,6 @@ class TimeDelay(Effect):
         """Return a recording whose effort is moved back."""
         return shifted(recording, float(value[0]), None if member.joint is None else [member.joint])
 
-    def corrected_torque(self, torque: Array, rate: float, member: Member, value: Array) -> Array:
-        """Return uniform samples of torque, shape (n, N), moved back."""
-        rows = slice(None) if member.joint is None else slice(member.joint, member.joint + 1)
-        result = torque.copy()
-        result[rows] = shifted_signal(torque[rows], rate, float(value[0]))
-        return result
-
     def settled(self, value: Array) -> bool:
         """Whether the delay is below `DELAY_STEP`."""
         return abs(float(value[0])) < DELAY_STEP
@@ -164,33 +157,11 @@ class TimeDelay(Effect):
         )
 
 
-def shifted_signal(torque: Array, rate: float, delay: float) -> Array:
-    """Return a uniform signal moved back by a delay: at t what it was at t + delay.
-
-    The signal is shifted in the frequency domain, after odd reflection at its ends, and so loses nothing at any
-    frequency.
-
-    Parameters
-    ----------
-    torque : ndarray, shape (k, N)
-        N at least 4.
-    rate : float
-        Samples per second.
-    delay : float
-        s, positive where the signal is late.
-
-    Returns
-    -------
-    ndarray, shape (k, N)
-    """
-    return _advanced(torque, delay * rate)
-
-
 def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = None) -> Recording:
     """Return a recording whose effort is moved back by a delay: the effort at t is that recorded at t + delay.
 
-    Uniform stretches are moved by `shifted_signal`; jittered ones are interpolated by a cubic spline. Nothing is moved
-    across gaps.
+    Uniform stretches are shifted in the frequency domain, after odd reflection at their ends, and so lose nothing at
+    any frequency; jittered ones are interpolated by a cubic spline. Nothing is moved across gaps.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ the same step, exactly.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -93,6 +93,8 @@ class Stretch:
     torque : ndarray, shape (n, N) or None
     rate : float
         Samples per second.
+    source : slice
+        Samples of the recording that it was made of.
     """
 
     name: str
@@ -101,6 +103,7 @@ class Stretch:
     position: Array
     torque: Array | None
     rate: float
+    source: slice
     _filtered: dict[tuple[int, float | None], tuple[Array, Array, Array]] = field(default_factory=dict, repr=False)
 
     def filtered(self, joint: int, cut: float | None) -> tuple[Array, Array, Array]:
@@ -154,9 +157,8 @@ def _cut_long(bounds: Sequence[int]) -> list[int]:
 
 
 def _uniform(recording: Recording, start: int, stop: int, median: float) -> Stretch:
-    time = recording.time[start:stop]
-    position = recording.position[:, start:stop]
-    torque = None if recording.effort is None else recording.effort[:, start:stop]
+    source = slice(start, stop)
+    time, position = recording.time[source], recording.position[:, source]
     count = len(time)
     ideal = time[0] + (time[-1] - time[0]) / (count - 1) * np.arange(count)
     if np.max(np.abs(time - ideal)) > UNIFORM_TOLERANCE * median:
@@ -166,9 +168,25 @@ def _uniform(recording: Recording, start: int, stop: int, median: float) -> Stre
         steps = int(np.sum(np.maximum(np.rint(np.diff(time) / median), 1.0)))
         ideal = np.linspace(time[0], time[-1], steps + 1)
         position = CubicSpline(time, position, axis=1)(ideal)
-        torque = None if torque is None else np.array([np.interp(ideal, time, row) for row in torque])
     rate = (len(ideal) - 1) / (ideal[-1] - ideal[0])
-    return Stretch(recording.name, recording.trajectory, ideal, position, torque, float(rate))
+    torque = _torque_at(recording, source, ideal, median)
+    return Stretch(recording.name, recording.trajectory, ideal, position, torque, float(rate), source)
+
+
+def _torque_at(recording: Recording, source: slice, grid: Array, median: float) -> Array | None:
+    """Return the effort of a part of a recording on a uniform grid, as it is where the samples lie on it."""
+    if recording.effort is None:
+        return None
+    time, effort = recording.time[source], recording.effort[:, source]
+    if len(time) == len(grid) and np.max(np.abs(time - grid)) <= UNIFORM_TOLERANCE * median:
+        return effort
+    return np.array([np.interp(grid, time, row) for row in effort])
+
+
+def with_effort_of(stretch: Stretch, recording: Recording) -> Stretch:
+    """Return a stretch with the effort of another recording of the same samples; the motion is shared."""
+    median = float(np.median(np.diff(recording.time)))
+    return replace(stretch, torque=_torque_at(recording, stretch.source, stretch.time, median))
 
 
 def torque_of(stretch: Stretch) -> Array:

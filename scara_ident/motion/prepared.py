@@ -23,6 +23,7 @@ from scara_ident.motion.motion import (
     motion_of,
     stretches,
     torque_of,
+    with_effort_of,
 )
 from scara_ident.recording.recording import Recording
 
@@ -210,12 +211,11 @@ class PreparedRecording:
             return self
         return replace(self, stretches=tuple(PreparedStretch(part.stretch, tuple(bands)) for part in self.stretches))
 
-    def with_torque(self, torques: Sequence[Array]) -> PreparedRecording:
-        """Return it with other torques, one array (n, N) per stretch; the motion is shared."""
-        moved = zip(self.stretches, torques, strict=True)
-        return replace(
-            self,
-            stretches=tuple(PreparedStretch(replace(part.stretch, torque=row), part.bands) for part, row in moved),
+    def with_effort_of(self, recording: Recording) -> PreparedRecording:
+        """Return it with the effort of another recording of the same samples; the motion is shared."""
+        return PreparedRecording(
+            recording,
+            tuple(PreparedStretch(with_effort_of(part.stretch, recording), part.bands) for part in self.stretches),
         )
 
 

@@ -190,7 +190,7 @@ def test_a_torque_is_needed_only_where_it_is_asked_for(run: Recording):
 def test_another_torque_on_the_same_motion(run: Recording):
     (item,) = prepare([run], BANDS).recordings
     (before,) = item.stretches
-    other = item.with_torque([2.0 * before.torque])
+    other = item.with_effort_of(replace(item.recording, effort=2.0 * item.recording.effort))
     (after,) = other.stretches
     assert_allclose(after.smooth_torque, 2.0 * before.smooth_torque)
     assert_array_equal(after.motion.a, before.motion.a)
