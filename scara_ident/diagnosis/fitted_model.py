@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scara_ident.diagnosis.candidates import Rows
 from scara_ident.estimation.information import orthonormal, weighted
 from scara_ident.estimation.observations import JointRows
+from scara_ident.threads import side_by_side
 
 Array = NDArray[np.float64]
 
@@ -151,21 +152,32 @@ def products_of(model: FittedModel, candidates: Sequence[Rows]) -> Products:
     candidates : sequence of mapping of int to ndarray, shape (k, N)
         Columns of each on the rows of every joint that it acts on.
     """
+    # Made here once and not in two threads.
+    _ = model.in_blocks, model.basis_blocks, model.residual
     g, k = len(candidates), len(next(iter(candidates[0].values())))
     blocks, r = len(model.owner), model.root.shape[1]
     inner, outer = np.zeros((blocks, g, k, k)), np.zeros((blocks, g, k, r))
     scores = np.zeros((blocks, g, k))
-    for j, (places, weight) in enumerate(zip(model.in_blocks, model.weights, strict=True)):
-        own = [i for i, candidate in enumerate(candidates) if j in candidate]
+
+    def of_joint(j: int) -> tuple[list[int], Array, Array, Array]:
+        places, own = model.in_blocks[j], [i for i, candidate in enumerate(candidates) if j in candidate]
         if not own:
-            continue
-        columns = weight * np.concatenate([candidates[i][j] for i in own])
+            return own, inner[:, own], outer[:, own], scores[:, own]
+        columns = model.weights[j] * np.concatenate([candidates[i][j] for i in own])
         part = np.ascontiguousarray(_by_block(columns, places))
         each = part.reshape(blocks, len(own), k, -1)
-        inner[:, own] += each @ each.transpose(0, 1, 3, 2)
-        outer[:, own] += (part @ model.basis_blocks[j]).reshape(blocks, len(own), k, r)
         error = _by_block(model.residual[j], places)
-        scores[:, own] += (part @ error[:, :, None]).reshape(blocks, len(own), k)
+        return (
+            own,
+            each @ each.transpose(0, 1, 3, 2),
+            (part @ model.basis_blocks[j]).reshape(blocks, len(own), k, r),
+            (part @ error[:, :, None]).reshape(blocks, len(own), k),
+        )
+
+    for own, columns, sums, score in side_by_side(of_joint, range(len(model.joints))):
+        inner[:, own] += columns
+        outer[:, own] += sums
+        scores[:, own] += score
     sums = np.sum(outer, axis=0)
     # S' (Z_b' Z_b S / 2 - Z_b' C_b) and its transpose are what the model takes from the products.
     half = 0.5 * (sums.reshape(g * k, r) @ model.basis_products).reshape(blocks, g, k, r) - outer

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -360,6 +361,7 @@ def _closed_length(count: int, reach: int, step: int) -> int:
     return step * _fast_length(-(-(lead + count + reach) // step))
 
 
+@lru_cache(maxsize=1024)
 def _fast_length(length: int) -> int:
     """Return the next length whose only prime factors are 2, 3 and 5."""
     best = 1 << (length - 1).bit_length()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
 # Samples at a time where columns are not kept: few enough for the cache.
-CHUNK = 4096
+CHUNK = 8192
 # The SCARA of Indri et al. 2002 and its P_d (equation 2), told by what the reduction finds.
 _SCARA_LEADS = ("I1zz", "mx2", "my2", "I2zz", "Ia2")
 _SCARA_MEANINGS = ("I1z + m2 l1^2 + Jm1/tau1^2", "m2 s2x", "m2 s2y", "I2z", "Jm2/tau2^2")
@@ -59,21 +59,34 @@ class RigidBody(Filled):
     def fill(self, motion: Motion, rows: Sequence[NDArray[np.float64]]) -> None:
         """Write the columns that links and rotors lead."""
         robot = self.robot
-        place = np.cumsum(self.pattern, axis=1) - 1
-        links, rotors = _split(self.base.kept[self.kept], robot.n)
         if self.kernel is not None:
             back = np.argsort(robot.order)
-            inner = np.argwhere(self.kernel.pattern[robot.order])
-            targets = {
-                int(robot.order[joint]) * len(links) + int(k): rows[joint][place[joint, links[k]]] for joint, k in inner
-            }
+            targets = {entry: rows[joint][place] for entry, joint, place in self._targets}
             self.kernel.fill(motion.q[back], motion.v[back], motion.a[back], targets)
-        for column in rotors:
-            joint = int(self.base.kept[self.kept[column]]) - 10 * robot.n
-            rows[joint][place[joint, column]] = motion.a[joint]
+        for joint, place in self._rotors:
+            rows[joint][place] = motion.a[joint]
         for joint, scale in enumerate(robot.row_scale):
             if scale != 1.0:
                 np.multiply(rows[joint], scale, out=rows[joint])
+
+    @cached_property
+    def _targets(self) -> list[tuple[int, int, int]]:
+        """Entry of the kernel, joint, and place among the joint's columns."""
+        if self.kernel is None:
+            return []
+        order, place = self.robot.order, np.cumsum(self.pattern, axis=1) - 1
+        links, _ = _split(self.base.kept[self.kept], self.robot.n)
+        inner = np.argwhere(self.kernel.pattern[order])
+        return [(int(order[j]) * len(links) + int(k), int(j), int(place[j, links[k]])) for j, k in inner]
+
+    @cached_property
+    def _rotors(self) -> list[tuple[int, int]]:
+        """Joint and place among its columns of those that rotors lead."""
+        place = np.cumsum(self.pattern, axis=1) - 1
+        standard = self.base.kept[self.kept]
+        _, rotors = _split(standard, self.robot.n)
+        joints = [int(standard[column]) - 10 * self.robot.n for column in rotors]
+        return [(joint, int(place[joint, column])) for joint, column in zip(joints, rotors, strict=True)]
 
     def torque(self, motion: Motion, value: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the torque of parameters ``value`` (p,) on a motion, shape (n, N), without keeping any column."""
