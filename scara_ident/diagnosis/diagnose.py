@@ -162,14 +162,14 @@ def diagnose(
     base = build_model(robot, model) if isinstance(model, str) else model
     data, held_out = prepare(recordings), prepare(validation)
     notes = data_notes((*data.recordings, *held_out.recordings))
-    given = bands is not None
+    given, known = bands is not None, None
     if bands is None:
         progress("choosing the band")
         choice = choose_bands(base, data)
         # A joint whose model lacks something seems to have less band than it has.
-        bands = (max(choice.bands),) * robot.n
+        bands, known = (max(choice.bands),) * robot.n, choice.observations
         notes += choice.notes
-    observations = observe(base, data.at(bands))
+    observations = observe(base, data.at(bands), known)
     faults = channel_faults(observations)
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))

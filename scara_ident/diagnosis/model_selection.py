@@ -95,11 +95,15 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
     for _ in range(criteria.most_widenings if free else 0):
         if not found.search.chosen:
             break
-        wider = max(choose_bands(found.search.model, found.search.data).bands)
+        choice = choose_bands(found.search.model, found.search.data)
+        wider = max(choice.bands)
         if wider < criteria.wider * _band(found):
             break
         # What was missing had hidden how far up the motion explains the torque, and other effects with it.
-        columns = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands))))
+        # Where the data were corrected, what the band was chosen with holds another torque.
+        known = choice.observations if found.search.correction is None else None
+        known = None if known is None else known.leading(task.model)
+        columns = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands)), known))
         found = _searched(task, columns, ())
     if free and (found.unexplained is not None or not _below_resonance(found, criteria)):
         columns, found = _narrowed(task, data, columns, found)

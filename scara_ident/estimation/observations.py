@@ -93,6 +93,19 @@ class Observations:
     owner: NDArray[np.intp]
     raw: tuple[tuple[Raw, ...], ...]
 
+    def leading(self, model: TorqueModel) -> Observations:
+        """Return the observations of a model whose terms are the first of this one's."""
+        kept = [joint.columns < len(model.columns) for joint in self.joints]
+        joints = (
+            replace(rows, columns=rows.columns[own], table=rows.table[np.append(own, True)])
+            for rows, own in zip(self.joints, kept, strict=True)
+        )
+        raw = tuple(
+            tuple(tuple(rows[own] for rows, own in zip(part, kept, strict=True)) for part in recording)
+            for recording in self.raw
+        )
+        return Observations(model, self.data, tuple(joints), self.owner, raw)
+
     @property
     def parameters(self) -> int:
         """Number of parameters p."""

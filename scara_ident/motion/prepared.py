@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scara_ident.motion.motion import (
     Motion,
     Stretch,
-    differentiate,
     low_pass,
     low_pass_every,
     motion_of,
@@ -342,7 +341,7 @@ def _velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | 
     if band is None:
         # Nothing was filtered; the noise is what a wide filter would take out.
         cut = 0.2 * stretch.rate
-        smooth = differentiate(stretch.position[joint], stretch.rate, cut)[0]
+        smooth = stretch.filtered(joint, cut)[0]
     else:
         smooth = motion.q[joint]
     rest = stretch.position[joint] - smooth

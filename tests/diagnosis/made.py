@@ -8,8 +8,9 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search
@@ -141,3 +142,51 @@ def model_of(columns: Array, torque: Array, recordings: int = 4, block: int = 40
     owner = starts[:-1] * recordings // count
     rows = JointRows(np.arange(columns.shape[1]), np.vstack([columns.T, torque]), starts, np.diff(starts).astype(float))
     return FittedModel((rows,), columns.shape[1], owner, owner, np.ones(1))
+
+
+def uneven_blocks(seed: int) -> tuple[FittedModel, list[Rows]]:
+    """Rows of three joints in blocks of any length, none among them, and candidates on one joint, two and all.
+
+    The model's last column is the sum of two others. Of the last three candidates one is the model's but for a little,
+    one wholly, and one in one of its two columns.
+    """
+    rng = np.random.default_rng(seed)
+    acting = ([0, 1, 3, 5], [1, 2, 3, 5], [2, 4, 5])
+    owner = np.sort(np.concatenate([np.arange(4), rng.integers(0, 4, 32)]))
+    value, carried, size = rng.standard_normal(6), rng.standard_normal(6), 10.0 ** rng.uniform(-3, 3, 7)
+    candidates: list[Rows] = [{} for _ in range(7)]
+    joints = []
+    for j, own in enumerate(acting):
+        counts = rng.integers(0, 30, len(owner))
+        counts[rng.permutation(len(owner))[:9]] = 0
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        columns = np.zeros((6, starts[-1]))
+        columns[own] = lfilter([1.0], [1.0, -0.9], rng.standard_normal((len(own), starts[-1])))
+        columns[5] = columns[1] + columns[2]
+        torque = value @ columns + lfilter([1.0], [1.0, -0.5], rng.standard_normal(starts[-1]))
+        for k, (places, width) in enumerate([([0], 1), ([1, 2], 2), *[(range(3), width) for width in (1, 3, 1, 1, 2)]]):
+            if j in places:
+                other = rng.standard_normal((width, starts[-1]))
+                known = carried @ columns
+                rows = {
+                    4: known + 1e-2 * np.std(known) * other,
+                    5: known[None],
+                    6: np.array([known, other[0]][:width]),
+                }.get(k, other)
+                candidates[k][j] = size[k] * rows
+        joints.append(JointRows(np.array(own), np.vstack([columns[own], torque]), starts, counts.astype(float)))
+    return FittedModel(tuple(joints), 6, owner, owner, rng.uniform(0.3, 3.0, 3)), candidates
+
+
+def dense_rows(model: FittedModel, candidate: Rows) -> tuple[Array, NDArray[np.intp]]:
+    """Weighted rows of all joints, shape (N, m + k + 1): model, candidate, torque; and the block of each."""
+    width = len(next(iter(candidate.values())))
+    dense, block = [], []
+    for j, (rows, weight) in enumerate(zip(model.joints, model.weights, strict=True)):
+        wide = np.zeros((rows.table.shape[1], model.parameters + width + 1))
+        wide[:, rows.columns] = rows.table[:-1].T
+        wide[:, model.parameters : -1] = candidate[j].T if j in candidate else 0.0
+        wide[:, -1] = rows.table[-1]
+        dense.append(weight * wide)
+        block.append(np.repeat(np.arange(len(model.owner)), np.diff(rows.starts)))
+    return np.vstack(dense), np.concatenate(block)

@@ -12,8 +12,7 @@ from scara_ident.diagnosis.candidate_tests import Examination, examine
 from scara_ident.diagnosis.candidates import Rows
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitted_model import FittedModel
-from scara_ident.estimation.observations import JointRows
-from tests.diagnosis.made import model_of
+from tests.diagnosis.made import dense_rows, model_of, uneven_blocks
 
 ROWS = 1600
 
@@ -173,52 +172,10 @@ def test_what_is_left_is_the_residual_of_every_block():
         assert_allclose(left, np.sum(rest.reshape(-1, 40) ** 2, axis=1), rtol=1e-8)
 
 
-def made(seed: int) -> tuple[FittedModel, list[Rows]]:
-    """Rows of three joints in blocks of any length, none among them, and candidates on one joint, two and all.
-
-    The model's last column is the sum of two others. Of the last three candidates one is the model's but for a little,
-    one wholly, and one in one of its two columns.
-    """
-    rng = np.random.default_rng(seed)
-    acting = ([0, 1, 3, 5], [1, 2, 3, 5], [2, 4, 5])
-    owner = np.sort(np.concatenate([np.arange(4), rng.integers(0, 4, 32)]))
-    value, carried, size = rng.standard_normal(6), rng.standard_normal(6), 10.0 ** rng.uniform(-3, 3, 7)
-    candidates: list[Rows] = [{} for _ in range(7)]
-    joints = []
-    for j, own in enumerate(acting):
-        counts = rng.integers(0, 30, len(owner))
-        counts[rng.permutation(len(owner))[:9]] = 0
-        starts = np.concatenate([[0], np.cumsum(counts)])
-        columns = np.zeros((6, starts[-1]))
-        columns[own] = lfilter([1.0], [1.0, -0.9], rng.standard_normal((len(own), starts[-1])))
-        columns[5] = columns[1] + columns[2]
-        torque = value @ columns + lfilter([1.0], [1.0, -0.5], rng.standard_normal(starts[-1]))
-        for k, (places, width) in enumerate([([0], 1), ([1, 2], 2), *[(range(3), width) for width in (1, 3, 1, 1, 2)]]):
-            if j in places:
-                other = rng.standard_normal((width, starts[-1]))
-                known = carried @ columns
-                rows = {
-                    4: known + 1e-2 * np.std(known) * other,
-                    5: known[None],
-                    6: np.array([known, other[0]][:width]),
-                }.get(k, other)
-                candidates[k][j] = size[k] * rows
-        joints.append(JointRows(np.array(own), np.vstack([columns[own], torque]), starts, counts.astype(float)))
-    return FittedModel(tuple(joints), 6, owner, owner, rng.uniform(0.3, 3.0, 3)), candidates
-
-
 def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
     """The same examination from dense rows of all joints, the model projected out of them."""
     width = len(next(iter(candidate.values())))
-    dense, block = [], []
-    for j, (rows, weight) in enumerate(zip(model.joints, model.weights, strict=True)):
-        wide = np.zeros((rows.table.shape[1], model.parameters + width + 1))
-        wide[:, rows.columns] = rows.table[:-1].T
-        wide[:, model.parameters : -1] = candidate[j].T if j in candidate else 0.0
-        wide[:, -1] = rows.table[-1]
-        dense.append(weight * wide)
-        block.append(np.repeat(np.arange(len(model.owner)), np.diff(rows.starts)))
-    rows, place = np.vstack(dense), np.concatenate(block)
+    rows, place = dense_rows(model, candidate)
     own, blocks = rows[:, : model.parameters], len(model.owner)
 
     def beside(target: np.ndarray) -> np.ndarray:
@@ -285,7 +242,7 @@ def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_it_is_what_all_rows_of_all_joints_say(seed: int):
-    model, candidates = made(seed)
+    model, candidates = uneven_blocks(seed)
     assert all(np.any(np.diff(rows.starts) == 0) for rows in model.joints)
     found = examine(model, candidates)
     assert [item.outside < CRITERIA.absorbed for item in found] == [False] * 5 + [True, False]
@@ -316,7 +273,7 @@ def test_it_is_what_all_rows_of_all_joints_say(seed: int):
 
 def test_candidates_are_examined_alike_alone_and_in_company():
     """More of them than have their products made together."""
-    model, candidates = made(0)
+    model, candidates = uneven_blocks(0)
     company = examine(model, candidates * 30)
     for place in (0, 100, 200):
         (alone,) = examine(model, [(candidates * 30)[place]])

@@ -16,6 +16,7 @@ from scara_ident.effects.friction import AsymmetricFriction, FrictionCoupling
 from scara_ident.effects.periodic import Vibration
 from scara_ident.effects.presliding import Presliding
 from scara_ident.estimation.bands import choose_bands
+from scara_ident.estimation.observations import observe
 from scara_ident.motion.prepared import prepare
 from tests.diagnosis.made import complete, searched, virtual_runs
 
@@ -23,7 +24,7 @@ MODEL = complete()
 
 
 def selected(runs, *catalogue, bands, free: bool) -> Outcome:
-    return select_model(SearchTask(MODEL, catalogue or CATALOGUE), prepare(runs, bands), free=free)
+    return select_model(SearchTask(MODEL, catalogue or CATALOGUE), observe(MODEL, prepare(runs, bands)), free=free)
 
 
 def found(outcome) -> set[str]:

@@ -303,3 +303,33 @@ def test_no_recordings_are_no_rows(model: TorqueModel):
     assert (nothing.blocks, nothing.samples, nothing.each) == (0, 0, ())
     assert all(information.rows == 0.0 for information in nothing.by_joint)
     assert np.isnan(nothing.unfiltered_rms(np.zeros(nothing.parameters))).all()
+
+
+def test_recordings_that_are_known_in_the_bands_are_not_observed_again(
+    model: TorqueModel, one: Recording, monkeypatch: pytest.MonkeyPatch
+):
+    other = swing(model.robot, "swing_2", 1)
+    known, whole = seen(model, one), seen(model, one, other)
+    made = []
+    columns = TorqueModel.joint_columns
+    monkeypatch.setattr(TorqueModel, "joint_columns", lambda *given: made.append(given[1].name) or columns(*given))
+    found = observe(model, prepare([one, other], BANDS), known)
+    assert made == ["swing_2"]
+    for one_joint, other_joint in zip(found.joints, whole.joints, strict=True):
+        assert_array_equal(one_joint.table, other_joint.table)
+    # In other bands nothing is known.
+    observe(model, prepare([one], (5.0, 5.0)), known)
+    assert made[1:] == [one.name]
+
+
+def test_the_first_terms_alone_are_the_model_of_them(model: TorqueModel, one: Recording):
+    first = TorqueModel("first", model.robot, model.terms[:2])
+    found, wanted = seen(model, one).leading(first), seen(first, one)
+    assert found.parameters == len(first.columns) < len(model.columns)
+    for part, whole in zip(found.joints, wanted.joints, strict=True):
+        assert_array_equal(part.columns, whole.columns)
+        assert_allclose(part.table, whole.table, rtol=0, atol=1e-12 * np.max(np.abs(whole.table)))
+        assert_array_equal(part.starts, whole.starts)
+    value = np.linspace(0.1, 1.0, found.parameters)
+    for part, whole in zip(found.predicted(value), wanted.predicted(value), strict=True):
+        assert_allclose(part, whole, rtol=0, atol=1e-12)

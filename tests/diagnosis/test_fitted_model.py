@@ -1,0 +1,80 @@
+"""A fitted model and the products of candidates beside it, against dense rows with the model projected out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from scara_ident.diagnosis.fitted_model import FittedModel, products_of
+from tests.diagnosis.made import dense_rows, uneven_blocks
+
+
+def by_block(values: np.ndarray, place: np.ndarray, blocks: int) -> np.ndarray:
+    return np.array([np.sum(values[place == b], axis=0) for b in range(blocks)])
+
+
+def outer(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return one[:, :, None] * other[:, None, :]
+
+
+def basis_of(model: FittedModel) -> np.ndarray:
+    return np.concatenate(model.basis, axis=1).T
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_its_basis_is_orthonormal_and_spans_what_its_columns_do(seed: int):
+    model, candidates = uneven_blocks(seed)
+    own = dense_rows(model, candidates[0])[0][:, : model.parameters]
+    basis = basis_of(model)
+    # One column is the sum of two others.
+    assert basis.shape[1] == model.parameters - 1
+    assert_allclose(basis.T @ basis, np.eye(basis.shape[1]), rtol=0, atol=1e-12)
+    assert_allclose(basis @ (basis.T @ own), own, rtol=0, atol=1e-10 * np.max(np.abs(own)))
+    assert_allclose(own @ model.root, basis, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_its_residual_and_products_are_those_of_dense_rows(seed: int):
+    model, candidates = uneven_blocks(seed)
+    rows, place = dense_rows(model, candidates[0])
+    blocks, basis, own, torque = len(model.owner), basis_of(model), rows[:, : model.parameters], rows[:, -1]
+    left = torque - own @ np.linalg.lstsq(own, torque, rcond=1e-12)[0]
+    assert_allclose(np.concatenate(model.residual), left, rtol=0, atol=1e-10 * np.max(np.abs(torque)))
+    assert_allclose(model.projected, basis.T @ torque, rtol=1e-10)
+    assert_allclose(model.squares, by_block(left**2, place, blocks), rtol=1e-9, atol=1e-12)
+    assert_allclose(model.basis_products, by_block(outer(basis, basis), place, blocks), rtol=0, atol=1e-12)
+    assert_allclose(model.basis_scores, by_block(basis * left[:, None], place, blocks), rtol=0, atol=1e-9)
+    assert model.folds == 4
+
+
+@pytest.mark.parametrize("chosen", [(0,), (1,), (2, 4, 5), (3,), (6, 6)])
+def test_products_of_candidates_are_those_of_what_lies_outside_the_model(chosen: tuple[int, ...]):
+    model, candidates = uneven_blocks(1)
+    found = products_of(model, [candidates[k] for k in chosen])
+    basis, blocks = basis_of(model), len(model.owner)
+    for place_of, k in enumerate(chosen):
+        rows, place = dense_rows(model, candidates[k])
+        columns = rows[:, model.parameters : -1]
+        beside = columns - basis @ (basis.T @ columns)
+        size = np.sum(columns**2, axis=0)
+        unit = np.sqrt(np.outer(size, size))
+        assert_allclose(found.sizes[place_of], size, rtol=1e-10)
+        assert_allclose(found.sums[place_of], columns.T @ basis, rtol=0, atol=1e-12 * np.sqrt(np.max(size)))
+        wanted = by_block(outer(beside, beside), place, blocks)
+        assert_allclose(found.columns[place_of] / unit, wanted / unit, rtol=0, atol=1e-13)
+        scores = by_block(beside * np.concatenate(model.residual)[:, None], place, blocks)
+        assert_allclose(found.scores[place_of] / np.sqrt(size), scores / np.sqrt(size), rtol=0, atol=1e-10)
+
+
+def test_a_block_without_a_row_of_a_joint_adds_nothing():
+    model, candidates = uneven_blocks(2)
+    found = products_of(model, [candidates[0]])
+    empty = np.diff(model.joints[0].starts) == 0
+    assert np.any(empty)
+    assert not np.any(model.basis_blocks[0][empty])
+    # The candidate acts on the first joint only: what is left of it elsewhere is the model's answer to it.
+    _, place = dense_rows(model, candidates[0])
+    answer = basis_of(model) @ found.sums[0].T
+    wanted = by_block(answer[:, 0] ** 2, place, len(model.owner))[empty]
+    assert_allclose(found.columns[0, empty, 0, 0], wanted, rtol=1e-9, atol=1e-12 * found.sizes[0, 0])
