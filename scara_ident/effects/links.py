@@ -26,6 +26,9 @@ SPEED_STEP = 1e-4
 
 _SHARED: WeakKeyDictionary[Signals | Scene, dict[Hashable, Array]] = WeakKeyDictionary()
 
+# Of each motion and joint the estimate that slopes were taken at, and the slopes.
+_SLOPES: WeakKeyDictionary[Motion, dict[int, tuple[Array, tuple[Array, Array, Array]]]] = WeakKeyDictionary()
+
 
 def shared(owner: Signals | Scene, key: Hashable, make: Callable[[], Array]) -> Array:
     """Return what several members of a family need of one stretch of motion, or of a scene, made once."""
@@ -131,10 +134,13 @@ def rigid_torque(scene: Scene, motion: Motion, q: Array, v: Array, a: Array) -> 
 
 
 def rigid_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
-    """Return the derivatives of all rigid-body torques by one joint's position, velocity and acceleration, each (n, N)."""
+    """Return the derivatives of all rigid-body torques by one joint's position, velocity and acceleration, each (n, N).
 
-    def make() -> Array:
-        scene, motion = signals.scene, signals.motion
+    Kept for the last estimate of the base model's parameters: they take more time than what is made of them.
+    """
+    scene, motion = signals.scene, signals.motion
+    held = _SLOPES.setdefault(motion, {})
+    if joint not in held or held[joint][0] is not scene.value:
         state = (motion.q, motion.v, motion.a)
         steps = (POSITION_STEP, SPEED_STEP * max(float(np.max(np.abs(motion.v))), 1.0))
         found = []
@@ -146,11 +152,9 @@ def rigid_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
         # Torque is linear in acceleration.
         pushed = motion.a.copy()
         pushed[joint] += 1.0
-        found.append(rigid_torque(scene, motion, motion.q, motion.v, pushed) - signals.rigid)
-        return np.stack(found)
-
-    by_q, by_v, by_a = shared(signals, ("slopes", joint), make)
-    return by_q, by_v, by_a
+        by_a = rigid_torque(scene, motion, motion.q, motion.v, pushed) - signals.rigid
+        held[joint] = scene.value, (found[0], found[1], by_a)
+    return held[joint][1]
 
 
 def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Array:
