@@ -12,7 +12,7 @@ from scara_ident.effects.effect import DOUBT, Effect, View
 from scara_ident.effects.links import lagging, link_inertia, shared, usual_link_inertia
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion.motion import differentiate
+from scara_ident.motion.motion import HIGHEST_CUT, differentiate
 
 Array = NDArray[np.float64]
 
@@ -201,7 +201,7 @@ def _load(signals: Signals, joint: int) -> Array:
 
 def _differentiated(signals: Signals, signal: Array, bands: float) -> tuple[Array, Array, Array]:
     rate, cut = signals.motion.rate, bands * signals.scene.band
-    return differentiate(signal, rate, cut if cut < 0.45 * rate else None)
+    return differentiate(signal, rate, cut if cut < HIGHEST_CUT * rate else None)
 
 
 def flank(drift: Array, width: float, step: float) -> Array:

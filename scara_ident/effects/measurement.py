@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scara_ident.effects.effect import DOUBT, Effect, View
 from scara_ident.effects.parameters import Coefficient, Member, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion.motion import UNIFORM_TOLERANCE, differentiate
+from scara_ident.motion.motion import HIGHEST_CUT, UNIFORM_TOLERANCE, differentiate
 from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.recording import Recording
 
@@ -123,7 +123,7 @@ class TimeDelay(Effect):
         """Return ``-du/dt`` of the predicted torque."""
         rows = slice(None) if member.joint is None else slice(member.joint, member.joint + 1)
         rate, band = signals.motion.rate, DERIVATIVE_BAND * signals.scene.band
-        change = -differentiate(signals.predicted[rows], rate, band if band < 0.45 * rate else None)[1]
+        change = -differentiate(signals.predicted[rows], rate, band if band < HIGHEST_CUT * rate else None)[1]
         return [change if member.joint is None else change[0]]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
