@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import DOUBT, SpectralLine, View
+from scara_ident.effects.effect import DOUBT_STDS, SpectralLine, View
 from scara_ident.effects.friction import friction_slope
 from scara_ident.effects.links import rigid_slopes
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
@@ -184,7 +184,7 @@ class Vibration(Sinusoid):
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where it leaves the torque limit behind."""
         limit = float(scene.robot.torque_limit[member.place])
-        least = _rms_amplitude(value) - DOUBT * float(np.max(std))
+        least = _rms_amplitude(value) - DOUBT_STDS * float(np.max(std))
         return "the vibration would be larger than the torque limit" if least > limit else None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
