@@ -151,42 +151,39 @@ def judged(as_it_is: Item, item: Item) -> dict[str, bool]:
 
 
 def table(results: Item, names: Sequence[str]) -> list[str]:
-    """Return the rows of a Markdown table over the sets whose diagnoses are all there."""
-    complete = {
-        name: items
-        for name, items in results.items()
-        if all(_key(c, f) in items for c in names if c in items[AS_IT_IS]["read"] for f in FACTORS)
-    }
-
-    def cell(criterion: str, factor: float) -> str:
-        each = [
-            judged(items[AS_IT_IS], items.get(_key(criterion, factor), items[AS_IT_IS])) for items in complete.values()
-        ]
-        return " ".join(str(sum(item[count] for item in each)) for count in COUNTS)
-
-    def verdict(item: Item) -> Any:
-        return item["verdict"], item["found"], item["unexplained"]
-
-    words = ", ".join(COUNTS)
+    """Return a Markdown table; a set counts for a criterion that it did not read, or was diagnosed by both values of."""
     rows = [
-        f"{len(complete)} sets; {words} of them",
-        "",
-        "| criterion | value | unit | read in | x 0.5 | x 1 | x 2 | other findings |",
-        "|---|---|---|---|---|---|---|---|",
+        "| criterion | value | unit | sets | of them read | x 0.5 | x 1 | x 2 | other findings |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for name in names:
-        read = sum(name in items[AS_IT_IS]["read"] for items in complete.values())
-        moved = [
-            sum(
-                verdict(items.get(_key(name, factor), items[AS_IT_IS])) != verdict(items[AS_IT_IS])
-                for items in complete.values()
+        usual, halved, doubled = [], [], []
+        for items in results.values():
+            keys = [_key(name, factor) for factor in FACTORS]
+            if name not in items[AS_IT_IS]["read"]:
+                keys = [AS_IT_IS, AS_IT_IS]
+            if all(key in items for key in keys):
+                usual.append(items[AS_IT_IS])
+                halved.append(items[keys[0]])
+                doubled.append(items[keys[1]])
+        cells = [
+            " ".join(
+                str(sum(judged(own, item)[count] for own, item in zip(usual, found, strict=True))) for count in COUNTS
             )
-            for factor in FACTORS
+            for found in (halved, usual, doubled)
         ]
-        cells = " | ".join((cell(name, 0.5), cell(AS_IT_IS, 1.0), cell(name, 2.0)))
-        value = getattr(CRITERIA, name)
-        rows.append(f"| `{name}` | {value} | {UNITS[name]} | {read} | {cells} | {moved[0]}, {moved[1]} |")
+        moved = [
+            str(sum(_finding(own) != _finding(item) for own, item in zip(usual, found, strict=True)))
+            for found in (halved, doubled)
+        ]
+        read = sum(name in item["read"] for item in usual)
+        columns = [f"`{name}`", getattr(CRITERIA, name), UNITS[name], len(usual), read, *cells, ", ".join(moved)]
+        rows.append("| " + " | ".join(str(column) for column in columns) + " |")
     return rows
+
+
+def _finding(item: Item) -> Any:
+    return item["verdict"], item["found"], item["unexplained"]
 
 
 def main() -> None:
@@ -198,7 +195,11 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--recordings", type=Path, default=Path("build/criteria"), help="folder that keeps them")
     parser.add_argument("--output", type=Path, default=Path("benchmarks/results/criteria.json"))
+    parser.add_argument("--table", action="store_true", help="print the table of what the output holds, and stop")
     arguments = parser.parse_args()
+    if arguments.table:
+        print("\n".join(table(json.loads(arguments.output.read_text(encoding="utf-8")), arguments.only)))
+        return
     sets = tasks(arguments.sets, arguments.seed, KINDS)
     results = run(arguments.recordings, sets, arguments.only, arguments.output, arguments.processes)
     print("\n".join(table(results, arguments.only)))
