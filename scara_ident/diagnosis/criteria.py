@@ -7,8 +7,11 @@ from typing import Any
 
 from scara_ident.effects.spanned import ABSORBED
 
+# Where nothing else is cited.
+CHOSEN = "chosen; docs/criteria.md shows what it moves"
 
-def _criterion(value: Any, unit: str, reason: str, source: str = "") -> Any:
+
+def _criterion(value: Any, unit: str, reason: str, source: str = CHOSEN) -> Any:
     return field(default=value, metadata={"unit": unit, "reason": reason, "source": source})
 
 
@@ -24,7 +27,7 @@ class SelectionCriteria:
         ABSORBED,
         "share of its square",
         "of less of a column outside the model only rounding is left",
-        "half the digits of a double",
+        "effects/spanned.py: above what a URDF loses by few digits",
     )
     least_outside: float = _criterion(
         5e-4,
@@ -36,7 +39,6 @@ class SelectionCriteria:
         0.05,
         "of the mean fold",
         "a trajectory that hardly excites an effect says nothing for or against it",
-        "design: folds that abstain",
     )
     family_error: float = _criterion(
         0.01,

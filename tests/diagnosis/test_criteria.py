@@ -36,13 +36,14 @@ def numbers(node: ast.AST) -> Iterator[ast.Constant]:
             yield item
 
 
-def test_every_number_has_a_unit_and_a_reason():
+def test_every_number_has_a_unit_a_reason_and_a_source():
     documented = CRITERIA.documented()
     assert [row[0] for row in documented] == [item.name for item in fields(SelectionCriteria)]
-    for name, value, unit, reason, _ in documented:
+    for name, value, unit, reason, source in documented:
         assert value == getattr(CRITERIA, name)
         assert unit, name
         assert len(reason.split()) >= 2, name
+        assert source, name
         assert np.all(np.asarray(value) > 0.0), name
 
 
