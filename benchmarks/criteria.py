@@ -102,7 +102,7 @@ def one_diagnosis(job: tuple[Path, tuple[str, int], str, float]) -> Item:
     if name != AS_IT_IS:
         return item
     was = json.loads((own / "truth.json").read_text(encoding="utf-8"))
-    true = [{"effect": each["name"], "joint": each["joint"]} for each in was["effects"]]
+    true = [{"effect": each["effect"], "joint": each["joint"]} for each in was["effects"]]
     return item | {"read": read, "kind": was["kind"], "true": true}
 
 
