@@ -165,6 +165,16 @@ def tasks(count: int, seed: int, kinds: Sequence[str] = KINDS) -> list[tuple[str
     return [(kinds[k % len(kinds)], seed * 100_000 + k) for k in range(count)]
 
 
+def write_set(made: VirtualSet, folder: Path) -> None:
+    """Write the recordings of a set, and last what the arm was."""
+    for part, recordings in (("train", made.training), ("test", made.held_out)):
+        (folder / part).mkdir(parents=True, exist_ok=True)
+        for recording in recordings:
+            write_recording(recording, folder / part / f"{recording.name}.parquet")
+    was = {"kind": made.kind, "seed": made.seed, "factors": list(made.factors)} | truth(made.arm, made.effects)
+    (folder / "truth.json").write_text(json.dumps(was, indent=1) + "\n", encoding="utf-8")
+
+
 def main() -> None:
     """Write the sets."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -173,14 +183,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=9)
     arguments = parser.parse_args()
     for k, (kind, seed) in enumerate(tasks(arguments.count, arguments.seed)):
-        made = simulate_set(kind, seed)
         folder = arguments.output / f"{k:03d}_{kind}"
-        for part, recordings in (("train", made.training), ("test", made.held_out)):
-            (folder / part).mkdir(parents=True, exist_ok=True)
-            for recording in recordings:
-                write_recording(recording, folder / part / f"{recording.name}.parquet")
-        was = {"kind": kind, "seed": seed, "factors": list(made.factors)} | truth(made.arm, made.effects)
-        (folder / "truth.json").write_text(json.dumps(was, indent=1) + "\n", encoding="utf-8")
+        write_set(simulate_set(kind, seed), folder)
         print(folder, flush=True)
 
 

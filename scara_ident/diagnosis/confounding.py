@@ -55,7 +55,7 @@ def _confounders_of(step: SelectionStep, found: Candidate, pool: Sequence[Candid
     scene, criteria = step.scene, step.criteria
     own = step.judge([found])[0]
     judged = best_of_each(step.judge(pool)).values()
-    near = [item for item in judged if item.accepted and item.gain > 0.5 * criteria.least_share * own.gain]
+    near = [item for item in judged if item.accepted and item.gain > criteria.near_confounder * own.gain]
     others = []
     for decision in step.refine(near):
         worse = decision.examination.left - own.examination.left

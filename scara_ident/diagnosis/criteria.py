@@ -7,8 +7,11 @@ from typing import Any
 
 from scara_ident.effects.spanned import ABSORBED
 
+# Where nothing else is cited.
+CHOSEN = "chosen; docs/criteria.md shows what it moves"
 
-def _criterion(value: Any, unit: str, reason: str, source: str = "") -> Any:
+
+def _criterion(value: Any, unit: str, reason: str, source: str = CHOSEN) -> Any:
     return field(default=value, metadata={"unit": unit, "reason": reason, "source": source})
 
 
@@ -24,7 +27,7 @@ class SelectionCriteria:
         ABSORBED,
         "share of its square",
         "of less of a column outside the model only rounding is left",
-        "half the digits of a double",
+        "effects/spanned.py: above what a URDF loses by few digits",
     )
     least_outside: float = _criterion(
         5e-4,
@@ -36,7 +39,6 @@ class SelectionCriteria:
         0.05,
         "of the mean fold",
         "a trajectory that hardly excites an effect says nothing for or against it",
-        "design: folds that abstain",
     )
     family_error: float = _criterion(
         0.01,
@@ -59,6 +61,21 @@ class SelectionCriteria:
         "by which its size differs from none with its nonlinear parameters free",
         "1 % two-sided",
     )
+    parts: int = _criterion(4, "parts", "of the only trajectory stand in for trajectories where there is but one")
+    rotor_inertia_std: float = _criterion(
+        0.2, "of its nominal value", "a data sheet leaves out shaft, brake and wave generator", "docs/diagnosis.md"
+    )
+    # Lines in the residual's spectra, which suggest orders and frequencies to try.
+    line_significance: float = _criterion(
+        1e-3, "probability", "that noise alone has the strongest line; its sidelobes are not tried"
+    )
+    lowest_order: float = _criterion(
+        0.4, "1 / motor turn", "slower changes over the motor's angle are motion, not gear"
+    )
+    highest_order: float = _criterion(13.0, "1 / motor turn", "gears and motors have orders up to 12")
+    least_line_periods: float = _criterion(
+        6.0, "periods in a recording", "a slower line in time is not told from the motion's own harmonics"
+    )
     # Searching.
     most_effects: int = _criterion(6, "effects", "more at once are not believed")
     near_best: float = _criterion(
@@ -76,6 +93,15 @@ class SelectionCriteria:
         1.0, "of the noise", "a repeatable remainder larger than the noise is one whatever it depends on"
     )
     significant: float = _criterion(0.01, "probability", "that noise alone repeats so much", "F test")
+    single_bins: int = _criterion(24, "bins", "of one signal, with equal numbers of samples, follow what it does")
+    pair_bins: int = _criterion(10, "bins", "of each signal of a pair, so that their square is filled")
+    least_per_bin: int = _criterion(10, "samples", "in each bin of a pair on average, or nothing is said")
+    shrinkage: float = _criterion(
+        5.0, "samples", "of zero in every bin, so that a mean over few samples counts for little"
+    )
+    alone: float = _criterion(
+        0.8, "of what the best pair explains", "one signal that explains so much is named without the other"
+    )
     # Choosing the band again.
     wider: float = _criterion(
         1.3, "of the band", "with an effect found the search is repeated where the band grows by so much"
@@ -94,6 +120,9 @@ class SelectionCriteria:
     most_demotions: int = _criterion(3, "rounds", "for time")
     # Effects that cannot be told apart.
     alike: float = _criterion(2.0, "standard errors", "errors of two models that differ by less are the same", "95 %")
+    near_confounder: float = _criterion(
+        0.4, "of its gain", "that another effect must remove at a grid point to be refined and compared"
+    )
     least_share: float = _criterion(0.8, "of its gain", "that another effect must remove to be a confounder")
 
     def documented(self) -> list[tuple[str, Any, str, str, str]]:

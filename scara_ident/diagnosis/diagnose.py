@@ -34,6 +34,8 @@ from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 Verdict = Literal["complete", "explained", "unexplained"]
+# Dependences that are handed on: further ones are pairs that only repeat the first.
+NAMED_DEPENDENCES = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +200,7 @@ def diagnose(
         tuple(effects),
         aliases(base),
         outcome.unexplained,
-        outcome.dependences[:12],
+        outcome.dependences[:NAMED_DEPENDENCES],
         tuple(notes),
     )
 

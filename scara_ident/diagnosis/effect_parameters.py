@@ -22,7 +22,7 @@ def physical_parameters(step: SelectionStep) -> list[dict[str, Parameter]]:
     Nonlinear parameters, armatures included, join the fit by the derivative of the effects' columns, so that the
     covariance is that of all parameters together.
     """
-    state = linearise(step.scene, step.columns, step.weights, step.chosen)
+    state = linearise(step.scene, step.columns, step.weights, step.chosen, step.criteria.rotor_inertia_std)
     covariance = _covariance(step, state)
     found = []
     for owner, (candidate, own) in enumerate(zip(step.chosen, state.places, strict=True)):

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.effects import Effect, Scene, SpectralLine
+from scara_ident.effects.periodic import HIGHEST_FREQUENCY_SHARE
 from scara_ident.effects.spectra import (
     NEIGHBOURS_IN_TIME,
     Line,
@@ -23,17 +25,17 @@ from scara_ident.estimation.residuals import Residuals
 
 Array = NDArray[np.float64]
 
-# Orders looked at, per motor turn, and points of the spectra per width of a line.
-HIGHEST_ORDER = 13.0
-LOWEST_ORDER = 0.4
+# Points of the spectra per width of a line, so that its peak is hardly missed between two.
 POINTS_PER_WIDTH = 3.0
-# The strongest line is taken; beside it the lesser ones are its sidelobes.
-SIGNIFICANCE = 1e-3
-# Periods in a recording below which a line in time is not told from motion.
-LEAST_PERIODS = 6.0
+# Line width over the lowest order from which on its neighbours, that give the noise floor, reach down to order zero.
+COARSEST_WIDTH = 0.3
+# Highest over lowest frequency below which the range holds too few neighbours for a noise floor.
+NARROWEST_RANGE = 3.0
 
 
-def line_candidates(scene: Scene, residuals: Residuals, catalogue: Sequence[Effect]) -> list[Candidate]:
+def line_candidates(
+    scene: Scene, residuals: Residuals, catalogue: Sequence[Effect], criteria: SelectionCriteria = CRITERIA
+) -> list[Candidate]:
     """Return periodic effects at the strongest line of each joint's residual, in motor angle and in time.
 
     Parameters
@@ -43,6 +45,7 @@ def line_candidates(scene: Scene, residuals: Residuals, catalogue: Sequence[Effe
         Of the model with the effects found so far.
     catalogue : sequence of Effect
         Only families that are in it are offered.
+    criteria : SelectionCriteria, optional
     """
     seeded = [effect for effect in catalogue if effect.seeded_by is not None]
     if not seeded:
@@ -61,8 +64,8 @@ def line_candidates(scene: Scene, residuals: Residuals, catalogue: Sequence[Effe
             continue
         rate, band = rates[0], residuals.data.bands[j]
         white = whitened(pieces, rate, highest=band)
-        order = _strongest_order(white, turns)
-        frequency = _strongest_frequency(white, rate, band or 0.4 * rate)
+        order = _strongest_order(white, turns, criteria)
+        frequency = _strongest_frequency(white, rate, band or HIGHEST_FREQUENCY_SHARE * rate, criteria)
         strongest = [] if order is None else [SpectralLine("order", order)]
         strongest += [] if frequency is None else [SpectralLine("frequency", frequency)]
         found += [
@@ -74,20 +77,22 @@ def line_candidates(scene: Scene, residuals: Residuals, catalogue: Sequence[Effe
     return found
 
 
-def _strongest_order(residuals: Sequence[Array], turns: Sequence[Array]) -> float | None:
+def _strongest_order(residuals: Sequence[Array], turns: Sequence[Array], criteria: SelectionCriteria) -> float | None:
     angle = np.concatenate(turns)
     width = order_width(angle)
-    if width > 0.3 * LOWEST_ORDER:
+    if width > COARSEST_WIDTH * criteria.lowest_order:
         return None
-    orders = np.arange(LOWEST_ORDER, HIGHEST_ORDER, width / POINTS_PER_WIDTH)
+    orders = np.arange(criteria.lowest_order, criteria.highest_order, width / POINTS_PER_WIDTH)
     power = order_spectrum(np.concatenate(residuals), angle, orders)
-    return _strongest(lines(orders, power, width, significance=SIGNIFICANCE))
+    return _strongest(lines(orders, power, width, significance=criteria.line_significance))
 
 
-def _strongest_frequency(residuals: Sequence[Array], rate: float, highest: float) -> float | None:
+def _strongest_frequency(
+    residuals: Sequence[Array], rate: float, highest: float, criteria: SelectionCriteria
+) -> float | None:
     width = frequency_width(residuals, rate)
-    lowest = LEAST_PERIODS * 0.5 * width
-    if highest < 3.0 * lowest:
+    lowest = criteria.least_line_periods * 0.5 * width
+    if highest < NARROWEST_RANGE * lowest:
         return None
     frequencies = np.arange(lowest, highest, width / POINTS_PER_WIDTH)
     power = frequency_spectrum(residuals, rate, frequencies)
@@ -98,7 +103,7 @@ def _strongest_frequency(residuals: Sequence[Array], rate: float, highest: float
             width,
             degrees=2 * len(residuals),
             neighbours=NEIGHBOURS_IN_TIME,
-            significance=SIGNIFICANCE,
+            significance=criteria.line_significance,
         )
     )
 

@@ -116,7 +116,7 @@ def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[s
     training = observed_at_every_sample(found.step)
     after = wls(training)
     before, left = found.uncorrected.residuals(found.start.value), training.residuals(after.value)
-    fit_after, dependences = lack_of_fit(left), screen(task.model, left)
+    fit_after, dependences = lack_of_fit(left), screen(task.model, left, task.criteria)
     unexplained = _unexplained(fit_after, dependences, task.criteria)
     return Outcome(found, after, training, left, lack_of_fit(before), fit_after, dependences, unexplained)
 
@@ -128,7 +128,11 @@ def _unexplained(
         top = dependences[0]
         # A pair must say clearly more than its better half.
         for other in dependences[1:]:
-            if other.joint == top.joint and len(other.signals) == 1 and other.explained > 0.8 * top.explained:
+            if (
+                other.joint == top.joint
+                and len(other.signals) == 1
+                and other.explained > criteria.alone * top.explained
+            ):
                 top = other
                 break
         return Unexplained(top.joint, top.signals, top.rms, top.explained)

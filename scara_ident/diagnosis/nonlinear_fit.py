@@ -22,16 +22,15 @@ from scara_ident.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
-# Standard deviation of a nominal rotor inertia, as a share of it.
-ARMATURE_STD = 0.2
-# Step for the derivative by a nonlinear parameter, as a share of it.
+# Step for the derivative by a nonlinear parameter, as a share of it: small beside its curvature, large beside rounding.
 DERIVATIVE_STEP = 1e-3
 # A longer one for an armature: the flights in a clearance begin and end at samples, which a short step does not move.
 ARMATURE_STEP = 2e-2
-# Steps of Gauss and Newton, and by how many standard deviations the last one may still move something.
+# Steps of Gauss and Newton; most fits settle in three, and a search has further ones.
 ROUNDS = 6
+# Standard deviations by which the last step may still move something: less is of no account.
 SETTLED = 0.1
-# A step moves a parameter by no more than this share of it.
+# A step moves a parameter by no more than this share of it: the linear model holds no further.
 LONGEST_STEP = 0.5
 # A rise of the squared error by more than this share turns a step back; loads that settle may raise it by less.
 RISE = 1e-5
@@ -146,7 +145,9 @@ class Linearised:
         return best[self.linear :], np.sqrt(self.variance * np.sum(half**2, axis=1)) / size
 
 
-def linearise(scene: Scene, columns: CandidateColumns, weights: Array, chosen: Sequence[Candidate]) -> Linearised:
+def linearise(
+    scene: Scene, columns: CandidateColumns, weights: Array, chosen: Sequence[Candidate], rotor_inertia_std: float
+) -> Linearised:
     """Return the linear model about the present nonlinear parameters.
 
     Parameters
@@ -156,9 +157,11 @@ def linearise(scene: Scene, columns: CandidateColumns, weights: Array, chosen: S
         On the rows of the base model.
     weights : ndarray, shape (n,)
     chosen : sequence of Candidate
+    rotor_inertia_std : float
+        Standard deviation of a nominal rotor inertia, as a share of it.
     """
     observations = columns.observations
-    unknowns = _unknowns(scene, chosen)
+    unknowns = _unknowns(scene, chosen, rotor_inertia_std)
     own = columns.rows(scene, chosen)
     bounds = observations.parameters + np.cumsum([0, *(len(next(iter(rows.values()))) for rows in own)])
     places = tuple(slice(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True))
@@ -211,13 +214,13 @@ def _beside(rows: JointRows, joint: int, changes: Sequence[dict[int, Array]], fi
 
 
 def tune(
-    scene: Scene, columns: CandidateColumns, weights: Array, chosen: Sequence[Candidate]
+    scene: Scene, columns: CandidateColumns, weights: Array, chosen: Sequence[Candidate], rotor_inertia_std: float
 ) -> tuple[Scene, tuple[Candidate, ...]]:
     """Fit the nonlinear parameters of all effects in a model together, and settle the loads that they depend on.
 
     Parameters
     ----------
-    scene, columns, weights, chosen
+    scene, columns, weights, chosen, rotor_inertia_std
         See `linearise`.
 
     Returns
@@ -231,7 +234,7 @@ def tune(
     best: Linearised | None = None
     change = np.zeros(0)
     for _ in range(ROUNDS):
-        now = linearise(scene, columns, weights, chosen)
+        now = linearise(scene, columns, weights, chosen, rotor_inertia_std)
         if best is not None and now.error > (1.0 + RISE) * best.error:
             change = 0.5 * change
             scene, chosen = _moved(best, change)
@@ -250,7 +253,7 @@ def tune(
     return replace(best.scene, value=best.value[:size]), best.chosen
 
 
-def _unknowns(scene: Scene, chosen: Sequence[Candidate]) -> tuple[Unknown, ...]:
+def _unknowns(scene: Scene, chosen: Sequence[Candidate], rotor_inertia_std: float) -> tuple[Unknown, ...]:
     """Return the nonlinear parameters of the effects, then the armatures."""
     found = [
         Unknown(owner, place, candidate.member.nonlinear[place], parameter.lower, parameter.upper)
@@ -261,7 +264,7 @@ def _unknowns(scene: Scene, chosen: Sequence[Candidate]) -> tuple[Unknown, ...]:
     for joint in dict.fromkeys(joint for joint in joints if joint is not None):
         nominal = scene.nominal_armature(joint)
         if scene.told_armature(joint) is None and nominal > 0.0:
-            held, spread = scene.armature(joint), ARMATURE_STD * nominal
+            held, spread = scene.armature(joint), rotor_inertia_std * nominal
             found.append(Unknown(None, joint, held, 0.1 * nominal, 3.0 * nominal, nominal, spread))
     return tuple(found)
 

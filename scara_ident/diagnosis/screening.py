@@ -8,19 +8,13 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.selection_step import PARTS
+from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
-
-# Bins of one signal, and of each signal of a pair; equal numbers of samples in each.
-SINGLE_BINS = 24
-PAIR_BINS = 10
-# A bin's mean is shrunk as if this many further samples of zero were in it.
-SHRINKAGE = 5.0
 
 
 @dataclass(frozen=True)
@@ -44,7 +38,7 @@ class Dependence:
     rms: float
 
 
-def screen(model: TorqueModel, residuals: Residuals) -> tuple[Dependence, ...]:
+def screen(model: TorqueModel, residuals: Residuals, criteria: SelectionCriteria = CRITERIA) -> tuple[Dependence, ...]:
     """Rank what each joint's residual depends on.
 
     Parameters
@@ -52,6 +46,7 @@ def screen(model: TorqueModel, residuals: Residuals) -> tuple[Dependence, ...]:
     model : TorqueModel
         Any; its robot names the signals.
     residuals : Residuals
+    criteria : SelectionCriteria, optional
 
     Returns
     -------
@@ -59,22 +54,25 @@ def screen(model: TorqueModel, residuals: Residuals) -> tuple[Dependence, ...]:
         All single signals and pairs of every joint, the most explaining first.
     """
     found: list[Dependence] = []
+    pair_bins = criteria.pair_bins
     for j, joint in enumerate(model.robot.joints):
-        residual, signals, fold = _samples(model.robot, residuals, j)
-        if len(residual) < 10 * PAIR_BINS**2 or not np.any(residual):
+        residual, signals, fold = _samples(model.robot, residuals, j, criteria.parts)
+        if len(residual) < criteria.least_per_bin * pair_bins**2 or not np.any(residual):
             continue
         total = float(np.mean(residual**2))
-        singles = {name: _bins(values, SINGLE_BINS) for name, values in signals.items()}
-        coarse = {name: _bins(values, PAIR_BINS) for name, values in signals.items()}
+        singles = {name: _bins(values, criteria.single_bins) for name, values in signals.items()}
+        coarse = {name: _bins(values, pair_bins) for name, values in signals.items()}
         sets: list[tuple[tuple[str, ...], NDArray[np.intp]]] = [((name,), bins) for name, bins in singles.items()]
-        sets += [((one, other), coarse[one] * PAIR_BINS + coarse[other]) for one, other in combinations(signals, 2)]
+        sets += [((one, other), coarse[one] * pair_bins + coarse[other]) for one, other in combinations(signals, 2)]
         for names, bins in sets:
-            share = _held_out(residual, bins, fold)
+            share = _held_out(residual, bins, fold, criteria.shrinkage)
             found.append(Dependence(joint, names, share, float(np.sqrt(max(share, 0.0) * total))))
     return tuple(sorted(found, key=lambda item: -item.explained))
 
 
-def _samples(robot: Robot, residuals: Residuals, j: int) -> tuple[Array, dict[str, Array], NDArray[np.intp]]:
+def _samples(
+    robot: Robot, residuals: Residuals, j: int, only_parts: int
+) -> tuple[Array, dict[str, Array], NDArray[np.intp]]:
     """Residual of a joint within its band at independent times, the signals then, and the fold of each."""
     data = residuals.data
     trajectories = data.trajectories
@@ -93,7 +91,7 @@ def _samples(robot: Robot, residuals: Residuals, j: int) -> tuple[Array, dict[st
     residual = np.concatenate(error)
     groups = np.concatenate(fold)
     if len(trajectories) == 1:
-        groups = np.arange(len(residual)) * PARTS // max(1, len(residual))
+        groups = np.arange(len(residual)) * only_parts // max(1, len(residual))
     return residual, merged, groups
 
 
@@ -117,13 +115,13 @@ def _bins(values: Array, count: int) -> NDArray[np.intp]:
     return np.asarray(np.searchsorted(edges, values), dtype=np.intp)
 
 
-def _held_out(residual: Array, bins: NDArray[np.intp], fold: NDArray[np.intp]) -> float:
+def _held_out(residual: Array, bins: NDArray[np.intp], fold: NDArray[np.intp], shrinkage: float) -> float:
     """Share of the squared residual that the bins' means of the other folds explain."""
     size = int(bins.max()) + 1
     folds = int(fold.max()) + 1
     place = fold * size + bins
     count = np.bincount(place, minlength=folds * size).reshape(folds, size)
     total = np.bincount(place, residual, folds * size).reshape(folds, size)
-    mean = (total.sum(axis=0) - total) / (count.sum(axis=0) - count + SHRINKAGE)
+    mean = (total.sum(axis=0) - total) / (count.sum(axis=0) - count + shrinkage)
     left = residual - mean[fold, bins]
     return 1.0 - float(np.sum(left**2) / np.sum(residual**2))

@@ -21,7 +21,7 @@ from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import Motion
+from scara_ident.motion.motion import HIGHEST_CUT, Motion
 from scara_ident.motion.prepared import PreparedData
 
 Array = NDArray[np.float64]
@@ -187,7 +187,7 @@ def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[s
         step = SelectionStep(scene, columns, chosen, weights, tried, criteria)
         decisions = step.judge(candidates, first)
         residuals = Residuals(observations.data, columns.predicted(scene, chosen, value))
-        seeds = line_candidates(scene, residuals, task.catalogue)
+        seeds = line_candidates(scene, residuals, task.catalogue, criteria)
         taken = {*without, *(item.label(scene) for item in chosen)}
         decisions += step.judge([item for item in seeds if item.label(scene) not in taken])
         if len(steps) >= criteria.most_effects:
@@ -205,7 +205,7 @@ def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[s
             chosen = (*chosen, candidate)
         if not candidate.corrects_data or candidate.effect.settled(found.value):
             candidates = [item for item in candidates if item.label(scene) != winner.label]
-        scene, chosen = tune(scene, columns, weights, chosen)
+        scene, chosen = tune(scene, columns, weights, chosen, criteria.rotor_inertia_std)
         fitted = observed(SelectionStep(scene, columns, chosen, weights, tried, criteria))
         estimate = wls(fitted)
         weights, value = estimate.weights, estimate.value
@@ -214,7 +214,7 @@ def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[s
         left = tuple(item.rms(value) if item.rows else None for item in fitted.by_joint)
         steps[len(steps) - repeated :] = [Step(winner, scene, chosen, observations.data, value, left)]
     kept = _backward(SelectionStep(scene, columns, chosen, weights, tried, criteria))
-    scene, kept = tune(scene, columns, weights, kept)
+    scene, kept = tune(scene, columns, weights, kept, criteria.rotor_inertia_std)
     labels = {item.label(scene) for item in kept}
     stayed = [item for item in steps if item.decision.label in labels or item.decision.candidate.corrects_data]
     final = SelectionStep(scene, columns, kept, weights, tried, criteria)
@@ -235,7 +235,7 @@ def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Sc
     for part in data.stretches:
         speed = np.maximum(speed, np.max(np.abs(part.motion.v), axis=1))
     slowest = float(min(part.rate for part in data.stretches))
-    band = max((band for band in data.bands if band is not None), default=0.45 * slowest)
+    band = max((band for band in data.bands if band is not None), default=HIGHEST_CUT * slowest)
     return Scene(model, value, longest, slowest, band, travel, speed, start, columns=columns_at_hand(observations))
 
 

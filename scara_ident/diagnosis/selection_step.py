@@ -21,10 +21,9 @@ from scara_ident.motion.prepared import PreparedData
 
 Array = NDArray[np.float64]
 
-# Folds where there is one trajectory only: consecutive parts of it.
-PARTS = 4
-# Points on the line between neighbouring scan points, and rounds of narrowing.
+# Points on a line from one neighbouring scan point to the other: with the middle one three on either side.
 LINE_POINTS = 7
+# Lines, each a third as long as the last: together they narrow a scan's spacing 27 times, and `tune` does the rest.
 LINE_ROUNDS = 4
 
 
@@ -60,7 +59,8 @@ class SelectionStep:
     @cached_property
     def model(self) -> FittedModel:
         """The base model with the chosen effects, fitted."""
-        return fitted_model(self.observations, self.columns.rows(self.scene, self.chosen), self.weights)
+        own = self.columns.rows(self.scene, self.chosen)
+        return fitted_model(self.observations, own, self.weights, self.criteria.parts)
 
     def judge(self, candidates: Sequence[Candidate], scene: Scene | None = None) -> list[Decision]:
         """Examine candidates, by the columns of another scene if one is given, and decide on each."""
@@ -95,7 +95,7 @@ class SelectionStep:
         return current
 
 
-def fitted_model(observations: Observations, chosen: Sequence[Rows], weights: Array) -> FittedModel:
+def fitted_model(observations: Observations, chosen: Sequence[Rows], weights: Array, parts: int) -> FittedModel:
     """Return the base model with further columns, to be tried beside; blocks without any row are left out."""
     joints = with_columns(observations, chosen)
     filled = np.flatnonzero(sum(np.diff(rows.starts) for rows in joints))
@@ -106,7 +106,7 @@ def fitted_model(observations: Observations, chosen: Sequence[Rows], weights: Ar
         for rows in joints
     )
     parameters = observations.parameters + sum(len(next(iter(rows.values()))) for rows in chosen)
-    return FittedModel(joints, parameters, owner, folds_of(observations.data, owner), weights)
+    return FittedModel(joints, parameters, owner, folds_of(observations.data, owner, parts), weights)
 
 
 def model_with(scene: Scene, chosen: Sequence[Candidate]) -> TorqueModel:
@@ -139,11 +139,11 @@ def observed_at_every_sample(step: SelectionStep) -> Observations:
     return replace(observed(step), raw=tuple(raws))
 
 
-def folds_of(data: PreparedData, owner: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the fold of each block: its trajectory, or its part of the only one."""
+def folds_of(data: PreparedData, owner: NDArray[np.intp], parts: int) -> NDArray[np.intp]:
+    """Return the fold of each block: its trajectory, or which of so many parts of the only one."""
     names = data.trajectories
     if len(names) == 1:
-        return np.minimum(np.arange(len(owner)) * PARTS // max(1, len(owner)), PARTS - 1)
+        return np.minimum(np.arange(len(owner)) * parts // max(1, len(owner)), parts - 1)
     place = np.array([names.index(item.trajectory) for item in data.recordings], dtype=np.intp)
     return np.asarray(place[owner], dtype=np.intp)
 

@@ -18,7 +18,7 @@ from scara_ident.model.terms import RigidBody
 Array = NDArray[np.float64]
 
 # On arms of more joints only neighbours and the joints after them are tried: drives run through them.
-REACH = 2
+NEIGHBOUR_REACH = 2
 
 
 class InertiaCoupling(Effect):
@@ -97,6 +97,6 @@ def _unspanned(term: RigidBody) -> tuple[tuple[int, int], ...]:
     robot = term.robot
     motion = random_motion(robot, np.random.default_rng(0), 20 + 2 * len(term.columns))
     span = Span.of(rows_by_sample(term.regressor(motion)))
-    pairs = [(j, k) for j in range(robot.n) for k in range(j + 1, min(robot.n, j + REACH + 1))]
+    pairs = [(j, k) for j in range(robot.n) for k in range(j + 1, min(robot.n, j + NEIGHBOUR_REACH + 1))]
     columns = {pair: _exchanged(robot.row_scale, motion.a, *pair)[:, None] for pair in pairs}
     return tuple(pair for pair in pairs if span.carriers(rows_by_sample(columns[pair])) is None)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import DOUBT, Effect, View
+from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.friction import friction_of, friction_torque
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
 from scara_ident.effects.position import offset_of
@@ -16,14 +16,14 @@ from scara_ident.model.terms import Column
 
 Array = NDArray[np.float64]
 
-# Time constants tried, as shares of the longest run.
+# Time constants tried, as shares of the longest run: 2.5 times apart, which refinement bridges.
 WARM_UP_SHARES = (0.06, 0.16, 0.4, 1.0)
 # A time constant above this many runs is not seen to end.
 LONGEST_WARM_UP = 4.0
 # Friction of a cold gear is not more than this many times that of a warm one, less one.
-MOST_WARM_UP = 3.0
+LARGEST_WARM_UP_SHARE = 3.0
 # A drift within this many standard deviations of none is an offset.
-LEAST_DRIFT = 3.0
+DRIFT_STDS = 3.0
 
 
 class WarmUp(Effect):
@@ -40,7 +40,7 @@ class WarmUp(Effect):
         Coefficient(
             "share", "1", "further friction of {joint} at the start of a run, as a share",
             "friction would be smaller when the run starts",
-            MOST_WARM_UP, f"friction would fall to less than a {1.0 + MOST_WARM_UP:.0f}th in the run",
+            LARGEST_WARM_UP_SHARE, f"friction would fall to less than a {1.0 + LARGEST_WARM_UP_SHARE:.0f}th in the run",
         ),
     )  # fmt: skip
     nonlinear = (NonlinearParameter("time_constant", "s", 0.05, 1e5),)
@@ -92,9 +92,9 @@ class OffsetDrift(Effect):
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where it is a constant, or leaves the torque limit behind."""
-        if len(value) > 1 and abs(value[0]) < LEAST_DRIFT * std[0]:
+        if len(value) > 1 and abs(value[0]) < DRIFT_STDS * std[0]:
             return "it is an offset, which the model lacks, rather than a drift"
-        if (abs(value[0]) - DOUBT * std[0]) * scene.duration > float(scene.robot.torque_limit[member.place]):
+        if (abs(value[0]) - DOUBT_STDS * std[0]) * scene.duration > float(scene.robot.torque_limit[member.place]):
             return "the offset would outgrow the torque limit"
         return None
 

@@ -25,7 +25,7 @@ from scara_ident.recording.recording import Recording
 Array = NDArray[np.float64]
 
 # Standard deviations by which a coefficient may lie beyond what a real arm can have.
-DOUBT = 2.0
+DOUBT_STDS = 2.0
 # Values of a nonlinear parameter that are tried where a family does not say which.
 SCAN_POINTS = 5
 
@@ -184,7 +184,7 @@ class Effect(ABC):
 
         A coefficient within two standard deviations of what is possible is possible.
         """
-        for item, x, spread in zip(self.coefficients, value, DOUBT * std, strict=False):
+        for item, x, spread in zip(self.coefficients, value, DOUBT_STDS * std, strict=False):
             if item.positive and x < -spread:
                 return item.positive
             if abs(x) > item.largest + spread:

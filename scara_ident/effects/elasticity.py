@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import DOUBT, Effect, View
+from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.links import lagging, link_inertia, shared, usual_link_inertia
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion.motion import differentiate
+from scara_ident.motion.motion import HIGHEST_CUT, differentiate
 
 Array = NDArray[np.float64]
 
@@ -20,15 +20,18 @@ Array = NDArray[np.float64]
 LOAD_BAND = 3.0
 # The link's lag in a clearance keeps this many times the band: beyond it its second derivative is noise.
 LAG_BAND = 1.5
-# Frequencies of the link against its held motor that are tried, in bands, and where arms have them, Hz.
+# Frequencies of the link against its held motor that are tried, in bands: from within it to where only the lag is seen.
 FREQUENCIES = (0.7, 1.2, 2.0, 4.0)
+# Limits of these frequencies, Hz, which hold for arms.
 LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 2.0, 200.0
 # Damping ratio of that swinging. Gears have 0.03 to 0.1, but then the phase after a few swings depends on inertia and
 # stiffness to the percent; the search begins with more, so that what the link does follows from the torque of the last swing.
 DAMPING = 0.2
-LEAST_DAMPING, MOST_DAMPING = 0.02, 0.7
-# Clearances tried, rad or m at the joint.
+# Damping ratios that the fit may reach: below it swings for longer than a move, above it does not swing.
+LOWEST_DAMPING, HIGHEST_DAMPING = 0.02, 0.7
+# Clearances tried, rad or m at the joint: three times apart, which refinement bridges.
 WIDTHS = (3e-4, 1e-3, 3e-3)
+# A clearance of more, rad or m, is felt by hand.
 LARGEST_WIDTH = 0.05
 
 
@@ -66,7 +69,7 @@ class JointElasticity(BehindGear):
     coefficients = (Coefficient("compliance", "{compliance}", "compliance of the gear of {joint}"),)
     nonlinear = (
         NonlinearParameter("frequency", "Hz", LOWEST_FREQUENCY, HIGHEST_FREQUENCY),
-        NonlinearParameter("_damping_ratio", "1", LEAST_DAMPING, MOST_DAMPING),
+        NonlinearParameter("_damping_ratio", "1", LOWEST_DAMPING, HIGHEST_DAMPING),
     )
     resonant = True
     view = View("acceleration")
@@ -99,10 +102,10 @@ class JointElasticity(BehindGear):
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where a spring does not pull back, or would swing slower than is seen."""
-        if value[0] < -DOUBT * std[0]:
+        if value[0] < -DOUBT_STDS * std[0]:
             return "its stiffness would be negative"
         usual = usual_link_inertia(scene, member.place)
-        least = value[0] - DOUBT * std[0]
+        least = value[0] - DOUBT_STDS * std[0]
         if usual > 0.0 and least > 0.0:
             frequency = float(1.0 / np.sqrt(least * usual) / (2.0 * np.pi))
             if 2.0 * frequency < min(member.nonlinear[0], scene.band):
@@ -201,7 +204,7 @@ def _load(signals: Signals, joint: int) -> Array:
 
 def _differentiated(signals: Signals, signal: Array, bands: float) -> tuple[Array, Array, Array]:
     rate, cut = signals.motion.rate, bands * signals.scene.band
-    return differentiate(signal, rate, cut if cut < 0.45 * rate else None)
+    return differentiate(signal, rate, cut if cut < HIGHEST_CUT * rate else None)
 
 
 def flank(drift: Array, width: float, step: float) -> Array:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import DOUBT, Effect, View
+from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine
@@ -19,9 +19,10 @@ Array = NDArray[np.float64]
 
 # Stribeck velocities tried, as shares of the joint's largest speed; above the last-but-widest a polynomial spans it.
 STRIBECK_SHARES = (0.006, 0.015, 0.04, 0.1, 0.25)
+# Stribeck velocities, as shares of the largest speed, above which it is friction at any speed.
 WIDEST_STRIBECK = 0.5
 # Friction that a joint has only at low speed is not larger than this many times its Coulomb friction.
-MOST_STRIBECK = 2.0
+LARGEST_STRIBECK_SHARE = 2.0
 # A joint that travels less, rad, shows no friction that varies with its position.
 SHORTEST_TRAVEL = 0.3
 # On arms with more joints than this only neighbours drive each other's friction.
@@ -91,8 +92,8 @@ class Stribeck(Effect):
         if member.nonlinear[0] > WIDEST_STRIBECK * scene.speed[member.place]:
             return "the joint is never fast against this speed"
         coulomb = friction_of(scene, member.place).get(0)
-        if coulomb is not None and value[0] - DOUBT * std[0] > MOST_STRIBECK * max(coulomb, 0.0):
-            return f"it would be more than {MOST_STRIBECK:g} times the Coulomb friction"
+        if coulomb is not None and value[0] - DOUBT_STDS * std[0] > LARGEST_STRIBECK_SHARE * max(coulomb, 0.0):
+            return f"it would be more than {LARGEST_STRIBECK_SHARE:g} times the Coulomb friction"
         return None
 
 
@@ -121,7 +122,7 @@ class AsymmetricFriction(Effect):
         """Say so where friction does not brake in both directions at the largest speed."""
         speed = float(scene.speed[member.place])
         friction = sum(a * speed**power for power, a in friction_of(scene, member.place).items())
-        if 0.5 * speed * (abs(value[0]) - DOUBT * std[0]) > max(friction, 0.0):
+        if 0.5 * speed * (abs(value[0]) - DOUBT_STDS * std[0]) > max(friction, 0.0):
             return "friction would push in one direction"
         return None
 
@@ -234,4 +235,4 @@ class FrictionCoupling(Effect):
             return None
         speed = float(scene.speed[member.place] + scene.speed[member.partner_place])
         fast, sure = value[1] + speed * value[0], float(np.hypot(std[1], speed * std[0]))
-        return "friction would push" if fast < -DOUBT * sure else super().inadmissible(scene, member, value, std)
+        return "friction would push" if fast < -DOUBT_STDS * sure else super().inadmissible(scene, member, value, std)

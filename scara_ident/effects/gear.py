@@ -14,7 +14,7 @@ from scara_ident.effects.signals import Scene, Signals
 Array = NDArray[np.float64]
 
 # A gear that loses more of the torque is broken.
-MOST_LOST = 0.75
+LARGEST_LOSS_SHARE = 0.75
 
 
 class TransmissionLoss(Effect):
@@ -33,10 +33,10 @@ class TransmissionLoss(Effect):
         Coefficient(
             "loss_coefficient", "1", "share of the transmitted torque lost in {joint}",
             "a gear cannot give energy: the lost share is negative",
-            MOST_LOST, "over three quarters of the torque would be lost",
+            LARGEST_LOSS_SHARE, "over three quarters of the torque would be lost",
         ),
     )  # fmt: skip
-    nonlinear = (NonlinearParameter("_lost_share", "1", 0.005, MOST_LOST),)
+    nonlinear = (NonlinearParameter("_lost_share", "1", 0.005, LARGEST_LOSS_SHARE),)
     at_rest = True
     follows_estimate = True
     view = View("load", along=True)

@@ -20,8 +20,9 @@ Array = NDArray[np.float64]
 
 # Where a robot's gravity is zero this is how large it is once the base tilts.
 STANDARD_GRAVITY = 9.81
-# Steps that differentiate the torque by position (rad or m) and, as a share of the largest speed or 1, by velocity.
+# Step that differentiates the torque by position, rad or m: near the cube root of rounding, where a central difference errs least.
 POSITION_STEP = 1e-5
+# Step that differentiates it by velocity, as a share of the largest speed or 1; it is quadratic, so that any is exact.
 SPEED_STEP = 1e-4
 
 _SHARED: WeakKeyDictionary[Signals | Scene, dict[Hashable, Array]] = WeakKeyDictionary()

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import DOUBT, Effect, View
+from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.parameters import Coefficient, Member, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion.motion import UNIFORM_TOLERANCE, differentiate
+from scara_ident.motion.motion import HIGHEST_CUT, UNIFORM_TOLERANCE, differentiate
 from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.recording import Recording
 
@@ -21,8 +21,9 @@ Array = NDArray[np.float64]
 
 # The derivative of the predicted torque keeps this many times the band, so that the band itself is left alone.
 DERIVATIVE_BAND = 3.0
-# No controller lives with a longer lag than this many seconds, or than this many samples where those last longer.
+# No controller lives with a longer lag than this many seconds.
 LONGEST_DELAY = 0.05
+# It may have this many samples where those last longer: a slow log is late by whole samples.
 LONGEST_DELAY_SAMPLES = 5.0
 # Torque constants of one arm that differ by more than this are a wrong unit, not a mismatch.
 LARGEST_MISMATCH = 0.5
@@ -60,7 +61,7 @@ class TorqueSensorNonlinearity(Effect):
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where what is recorded does not grow with the torque, up to the torque limit."""
         limit = float(scene.robot.torque_limit[member.place])
-        if np.isfinite(limit) and value[0] + DOUBT * std[0] < -1.0 / limit**2:
+        if np.isfinite(limit) and value[0] + DOUBT_STDS * std[0] < -1.0 / limit**2:
             return "the recorded torque would change sign below the torque limit"
         return None
 
@@ -123,13 +124,13 @@ class TimeDelay(Effect):
         """Return ``-du/dt`` of the predicted torque."""
         rows = slice(None) if member.joint is None else slice(member.joint, member.joint + 1)
         rate, band = signals.motion.rate, DERIVATIVE_BAND * signals.scene.band
-        change = -differentiate(signals.predicted[rows], rate, band if band < 0.45 * rate else None)[1]
+        change = -differentiate(signals.predicted[rows], rate, band if band < HIGHEST_CUT * rate else None)[1]
         return [change if member.joint is None else change[0]]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where no loop is that late."""
         longest = max(LONGEST_DELAY, LONGEST_DELAY_SAMPLES / scene.rate)
-        if abs(value[0]) > longest + DOUBT * std[0]:
+        if abs(value[0]) > longest + DOUBT_STDS * std[0]:
             return f"a delay of {value[0]:.3g} s is longer than any measurement's"
         return None
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import DOUBT, Effect, View
+from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.links import point_mass, shared, tool_of
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
@@ -24,16 +24,18 @@ from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Instants tried over a run, with the mounting known and unknown.
+# Instants tried over a run with the mounting known; a tenth of a run apart, which refinement bridges.
 INSTANTS = 9
+# Instants tried with the mounting unknown: fewer, for every one has more columns.
 INSTANTS_FREE = 4
-# Columns for a payload mounted anyhow; the next would add less than this share of the torque of the first.
-MOST_FREE = 4
-LEAST_FREE = 0.02
-# Masses and moments of inertia are seen to be there this many standard deviations from none.
-SEEN = 3.0
-# Groups of recordings tried.
-MOST_GROUPS = 24
+# Columns for a payload mounted anyhow: more of its ten parameters let an effect imitate anything.
+FREE_COLUMNS = 4
+# A further one must add this share of the torque of the first, or it is noise that is fitted.
+FREE_COLUMN_SHARE = 0.02
+# Masses and moments of inertia are seen to be there this many standard deviations from none: 0.3 % two-sided.
+SEEN_STDS = 3.0
+# Groups of recordings tried, for time: every one is a candidate.
+GROUP_LIMIT = 24
 # A tool nearer to the last joint than this, m, says nothing of how far out an unknown payload sits.
 SHORTEST_ARM = 0.1
 
@@ -98,7 +100,7 @@ class FreePayloadChange(PayloadChange):
         signs = {
             float(np.sign(value[place]))
             for place, k in enumerate(shown)
-            if k in (0, 4, 6, 9) and abs(value[place]) > SEEN * std[place]
+            if k in (0, 4, 6, 9) and abs(value[place]) > SEEN_STDS * std[place]
         }
         if len(signs) > 1:
             return "mass and inertia would have opposite signs"
@@ -191,7 +193,7 @@ def _at_tool(signals: Signals) -> Array:
 
 def _too_heavy(scene: Scene, mass: float, std: float) -> str | None:
     weight = float(np.sum(scene.robot.standard_parameters()[: 10 * scene.robot.n : 10]))
-    if weight > 0.0 and abs(mass) > weight + DOUBT * std:
+    if weight > 0.0 and abs(mass) > weight + DOUBT_STDS * std:
         return f"a payload of {mass:.3g} kg is more than the arm's own {weight:.3g} kg"
     return None
 
@@ -210,10 +212,10 @@ def _shown(robot: Robot) -> tuple[int, ...]:
     largest = float(np.max(np.linalg.norm(rows, axis=0))) or 1.0
     chosen: list[int] = []
     left = rows.copy()
-    while len(chosen) < MOST_FREE:
+    while len(chosen) < FREE_COLUMNS:
         size = np.linalg.norm(left, axis=0)
-        k = 0 if not chosen and size[0] > LEAST_FREE * largest else int(np.argmax(size))
-        if size[k] <= LEAST_FREE * largest:
+        k = 0 if not chosen and size[0] > FREE_COLUMN_SHARE * largest else int(np.argmax(size))
+        if size[k] <= FREE_COLUMN_SHARE * largest:
             break
         chosen.append(k)
         direction = left[:, k] / size[k]
@@ -248,4 +250,4 @@ def _groups_of(names: tuple[str, ...]) -> tuple[frozenset[str], ...]:
     proposals += [frozenset([name]) for name in names]
     # A group and its complement say the same; the one without the first recording counts what was added since.
     proposals = [everything - group if names[0] in group else group for group in proposals]
-    return tuple(dict.fromkeys(group for group in proposals if group))[:MOST_GROUPS]
+    return tuple(dict.fromkeys(group for group in proposals if group))[:GROUP_LIMIT]

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import DOUBT, SpectralLine, View
+from scara_ident.effects.effect import DOUBT_STDS, SpectralLine, View
 from scara_ident.effects.friction import friction_slope
 from scara_ident.effects.links import rigid_slopes
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
@@ -21,16 +21,14 @@ Array = NDArray[np.float64]
 
 # Orders that gears and motors have; others are found in the residual's spectrum.
 ORDERS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0)
+# Orders of an encoder's error: an eccentric disc has one period per turn, an oval one two.
 ENCODER_ORDERS = (1.0, 2.0)
-# A line is looked for where the travel holds this many periods, and where the joint at this share of its largest
-# speed leaves it within the band.
-LEAST_PERIODS = 2.0
+# Periods that the travel, or the longest recording, must hold for sine and cosine to be told from a slope.
+PERIODS_COVERED = 2.0
+# Share of the joint's largest speed at which an order must lie within the band: a joint is hardly ever slower for long.
 SLOW_SHARE = 0.03
-# Above this share of the sample rate a sampled sine is another one.
-FASTEST = 0.4
-# Steps that differentiate the torque by position (rad or m) and, as a share of the largest speed or 1, by velocity.
-POSITION_STEP = 1e-5
-SPEED_STEP = 1e-4
+# Share of the sample rate above which a sampled sine is another one.
+HIGHEST_FREQUENCY_SHARE = 0.4
 # No encoder errs by more than this, rad of the motor; beyond it the linear form ends too.
 LARGEST_ECCENTRICITY = 0.1
 
@@ -46,7 +44,7 @@ class PerMotorTurn(Sinusoid):
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return the orders with enough periods in the travel that lie within the band while the joint is slow."""
         turns_per_second = abs(float(scene.robot.reduction[joint])) * float(scene.speed[joint]) / (2.0 * np.pi)
-        least = LEAST_PERIODS * _order_resolution(scene, joint)
+        least = PERIODS_COVERED * _order_resolution(scene, joint)
         return ((x,) for x in self.orders if x >= least and SLOW_SHARE * x * turns_per_second <= scene.band)
 
     def resolution(self, scene: Scene, member: Member) -> tuple[float, ...]:
@@ -156,7 +154,7 @@ class Vibration(Sinusoid):
 
     def seeds(self, scene: Scene, joint: int, line: SpectralLine) -> tuple[Member, ...]:
         """Return the member at a frequency that the band and the recordings can show."""
-        seen = LEAST_PERIODS / scene.duration <= line.position <= FASTEST * scene.rate
+        seen = PERIODS_COVERED / scene.duration <= line.position <= HIGHEST_FREQUENCY_SHARE * scene.rate
         return super().seeds(scene, joint, line) if seen else ()
 
     def resolution(self, scene: Scene, member: Member) -> tuple[float, ...]:
@@ -186,7 +184,7 @@ class Vibration(Sinusoid):
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where it leaves the torque limit behind."""
         limit = float(scene.robot.torque_limit[member.place])
-        least = _rms_amplitude(value) - DOUBT * float(np.max(std))
+        least = _rms_amplitude(value) - DOUBT_STDS * float(np.max(std))
         return "the vibration would be larger than the torque limit" if least > limit else None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
@@ -211,7 +209,7 @@ def _order_resolution(scene: Scene, joint: int) -> float:
 def _seen(signals: Signals, joint: int, order: float) -> NDArray[np.bool_]:
     """Where a sampled line is itself and no alias, shape (N,)."""
     per_second = np.abs(order * signals.scene.robot.reduction[joint] * signals.motion.v[joint]) / (2.0 * np.pi)
-    return np.asarray(per_second < FASTEST * signals.motion.rate)
+    return np.asarray(per_second < HIGHEST_FREQUENCY_SHARE * signals.motion.rate)
 
 
 def _slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:

@@ -7,23 +7,25 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import DOUBT, Effect, View
+from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.friction import friction_of
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
 
 Array = NDArray[np.float64]
 
-# Distances tried, rad; on a joint that translates times a tenth of a metre.
+# Distances tried, rad: three times apart, which refinement bridges, over what joints have.
 DISTANCES = (0.0004, 0.0012, 0.004, 0.012, 0.036)
+# On a joint that translates distances are those on a pinion of this radius, m.
 METRES_PER_RADIAN = 0.1
 # A distance above this share of the travel is a spring rather than friction.
 LONGEST_SHARE = 0.15
-# Friction in the state cannot be more than this many times what slides.
-LEAST_OF_COULOMB = 0.4
-MOST_OF_COULOMB = 1.5
+# Friction in the state is at least this many times what slides, or it is something else.
+SMALLEST_COULOMB_SHARE = 0.4
+# It cannot be more than this many times what slides.
+LARGEST_COULOMB_SHARE = 1.5
 # Reversals shorter than this share of the distance change the state by less, and are noise of the position.
-LEAST_REVERSAL = 0.02
+SMALLEST_REVERSAL_SHARE = 0.02
 
 
 class Presliding(Effect):
@@ -65,10 +67,10 @@ class Presliding(Effect):
         if member.nonlinear[0] > LONGEST_SHARE * scene.travel[member.place]:
             return "over so long a way it is a spring, not friction"
         coulomb = friction_of(scene, member.place).get(0)
-        if coulomb is not None and value[0] + DOUBT * std[0] < LEAST_OF_COULOMB * max(coulomb, 0.0):
+        if coulomb is not None and value[0] + DOUBT_STDS * std[0] < SMALLEST_COULOMB_SHARE * max(coulomb, 0.0):
             return "only a small part of the Coulomb friction would build up over a distance; all of it does"
-        if coulomb is not None and value[0] - DOUBT * std[0] > MOST_OF_COULOMB * max(coulomb, 0.0):
-            return f"it would be more than {MOST_OF_COULOMB:g} times the Coulomb friction"
+        if coulomb is not None and value[0] - DOUBT_STDS * std[0] > LARGEST_COULOMB_SHARE * max(coulomb, 0.0):
+            return f"it would be more than {LARGEST_COULOMB_SHARE:g} times the Coulomb friction"
         return None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
@@ -92,7 +94,7 @@ def dahl_state(q: Array, distance: float, start: float = 0.0) -> Array:
     -------
     ndarray, shape (N,)
     """
-    places = turning_points(q, LEAST_REVERSAL * distance)
+    places = turning_points(q, SMALLEST_REVERSAL_SHARE * distance)
     q_turn = q[places]
     way = np.diff(q_turn)
     end = np.sign(way)

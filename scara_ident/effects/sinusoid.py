@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import DOUBT, Effect
+from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.parameters import Coefficient, Member, Parameter
 from scara_ident.effects.signals import Scene
 
@@ -59,4 +59,4 @@ class Sinusoid(Effect):
 
 def least_amplitude(value: Array, std: Array) -> float:
     """Return the amplitude of a sine and a cosine less what it may be too large by."""
-    return float(np.hypot(*value)) - DOUBT * float(np.max(std))
+    return float(np.hypot(*value)) - DOUBT_STDS * float(np.max(std))

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 # Share of an effect's square outside the model below which it is absorbed; above what a URDF loses by few digits.
 ABSORBED = 1e-6
 # Parameters that carry less than this share of the effect are not named.
-NAMED = 1e-4
+NAMED_SHARE = 1e-4
 
 
 def random_motion(robot: Robot, rng: np.random.Generator, samples: int) -> Motion:
@@ -66,4 +66,4 @@ class Span:
         sums = self.inverse @ rows
         if np.any(np.sum((rows - self.unit @ sums) ** 2, axis=0) >= ABSORBED):
             return None
-        return [int(self.entering[k]) for k in np.flatnonzero(np.any(np.abs(sums) > NAMED, axis=1))]
+        return [int(self.entering[k]) for k in np.flatnonzero(np.any(np.abs(sums) > NAMED_SHARE, axis=1))]

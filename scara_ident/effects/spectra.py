@@ -21,12 +21,14 @@ FINENESS = 16
 # The noise floor at a line is taken from this many line widths on either side, without the nearest few. Noise changes
 # faster over frequency, where the loop and the trajectory shape it, than over order.
 NEIGHBOURS = 40.0
+# The same over frequency.
 NEIGHBOURS_IN_TIME = 12.0
+# Line widths left out on either side: the Hann window spreads a line over two.
 GUARD = 3.0
 # The largest of a spectrum between its independent positions is that of this many per line width.
 TRIALS_PER_WIDTH = 3.0
 # At angles of which the samples do not tell cosine and sine apart a line cannot be seen.
-LEAST_DETERMINANT = 1e-3
+SMALLEST_DETERMINANT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def order_spectrum(residual: Array, motor_angle: Array, orders: Array) -> Array:
     cs = 0.5 * twice.imag - once.real * once.imag / count
     c, s = first.real, first.imag
     determinant = cc * ss - cs**2
-    seen = determinant > LEAST_DETERMINANT * (0.5 * count) ** 2
+    seen = determinant > SMALLEST_DETERMINANT * (0.5 * count) ** 2
     explained = np.divide(ss * c**2 - 2.0 * cs * c * s + cc * s**2, determinant, out=np.zeros_like(c), where=seen)
     return np.asarray(np.maximum(explained, 0.0) / count)
 

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.effects.effect import DOUBT, Effect, View
+from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.links import first_moments, gravity_columns, shared
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
@@ -24,9 +24,9 @@ LARGEST_TILT = 0.1
 # Nominal first moments of links that the base model says nothing of are believed within this factor.
 MOMENT_FACTOR = 2.0
 # Torques below this share of the largest are rounding of angles in the URDF.
-NOTHING = 1e-4
+NEGLIGIBLE_TORQUE_SHARE = 1e-4
 # Known and newly entering parameters agree on the direction of gravity within this many standard deviations.
-AGREEMENT = 3.0
+AGREEMENT_STDS = 3.0
 AXES = ("x", "y")
 
 
@@ -76,13 +76,13 @@ def _gravity(term: RigidBody) -> _Gravity:
     q = reach * rng.uniform(-1.0, 1.0, (robot.n, max(30, 10 * robot.n)))
     columns = [rows_by_sample(gravity_columns(robot, axis, q)) for axis in range(2)]
     largest = max(float(np.max(np.linalg.norm(part, axis=0))) for part in columns) or 1.0
-    axes = tuple(axis for axis in range(2) if np.linalg.norm(columns[axis] @ known) > NOTHING * largest)
+    axes = tuple(axis for axis in range(2) if np.linalg.norm(columns[axis] @ known) > NEGLIGIBLE_TORQUE_SHARE * largest)
     new = np.hstack([part @ rest for part in columns])
     pivots: list[int] = []
     if np.max(np.abs(new), initial=0.0) > 0.0:
         _, factor, order = qr(new, mode="economic", pivoting=True)
         size = np.abs(np.diag(factor))
-        pivots = sorted(int(k) for k in order[: np.count_nonzero(size > NOTHING * largest)])
+        pivots = sorted(int(k) for k in order[: np.count_nonzero(size > NEGLIGIBLE_TORQUE_SHARE * largest)])
     chosen = np.array(pivots, dtype=np.intp)
     blend: Array = np.zeros((len(pivots), 2), dtype=np.float64)
     if pivots:
@@ -170,7 +170,7 @@ class BaseTilt(_Tilt):
         steep = _too_steep(value[:count], std[:count])
         if steep is not None or not gravity.entering_axes:
             return steep
-        if np.all(np.abs(value[:count]) < DOUBT * std[:count]):
+        if np.all(np.abs(value[:count]) < DOUBT_STDS * std[:count]):
             return "only one joint shows it, as a spring would; what else gravity must do is missing"
         return None
 
@@ -240,7 +240,7 @@ def _moment_unit(robot: Robot, moments: Array) -> str:
 
 
 def _too_steep(tilt: Array, std: Array) -> str | None:
-    if np.any(np.abs(tilt) > LARGEST_TILT + DOUBT * std):
+    if np.any(np.abs(tilt) > LARGEST_TILT + DOUBT_STDS * std):
         return f"a base that leans by {float(np.max(np.abs(tilt))):.2g} rad would be seen by eye"
     return None
 
@@ -266,7 +266,7 @@ def _combined(value: Array, covariance: Array, blend: Array) -> tuple[Array, Arr
     error = value - np.concatenate([tilt, factor * blend @ tilt])
     disagreement = float(error @ weight @ error)
     free = len(value) - 3
-    accepted = chi2.ppf(chi2.cdf(AGREEMENT**2, 1), free) if free > 0 else np.inf
+    accepted = chi2.ppf(chi2.cdf(AGREEMENT_STDS**2, 1), free) if free > 0 else np.inf
     believed = 1.0 / MOMENT_FACTOR <= factor <= MOMENT_FACTOR
     if not np.isfinite(disagreement) or disagreement > accepted or not believed:
         return value[:2], covariance[:2, :2]

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 # Longer parts are cut, so that memory does not grow with the length of a recording.
 MOST_SAMPLES = 60_000
+# Cut-off over sample rate above which a low-pass is left out: it would take off next to nothing.
+HIGHEST_CUT = 0.45
 # A time step that differs by less than this share from the median is not jitter.
 UNIFORM_TOLERANCE = 1e-3
 # The filter's memory in periods of its cut-off: 4 of them leave under 1e-4 of a step.

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.motion.motion import (
+    HIGHEST_CUT,
     Motion,
     Stretch,
     low_pass,
@@ -282,7 +283,9 @@ def prepare(recordings: Sequence[Recording], bands: Bands = ()) -> PreparedData:
 
 def position_cuts(rate: float, bands: Bands) -> list[float | None]:
     """Return the cut-offs of the positions that go with the bands; None where that is beyond half the rate."""
-    return [None if band is None or POSITION_BAND * band > 0.45 * rate else POSITION_BAND * band for band in bands]
+    return [
+        None if band is None or POSITION_BAND * band > HIGHEST_CUT * rate else POSITION_BAND * band for band in bands
+    ]
 
 
 def row_step(rate: float, band: float | None) -> int:
@@ -337,7 +340,7 @@ def _velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | 
 
     White position noise of density s/rate integrates to ``s (2 pi)^2 f^3 / 3`` in velocity up to f.
     """
-    cut = position_cuts(stretch.rate, [band])[0] or 0.45 * stretch.rate
+    cut = position_cuts(stretch.rate, [band])[0] or HIGHEST_CUT * stretch.rate
     if band is None:
         # Nothing was filtered; the noise is what a wide filter would take out.
         cut = 0.2 * stretch.rate

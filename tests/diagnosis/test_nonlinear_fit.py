@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.effect_parameters import physical_parameters
-from scara_ident.diagnosis.nonlinear_fit import ARMATURE_STD, Linearised, linearise, tune
+from scara_ident.diagnosis.nonlinear_fit import Linearised, linearise, tune
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Member
 from scara_ident.effects.elasticity import Backlash
@@ -44,7 +45,7 @@ def loss_runs(loss: float, rotor: float):
 def linear(step: SelectionStep, **change) -> Linearised:
     """The linear model of a step, or of one that differs from it."""
     step = replace(step, **change)
-    return linearise(step.scene, step.columns, step.weights, step.chosen)
+    return linearise(step.scene, step.columns, step.weights, step.chosen, CRITERIA.rotor_inertia_std)
 
 
 def dense(state: Linearised) -> np.ndarray:
@@ -60,7 +61,7 @@ def dense(state: Linearised) -> np.ndarray:
 def tuned(runs, *chosen: Candidate) -> SelectionStep:
     """The step with its effects tuned."""
     step = step_beside(runs, chosen, WEIGHTS)
-    scene, found = tune(step.scene, step.columns, WEIGHTS, chosen)
+    scene, found = tune(step.scene, step.columns, WEIGHTS, chosen, CRITERIA.rotor_inertia_std)
     return replace(step, scene=scene, chosen=found)
 
 
@@ -96,7 +97,7 @@ def test_where_data_say_nothing_the_armature_stays_nominal_and_as_unsure_as_it_w
     scene, state = step.scene, linear(step)
     (armature,) = [item for item in state.unknowns if item.owner is None]
     assert armature.nominal == armature.value == scene.nominal_armature(0)
-    assert armature.spread == pytest.approx(ARMATURE_STD * armature.nominal)
+    assert armature.spread == pytest.approx(CRITERIA.rotor_inertia_std * armature.nominal)
     change, std = state.solve()
     assert abs(change[-1]) < 0.5 * armature.spread
     assert 0.8 * armature.spread < std[-1] < 1.01 * armature.spread
@@ -116,7 +117,7 @@ def test_a_backlash_shows_the_rotor_though_its_flights_begin_and_end_at_samples(
 
 def test_without_effects_there_is_nothing_to_tune() -> None:
     step = step_beside(exact_runs())
-    assert tune(step.scene, step.columns, WEIGHTS, []) == (step.scene, ())
+    assert tune(step.scene, step.columns, WEIGHTS, [], CRITERIA.rotor_inertia_std) == (step.scene, ())
 
 
 def test_the_derivatives_are_those_of_the_predicted_torque() -> None:

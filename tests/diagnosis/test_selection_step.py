@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.selection_step import (
-    PARTS,
     best_of_each,
     folds_of,
     model_with,
@@ -139,17 +138,17 @@ def test_trajectories_are_the_folds():
     seen = observed(exact_runs())
     assert_array_equal(np.unique(seen.owner), range(4))
     assert np.all(np.diff(seen.owner) >= 0)
-    assert_array_equal(folds_of(seen.data, seen.owner), seen.owner // 2)
+    assert_array_equal(folds_of(seen.data, seen.owner, 4), seen.owner // 2)
 
 
 def test_parts_of_the_only_trajectory_are_its_folds():
     seen = observed(exact_runs()[:1])
-    fold = folds_of(seen.data, seen.owner)
-    assert_array_equal(np.unique(fold), range(PARTS))
+    fold = folds_of(seen.data, seen.owner, 4)
+    assert_array_equal(np.unique(fold), range(4))
     assert np.all(np.diff(fold) >= 0)
     assert np.ptp(np.bincount(fold)) <= 1
     # Fewer blocks than parts leave parts empty, not folds out of range.
-    assert folds_of(seen.data, seen.owner[:2]).max() < PARTS
+    assert folds_of(seen.data, seen.owner[:2], 4).max() < 4
 
 
 def test_blocks_without_any_row_are_left_out():

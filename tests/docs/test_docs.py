@@ -160,3 +160,9 @@ def test_the_diagnosis_page_lists_every_alias_and_the_limits_of_the_program() ->
     ):
         assert said in " ".join(page.split()), said
     assert CRITERIA.alike == 2.0
+
+
+def test_the_page_of_criteria_has_each_with_its_value_and_unit() -> None:
+    page = (DOCS / "criteria.md").read_text(encoding="utf-8")
+    for name, value, unit, *_ in CRITERIA.documented():
+        assert f"| `{name}` | {value} | {unit} |" in page, name

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scara_ident.effects import Member
-from scara_ident.effects.presliding import DISTANCES, LEAST_REVERSAL, Presliding, dahl_state, turning_points
+from scara_ident.effects.presliding import DISTANCES, SMALLEST_REVERSAL_SHARE, Presliding, dahl_state, turning_points
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import effects as fx
@@ -33,7 +33,9 @@ def stepped(q: np.ndarray, distance: float, start: float = 0.0) -> np.ndarray:
 def test_the_state_is_that_of_the_differential_equation(steps: list[float], distance: float, start: float):
     q = np.concatenate([[0.3], 0.3 + np.cumsum(steps)])
     # A turn that is left out shifts the state by at most its own share.
-    assert dahl_state(q, distance, start) == pytest.approx(stepped(q, distance, start), abs=3.0 * LEAST_REVERSAL)
+    assert dahl_state(q, distance, start) == pytest.approx(
+        stepped(q, distance, start), abs=3.0 * SMALLEST_REVERSAL_SHARE
+    )
 
 
 def test_the_state_is_exact_on_a_smooth_path():

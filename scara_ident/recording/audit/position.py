@@ -30,11 +30,11 @@ LOW, HIGH, FAST = 2.0, 98.0, 95.0
 SPEED_ROWS = 20
 # Another unit is sought where positions lie beyond the limits by this share of the range (real arms have been seen a
 # fifth beyond, degrees lie tens of ranges beyond), or move this many times faster than the arm can ...
-FAR_OUT = 1.0
-TOO_FAST = 5.0
+POSITION_EXCESS = 1.0
+SPEED_EXCESS = 5.0
 # ... or where both are seen to a lesser extent.
-OUT = 0.1
-FAST_TOO = 2.0
+POSITION_EXCESS_OF_BOTH = 0.1
+SPEED_EXCESS_OF_BOTH = 2.0
 # Whole numbers over a range this wide are encoder counts: as degrees they would be three turns.
 COUNTS = 1000.0
 # So many readings are named where several fit, the commonest mistakes first.
@@ -75,7 +75,12 @@ def position_unit(samples: Samples) -> Checked:
     beyond = np.where(bounded, beyond, 0.0)
     haste = speed / speed_limit(robot)
     counts = (high - low > COUNTS) & np.array([_whole(values) for values in samples.position])
-    suspect = (beyond > FAR_OUT) | (haste > TOO_FAST) | ((beyond > OUT) & (haste > FAST_TOO)) | counts
+    suspect = (
+        (beyond > POSITION_EXCESS)
+        | (haste > SPEED_EXCESS)
+        | ((beyond > POSITION_EXCESS_OF_BOTH) & (haste > SPEED_EXCESS_OF_BOTH))
+        | counts
+    )
     if not suspect.any():
         return samples, []
 
@@ -86,7 +91,7 @@ def position_unit(samples: Samples) -> Checked:
         index = int(np.argmin(values) if under else np.argmax(values))
         bounds = f"{robot.lower[joint]:.4g} to {robot.upper[joint]:.4g} {name}"
         seen = f"reaches {values[index]:.4g} in {samples.where(index)}, limits {bounds}"
-    elif haste[joint] > TOO_FAST:
+    elif haste[joint] > SPEED_EXCESS:
         seen = f"moves at {speed[joint]:.4g} a second, limit {robot.velocity_limit[joint]:.4g} {name}/s"
     else:
         seen = f"runs from {low[joint]:.6g} to {high[joint]:.6g} in whole numbers"
@@ -243,11 +248,11 @@ def _readings(robot: Robot, joint: int, low: float, high: float) -> list[_Readin
 
 def _fits(reading: _Reading, robot: Robot, joint: int, low: float, high: float, speed: float) -> bool:
     ends = np.array([low, high]) * reading.factor + reading.offset
-    slack = OUT * joint_range(robot)[joint]
+    slack = POSITION_EXCESS_OF_BOTH * joint_range(robot)[joint]
     return bool(
         ends.min() >= robot.lower[joint] - slack
         and ends.max() <= robot.upper[joint] + slack
-        and speed * abs(reading.factor) <= FAST_TOO * speed_limit(robot)[joint]
+        and speed * abs(reading.factor) <= SPEED_EXCESS_OF_BOTH * speed_limit(robot)[joint]
     )
 
 
