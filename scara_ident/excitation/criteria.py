@@ -11,12 +11,10 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.model.model import TorqueModel
-
-Array = NDArray[np.float64]
 
 # Sharpness with which the mean of eigenvalues' powers stands for the largest or smallest of them at the end.
 SHARPEST = 24.0

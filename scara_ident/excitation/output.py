@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information
 from scara_ident.excitation.criteria import BlockLogDet, Condition
@@ -15,8 +15,6 @@ from scara_ident.excitation.curves import Basis, ExcitationTrajectory
 from scara_ident.excitation.design import Design, information_of
 from scara_ident.excitation.limits import scara03_friction
 from scara_ident.recording.files.parquet_csv import write_columns
-
-Array = NDArray[np.float64]
 
 RATE = 1000.0
 # Points of a JointTrajectory are splined by the controller that gets them: this many per second, and at least so

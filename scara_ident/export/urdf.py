@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.export.bodies import (
     Body,
     body_about_com,
@@ -33,8 +33,6 @@ from scara_ident.export.xml_text import (
     set_numbers,
 )
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _ARMATURE_COMMENT = re.compile(rb"\s*armature [^ ]+ kg( m\^2)? at the joint\s*")

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.estimation import Estimate, History, JointError
 from scara_ident.estimation.bands import choose_bands
@@ -27,8 +27,6 @@ from scara_ident.motion.repeatability import repeatability
 from scara_ident.motion.velocity_audit import audit_velocity
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scara_ident.arrays import Array
 
 MEAN_BINS = 24
 LEAST_COUNT = 8

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.model_selection import Unexplained, rms_of
@@ -15,8 +15,6 @@ from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
 from scara_ident.model.terms.friction import Friction
-
-Array = NDArray[np.float64]
 
 
 def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:

@@ -11,14 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import EffectTerm
 from scara_ident.estimation.observations import Observations
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
 from scara_ident.motion.motion import Motion, low_pass
 from scara_ident.motion.prepared import PreparedStretch
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

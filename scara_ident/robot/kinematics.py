@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.robot import Robot
 
@@ -20,7 +20,7 @@ def parent(robot: Robot, joint: int) -> int:
     return place_of(robot, int(robot.model.parents[int(robot.order[joint]) + 1]))
 
 
-def axis(robot: Robot, data: pin.Data, joint: int) -> NDArray[np.float64]:
+def axis(robot: Robot, data: pin.Data, joint: int) -> Array:
     """Return the axis of a revolute joint in the base frame, at the configuration last computed."""
     joint_id = int(robot.order[joint]) + 1
     subspace = robot.model.joints[joint_id].createData().S

@@ -8,12 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def visual_boxes(robot: Robot) -> tuple[tuple[Array, Array], ...]:

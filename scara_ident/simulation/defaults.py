@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation.arm import Controller, VirtualArm
-
-Array = NDArray[np.float64]
 
 # Table 5, column OJD (a0, a1, a2 of the two joints; cubic friction left out) and sigma of Table 1, row L1.
 SCARA_FRICTION = ((0.210, 0.093, -0.016, 0.0), (0.088, 0.049, -0.007, 0.0))

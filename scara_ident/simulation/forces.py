@@ -15,13 +15,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
 from scara_ident.simulation.plant import Plant
 from scara_ident.simulation.spatial import dynamics
-
-Array = NDArray[np.float64]
 
 
 class Room(NamedTuple):

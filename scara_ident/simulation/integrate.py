@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
 from scara_ident.simulation.forces import Room, accelerate, settle
 from scara_ident.simulation.plant import Plant
-
-Array = NDArray[np.float64]
 
 # Within one step every joint may stop and start again a few times; more would be an error of the model.
 EVENTS_PER_JOINT = 4

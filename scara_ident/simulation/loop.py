@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
 from scara_ident.simulation.forces import Room, make_room
 from scara_ident.simulation.integrate import Stages, State, first_stage, make_stages, make_state, step
 from scara_ident.simulation.plant import Plant, Sensors
-
-Array = NDArray[np.float64]
 
 
 class Gains(NamedTuple):

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.robot.robot import Robot
 from scara_ident.simulation.defaults import tool_point
 from scara_ident.simulation.laws import MotionLaw
 from scara_ident.simulation.reference import ReferenceMotion
-
-Array = NDArray[np.float64]
 
 # A pose whose smallest singular value is this share of the largest is taken for singular.
 SINGULAR = 5e-3

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scara_ident.errors import UsageError
 from scara_ident.paper import LINK_LENGTH, TABLE_1, TRAJECTORIES, criteria, regressor
@@ -22,8 +21,6 @@ from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation.laws import MotionLaw
 from scara_ident.simulation.paths import circle, line
 from scara_ident.simulation.reference import ReferenceMotion
-
-Array = NDArray[np.float64]
 
 # Where the elbow is sought: q2 is positive on all three.
 ELBOW = (1.2, 1.3)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation.consistent.bodies import LinkInertia, link_inertia
 from scara_ident.estimation.consistent.constraints import active_set
@@ -22,7 +22,6 @@ from scara_ident.threads import one_blas_thread
 
 __all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "physical_consistency"]
 
-Array = NDArray[np.float64]
 
 # Directions that active constraints allow by less than this are what the solver's digits leave of forbidden ones.
 DIGITS = 1e-6

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation.consistent.friction import FrictionFault, friction_faults
 from scara_ident.estimation.consistent.options import ConsistentOptions
@@ -24,8 +25,6 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.constraints import BrakingPolynomial
 from scara_ident.model.terms.term import Column
 from scara_ident.threads import one_blas_thread
-
-Array = NDArray[np.float64]
 
 # A body that lacks less than this share of the nominal one lacks nothing but the solver's digits.
 ROUNDING = 1e-7

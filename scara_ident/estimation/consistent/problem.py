@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation.consistent.constraints import Cone, Statement, body_limits
 from scara_ident.estimation.consistent.friction import certificate
@@ -28,8 +29,6 @@ from scara_ident.estimation.consistent.nominal import Nominal, nominal
 from scara_ident.estimation.consistent.options import ConsistentOptions
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.constraints import BrakingPolynomial, Nonnegative, constraints_of
-
-Array = NDArray[np.float64]
 
 # Every body keeps this share of its nominal pseudo-inertia: above what the solver leaves of its constraints, and small
 # enough that no estimate moves by more than about this share of the nominal.

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation.consistent.feasibility import (
     ROUNDING,
@@ -36,8 +36,6 @@ from scara_ident.estimation.information import (
     weighted,
 )
 from scara_ident.threads import one_blas_thread
-
-Array = NDArray[np.float64]
 
 # The solver's constraints are kept to this, relative to the nominal bodies.
 DIGITS = 1e-6

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scara_ident.arrays import Array
 
 VAR, SIN, COS, ADD, SUB, MUL, ADD_CONST, MUL_CONST = range(8)
 

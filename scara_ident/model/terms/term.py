@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
@@ -55,7 +56,7 @@ class Term(Protocol):
         """Which entries can differ from zero, shape (n, p)."""
         ...
 
-    def fill(self, motion: Motion, rows: Sequence[NDArray[np.float64]]) -> None:
+    def fill(self, motion: Motion, rows: Sequence[Array]) -> None:
         """Write the columns on a stretch of motion, on the side of the recorded torque.
 
         Parameters
@@ -67,7 +68,7 @@ class Term(Protocol):
         """
         ...
 
-    def regressor(self, motion: Motion) -> NDArray[np.float64]:
+    def regressor(self, motion: Motion) -> Array:
         """Return the columns on a stretch of motion, shape (n, p, N), on the side of the recorded torque."""
         ...
 
@@ -75,7 +76,7 @@ class Term(Protocol):
 class Filled:
     """A term whose dense regressor is made of what it fills in."""
 
-    def regressor(self: Term, motion: Motion) -> NDArray[np.float64]:
+    def regressor(self: Term, motion: Motion) -> Array:
         """Return the columns on a stretch of motion, shape (n, p, N), zero where the pattern says so."""
         pattern = self.pattern
         rows = [np.empty((np.count_nonzero(row), motion.samples)) for row in pattern]

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.recording.audit.samples import (
     GAP_STEPS,
     IDLE_TRAVEL,
-    Array,
     Finding,
     Samples,
     joint_range,

@@ -8,9 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 
 if TYPE_CHECKING:
@@ -64,7 +62,7 @@ def column_names(path: Path) -> tuple[str, ...]:
     return tuple(names)
 
 
-def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
     """Read some columns of a file as float64, and only those.
 
     Parameters
@@ -96,7 +94,7 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
     return {name: _numbers(path, frame[name]) for name in names}
 
 
-def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
+def write_columns(path: Path, columns: Mapping[str, Array]) -> None:
     """Write columns to a file, whole or not at all.
 
     Parameters
@@ -172,7 +170,7 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
     return frame.rename({file_name: name for name, file_name in raw.items()})
 
 
-def _numbers(path: Path, series: pl.Series) -> NDArray[np.float64]:
+def _numbers(path: Path, series: pl.Series) -> Array:
     import polars as pl
 
     if series.dtype == pl.String:
@@ -189,7 +187,7 @@ def _numbers(path: Path, series: pl.Series) -> NDArray[np.float64]:
     elif not series.dtype.is_numeric():
         hint = "time in seconds" if series.name == "time" else "numbers"
         raise RecordingError(f"{path}: column {series.name!r} holds {series.dtype}; it must hold {hint}")
-    values: NDArray[np.float64] = series.cast(pl.Float64).to_numpy()
+    values: Array = series.cast(pl.Float64).to_numpy()
     return values
 
 

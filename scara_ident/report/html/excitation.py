@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.motion.motion import Motion
 from scara_ident.report.html.blocks import (
     Arm,
@@ -31,8 +31,6 @@ from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection, Section
 from scara_ident.report.plot import Figure, Grid, Layer, Level, Line, Mark, Panel, Plot, single
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Pictures of the arm per second, and at the most.
 FRAME_RATE = 25.0
