@@ -29,12 +29,10 @@ def base(robot: options.Robot = None, output: options.Output = None, json: optio
     for row in content["approximate"]:
         console.print(
             f"note: {row['name']} is regrouped though {row['share']:.1e} of its column is independent; "
-            "an angle in the URDF may have few digits",
+            "an angle in the URDF may have few digits"
         )
     check = content["check"]
-    console.print(
-        f"check: rank {check['rank']} of {content['count']}, torque unchanged to {check['torque_error']:.1e}",
-    )
+    console.print(f"check: rank {check['rank']} of {content['count']}, torque unchanged to {check['torque_error']:.1e}")
     if output is not None:
         write_json(output / "base.json", content)
         console.written(output, "base.json")

@@ -114,7 +114,7 @@ def _show(console: PlainConsole, found: Inspection, written: Path | None) -> Non
         seconds = recording.time[-1] - recording.time[0]
         console.print(
             f"audit: {len(recording.time)} samples, {seconds:.4g} s, {recording.rate:.4g} Hz; "
-            f"{several(len(recording.findings), 'finding')}",
+            f"{several(len(recording.findings), 'finding')}"
         )
         for finding in recording.findings:
             console.print(f"  {finding.message}")

@@ -9,14 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from scara_ident.arrays import Array
-from scara_ident.export.bodies import (
-    Body,
-    body_about_com,
-    body_parameters,
-    check_standard,
-    members_of,
-    share,
-)
+from scara_ident.export.bodies import Body, body_about_com, body_parameters, check_standard, members_of, share
 from scara_ident.export.friction import JointFriction, joint_side
 from scara_ident.export.xml_text import (
     COMMENT,

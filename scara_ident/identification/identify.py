@@ -205,10 +205,7 @@ def check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequenc
 
 
 def estimate_by(
-    method: str,
-    observations: Observations,
-    noise: Array | None = None,
-    options: ConsistentOptions | None = None,
+    method: str, observations: Observations, noise: Array | None = None, options: ConsistentOptions | None = None
 ) -> tuple[Estimate, History | None]:
     """Estimate by a method given by name; ``noise`` is each joint's, where repetitions tell it."""
     estimator = ESTIMATORS.get(method)

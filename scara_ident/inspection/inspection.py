@@ -90,11 +90,7 @@ class Inspection:
 
 
 def inspect_file(
-    path: Path | str,
-    *,
-    urdf: Path | str | None = None,
-    robot: Path | str | None = None,
-    folder: Path | str = ".",
+    path: Path | str, *, urdf: Path | str | None = None, robot: Path | str | None = None, folder: Path | str = "."
 ) -> Inspection:
     """Look into a file, guess which columns are an arm's channels, and audit it.
 

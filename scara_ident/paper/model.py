@@ -66,12 +66,7 @@ REDUCED_COLUMNS: tuple[int, ...] = tuple(i for i, p in enumerate(PARAMETERS) if 
 
 
 def regressor(
-    q: Array,
-    v: Array,
-    a: Array,
-    *,
-    link_length: float = LINK_LENGTH,
-    reduction: tuple[float, float] = REDUCTION,
+    q: Array, v: Array, a: Array, *, link_length: float = LINK_LENGTH, reduction: tuple[float, float] = REDUCTION
 ) -> Array:
     """Regressor W of the 15 parameters, motor side.
 

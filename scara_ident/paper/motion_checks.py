@@ -32,9 +32,7 @@ PEAK_TOLERANCE = 0.02
 TORQUE_TOLERANCE = 0.05
 
 
-def _motion(
-    trajectory: Trajectory,
-) -> tuple[Array, Array, Array]:
+def _motion(trajectory: Trajectory) -> tuple[Array, Array, Array]:
     return trajectory.motion(trajectory.times())
 
 

@@ -84,13 +84,7 @@ OJD = Trajectory(
 """One harmonic, chosen by the paper for the greatest determinant J_d."""
 
 
-def tool_acceleration(
-    q: Array,
-    v: Array,
-    a: Array,
-    *,
-    link_length: float = LINK_LENGTH,
-) -> Array:
+def tool_acceleration(q: Array, v: Array, a: Array, *, link_length: float = LINK_LENGTH) -> Array:
     """Horizontal acceleration of the gripper.
 
     Parameters

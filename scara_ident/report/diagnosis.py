@@ -54,11 +54,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
             for effect in diagnosis.effects
         ],
         "training": _before_after(
-            joints,
-            diagnosis.before.value,
-            diagnosis.training_before,
-            diagnosis.after.value,
-            diagnosis.training_after,
+            joints, diagnosis.before.value, diagnosis.training_before, diagnosis.after.value, diagnosis.training_after
         ),
         "validation": _before_after(
             joints,

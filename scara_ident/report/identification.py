@@ -86,10 +86,7 @@ def _error(error: JointError | None) -> dict[str, float | None]:
 
 
 def _left_out(robot: Robot, item: Observations) -> dict[str, Any]:
-    return {
-        "ends_s": item.left_out_ends,
-        "at_rest_share": dict(zip(robot.joints, item.left_out_rest, strict=True)),
-    }
+    return {"ends_s": item.left_out_ends, "at_rest_share": dict(zip(robot.joints, item.left_out_rest, strict=True))}
 
 
 def sentences(identification: Identification) -> tuple[str, ...]:

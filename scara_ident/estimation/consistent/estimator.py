@@ -57,10 +57,7 @@ class ConsistentEstimate(Estimate):
 
 @one_blas_thread()
 def consistent(
-    observations: Observations,
-    *,
-    options: ConsistentOptions | None = None,
-    problem: Problem | None = None,
+    observations: Observations, *, options: ConsistentOptions | None = None, problem: Problem | None = None
 ) -> ConsistentEstimate:
     """Estimate by least squares among all arms that can exist.
 

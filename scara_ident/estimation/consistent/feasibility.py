@@ -254,11 +254,7 @@ def _gap(result: Any) -> float:
 
 @one_blas_thread()
 def check_consistency(
-    model: TorqueModel,
-    value: Array,
-    *,
-    information: Information | None = None,
-    unknowns: Unknowns | None = None,
+    model: TorqueModel, value: Array, *, information: Information | None = None, unknowns: Unknowns | None = None
 ) -> PhysicalConsistency:
     """Check whether a physically consistent arm has these parameters.
 

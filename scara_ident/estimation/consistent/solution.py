@@ -16,12 +16,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError, UsageError
-from scara_ident.estimation.consistent.feasibility import (
-    ROUNDING,
-    fixed,
-    fixed_columns,
-    furthest_inside,
-)
+from scara_ident.estimation.consistent.feasibility import ROUNDING, fixed, fixed_columns, furthest_inside
 from scara_ident.estimation.consistent.friction import friction_faults, shape_faults
 from scara_ident.estimation.consistent.options import FrictionShape
 from scara_ident.estimation.consistent.prior import nearest_to_nominal, prior_rows
@@ -222,11 +217,7 @@ def _best(problem: Problem, information: Information, standard_prior: StandardPr
 
 @one_blas_thread()
 def nearest_arm(
-    problem: Problem,
-    information: Information,
-    x: Array,
-    *,
-    standard_prior: StandardPrior | None = None,
+    problem: Problem, information: Information, x: Array, *, standard_prior: StandardPrior | None = None
 ) -> Array:
     """Find the arm nearest to the nominal one among those that give the same torque.
 

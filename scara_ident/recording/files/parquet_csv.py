@@ -158,12 +158,7 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
         # Something is not a number: read the words themselves, so that it can be named.
         _refuse_long_rows(path, separator)
         frame = pl.read_csv(
-            path,
-            columns=list(raw.values()),
-            infer_schema=False,
-            separator=separator,
-            null_values=MISSING,
-            glob=False,
+            path, columns=list(raw.values()), infer_schema=False, separator=separator, null_values=MISSING, glob=False
         )
         if decimal_comma:
             frame = frame.with_columns(pl.all().str.replace(",", ".", literal=True))

@@ -128,11 +128,7 @@ def _own(robot: Robot, chapter: Chapter) -> Figure | None:
 
 
 def _means_plot(
-    robot: Robot,
-    chapter: Chapter,
-    x_before: Sequence[Array],
-    x_after: Sequence[Array],
-    label: str,
+    robot: Robot, chapter: Chapter, x_before: Sequence[Array], x_after: Sequence[Array], label: str
 ) -> Plot:
     j, view = chapter.joint, chapter.view
     after = kept(chapter.after, x_after, j)
