@@ -1,7 +1,5 @@
 """The type of all arrays of real numbers; docstrings give their shapes."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -76,10 +76,6 @@ def aliases(model: TorqueModel, *, seed: int = 0) -> tuple[Alias, ...]:
     model : TorqueModel
     seed : int, optional
         Of the random states and parameters.
-
-    Returns
-    -------
-    tuple of Alias
     """
     rng = np.random.default_rng(seed)
     motion = random_motion(model.robot, rng, 40 + len(model.columns))

@@ -174,10 +174,6 @@ class FrictionCoupling(Effect):
     w is the other joint's velocity v_k, or, where one motor moves with two joints as in belt drives and wrists, the
     sum or difference ``v_j + v_k``, ``v_j - v_k`` in the direction of the drive; the linear part in v_j then adds to
     the joint's own viscous friction.
-
-    Attributes
-    ----------
-    way : {"other", "sum", "difference"}
     """
 
     way: Literal["other", "sum", "difference"] = "other"

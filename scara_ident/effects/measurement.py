@@ -169,10 +169,6 @@ def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = N
         s, positive where effort lags position.
     joints : sequence of int, optional
         Places of the joints whose effort is moved; by default all.
-
-    Returns
-    -------
-    Recording
     """
     if recording.effort is None or delay == 0.0:
         return recording

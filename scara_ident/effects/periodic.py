@@ -131,10 +131,6 @@ class Vibration(Sinusoid):
 
     There is no grid of frequencies: lines are as narrow as the recordings are long, and come from the spectrum of the
     residual.
-
-    Attributes
-    ----------
-    free_phase : bool
     """
 
     free_phase: bool = False

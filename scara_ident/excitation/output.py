@@ -126,10 +126,6 @@ def write_joint_trajectory(trajectory: ExcitationTrajectory, path: Path | str, r
 def excitation_dict(design: Design) -> dict[str, Any]:
     """Return the content of ``excitation.json``.
 
-    Parameters
-    ----------
-    design : Design
-
     Returns
     -------
     dict

@@ -34,10 +34,6 @@ class JointFriction:
 def friction_of(estimate: Estimate) -> JointFriction | None:
     """Read Coulomb and viscous friction from an estimate.
 
-    Parameters
-    ----------
-    estimate : Estimate
-
     Returns
     -------
     JointFriction or None

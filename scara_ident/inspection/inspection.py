@@ -105,10 +105,6 @@ def inspect_file(
     folder : path
         Where the description will stand: its ``urdf`` is relative to it.
 
-    Returns
-    -------
-    Inspection
-
     Raises
     ------
     RecordingError, RobotError

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -22,9 +22,6 @@ from scara_ident.robot.examples import example_urdf, is_name
 from scara_ident.robot.signal_map import Channels, build_channels
 from scara_ident.robot.transmissions import reductions, rotor_inertias
 from scara_ident.robot.urdf_validation import urdf_fault
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 MOVABLE = ("revolute", "continuous", "prismatic")
 

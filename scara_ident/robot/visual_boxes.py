@@ -19,10 +19,6 @@ def visual_boxes(robot: Robot) -> tuple[tuple[Array, Array], ...]:
 
     A body is the link that a joint moves with all that is fixed or locked to it.
 
-    Parameters
-    ----------
-    robot : Robot
-
     Returns
     -------
     tuple of (ndarray, ndarray)

@@ -132,10 +132,6 @@ def line(
         Samples per second.
     name : str
 
-    Returns
-    -------
-    ReferenceMotion
-
     Raises
     ------
     PathError

@@ -55,13 +55,7 @@ RECONSTRUCTIONS: dict[str, LinePath | CirclePath] = {
 
 @dataclass(frozen=True)
 class Match:
-    """One figure of the paper and the reconstruction's.
-
-    Attributes
-    ----------
-    trajectory, quantity, unit : str
-    printed, reconstructed : float
-    """
+    """One figure of the paper and the reconstruction's."""
 
     trajectory: str
     quantity: str
@@ -122,10 +116,6 @@ def reconstruction_match(names: tuple[str, ...] = ("L1", "L2", "CI"), *, samples
     names : tuple of str
     samples : int
         Equally spaced samples for J_d and J_k, 2500 as for the paper's other trajectories.
-
-    Returns
-    -------
-    tuple of Match
     """
     found: list[Match] = []
     for name in names:

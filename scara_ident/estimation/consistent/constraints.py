@@ -199,11 +199,6 @@ def _face(value: Array, multiplier: Array) -> Array:
 def body_limits(robot: Robot, options: ConsistentOptions) -> tuple[Cone, ...]:
     """Collect what the options say of masses and centres of mass.
 
-    Parameters
-    ----------
-    robot : Robot
-    options : ConsistentOptions
-
     Returns
     -------
     tuple of Cone

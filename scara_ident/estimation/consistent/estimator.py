@@ -122,10 +122,6 @@ def consistent(
 def links(estimate: ConsistentEstimate) -> tuple[LinkInertia, ...]:
     """Return mass, centre of mass and inertia of every identified link.
 
-    Parameters
-    ----------
-    estimate : ConsistentEstimate
-
     Returns
     -------
     tuple of LinkInertia
@@ -137,16 +133,7 @@ def links(estimate: ConsistentEstimate) -> tuple[LinkInertia, ...]:
 
 
 def physical_consistency(estimate: Estimate) -> PhysicalConsistency:
-    """Say whether an arm with the estimated parameters can exist, for any method.
-
-    Parameters
-    ----------
-    estimate : Estimate
-
-    Returns
-    -------
-    PhysicalConsistency
-    """
+    """Say whether an arm with the estimated parameters can exist, for any method."""
     return check_consistency(estimate.model, estimate.value, information=estimate.information)
 
 

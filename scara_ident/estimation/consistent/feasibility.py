@@ -159,10 +159,6 @@ def furthest_inside(unknowns: Unknowns, value: Array, given: Fixed) -> BestArm:
     given : Fixed
         The combinations that are given. What they leave free among friction and other columns keeps its own
         constraints; what they fix there is not judged.
-
-    Returns
-    -------
-    BestArm
     """
     u, start, free = unknowns, given.shortest(value), given.free
     total, count = u.size + u.auxiliary, free.shape[1]
@@ -271,10 +267,6 @@ def check_consistency(
         The rows that they came from, to give the distance in standard deviations.
     unknowns : Unknowns, optional
         Of the same model, to spare building them again; limits on masses and centres of mass in them count too.
-
-    Returns
-    -------
-    PhysicalConsistency
 
     Raises
     ------

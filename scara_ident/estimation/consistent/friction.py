@@ -61,10 +61,6 @@ def certificate(polynomial: BrakingPolynomial, shape: Shape, margin: float = MAR
     margin : float, optional
         Distance kept from 0 and the limit, as a share of the limit.
 
-    Returns
-    -------
-    Certificate
-
     Raises
     ------
     UsageError

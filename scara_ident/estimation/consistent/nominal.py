@@ -56,16 +56,7 @@ class Nominal:
 
 
 def nominal(robot: Robot) -> Nominal:
-    """Take the nominal bodies of a robot and make them physical.
-
-    Parameters
-    ----------
-    robot : Robot
-
-    Returns
-    -------
-    Nominal
-    """
+    """Take the nominal bodies of a robot and make them physical."""
     standard = robot.standard_parameters()
     bodies = standard[: 10 * robot.n].reshape(robot.n, 10)
     length = _length(robot)

@@ -148,15 +148,6 @@ class Unknowns:
 def build_unknowns(model: TorqueModel, options: ConsistentOptions) -> Unknowns:
     """Collect the unknowns and the constraints that the model's terms and the options declare.
 
-    Parameters
-    ----------
-    model : TorqueModel
-    options : ConsistentOptions
-
-    Returns
-    -------
-    Unknowns
-
     Raises
     ------
     UsageError
@@ -297,10 +288,6 @@ class Problem:
         target : ndarray, shape (r,)
         prior : ndarray, shape (size, size)
             Rows W on the unknowns' distance from their reference; of full rank, so that there is one solution.
-
-        Returns
-        -------
-        Point
 
         Raises
         ------

@@ -153,10 +153,6 @@ def solve_consistent(
         All rows, weighted, with those of priors on the model's parameters.
     standard_prior : StandardPrior, optional
 
-    Returns
-    -------
-    ConsistentSolution
-
     Raises
     ------
     EstimationError
@@ -180,15 +176,6 @@ def solve_consistent(
 
 def least_squares_arm(problem: Problem, information: Information) -> ConsistentSolution | None:
     """Return an arm that plain least squares describes, None where there is none or the solver finds none.
-
-    Parameters
-    ----------
-    problem : Problem
-    information : Information
-
-    Returns
-    -------
-    ConsistentSolution or None
 
     Raises
     ------

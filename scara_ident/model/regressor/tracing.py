@@ -143,10 +143,6 @@ def vanishing(trace: Trace, values: Sequence[Scalar], inputs: Array) -> list[boo
     values : sequence of Expr or float
     inputs : ndarray (inputs, states)
         Random states.
-
-    Returns
-    -------
-    list of bool
     """
     found: list[Array] = []
     sizes: list[Array] = []
@@ -207,10 +203,6 @@ def compile_program(trace: Trace, outputs: Sequence[tuple[int, Scalar]]) -> Prog
         The graph in which the expressions were recorded.
     outputs : sequence of (int, Expr or float)
         Index of each target vector and what to write there, in the order of evaluation.
-
-    Returns
-    -------
-    Program
     """
     return _Emitter(trace, outputs).program()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,7 @@ from scara_ident.recording.audit.samples import (
     several,
     speed_limit,
 )
-
-if TYPE_CHECKING:
-    from scara_ident.robot.robot import Robot
+from scara_ident.robot.robot import Robot
 
 Checked = tuple[Samples, list[Finding]]
 

@@ -299,11 +299,6 @@ SECTIONS: tuple[Section, ...] = (
 def diagnosis_report(path: Path, context: DiagnosisContext) -> None:
     """Write the report of a diagnosis as one HTML file.
 
-    Parameters
-    ----------
-    path : Path
-    context : DiagnosisContext
-
     Raises
     ------
     ScaraIdentError

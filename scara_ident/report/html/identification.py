@@ -139,11 +139,6 @@ SECTIONS: tuple[Section, ...] = (
 def identification_report(path: Path, context: IdentificationContext) -> None:
     """Write the report of an identification as one HTML file.
 
-    Parameters
-    ----------
-    path : Path
-    context : IdentificationContext
-
     Raises
     ------
     ScaraIdentError
