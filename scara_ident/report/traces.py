@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,3 +173,22 @@ def _trace(
 
 def _banded(part: PreparedStretch, rows: Array) -> Array:
     return np.array([low_pass(row, part.rate, band) for row, band in zip(rows, part.bands, strict=True)])
+
+
+class FittedContext:
+    """What reports of fitted models draw from: the traces of their recordings by role, those held out first."""
+
+    @cached_property
+    def groups(self) -> dict[str, list[tuple[Trace, ...]]]:
+        """Traces by recording."""
+        raise NotImplementedError
+
+    @property
+    def parts(self) -> list[tuple[str, tuple[Trace, ...]]]:
+        """Traces of every recording by its name and role, those held out first."""
+        return [(f"{found[0].recording} ({role})", found) for role, group in self.groups.items() for found in group]
+
+    @property
+    def sets(self) -> dict[str, list[Trace]]:
+        """Traces of the recordings that were fitted and of those held out."""
+        return {role: list(chain.from_iterable(group)) for role, group in reversed(self.groups.items())}

@@ -53,3 +53,10 @@ def tool_frame(robot: Robot, link: str | None = None) -> pin.Frame:
     if found.parentJoint == 0:
         raise RobotError(f"{robot.urdf}: no identified joint moves {link!r}; name a link that moves")
     return found
+
+
+def farthest_point(robot: Robot) -> Array:
+    """Return the farthest frame that the last joint carries, in that joint's frame, m, shape (3,)."""
+    model = robot.model
+    points = [np.array(frame.placement.translation) for frame in model.frames if frame.parentJoint == model.njoints - 1]
+    return max(points, key=lambda point: float(np.linalg.norm(point)), default=np.zeros(3))

@@ -10,8 +10,8 @@ import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.robot.kinematics import farthest_point
 from scara_ident.robot.robot import Robot
-from scara_ident.simulation.defaults import tool_point
 from scara_ident.simulation.laws import MotionLaw
 from scara_ident.simulation.reference import ReferenceMotion
 
@@ -89,7 +89,7 @@ class Tool:
 def tool_of(robot: Robot, point: Array | None = None) -> Tool:
     """Describe the tool of an arm; ``point`` defaults to the farthest frame that the last joint carries."""
     model = robot.model
-    chosen = tool_point(robot) if point is None else np.asarray(point, dtype=float)
+    chosen = farthest_point(robot) if point is None else np.asarray(point, dtype=float)
     lengths = [float(np.linalg.norm(placement.translation)) for placement in model.jointPlacements]
     reach = max(sum(lengths) + float(np.linalg.norm(chosen)), 1e-3)
     tool = Tool(robot, chosen, robot.n >= 6, 0, reach)
