@@ -95,17 +95,9 @@ def reconstruction(name: str, robot: Robot | None = None, *, rate: float = 1000.
     if isinstance(path, LinePath):
         return line(robot, path.start, path.end, duration, near=ELBOW, law=path.law, rate=rate, name=name)
     return circle(
-        robot,
-        path.centre,
-        path.radius,
-        duration,
-        near=ELBOW,
-        start_angle=path.start_angle,
-        turns=path.turns,
-        law=path.law,
-        rate=rate,
-        name=name,
-    )
+        robot, path.centre, path.radius, duration, near=ELBOW, start_angle=path.start_angle, turns=path.turns,
+        law=path.law, rate=rate, name=name,
+    )  # fmt: skip
 
 
 def reconstruction_match(names: tuple[str, ...] = ("L1", "L2", "CI"), *, samples: int = SAMPLES) -> tuple[Match, ...]:

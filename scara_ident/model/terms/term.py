@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,10 @@ class Column:
     unit: str
     meaning: str
     nonnegative: bool = False
+
+    def entry(self, **numbers: float) -> dict[str, Any]:
+        """Return what result files say of the parameter, with its numbers."""
+        return {"name": self.name, "joint": self.joint, **numbers, "unit": self.unit, "meaning": self.meaning}
 
 
 class Term(Protocol):

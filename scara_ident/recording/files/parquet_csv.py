@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.recording.files.files import check_file
 
 if TYPE_CHECKING:
     import polars as pl
@@ -41,20 +42,16 @@ def column_names(path: Path) -> tuple[str, ...]:
     import polars as pl
 
     check_suffix(path)
+    check_file(path)
     try:
-        with path.open("rb") as file:
-            if not file.read(1):
-                raise RecordingError(f"{path}: the file is empty; record it again")
-            if path.suffix.lower() == ".csv":
-                names = [name.strip() for name in _csv_header(path)]
-            else:
-                file.seek(0)
+        if path.suffix.lower() == ".csv":
+            names = [name.strip() for name in _csv_header(path)]
+        else:
+            with path.open("rb") as file:
                 names = list(pl.read_parquet_schema(file))
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
     except UnicodeDecodeError as error:
         raise RecordingError(f"{path}: not a text file in UTF-8; save the CSV again in UTF-8") from error
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
         raise _damaged(path, error) from error
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
