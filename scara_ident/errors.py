@@ -1,7 +1,5 @@
 """What can go wrong, each as one line that says what, where and what to do."""
 
-from __future__ import annotations
-
 
 class ScaraIdentError(Exception):
     """The data or the model cannot give what was asked (exit status 1)."""

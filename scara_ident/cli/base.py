@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from scara_ident.cli.console import JsonOption, OutputOption, RobotOption, output_console, print_json, table
+from scara_ident.cli import options
+from scara_ident.cli.console import result_console, table
 
 
-def base(robot: RobotOption = None, output: OutputOption = None, json: JsonOption = False) -> None:
+def base(robot: options.Robot = None, output: options.Output = None, json: options.Json = False) -> None:
     """Print the base parameters: what each is made of, what is not identifiable and why."""
     from scara_ident.files import check_output, write_json
     from scara_ident.report.base import base_dict
@@ -14,9 +15,7 @@ def base(robot: RobotOption = None, output: OutputOption = None, json: JsonOptio
     check_output(output)
     arm = load_robot(robot)
     content = base_dict(arm)
-    if json:
-        print_json(content)
-    console = output_console(quiet=json)
+    console = result_console(content, json)
     bodies = table("bodies", "number", "joint", "link", "reduction", right=("reduction",))
     for body in content["bodies"]:
         bodies.add_row(str(body["number"]), body["joint"], body["link"], f"{body['reduction']:g}")
@@ -25,19 +24,15 @@ def base(robot: RobotOption = None, output: OutputOption = None, json: JsonOptio
     for row in content["base_parameters"]:
         rows.add_row(row["name"], row["unit"], row["expression"])
     console.print(rows)
-    console.print(f"never enter the torque: {', '.join(content['never_enter']) or 'none'}", markup=False)
-    console.print(f"enter only in sums: {', '.join(content['only_in_sums']) or 'none'}", markup=False)
+    console.print(f"never enter the torque: {', '.join(content['never_enter']) or 'none'}")
+    console.print(f"enter only in sums: {', '.join(content['only_in_sums']) or 'none'}")
     for row in content["approximate"]:
         console.print(
             f"note: {row['name']} is regrouped though {row['share']:.1e} of its column is independent; "
-            "an angle in the URDF may have few digits",
-            markup=False,
+            "an angle in the URDF may have few digits"
         )
     check = content["check"]
-    console.print(
-        f"check: rank {check['rank']} of {content['count']}, torque unchanged to {check['torque_error']:.1e}",
-        markup=False,
-    )
+    console.print(f"check: rank {check['rank']} of {content['count']}, torque unchanged to {check['torque_error']:.1e}")
     if output is not None:
         write_json(output / "base.json", content)
-        console.print(f"written: {output / 'base.json'}", markup=False, soft_wrap=True)
+        console.written(output, "base.json")

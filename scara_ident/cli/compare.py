@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-from scara_ident.cli.console import (
-    JsonOption,
-    MethodOption,
-    ModelOption,
-    OutputOption,
-    RecordingArguments,
-    RobotOption,
-    VerboseOption,
-    check_report,
-    output_console,
-    print_json,
-    progress,
-    show_recordings,
-    table,
-)
+from scara_ident.cli import options
+from scara_ident.cli.console import check_report, progress, result_console, show_recordings, table
 
 
 def compare(
-    recordings: RecordingArguments,
-    robot: RobotOption = None,
-    model: ModelOption = "complete",
-    method: MethodOption = "ols",
-    output: OutputOption = None,
-    json: JsonOption = False,
-    verbose: VerboseOption = False,
+    recordings: options.Recordings,
+    robot: options.Robot = None,
+    model: options.Model = "complete",
+    method: options.Method = "ols",
+    output: options.Output = None,
+    json: options.Json = False,
+    verbose: options.Verbose = False,
 ) -> None:
     """Set every trajectory's parameters against every trajectory."""
     from scara_ident.files import write_json, written_together
@@ -42,13 +29,10 @@ def compare(
         given = read_recordings(recordings, arm)
         result = run(arm, given, model=model, method=method, progress=step)
     content = comparison_dict(result)
-    if json:
-        print_json(content)
-    console = output_console(quiet=json)
+    console = result_console(content, json)
     if verbose:
         show_recordings(console, given)
-    for note in result.notes:
-        console.print(f"note: {note}", markup=False, style="dim")
+    console.note(result.notes)
     names = content["trajectories"]
     what = table("trajectories", "trajectory", "J_d", "J_k", "runs", right=("J_d", "J_k", "runs"))
     for name in names:
@@ -70,13 +54,11 @@ def compare(
         averages = [f"{content['average_of_estimated'][other][joint]:.3g}" for other in names]
         rows.add_row("average", "", *averages, "")
         console.print(rows)
-    for sentence in content["summary"]:
-        console.print(sentence, markup=False)
+    console.say(content["summary"])
     if output is not None:
         from scara_ident.report.html import comparison_report
 
         with written_together(output) as place:
             comparison_report(place / "report.html", content)
             write_json(place / "comparison.json", content)
-        written = ", ".join(str(output / name) for name in ("comparison.json", "report.html"))
-        console.print(f"written: {written}", markup=False, soft_wrap=True)
+        console.written(output, "comparison.json", "report.html")

@@ -5,20 +5,17 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 from warnings import catch_warnings, simplefilter
 
 import typer
 from rich.console import Console
 from rich.table import Table
-from typer.core import TyperCommand, TyperOption
 
 from scara_ident.errors import PluginWarning
-from scara_ident.identification import ESTIMATORS
-from scara_ident.model import MODELS
 
 if TYPE_CHECKING:
     from scara_ident.recording.recording import Recording
@@ -26,66 +23,6 @@ if TYPE_CHECKING:
 
 # Of a pipe or a file, which have no width of their own.
 PIPE_WIDTH = 80
-
-RecordingArguments = Annotated[
-    list[str],
-    typer.Argument(
-        metavar="RECORDING...",
-        help="Recordings (.parquet, .csv, .mat, .h5, .mcap, .db3, a rosbag2 folder), folders or globs of them.",
-    ),
-]
-RobotOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--robot",
-        metavar="FILE",
-        help="robot.yaml, a URDF, or a robot of example-robot-data by its name, as ur5; default: the embedded SCARA03.",
-    ),
-]
-ModelOption = Annotated[
-    str,
-    typer.Option(
-        "--model",
-        metavar="NAME",
-        callback=MODELS.check,
-        autocompletion=MODELS.names,
-        help="Terms of the torque equation: {models}.",
-    ),
-]
-MethodOption = Annotated[
-    str,
-    typer.Option(
-        "--method",
-        metavar="NAME",
-        callback=ESTIMATORS.check,
-        autocompletion=ESTIMATORS.names,
-        help="Estimator: {methods}; consistent: an arm that can exist.",
-    ),
-]
-BandOption = Annotated[
-    float | None,
-    typer.Option("--band", metavar="HZ", min=1e-3, help="Low-pass for all joints; default: chosen from the data."),
-]
-OutputOption = Annotated[
-    Path | None, typer.Option("--output", metavar="DIR", help="Folder for the results; made if needed.")
-]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, and nothing else there.")]
-VerboseOption = Annotated[
-    bool, typer.Option("--verbose", help="Also list what every file holds and what its audit found.")
-]
-
-
-class Command(TyperCommand):
-    """A command whose help lists what the registries hold; they are asked then only, as finding out takes time."""
-
-    def get_help(self, ctx: Any) -> str:
-        """Return the help."""
-        lists = {"{models}": MODELS, "{methods}": ESTIMATORS}
-        for option in self.params:
-            for word, registry in lists.items():
-                if isinstance(option, TyperOption) and word in (option.help or ""):
-                    option.help = str(option.help).replace(word, ", ".join(registry.names()))
-        return super().get_help(ctx)
 
 
 class PlainConsole(Console):
@@ -99,14 +36,28 @@ class PlainConsole(Console):
         self.quiet = True
         _drain(sys.stderr if self.stderr else sys.stdout)
 
+    def say(self, sentences: Iterable[str]) -> None:
+        """Print sentences, each in lines of its own."""
+        for sentence in sentences:
+            self.print(sentence)
 
-def output_console(*, quiet: bool = False) -> Console:
+    def note(self, notes: Iterable[str]) -> None:
+        """Print what there is to know of the data or the result."""
+        for note in notes:
+            self.print(f"note: {note}", style="dim")
+
+    def written(self, folder: Path, *names: str) -> None:
+        """Tell where files were written, in one line that can be copied."""
+        self.print(f"written: {', '.join(str(folder / name) for name in names)}", soft_wrap=True)
+
+
+def output_console(*, quiet: bool = False) -> PlainConsole:
     """Return a console on stdout, silent if wanted; 80 columns where it is not a terminal."""
     console = PlainConsole(quiet=quiet)
     return console if console.is_terminal else PlainConsole(width=PIPE_WIDTH, quiet=quiet)
 
 
-def errors_console() -> Console:
+def errors_console() -> PlainConsole:
     """Return a console on stderr."""
     return PlainConsole(stderr=True)
 
@@ -120,7 +71,7 @@ def plugin_notices() -> Iterator[None]:
 
         def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
             if issubclass(category, PluginWarning):
-                errors_console().print(f"scara-ident: note: {message}", markup=False, soft_wrap=True)
+                errors_console().print(f"scara-ident: note: {message}", soft_wrap=True)
             else:
                 others(message, category, *where, **more)
 
@@ -158,6 +109,13 @@ def table(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
     return result
 
 
+def result_console(content: dict[str, Any], json: bool) -> PlainConsole:
+    """Print a result as JSON where that is wanted; return the console for words, which is silent then."""
+    if json:
+        print_json(content)
+    return output_console(quiet=json)
+
+
 def print_json(content: dict[str, Any]) -> None:
     """Print a result as JSON for scripts; files are still written when nobody reads it."""
     from scara_ident.files import json_text
@@ -185,7 +143,7 @@ def show_recordings(console: Console, recordings: Sequence[Recording]) -> None:
     console.print(rows)
     for item in recordings:
         for finding in item.findings:
-            console.print(f"{item.name}: {finding.message}", markup=False)
+            console.print(f"{item.name}: {finding.message}")
 
 
 def number(value: float, std: float | None = None) -> str:

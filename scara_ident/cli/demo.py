@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from scara_ident.cli import options
 from scara_ident.cli.console import output_console
 
 # What the arm has and the identifier is not told.
@@ -14,9 +15,7 @@ HIDDEN = "transmission_loss:joint2:loss_coefficient=0.2"
 
 
 def demo(
-    output: Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")] = Path(
-        "demo-output"
-    ),
+    output: options.Folder = Path("demo-output"),
     seed: Annotated[int, typer.Option(min=0, help="Of noise and random starts.")] = 1,
 ) -> None:
     """Run the whole story on the embedded arm: design, record, identify, compare, diagnose, report."""
@@ -33,7 +32,7 @@ def demo(
     console = output_console()
 
     def chapter(text: str) -> None:
-        console.print(f"\n== {text}", markup=False, style="bold")
+        console.print(f"\n== {text}", style="bold")
 
     train, test = output / "train", output / "test"
     chapter("What torque can tell of this arm")
@@ -53,5 +52,5 @@ def demo(
     chapter("What the model lacks")
     diagnose([str(train)], validate=[str(test)], output=output / "diagnose")
     chapter("Done")
-    console.print(f"The arm really had {HIDDEN}: see {train / 'OJD_1.truth.json'}.", markup=False, soft_wrap=True)
-    console.print(f"Open {output / 'diagnose' / 'report.html'}", markup=False, soft_wrap=True)
+    console.print(f"The arm really had {HIDDEN}: see {train / 'OJD_1.truth.json'}.", soft_wrap=True)
+    console.print(f"Open {output / 'diagnose' / 'report.html'}", soft_wrap=True)

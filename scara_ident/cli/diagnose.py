@@ -6,21 +6,8 @@ from typing import Annotated
 
 import typer
 
-from scara_ident.cli.console import (
-    BandOption,
-    JsonOption,
-    ModelOption,
-    OutputOption,
-    RecordingArguments,
-    RobotOption,
-    VerboseOption,
-    check_report,
-    output_console,
-    print_json,
-    progress,
-    show_recordings,
-    table,
-)
+from scara_ident.cli import options
+from scara_ident.cli.console import check_report, progress, result_console, show_recordings, table
 
 
 def _known(names: str | None) -> str | None:
@@ -37,22 +24,20 @@ def _parted(names: str) -> list[str]:
 
 
 def diagnose(
-    recordings: RecordingArguments,
-    robot: RobotOption = None,
-    model: ModelOption = "complete",
-    validate: Annotated[
-        list[str] | None, typer.Option("--validate", metavar="RECORDING", help="Recording held out; may be repeated.")
-    ] = None,
-    band: BandOption = None,
+    recordings: options.Recordings,
+    robot: options.Robot = None,
+    model: options.Model = "complete",
+    validate: options.Validate = None,
+    band: options.Band = None,
     effects: Annotated[
         str | None,
         typer.Option(
             "--effects", metavar="NAME,...", callback=_known, help="Try only these effects; default: all there are."
         ),
     ] = None,
-    output: OutputOption = None,
-    json: JsonOption = False,
-    verbose: VerboseOption = False,
+    output: options.Output = None,
+    json: options.Json = False,
+    verbose: options.Verbose = False,
 ) -> None:
     """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
     from scara_ident.diagnosis import diagnose as run
@@ -78,16 +63,12 @@ def diagnose(
             progress=step,
         )
     content = diagnosis_dict(result)
-    if json:
-        print_json(content)
-    console = output_console(quiet=json)
+    console = result_console(content, json)
     if verbose:
         show_recordings(console, (*training, *held_out))
-    for note in result.notes:
-        console.print(f"note: {note}", markup=False, style="dim")
-    console.print(f"{arm.name}: {result.verdict}", markup=False, style="bold")
-    for sentence in content["summary"]:
-        console.print(sentence, markup=False)
+    console.note(result.notes)
+    console.print(f"{arm.name}: {result.verdict}", style="bold")
+    console.say(content["summary"])
     errors = table("rms error within the band", "recordings", "joint", "before", "after", right=("before", "after"))
     for kind in ("training", "validation"):
         for joint in arm.joints if content[kind]["before"] else ():
@@ -109,9 +90,7 @@ def diagnose(
             diagnosis_report(place / "report.html", context)
             write_json(place / "diagnosis.json", content)
         remove_stale(output, [name for _, name in pictures])
-        names = ("diagnosis.json", "diagnosis.md", *(name for _, name in pictures), "report.html")
-        written = ", ".join(str(output / name) for name in names)
-        console.print(f"written: {written}", markup=False, soft_wrap=True)
+        console.written(output, "diagnosis.json", "diagnosis.md", *(name for _, name in pictures), "report.html")
 
 
 def _number(value: float | None) -> str:

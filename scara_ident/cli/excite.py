@@ -7,21 +7,13 @@ from typing import Annotated, Literal
 
 import typer
 
-from scara_ident.cli.console import (
-    JsonOption,
-    ModelOption,
-    RobotOption,
-    check_report,
-    output_console,
-    print_json,
-    progress,
-    table,
-)
+from scara_ident.cli import options
+from scara_ident.cli.console import check_report, progress, result_console, table
 
 
 def excite(
-    robot: RobotOption = None,
-    model: ModelOption = "complete",
+    robot: options.Robot = None,
+    model: options.Model = "complete",
     criterion: Annotated[
         Literal["logdet", "cond"], typer.Option(help="ln det or the condition of the stacked regressor.")
     ] = "logdet",
@@ -64,8 +56,8 @@ def excite(
     seed: Annotated[int, typer.Option(min=0, help="Of the random starts.")] = 0,
     starts: Annotated[int, typer.Option(min=1, help="Random starts; more take longer and may find better.")] = 8,
     rate: Annotated[float, typer.Option(min=1.0, max=1e5, help="Samples per second of trajectory.csv.")] = 1000.0,
-    output: Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")] = Path("."),
-    json: JsonOption = False,
+    output: options.Folder = Path("."),
+    json: options.Json = False,
 ) -> None:
     """Design an excitation trajectory within the limits of the joints, the motors and the tool."""
     import numpy as np
@@ -136,17 +128,13 @@ def excite(
             progress=told,
         )
     content = excitation_dict(design)
-    if json:
-        print_json(content)
-    console = output_console(quiet=json)
-    for sentence in content["summary"]:
-        console.print(sentence, markup=False)
+    console = result_console(content, json)
+    console.say(content["summary"])
     reached = table("limits", "limit", "bound", "reached", right=("bound", "reached"))
     for each in design.reached:
         reached.add_row(each.name, f"{each.bound:.4g} {each.unit}", f"{each.reached:.4g} {each.unit}")
     console.print(reached)
-    for note in content["notes"]:
-        console.print(f"note: {note}", markup=False, style="dim")
+    console.note(content["notes"])
     with written_together(output) as folder:
         for trajectory, csv, yaml in zip(
             design.trajectories, file_names(design, ".csv"), file_names(design, ".yaml"), strict=True
@@ -157,12 +145,5 @@ def excite(
         motions = [design.motion(k, PAPER_SAMPLES / duration) for k in range(trajectories)]
         excitation_report(folder / "report.html", content, arm, motions)
         write_json(folder / "excitation.json", content)
-    names = (
-        *file_names(design, ".csv"),
-        *file_names(design, ".yaml"),
-        "excitation.json",
-        "report.html",
-        "excitation.png",
-    )
-    written = ", ".join(str(output / name) for name in names)
-    console.print(f"written: {written}", markup=False, soft_wrap=True)
+    trajectory_files = (*file_names(design, ".csv"), *file_names(design, ".yaml"))
+    console.written(output, *trajectory_files, "excitation.json", "report.html", "excitation.png")

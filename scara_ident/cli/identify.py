@@ -7,41 +7,24 @@ from typing import Annotated, Literal
 
 import typer
 
-from scara_ident.cli.console import (
-    BandOption,
-    JsonOption,
-    MethodOption,
-    ModelOption,
-    OutputOption,
-    RecordingArguments,
-    RobotOption,
-    VerboseOption,
-    check_report,
-    number,
-    output_console,
-    print_json,
-    progress,
-    show_recordings,
-    table,
-)
+from scara_ident.cli import options
+from scara_ident.cli.console import check_report, number, progress, result_console, show_recordings, table
 
 
 def identify(
-    recordings: RecordingArguments,
-    robot: RobotOption = None,
-    model: ModelOption = "complete",
-    method: MethodOption = "ols",
+    recordings: options.Recordings,
+    robot: options.Robot = None,
+    model: options.Model = "complete",
+    method: options.Method = "ols",
     friction: Annotated[
         Literal["dissipative", "lubricated", "free"],
         typer.Option(help="Friction of the method consistent: takes energy out; also grows and flattens; anything."),
     ] = "dissipative",
-    validate: Annotated[
-        list[str] | None, typer.Option("--validate", metavar="RECORDING", help="Recording held out; may be repeated.")
-    ] = None,
-    band: BandOption = None,
-    output: OutputOption = None,
-    json: JsonOption = False,
-    verbose: VerboseOption = False,
+    validate: options.Validate = None,
+    band: options.Band = None,
+    output: options.Output = None,
+    json: options.Json = False,
+    verbose: options.Verbose = False,
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
     from scara_ident.estimation.consistent.options import ConsistentOptions
@@ -69,13 +52,10 @@ def identify(
             progress=step,
         )
     content = identification_dict(result)
-    if json:
-        print_json(content)
-    console = output_console(quiet=json)
+    console = result_console(content, json)
     if verbose:
         show_recordings(console, (*training, *held_out))
-    for note in result.notes:
-        console.print(f"note: {note}", markup=False, style="dim")
+    console.note(result.notes)
     parameters = table(
         f"{arm.name}: {model} model by {method}", "name", "value", "std", "unit", "meaning", right=("value", "std")
     )
@@ -99,9 +79,8 @@ def identify(
         f"{joint} {'none' if cut is None else f'{cut:.3g} Hz'}"
         for joint, cut in zip(arm.joints, result.bands, strict=True)
     )
-    console.print(f"band: {bands}; J_d {result.log_det:.2f}, J_k {result.condition:.3g}", markup=False)
-    for sentence in sentences(result):
-        console.print(sentence, markup=False)
+    console.print(f"band: {bands}; J_d {result.log_det:.2f}, J_k {result.condition:.3g}")
+    console.say(sentences(result))
     if output is not None:
         from scara_ident.export.robots import export_mjcf, export_urdf
         from scara_ident.report.html import IdentificationContext, identification_report
@@ -113,11 +92,9 @@ def identify(
         with written_together(output) as place:
             if arm_found is not None:
                 notes = [export_urdf(arm_found, place / urdf), export_mjcf(arm_found, place / mjcf)]
-                for note in dict.fromkeys(chain.from_iterable(notes)):
-                    console.print(f"note: {note}", markup=False, style="dim")
+                console.note(dict.fromkeys(chain.from_iterable(notes)))
             torque_picture(place / "torque.png", context)
             identification_report(place / "report.html", context)
             write_json(place / "identification.json", content)
-        names = ("identification.json", "report.html", "torque.png", *((urdf, mjcf) if arm_found is not None else ()))
-        written = ", ".join(str(output / name) for name in names)
-        console.print(f"written: {written}", markup=False, soft_wrap=True)
+        models = (urdf, mjcf) if arm_found is not None else ()
+        console.written(output, "identification.json", "report.html", "torque.png", *models)

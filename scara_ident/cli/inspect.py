@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from scara_ident.cli.console import OutputOption, output_console, print_json, progress, table
+from scara_ident.cli import options
+from scara_ident.cli.console import PlainConsole, output_console, print_json, progress, table
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from scara_ident.inspection.inspection import Inspection
 
 # Of columns that are no channels so many are shown on a terminal; --json has them all.
@@ -33,7 +32,7 @@ def inspect(
     robot: Annotated[
         Path | None, typer.Option("--robot", metavar="FILE", help="robot.yaml, to check its mapping on this file.")
     ] = None,
-    output: OutputOption = None,
+    output: options.Output = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Show what is in a file, guess which columns are the arm's, audit it and write a first robot.yaml."""
@@ -84,7 +83,7 @@ def inspection_dict(found: Inspection, written: Path | None) -> dict[str, Any]:
     }
 
 
-def _show(console: Console, found: Inspection, written: Path | None) -> None:
+def _show(console: PlainConsole, found: Inspection, written: Path | None) -> None:
     from scara_ident.recording.audit.samples import several
 
     rows = table(str(found.path), "column", "samples", "range", "taken for", right=("samples",))
@@ -103,32 +102,30 @@ def _show(console: Console, found: Inspection, written: Path | None) -> None:
         rows.add_row(column.name, samples, span, "; ".join(filter(None, said)))
     console.print(rows)
     if others > OTHERS_SHOWN:
-        console.print(f"... and {others - OTHERS_SHOWN} other columns; --json lists them", markup=False)
+        console.print(f"... and {others - OTHERS_SHOWN} other columns; --json lists them")
     if len(found.topics) > 1:
         listed = ", ".join(f"{topic} ({count})" for topic, count in found.topics.items())
-        console.print(f"topics of joint states: {listed}", markup=False)
-    for note in found.notes:
-        console.print(f"note: {note}", markup=False, style="dim")
+        console.print(f"topics of joint states: {listed}")
+    console.note(found.notes)
     for problem in found.problems:
-        console.print(f"missing: {problem}", markup=False)
+        console.print(f"missing: {problem}")
     recording = found.recording
     if recording is not None:
         seconds = recording.time[-1] - recording.time[0]
         console.print(
             f"audit: {len(recording.time)} samples, {seconds:.4g} s, {recording.rate:.4g} Hz; "
-            f"{several(len(recording.findings), 'finding')}",
-            markup=False,
+            f"{several(len(recording.findings), 'finding')}"
         )
         for finding in recording.findings:
-            console.print(f"  {finding.message}", markup=False)
+            console.print(f"  {finding.message}")
     elif found.refusal is not None:
-        console.print(f"audit: refused: {found.refusal}", markup=False)
+        console.print(f"audit: refused: {found.refusal}")
     if written is not None:
-        console.print(f"written: {written}; go through the lines marked STATE", markup=False, soft_wrap=True)
+        console.print(f"written: {written}; go through the lines marked STATE", soft_wrap=True)
     elif found.description is not None:
-        console.print("a first robot.yaml is written with --output DIR", markup=False)
+        console.print("a first robot.yaml is written with --output DIR")
     elif recording is None and found.refusal is None:
-        console.print("with --urdf URDF columns are matched to the arm's joints and audited", markup=False)
+        console.print("with --urdf URDF columns are matched to the arm's joints and audited")
 
 
 def _meaning(column: Any) -> str:

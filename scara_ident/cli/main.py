@@ -9,9 +9,10 @@ from typing import Annotated, Any
 
 import typer
 
+from scara_ident.cli import options
 from scara_ident.cli.base import base
 from scara_ident.cli.compare import compare
-from scara_ident.cli.console import Command, errors_console, plugin_notices
+from scara_ident.cli.console import errors_console, plugin_notices
 from scara_ident.cli.demo import demo
 from scara_ident.cli.diagnose import diagnose
 from scara_ident.cli.excite import excite
@@ -64,7 +65,7 @@ _COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (demo, "Run the whole story on the embedded arm."),
 )
 for _command, _line in _COMMANDS:
-    app.command(short_help=_line, cls=Command)(_command)
+    app.command(short_help=_line, cls=options.Command)(_command)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -87,7 +88,7 @@ def run(arguments: list[str]) -> int:
     except typer.TyperException as error:
         text = error.format_message()
         # Without any word the message is the help, which keeps its lines.
-        _complain(_with_help(error, text)) if arguments else errors_console().print(text, markup=False)
+        _complain(_with_help(error, text)) if arguments else errors_console().print(text)
         return 2
     except typer.Exit as error:
         return error.exit_code
@@ -125,4 +126,4 @@ def _with_help(error: typer.TyperException, text: str) -> str:
 
 
 def _complain(message: str) -> None:
-    errors_console().print(f"scara-ident: {message}", markup=False, highlight=False, soft_wrap=True)
+    errors_console().print(f"scara-ident: {message}", highlight=False, soft_wrap=True)

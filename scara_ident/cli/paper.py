@@ -5,18 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scara_ident.cli.console import OutputOption, check_report, output_console, table
+from scara_ident.cli import options
+from scara_ident.cli.console import PlainConsole, check_report, output_console, table
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from scara_ident.paper.report import PaperReport
 
 # Printed line by line; of the others only the count and what differs.
 _IN_FULL = ("Table 1", "Limits", "Torque rms from Table 5")
 
 
-def paper(output: OutputOption = None) -> None:
+def paper(output: options.Output = None) -> None:
     """Set the printed tables of the paper (Indri et al., 2002) beside what the program computes."""
     from scara_ident.paper import check_paper
 
@@ -32,22 +31,12 @@ def paper(output: OutputOption = None) -> None:
         if not shown:
             console.print(title, style="italic")
             continue
-        rows = table(
-            title,
-            *("quantity", "trajectory", "joint", "printed", "computed", "", "comment"),
-            right=("printed", "computed"),
-        )
+        columns = ("quantity", "trajectory", "joint", "printed", "computed", "", "comment")
+        rows = table(title, *columns, right=("printed", "computed"))
         for check in shown:
             mark = {True: "agrees", False: "differs", None: ""}[check.agrees]
-            rows.add_row(
-                check.quantity,
-                check.trajectory or "",
-                str(check.joint or ""),
-                _number(check.printed),
-                _number(check.computed),
-                mark,
-                check.comment or "",
-            )
+            numbers = (_number(check.printed), _number(check.computed))
+            rows.add_row(check.quantity, check.trajectory, check.joint, *numbers, mark, check.comment)
         console.print(rows)
     if output is not None:
         _write(output, report, console)
@@ -65,19 +54,18 @@ def paper_in_short(output: Path) -> None:
         rows.add_row(section, str(sum(judged)), str(len(judged)))
     console = output_console()
     console.print(rows)
-    console.print("Every value, and why some differ: scara-ident paper", markup=False)
+    console.print("Every value, and why some differ: scara-ident paper")
     _write(output, report, console)
 
 
-def _write(output: Path, report: PaperReport, console: Console) -> None:
+def _write(output: Path, report: PaperReport, console: PlainConsole) -> None:
     from scara_ident.files import write_json, written_together
     from scara_ident.report.html import paper_report
 
     with written_together(output) as place:
         paper_report(place / "report.html", report)
         write_json(place / "paper.json", report.to_dict())
-    written = ", ".join(str(output / name) for name in ("paper.json", "report.html"))
-    console.print(f"written: {written}", markup=False, soft_wrap=True)
+    console.written(output, "paper.json", "report.html")
 
 
 def _number(value: float | None) -> str:

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from scara_ident.cli.console import RobotOption, output_console, progress
+from scara_ident.cli import options
+from scara_ident.cli.console import output_console, progress
 
 
 def simulate(
@@ -15,7 +16,7 @@ def simulate(
         list[str],
         typer.Argument(metavar="TRAJECTORY...", help="trajectory.csv, or OJK, OJD, CI, L1, L2 on the SCARA03."),
     ],
-    robot: RobotOption = None,
+    robot: options.Robot = None,
     effect: Annotated[
         list[str] | None,
         typer.Option("--effect", metavar="NAME[:JOINT][:KEY=VALUE,..]", help="Effect to switch on; may be repeated."),
@@ -43,4 +44,4 @@ def simulate(
                 result = run(arm, motion, effects=effects, seed=seed, repetition=repetition)
                 with written_together(output) as place:
                     path = write_simulation(result, place)
-                console.print(f"written: {output / path.name}", markup=False, soft_wrap=True)
+                console.written(output, path.name)

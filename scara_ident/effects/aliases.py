@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.links import point_mass, tool_of
 from scara_ident.effects.spanned import Span, random_motion, rows_by_sample
 from scara_ident.model.base_parameters import standard_regressor
@@ -20,7 +20,6 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.kinematics import axis, parent
 
-Array = NDArray[np.float64]
 Columns = Iterator[tuple[int | None, Array]]
 Candidates = Callable[[TorqueModel, Motion, np.random.Generator], Columns]
 
@@ -77,10 +76,6 @@ def aliases(model: TorqueModel, *, seed: int = 0) -> tuple[Alias, ...]:
     model : TorqueModel
     seed : int, optional
         Of the random states and parameters.
-
-    Returns
-    -------
-    tuple of Alias
     """
     rng = np.random.default_rng(seed)
     motion = random_motion(model.robot, rng, 40 + len(model.columns))

@@ -7,15 +7,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect
 from scara_ident.effects.parameters import Coefficient, Member
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.spanned import Span, random_motion, rows_by_sample
 from scara_ident.model.terms import RigidBody
-
-Array = NDArray[np.float64]
 
 # On arms of more joints only neighbours and the joints after them are tried: drives run through them.
 NEIGHBOUR_REACH = 2

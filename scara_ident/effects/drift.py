@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.friction import friction_of, friction_torque
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
 from scara_ident.effects.position import offset_of
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.terms import Column
-
-Array = NDArray[np.float64]
 
 # Time constants tried, as shares of the longest run: 2.5 times apart, which refinement bridges.
 WARM_UP_SHARES = (0.06, 0.16, 0.4, 1.0)

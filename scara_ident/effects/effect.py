@@ -16,13 +16,12 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.terms import Column
 from scara_ident.motion.motion import Motion
 from scara_ident.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 # Standard deviations by which a coefficient may lie beyond what a real arm can have.
 DOUBT_STDS = 2.0

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine
 from scara_ident.model.terms import Column, Friction
-
-Array = NDArray[np.float64]
 
 # Stribeck velocities tried, as shares of the joint's largest speed; above the last-but-widest a polynomial spans it.
 STRIBECK_SHARES = (0.006, 0.015, 0.04, 0.1, 0.25)
@@ -176,10 +174,6 @@ class FrictionCoupling(Effect):
     w is the other joint's velocity v_k, or, where one motor moves with two joints as in belt drives and wrists, the
     sum or difference ``v_j + v_k``, ``v_j - v_k`` in the direction of the drive; the linear part in v_j then adds to
     the joint's own viscous friction.
-
-    Attributes
-    ----------
-    way : {"other", "sum", "difference"}
     """
 
     way: Literal["other", "sum", "difference"] = "other"

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect, View
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter
 from scara_ident.effects.signals import Scene, Signals
-
-Array = NDArray[np.float64]
 
 # A gear that loses more of the torque is broken.
 LARGEST_LOSS_SHARE = 0.75

@@ -10,13 +10,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.kinematics import place_of, tool_frame
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Where a robot's gravity is zero this is how large it is once the base tilts.
 STANDARD_GRAVITY = 9.81

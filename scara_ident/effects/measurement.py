@@ -8,16 +8,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.parameters import Coefficient, Member, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.motion.motion import HIGHEST_CUT, UNIFORM_TOLERANCE, differentiate
 from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 # The derivative of the predicted torque keeps this many times the band, so that the band itself is left alone.
 DERIVATIVE_BAND = 3.0
@@ -171,10 +169,6 @@ def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = N
         s, positive where effort lags position.
     joints : sequence of int, optional
         Places of the joints whose effort is moved; by default all.
-
-    Returns
-    -------
-    Recording
     """
     if recording.effort is None or delay == 0.0:
         return recording

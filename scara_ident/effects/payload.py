@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.links import point_mass, shared, tool_of
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter
@@ -21,8 +21,6 @@ from scara_ident.model.terms import Column
 from scara_ident.motion.motion import Motion
 from scara_ident.recording.recording import split_name
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Instants tried over a run with the mounting known; a tenth of a run apart, which refinement bridges.
 INSTANTS = 9

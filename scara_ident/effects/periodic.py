@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, SpectralLine, View
 from scara_ident.effects.friction import friction_slope
 from scara_ident.effects.links import rigid_slopes
@@ -16,8 +17,6 @@ from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine
 from scara_ident.model.terms import Column
-
-Array = NDArray[np.float64]
 
 # Orders that gears and motors have; others are found in the residual's spectrum.
 ORDERS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0)
@@ -132,10 +131,6 @@ class Vibration(Sinusoid):
 
     There is no grid of frequencies: lines are as narrow as the recordings are long, and come from the spectrum of the
     residual.
-
-    Attributes
-    ----------
-    free_phase : bool
     """
 
     free_phase: bool = False

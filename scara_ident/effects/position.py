@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect, View
 from scara_ident.effects.parameters import Coefficient, Member, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.terms import Column
 from scara_ident.model.terms.friction import Offset
-
-Array = NDArray[np.float64]
 
 
 class Spring(Effect):

@@ -7,12 +7,11 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.friction import friction_of
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
-
-Array = NDArray[np.float64]
 
 # Distances tried, rad: three times apart, which refinement bridges, over what joints have.
 DISTANCES = (0.0004, 0.0012, 0.004, 0.012, 0.036)

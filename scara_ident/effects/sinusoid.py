@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.parameters import Coefficient, Member, Parameter
 from scara_ident.effects.signals import Scene
-
-Array = NDArray[np.float64]
 
 
 def amplitude_and_phase(value: Array, covariance: Array) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Share of an effect's square outside the model below which it is absorbed; above what a URDF loses by few digits.
 ABSORBED = 1e-6

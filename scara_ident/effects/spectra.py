@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scara_ident.arrays import Array
 
 # Points of the angle grid per period of twice the highest order; each sample is shared by its two neighbours.
 GRID_POINTS = 8

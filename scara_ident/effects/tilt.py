@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.links import first_moments, gravity_columns, shared
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
@@ -16,8 +16,6 @@ from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.spanned import rows_by_sample
 from scara_ident.model.terms import Column, RigidBody
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 # A base that leans further, rad, is seen by eye.
 LARGEST_TILT = 0.1

@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.model.model import TorqueModel
-
-Array = NDArray[np.float64]
 
 # Sharpness with which the mean of eigenvalues' powers stands for the largest or smallest of them at the end.
 SHARPEST = 24.0
@@ -41,26 +39,25 @@ class Criterion(Protocol):
         ...
 
 
+class _Smooth:
+    def sharpened(self, share: float) -> Self:
+        """Return the criterion itself: it is smooth."""
+        return self
+
+
 @dataclass(frozen=True)
-class LogDet:
+class LogDet(_Smooth):
     """D-optimality: ``-ln det P``, that is -J_d of Indri et al. 2002."""
 
-    @property
-    def name(self) -> str:
-        """Name for results."""
-        return "logdet"
+    name: ClassVar[str] = "logdet"
 
     def cost(self, information: Array) -> tuple[float, Array]:
         """Return -ln det P and its gradient."""
         return _log_det(information)
 
-    def sharpened(self, share: float) -> Criterion:
-        """It is smooth."""
-        return self
-
 
 @dataclass(frozen=True)
-class BlockLogDet:
+class BlockLogDet(_Smooth):
     """D_s-optimality: ``-ln det`` of the information about some parameters while the others are estimated too.
 
     That information is the Schur complement of the others in P (Atkinson, Donev and Tobias 2007, section 10.3).
@@ -71,12 +68,8 @@ class BlockLogDet:
         Places of these parameters.
     """
 
+    name: ClassVar[str] = "block_logdet"
     columns: tuple[int, ...]
-
-    @property
-    def name(self) -> str:
-        """Name for results."""
-        return "block_logdet"
 
     def cost(self, information: Array) -> tuple[float, Array]:
         """Return -ln det P + ln det of the part of the others, and its gradient."""
@@ -88,10 +81,6 @@ class BlockLogDet:
             cost -= rest
             gradient[inner] -= slope
         return cost, gradient
-
-    def sharpened(self, share: float) -> Criterion:
-        """It is smooth."""
-        return self
 
 
 @dataclass(frozen=True)

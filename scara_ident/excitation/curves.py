@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.motion.motion import Motion
 
-Array = NDArray[np.float64]
 Family = Literal["fourier", "spline"]
 
 # Splines of this degree have a continuous third derivative of acceleration.

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.estimation.information import Information, merge
 from scara_ident.excitation.criteria import Criterion, LogDet
@@ -20,8 +20,6 @@ from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.verification import Reached, reached
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
-
-Array = NDArray[np.float64]
 
 # Samples of a trajectory in the criterion: those of Indri et al. 2002.
 SAMPLES = 2500

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
+from scara_ident.arrays import Array
 from scara_ident.excitation.problem import Problem, Slopes
-
-Array = NDArray[np.float64]
 
 # Share of the way to the nearest limit that a step may go.
 NEARLY = 0.95

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, ScaraIdentError, UsageError
 from scara_ident.excitation.tool import Tool, tool_motion, tool_of
 from scara_ident.model.model import TorqueModel
@@ -17,7 +17,6 @@ from scara_ident.motion.motion import Motion
 from scara_ident.paper import PARAMETERS, table5_parameters
 from scara_ident.robot.robot import Robot
 
-Array = NDArray[np.float64]
 Value = TypeVar("Value")
 
 # Indri et al. 2002, section 2.1, horizontal acceleration of the gripper, m/s^2.

@@ -6,17 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information
 from scara_ident.excitation.criteria import BlockLogDet, Condition
 from scara_ident.excitation.curves import Basis, ExcitationTrajectory
 from scara_ident.excitation.design import Design, information_of
 from scara_ident.excitation.limits import scara03_friction
+from scara_ident.files import write_text
 from scara_ident.recording.files.parquet_csv import write_columns
-
-Array = NDArray[np.float64]
 
 RATE = 1000.0
 # Points of a JointTrajectory are splined by the controller that gets them: this many per second, and at least so
@@ -116,21 +115,11 @@ def joint_trajectory_yaml(trajectory: ExcitationTrajectory, rate: float | None =
 
 def write_joint_trajectory(trajectory: ExcitationTrajectory, path: Path | str, rate: float | None = None) -> None:
     """Write a ROS 2 ``JointTrajectory``; see `joint_trajectory_yaml`."""
-    path = Path(path)
-    text = joint_trajectory_yaml(trajectory, rate)
-    _make_folder(path)
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ScaraIdentError(f"{path}: cannot be written: {error.strerror or error}") from error
+    write_text(Path(path), joint_trajectory_yaml(trajectory, rate))
 
 
 def excitation_dict(design: Design) -> dict[str, Any]:
     """Return the content of ``excitation.json``.
-
-    Parameters
-    ----------
-    design : Design
 
     Returns
     -------

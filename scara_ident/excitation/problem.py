@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.excitation.criteria import Criterion
 from scara_ident.excitation.curves import Basis
 from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.tool import ToolMotion, tool_motion
 from scara_ident.motion.motion import Motion
-
-Array = NDArray[np.float64]
 
 # Coulomb friction turns within this share of a joint's velocity limit, at the start and at the end of a search.
 WIDEST, NARROWEST = 0.05, 0.005

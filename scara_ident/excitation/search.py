@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.excitation.criteria import Condition
 from scara_ident.excitation.interior_point import Minimum, Schedule, minimise, shrunk_inside
 from scara_ident.excitation.limits import InfeasibleLimits
@@ -16,8 +16,6 @@ from scara_ident.excitation.problem import Problem, Task, row_names
 from scara_ident.excitation.verification import extremes, grid
 from scara_ident.motion.motion import Motion
 from scara_ident.threads import one_blas_thread
-
-Array = NDArray[np.float64]
 
 # Times of the limits per period of the highest frequency, in the search and for the winner.
 COARSE, FINE = 12, 48

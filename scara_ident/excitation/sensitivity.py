@@ -16,13 +16,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction, Offset, RigidBody, Term
 from scara_ident.motion.motion import Motion
 
-Array = NDArray[np.float64]
 Stencil = tuple[tuple[float, float], ...]
 
 # f'(x) = sum_k weight_k f(x + shift_k), exact for trigonometric polynomials of degree 2.

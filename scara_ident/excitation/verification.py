@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.excitation.curves import CHUNK, Basis
 from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.problem import Problem, Task, row_names
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

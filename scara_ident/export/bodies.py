@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import ScaraIdentError
 from scara_ident.model.base_parameters import pseudo_inertia
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 # A pseudo-inertia counts as positive semidefinite down to this share of its trace: what a conic solver leaves.
 CONSISTENCY_TOLERANCE = 1e-9

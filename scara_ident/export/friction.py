@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.model.terms import Friction
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +33,6 @@ class JointFriction:
 
 def friction_of(estimate: Estimate) -> JointFriction | None:
     """Read Coulomb and viscous friction from an estimate.
-
-    Parameters
-    ----------
-    estimate : Estimate
 
     Returns
     -------

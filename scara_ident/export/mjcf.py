@@ -7,15 +7,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import ScaraIdentError
 from scara_ident.export.bodies import Body, body_about_com, check_standard
 from scara_ident.export.friction import JointFriction, JointSideFriction, joint_side
 from scara_ident.export.xml_text import format_numbers
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 # MuJoCo takes no body on the edge of the possible (a rod, a plate, a point): the covariance of mass gets at
 # least this share of its trace in every direction, and at least this much in kg m^2 (MuJoCo's own is 1e-15).

@@ -7,16 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from scara_ident.export.bodies import (
-    Body,
-    body_about_com,
-    body_parameters,
-    check_standard,
-    members_of,
-    share,
-)
+from scara_ident.arrays import Array
+from scara_ident.export.bodies import Body, body_about_com, body_parameters, check_standard, members_of, share
 from scara_ident.export.friction import JointFriction, joint_side
 from scara_ident.export.xml_text import (
     COMMENT,
@@ -33,8 +26,6 @@ from scara_ident.export.xml_text import (
     set_numbers,
 )
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _ARMATURE_COMMENT = re.compile(rb"\s*armature [^ ]+ kg( m\^2)? at the joint\s*")

@@ -10,12 +10,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.estimation.least_squares import weighted_value, wls
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.model.terms.friction import Friction
 from scara_ident.motion.prepared import PreparedData, PreparedStretch
 
-Array = NDArray[np.float64]
 Signal = Literal["effort", "position", "effort and position"]
 
 # Another mapping must leave at most this share of the error, geometric mean over the joints.

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.bands import choose_bands
@@ -19,8 +19,6 @@ from scara_ident.motion.prepared import prepare
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

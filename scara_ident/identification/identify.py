@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.estimation import Estimate, History, JointError
 from scara_ident.estimation.bands import choose_bands
@@ -27,8 +27,6 @@ from scara_ident.motion.repeatability import repeatability
 from scara_ident.motion.velocity_audit import audit_velocity
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,10 +205,7 @@ def check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequenc
 
 
 def estimate_by(
-    method: str,
-    observations: Observations,
-    noise: Array | None = None,
-    options: ConsistentOptions | None = None,
+    method: str, observations: Observations, noise: Array | None = None, options: ConsistentOptions | None = None
 ) -> tuple[Estimate, History | None]:
     """Estimate by a method given by name; ``noise`` is each joint's, where repetitions tell it."""
     estimator = ESTIMATORS.get(method)

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.inspection.names import CURRENT, TORQUE, Meaning, meaning
 from scara_ident.inspection.values import Reading, position_readings, slopes, time_unit, velocity_reading
+from scara_ident.robot.robot import Robot
 from scara_ident.robot.units import COUNT, DRIVE, TIME, Unit, find_unit, table_of
-
-if TYPE_CHECKING:
-    from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 CLOCKS = ("time", "__time", "timestamp", "t")
 """Names of clocks; where a file has several, the first of these is taken."""

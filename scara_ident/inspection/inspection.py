@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.inspection.guess import Guess, guess
 from scara_ident.inspection.names import Meaning, meaning
@@ -21,8 +21,6 @@ from scara_ident.recording.recording import Recording, read_recording
 from scara_ident.robot.description import RobotDescription, check_description
 from scara_ident.robot.robot import Robot, build_robot, load_robot
 from scara_ident.robot.signal_map import SIGNALS, contract_channels
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -92,11 +90,7 @@ class Inspection:
 
 
 def inspect_file(
-    path: Path | str,
-    *,
-    urdf: Path | str | None = None,
-    robot: Path | str | None = None,
-    folder: Path | str = ".",
+    path: Path | str, *, urdf: Path | str | None = None, robot: Path | str | None = None, folder: Path | str = "."
 ) -> Inspection:
     """Look into a file, guess which columns are an arm's channels, and audit it.
 
@@ -110,10 +104,6 @@ def inspect_file(
         A robot description, whose mapping is then used instead of a guess.
     folder : path
         Where the description will stand: its ``urdf`` is relative to it.
-
-    Returns
-    -------
-    Inspection
 
     Raises
     ------

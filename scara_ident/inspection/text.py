@@ -6,14 +6,12 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from scara_ident.inspection.guess import Guess, Signal
+from scara_ident.robot.robot import Robot
 from scara_ident.robot.signal_map import fill
 from scara_ident.robot.units import DRIVE, table_of
-
-if TYPE_CHECKING:
-    from scara_ident.inspection.guess import Guess, Signal
-    from scara_ident.robot.robot import Robot
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 # Words that YAML takes for truth values or for nothing.

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
+from scara_ident.robot.robot import Robot
 from scara_ident.robot.units import COUNT, TIME, TURN, table_of
-
-if TYPE_CHECKING:
-    from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 # No arm is logged slower than 5 Hz or faster than 100 kHz, and most near 500 Hz.
 SLOWEST, FASTEST, USUAL = 0.2, 1e-5, 2e-3

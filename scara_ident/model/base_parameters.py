@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.model.regressor.kernel import pinocchio_regressor
 from scara_ident.robot.robot import Robot
@@ -59,10 +60,10 @@ class BaseParameters:
     standard_names: tuple[str, ...]
     standard_units: tuple[str, ...]
     kept: NDArray[np.intp]
-    grouping: NDArray[np.float64]
+    grouping: Array
     absent: tuple[int, ...]
     approximate: tuple[tuple[int, float], ...]
-    reduction: NDArray[np.float64]
+    reduction: Array
 
     @property
     def count(self) -> int:
@@ -109,9 +110,7 @@ class BaseParameters:
         return tuple(int(k) for k in entering if int(k) not in alone)
 
 
-def standard_regressor(
-    robot: Robot, q: NDArray[np.float64], v: NDArray[np.float64], a: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def standard_regressor(robot: Robot, q: Array, v: Array, a: Array) -> Array:
     """Regressor of all standard parameters, armatures included, straight from Pinocchio.
 
     Parameters
@@ -236,14 +235,14 @@ def _length_scale(robot: Robot) -> float:
     return total if total > 0.0 else 1.0
 
 
-def _parameter_scale(robot: Robot) -> NDArray[np.float64]:
+def _parameter_scale(robot: Robot) -> Array:
     """Factors on the columns that go with one kilogram at the arm's length, shape (11 n,)."""
     length = _length_scale(robot)
     body = [1.0, *(length,) * 3, *(length**2,) * 6]
     return np.concatenate([np.tile(body, robot.n), np.where(robot.prismatic, 1.0, length**2)])
 
 
-def _random_columns(robot: Robot, seed: int, samples: int) -> NDArray[np.float64]:
+def _random_columns(robot: Robot, seed: int, samples: int) -> Array:
     """Stack the standard regressor of random states that move gravity, speed and acceleration alike."""
     rng = np.random.default_rng(seed)
     n, length = robot.n, _length_scale(robot)
@@ -326,6 +325,6 @@ def check_base_parameters(robot: Robot, base: BaseParameters, *, seed: int = 1) 
     )
 
 
-def pseudo_inertia(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+def pseudo_inertia(parameters: Array) -> Array:
     """Return the 4x4 pseudo-inertia of a body's ten parameters (Wensing, Kim, Slotine 2018)."""
     return np.asarray(pin.PseudoInertia.FromDynamicParameters(np.asarray(parameters, dtype=float)).toMatrix())

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.model import MODELS
 from scara_ident.model.terms import Column, Friction, Offset, RigidBody, Term
 from scara_ident.model.terms.rigid_body import rigid_body
@@ -59,7 +60,7 @@ class TorqueModel:
             start += len(other.columns)
         raise ValueError(f"the model {self.name} has no such term: {term.name}")
 
-    def regressor(self, motion: Motion) -> NDArray[np.float64]:
+    def regressor(self, motion: Motion) -> Array:
         """Return the regressor of a stretch of motion.
 
         Parameters
@@ -79,7 +80,7 @@ class TorqueModel:
         """Columns that can differ from zero on each joint."""
         return tuple(np.flatnonzero(row) for row in self.pattern)
 
-    def joint_columns(self, motion: Motion) -> tuple[NDArray[np.float64], ...]:
+    def joint_columns(self, motion: Motion) -> tuple[Array, ...]:
         """Return for each joint the columns that act on it, each of shape (k, N), see `active`."""
         found = tuple(np.empty((len(active), motion.samples)) for active in self.active)
         start = np.zeros(self.robot.n, dtype=np.intp)

@@ -4,8 +4,6 @@ M. Indri, G. Calafiore, G. Legnani, F. Jatta, A. Visioli, "Optimized dynamic cal
 IFAC World Congress 2002.
 """
 
-from __future__ import annotations
-
 from scara_ident.paper.checks import check_paper
 from scara_ident.paper.model import (
     LINK_LENGTH,

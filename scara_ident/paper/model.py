@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from scara_ident.arrays import Array
 
 LINK_LENGTH = 0.33
 """Length of each link, m."""
@@ -64,13 +66,8 @@ REDUCED_COLUMNS: tuple[int, ...] = tuple(i for i, p in enumerate(PARAMETERS) if 
 
 
 def regressor(
-    q: NDArray[np.float64],
-    v: NDArray[np.float64],
-    a: NDArray[np.float64],
-    *,
-    link_length: float = LINK_LENGTH,
-    reduction: tuple[float, float] = REDUCTION,
-) -> NDArray[np.float64]:
+    q: Array, v: Array, a: Array, *, link_length: float = LINK_LENGTH, reduction: tuple[float, float] = REDUCTION
+) -> Array:
     """Regressor W of the 15 parameters, motor side.
 
     Parameters
@@ -120,7 +117,7 @@ def regressor(
     return w
 
 
-def inertial_grouping(link_length: float = LINK_LENGTH) -> NDArray[np.float64]:
+def inertial_grouping(link_length: float = LINK_LENGTH) -> Array:
     """Matrix that takes the standard parameters of the two-link arm to P_d.
 
     Parameters
@@ -148,7 +145,7 @@ def inertial_grouping(link_length: float = LINK_LENGTH) -> NDArray[np.float64]:
     return grouping
 
 
-def friction(velocity: ArrayLike, coefficients: ArrayLike) -> NDArray[np.float64]:
+def friction(velocity: ArrayLike, coefficients: ArrayLike) -> Array:
     """Friction torque of one joint at the motor, eq. (3).
 
     Parameters
@@ -169,7 +166,7 @@ def friction(velocity: ArrayLike, coefficients: ArrayLike) -> NDArray[np.float64
     return np.asarray(a0 * direction + a1 * v + a2 * direction * v**2 + a3 * v**3)
 
 
-def criteria(w: NDArray[np.float64]) -> tuple[float, float]:
+def criteria(w: Array) -> tuple[float, float]:
     """D-optimality and conditioning of a regressor, R_v = identity.
 
     Parameters

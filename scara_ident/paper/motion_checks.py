@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.paper.model import criteria, regressor
-from scara_ident.paper.report import Check, equality, inequality, information
+from scara_ident.paper.report import Check, Subject, equality, inequality, information
 from scara_ident.paper.tables import (
     POSITION_LIMITS,
     POSITION_RANGE_2,
@@ -32,17 +32,15 @@ PEAK_TOLERANCE = 0.02
 TORQUE_TOLERANCE = 0.05
 
 
-def _motion(
-    trajectory: Trajectory,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _motion(trajectory: Trajectory) -> tuple[Array, Array, Array]:
     return trajectory.motion(trajectory.times())
 
 
-def _rms(torque: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rms(torque: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(torque**2, axis=1)))
 
 
-def _torque(w: NDArray[np.float64], parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+def _torque(w: Array, parameters: Array) -> Array:
     return np.asarray(np.einsum("ipn,p->in", w, parameters))
 
 
@@ -53,39 +51,19 @@ def table1() -> Iterator[Check]:
         column = TRAJECTORIES.index(trajectory.name)
         q, v, a = _motion(trajectory)
         log_det, condition = criteria(regressor(q, v, a))
-        yield equality(
-            section,
-            "J_d",
-            TABLE_1.log_det[column],
-            log_det,
-            LOG_DET_TOLERANCE,
-            trajectory=trajectory.name,
-            comment="ideal motion, R_v = identity, natural logarithm",
-        )
-        yield equality(
-            section,
-            "J_k",
-            TABLE_1.condition[column],
-            condition,
-            CONDITION_TOLERANCE,
-            trajectory=trajectory.name,
-            comment="ideal motion, R_v = identity",
-        )
+        words = "ideal motion, R_v = identity"
+        subject = Subject(section, "J_d", trajectory.name)
+        yield equality(subject, TABLE_1.log_det[column], log_det, LOG_DET_TOLERANCE, f"{words}, natural logarithm")
+        subject = Subject(section, "J_k", trajectory.name)
+        yield equality(subject, TABLE_1.condition[column], condition, CONDITION_TOLERANCE, words)
         for quantity, unit, signal, printed in (
             ("peak velocity", "rad/s", v, TABLE_1.peak_velocity),
             ("peak acceleration", "rad/s^2", a, TABLE_1.peak_acceleration),
         ):
             for joint, name in enumerate(JOINTS):
-                yield equality(
-                    section,
-                    quantity,
-                    printed[joint][column],
-                    float(np.max(np.abs(signal[joint]))),
-                    PEAK_TOLERANCE,
-                    trajectory=trajectory.name,
-                    joint=name,
-                    unit=unit,
-                )
+                subject = Subject(section, quantity, trajectory.name, name, unit)
+                peak = float(np.max(np.abs(signal[joint])))
+                yield equality(subject, printed[joint][column], peak, PEAK_TOLERANCE)
 
 
 def limits() -> Iterator[Check]:
@@ -93,57 +71,18 @@ def limits() -> Iterator[Check]:
     section = "Limits"
     for trajectory in PRINTED_AS_FORMULA:
         q, v, a = _motion(trajectory)
-        about = {"trajectory": trajectory.name}
-        acceleration = float(np.max(tool_acceleration(q, v, a)))
-        yield inequality(
-            section,
-            "tool acceleration",
-            "computed <= printed",
-            acceleration <= TOOL_ACCELERATION_LIMIT,
-            TOOL_ACCELERATION_LIMIT,
-            acceleration,
-            unit="m/s^2",
-            **about,
-        )
+        most = float(np.max(tool_acceleration(q, v, a)))
+        subject = Subject(section, "tool acceleration", trajectory.name, unit="m/s^2")
+        yield _at_most(subject, TOOL_ACCELERATION_LIMIT, most)
         for joint, name in enumerate(JOINTS):
-            speed = float(np.max(np.abs(v[joint])))
-            yield inequality(
-                section,
-                "velocity limit",
-                "computed <= printed",
-                speed <= VELOCITY_LIMIT,
-                VELOCITY_LIMIT,
-                speed,
-                joint=name,
-                unit="rad/s",
-                **about,
-            )
+            subject = Subject(section, "velocity limit", trajectory.name, name, "rad/s")
+            yield _at_most(subject, VELOCITY_LIMIT, float(np.max(np.abs(v[joint]))))
             low, high = (float(np.deg2rad(bound)) for bound in POSITION_LIMITS[joint])
             least, most = float(q[joint].min()), float(q[joint].max())
-            yield inequality(
-                section,
-                "lower position limit",
-                "computed >= printed",
-                least >= low,
-                low,
-                least,
-                joint=name,
-                unit="rad",
-                comment=_beyond(low - least),
-                **about,
-            )
-            yield inequality(
-                section,
-                "upper position limit",
-                "computed <= printed",
-                most <= high,
-                high,
-                most,
-                joint=name,
-                unit="rad",
-                comment=_beyond(most - high),
-                **about,
-            )
+            subject = Subject(section, "lower position limit", trajectory.name, name, "rad")
+            yield inequality(subject, "computed >= printed", least >= low, low, least, _beyond(low - least))
+            subject = Subject(section, "upper position limit", trajectory.name, name, "rad")
+            yield _at_most(subject, high, most, _beyond(most - high))
         column = TRAJECTORIES.index(trajectory.name)
         digit = 10.0 ** -_decimals(POSITION_RANGE_2[column])
         for quantity, printed, computed in zip(
@@ -152,17 +91,13 @@ def limits() -> Iterator[Check]:
             (float(q[1].min()), float(q[1].max())),
             strict=True,
         ):
-            yield equality(
-                section,
-                quantity,
-                printed,
-                computed,
-                0.5 * digit / abs(printed),
-                joint="joint2",
-                unit="rad",
-                comment="tolerance: half of the last printed digit",
-                **about,
-            )
+            subject = Subject(section, quantity, trajectory.name, "joint2", "rad")
+            tolerance = 0.5 * digit / abs(printed)
+            yield equality(subject, printed, computed, tolerance, "tolerance: half of the last printed digit")
+
+
+def _at_most(subject: Subject, limit: float, reached: float, comment: str = "") -> Check:
+    return inequality(subject, "computed <= printed", reached <= limit, limit, reached, comment)
 
 
 def _beyond(excess: float) -> str:
@@ -189,29 +124,12 @@ def torque_rms() -> Iterator[Check]:
         for source in reversed(TRAJECTORIES):
             computed = _rms(_torque(w, table5_parameters(source)))
             for joint, name in enumerate(JOINTS):
-                quantity = f"torque rms, parameters of {source}"
+                subject = Subject(section, f"torque rms, parameters of {source}", trajectory.name, name, "N m")
                 printed, value = TORQUE_RMS[joint][row], float(computed[joint])
                 if source == OJD.name:
-                    yield equality(
-                        section,
-                        quantity,
-                        printed,
-                        value,
-                        TORQUE_TOLERANCE,
-                        trajectory=trajectory.name,
-                        joint=name,
-                        unit="N m",
-                    )
+                    yield equality(subject, printed, value, TORQUE_TOLERANCE)
                 else:
-                    yield information(
-                        section,
-                        quantity,
-                        printed,
-                        value,
-                        trajectory=trajectory.name,
-                        joint=name,
-                        unit="N m",
-                    )
+                    yield information(subject, printed, value)
 
 
 def prediction_errors() -> Iterator[Check]:
@@ -233,14 +151,7 @@ def prediction_errors() -> Iterator[Check]:
             change = _rms(_torque(w, table5_parameters(source) - own))
             for joint, name in enumerate(JOINTS):
                 errors = TABLE_4.errors[joint][row]
-                yield equality(
-                    section,
-                    f"error, parameters of {source}",
-                    errors[column],
-                    float(np.hypot(errors[row], change[joint])),
-                    TORQUE_TOLERANCE,
-                    trajectory=trajectory.name,
-                    joint=name,
-                    unit="N m",
-                    comment="own error and the change of predicted torque, root of squares",
-                )
+                implied = float(np.hypot(errors[row], change[joint]))
+                words = "own error and the change of predicted torque, root of squares"
+                subject = Subject(section, f"error, parameters of {source}", trajectory.name, name, "N m")
+                yield equality(subject, errors[column], implied, TORQUE_TOLERANCE, words)

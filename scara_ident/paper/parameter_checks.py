@@ -6,10 +6,10 @@ import itertools
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.paper.model import LINK_LENGTH, PARAMETERS
-from scara_ident.paper.report import Check, inequality, information
+from scara_ident.paper.report import Check, Subject, inequality, information
 from scara_ident.paper.tables import TABLE_1, TRAJECTORIES, VELOCITY_LIMIT, table5_parameters
 
 JOINTS = ("joint1", "joint2")
@@ -31,39 +31,16 @@ def inertia() -> Iterator[Check]:
             ("P_d4 = I2z", d4, "kg m^2", "an inertia"),
             ("P_d5 = Jm2/tau2^2", d5, "kg m^2", "an inertia"),
         ):
-            yield inequality(
-                section,
-                quantity,
-                "printed > 0",
-                value > 0.0,
-                value,
-                0.0,
-                trajectory=trajectory,
-                unit=unit,
-                comment=why,
-            )
+            subject = Subject(section, quantity, trajectory, unit=unit)
+            yield inequality(subject, "printed > 0", value > 0.0, value, 0.0, why)
         first_moment = d2**2 + d3**2
         least = LINK_LENGTH**2 * first_moment / d1
         exists = min(d1, d4, d5) > 0.0 and d4 >= least
-        yield inequality(
-            section,
-            "an arm exists: least I2z that P_d1, P_d2 allow",
-            "printed >= computed, P_d1, P_d4, P_d5 > 0",
-            exists,
-            d4,
-            least,
-            trajectory=trajectory,
-            unit="kg m^2",
-        )
+        subject = Subject(section, "an arm exists: least I2z that P_d1, P_d2 allow", trajectory, unit="kg m^2")
+        yield inequality(subject, "printed >= computed, P_d1, P_d4, P_d5 > 0", exists, d4, least)
         if d4 > 0.0:
-            yield information(
-                section,
-                "least mass of link 2, P_d2^2 / P_d4",
-                None,
-                first_moment / d4,
-                trajectory=trajectory,
-                unit="kg",
-            )
+            subject = Subject(section, "least mass of link 2, P_d2^2 / P_d4", trajectory, unit="kg")
+            yield information(subject, None, first_moment / d4)
 
 
 def friction_signs() -> Iterator[Check]:
@@ -77,38 +54,19 @@ def friction_signs() -> Iterator[Check]:
             for k, quantity in ((0, "Coulomb"), (1, "viscous")):
                 parameter = PARAMETERS[first + k]
                 value = float(coefficients[k])
-                yield inequality(
-                    section,
-                    f"{parameter.name}, {quantity}",
-                    "printed >= 0",
-                    value >= 0.0,
-                    value,
-                    0.0,
-                    trajectory=trajectory,
-                    joint=name,
-                    unit=parameter.unit,
-                )
+                subject = Subject(section, f"{parameter.name}, {quantity}", trajectory, name, parameter.unit)
+                yield inequality(subject, "printed >= 0", value >= 0.0, value, 0.0)
             for quantity, top in (
                 ("least friction at speeds it was estimated from", TABLE_1.peak_velocity[joint][column]),
                 ("least friction at speeds the joint can reach", VELOCITY_LIMIT),
             ):
                 value, zero = least_friction(coefficients, top)
                 where = "" if zero is None else f", negative from {zero:.2f} rad/s on: it would drive the joint"
-                yield inequality(
-                    section,
-                    quantity,
-                    "computed >= 0",
-                    value >= 0.0,
-                    None,
-                    value,
-                    trajectory=trajectory,
-                    joint=name,
-                    unit="N m",
-                    comment=f"up to {top:g} rad/s{where}",
-                )
+                subject = Subject(section, quantity, trajectory, name, "N m")
+                yield inequality(subject, "computed >= 0", value >= 0.0, None, value, f"up to {top:g} rad/s{where}")
 
 
-def least_friction(coefficients: NDArray[np.float64], top: float) -> tuple[float, float | None]:
+def least_friction(coefficients: Array, top: float) -> tuple[float, float | None]:
     """Least friction torque at speeds above 0 up to ``top``, and where it first becomes negative.
 
     Parameters
@@ -144,7 +102,7 @@ def least_friction(coefficients: NDArray[np.float64], top: float) -> tuple[float
     return least, None
 
 
-def _turning_speeds(coefficients: NDArray[np.float64], top: float) -> list[float]:
+def _turning_speeds(coefficients: Array, top: float) -> list[float]:
     """Speeds inside (0, top) where the slope a_1 + 2 a_2 v + 3 a_3 v^2 is 0, ascending."""
     c, b, a = (float(k * coefficients[k]) for k in (1, 2, 3))
     discriminant = b * b - 4.0 * a * c

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 
 @dataclass(frozen=True)
-class Check:
-    """One printed figure, or one law that printed figures must obey, against what is computed.
+class Subject:
+    """What a check is about.
 
     Attributes
     ----------
@@ -19,6 +19,21 @@ class Check:
         Empty where the check concerns no single one.
     unit : str
         "1" where there is none.
+    """
+
+    section: str
+    quantity: str
+    trajectory: str = ""
+    joint: str = ""
+    unit: str = "1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check(Subject):
+    """One printed figure, or one law that printed figures must obey, against what is computed.
+
+    Attributes
+    ----------
     condition : str
         What must hold: "equal", or a relation of "printed" and "computed". Empty for information only.
     printed : float or None
@@ -35,110 +50,38 @@ class Check:
         One short sentence or empty.
     """
 
-    section: str
-    quantity: str
-    trajectory: str
-    joint: str
-    unit: str
-    condition: str
+    condition: str = ""
     printed: float | None
     computed: float
     relative_difference: float | None
-    tolerance: float | None
-    agrees: bool | None
+    tolerance: float | None = None
+    agrees: bool | None = None
     comment: str
 
 
-def equality(
-    section: str,
-    quantity: str,
-    printed: float,
-    computed: float,
-    tolerance: float,
-    *,
-    trajectory: str = "",
-    joint: str = "",
-    unit: str = "1",
-    comment: str = "",
-) -> Check:
+def equality(subject: Subject, printed: float, computed: float, tolerance: float, comment: str = "") -> Check:
     """Return the check that a computed figure equals the printed one within a relative tolerance."""
-    difference = _relative(printed, computed)
-    return Check(
-        section=section,
-        quantity=quantity,
-        trajectory=trajectory,
-        joint=joint,
-        unit=unit,
-        condition="equal",
-        printed=printed,
-        computed=float(computed),
-        relative_difference=difference,
-        tolerance=float(tolerance),
-        agrees=difference is not None and bool(abs(difference) <= tolerance),
-        comment=comment,
-    )
+    check = information(subject, printed, computed, comment)
+    difference = check.relative_difference
+    agrees = difference is not None and bool(abs(difference) <= tolerance)
+    return replace(check, condition="equal", tolerance=float(tolerance), agrees=agrees)
 
 
 def inequality(
-    section: str,
-    quantity: str,
-    condition: str,
-    holds: bool,
-    printed: float | None,
-    computed: float,
-    *,
-    trajectory: str = "",
-    joint: str = "",
-    unit: str = "1",
-    comment: str = "",
+    subject: Subject, condition: str, holds: bool, printed: float | None, computed: float, comment: str = ""
 ) -> Check:
     """Return the check of a law; ``condition`` says in words what ``holds`` tells."""
-    return Check(
-        section=section,
-        quantity=quantity,
-        trajectory=trajectory,
-        joint=joint,
-        unit=unit,
-        condition=condition,
-        printed=printed,
-        computed=float(computed),
-        relative_difference=_relative(printed, computed) if computed else None,
-        tolerance=None,
-        agrees=bool(holds),
-        comment=comment,
-    )
+    check = information(subject, printed, computed, comment)
+    difference = check.relative_difference if computed else None
+    return replace(check, condition=condition, relative_difference=difference, agrees=bool(holds))
 
 
-def information(
-    section: str,
-    quantity: str,
-    printed: float | None,
-    computed: float,
-    *,
-    trajectory: str = "",
-    joint: str = "",
-    unit: str = "1",
-    comment: str = "",
-) -> Check:
+def information(subject: Subject, printed: float | None, computed: float, comment: str = "") -> Check:
     """Return a figure that stands beside the printed one without a judgement."""
+    difference = None if not printed else float((computed - printed) / abs(printed))
     return Check(
-        section=section,
-        quantity=quantity,
-        trajectory=trajectory,
-        joint=joint,
-        unit=unit,
-        condition="",
-        printed=printed,
-        computed=float(computed),
-        relative_difference=_relative(printed, computed),
-        tolerance=None,
-        agrees=None,
-        comment=comment,
+        **vars(subject), printed=printed, computed=float(computed), relative_difference=difference, comment=comment
     )
-
-
-def _relative(printed: float | None, computed: float) -> float | None:
-    return None if not printed else float((computed - printed) / abs(printed))
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scara_ident.paper.report import Check, equality, inequality
+from scara_ident.arrays import Array
+from scara_ident.paper.report import Check, Subject, equality, inequality
 from scara_ident.paper.tables import TABLE_1, TABLE_2, TABLE_3, TABLE_4, TORQUE_RMS, TRAJECTORIES, ErrorTable
 
 JOINTS = ("joint1", "joint2")
@@ -18,12 +18,12 @@ ROUNDING = 2.0 * HALF_DIGIT
 _FLOAT = 1e-12  # a tie in decimals must not be decided by binary rounding
 
 
-def _averaged(cells: NDArray[np.float64], axis: int, *, with_own: bool) -> NDArray[np.float64]:
+def _averaged(cells: Array, axis: int, *, with_own: bool) -> Array:
     keep = np.ones_like(cells, dtype=bool) if with_own else ~np.eye(len(cells), dtype=bool)
     return np.asarray(np.mean(cells, axis=axis, where=keep))
 
 
-def _printed_averages(table: ErrorTable, joint: int) -> tuple[tuple[NDArray[np.float64], int], ...]:
+def _printed_averages(table: ErrorTable, joint: int) -> tuple[tuple[Array, int], ...]:
     return ((np.array(table.row_average[joint]), 1), (np.array(table.column_average[joint]), 0))
 
 
@@ -49,39 +49,25 @@ def averages() -> Iterator[Check]:
         with_own = inside >= outside
         convention = "diagonal included" if with_own else "diagonal left out"
         tied = "" if inside != outside else "; both conventions reproduce as many"
-        yield equality(
-            section,
-            f"averages reproduced, {convention}",
-            float(total),
-            float(max(inside, outside)),
-            0.0,
-            comment=f"the other convention reproduces {min(inside, outside)} of {total}{tied}",
-        )
+        words = f"the other convention reproduces {min(inside, outside)} of {total}{tied}"
+        subject = Subject(section, f"averages reproduced, {convention}")
+        yield equality(subject, float(total), float(max(inside, outside)), 0.0, words)
         for joint, name in enumerate(JOINTS):
             cells = np.array(table.errors[joint])
             for printed, axis in _printed_averages(table, joint):
                 computed = _averaged(cells, axis, with_own=with_own)
                 kind = "row average" if axis == 1 else "column average"
                 for k, trajectory in enumerate(TRAJECTORIES):
-                    yield _average(section, kind, float(printed[k]), float(computed[k]), trajectory, name, table.unit)
+                    subject = Subject(section, kind, trajectory, name, table.unit)
+                    yield _average(subject, float(printed[k]), float(computed[k]))
             overall = float(np.mean(_averaged(cells, 1, with_own=with_own)))
-            yield _average(section, "average of all", table.average[joint], overall, "", name, table.unit)
+            subject = Subject(section, "average of all", joint=name, unit=table.unit)
+            yield _average(subject, table.average[joint], overall)
 
 
-def _average(
-    section: str, quantity: str, printed: float, computed: float, trajectory: str, joint: str, unit: str
-) -> Check:
-    return equality(
-        section,
-        quantity,
-        printed,
-        computed,
-        (ROUNDING + _FLOAT) / printed,
-        trajectory=trajectory,
-        joint=joint,
-        unit=unit,
-        comment="tolerance: rounding of the cells and of the average",
-    )
+def _average(subject: Subject, printed: float, computed: float) -> Check:
+    words = "tolerance: rounding of the cells and of the average"
+    return equality(subject, printed, computed, (ROUNDING + _FLOAT) / printed, words)
 
 
 def normalisation() -> Iterator[Check]:
@@ -102,14 +88,11 @@ def normalisation() -> Iterator[Check]:
             others = [k for k in range(len(TRAJECTORIES)) if k != row]
             worst = max(others, key=lambda k: float(abs(ratio[k] - printed[k]) / allowed[k]))
             yield equality(
-                section,
-                f"worst cell, parameters of {TRAJECTORIES[worst]}",
+                Subject(section, f"worst cell, parameters of {TRAJECTORIES[worst]}", trajectory, name),
                 float(printed[worst]),
                 float(ratio[worst]),
                 float((allowed[worst] + _FLOAT) / printed[worst]),
-                trajectory=trajectory,
-                joint=name,
-                comment="tolerance: rounding of both cells of Table 2 and of Table 3",
+                "tolerance: rounding of both cells of Table 2 and of Table 3",
             )
 
 
@@ -124,34 +107,21 @@ def own_errors() -> Iterator[Check]:
             for joint, name in enumerate(JOINTS):
                 errors = table.errors[joint][row]
                 nearest = min((k for k in range(len(errors)) if k != row), key=lambda k: errors[k])
-                yield inequality(
-                    section,
-                    f"{table.name} own error, least of its row",
-                    "printed <= computed",
-                    errors[row] <= errors[nearest] + ROUNDING + _FLOAT,
-                    errors[row],
-                    errors[nearest],
-                    trajectory=trajectory,
-                    joint=name,
-                    unit=table.unit,
-                    comment=f"smallest other: parameters of {TRAJECTORIES[nearest]}",
-                )
+                subject = Subject(section, f"{table.name} own error, least of its row", trajectory, name, table.unit)
+                words = f"smallest other: parameters of {TRAJECTORIES[nearest]}"
+                yield _at_most(subject, errors[row], errors[nearest], words)
     for row, trajectory in enumerate(TRAJECTORIES):
         complete, reduced = (
             float(np.hypot(table.errors[0][row][row], table.errors[1][row][row])) for table in (TABLE_2, TABLE_4)
         )
-        yield inequality(
-            section,
-            "own error, reduced against complete model",
-            "printed >= computed",
-            reduced >= complete - np.sqrt(2.0) * ROUNDING - _FLOAT,
-            reduced,
-            complete,
-            trajectory=trajectory,
-            joint="both",
-            unit="N m",
-            comment="fewer parameters cannot fit better",
-        )
+        subject = Subject(section, "own error, reduced against complete model", trajectory, "both", "N m")
+        holds = reduced >= complete - np.sqrt(2.0) * ROUNDING - _FLOAT
+        yield inequality(subject, "printed >= computed", holds, reduced, complete, "fewer parameters cannot fit better")
+
+
+def _at_most(subject: Subject, printed: float, bound: float, comment: str) -> Check:
+    holds = printed <= bound + ROUNDING + _FLOAT
+    return inequality(subject, "printed <= computed", holds, printed, bound, comment)
 
 
 def noise() -> Iterator[Check]:
@@ -162,18 +132,8 @@ def noise() -> Iterator[Check]:
     for row, trajectory in enumerate(TRAJECTORIES):
         for joint, name in enumerate(JOINTS):
             own, sigma = TABLE_2.errors[joint][row][row], TABLE_1.sigma[joint][row]
-            yield inequality(
-                "Own errors and noise",
-                "Table 2 own error, at most sigma",
-                "printed <= computed",
-                own <= sigma + ROUNDING + _FLOAT,
-                own,
-                sigma,
-                trajectory=trajectory,
-                joint=name,
-                unit="N m",
-                comment=f"{own / sigma:.2f} times the repeatability",
-            )
+            subject = Subject("Own errors and noise", "Table 2 own error, at most sigma", trajectory, name, "N m")
+            yield _at_most(subject, own, sigma, f"{own / sigma:.2f} times the repeatability")
 
 
 def worse_than_no_model() -> Iterator[Check]:
@@ -184,18 +144,10 @@ def worse_than_no_model() -> Iterator[Check]:
                 rms = TORQUE_RMS[joint][row]
                 errors = table.errors[joint][row]
                 bad = [TRAJECTORIES[k] for k, error in enumerate(errors) if error > rms]
-                yield inequality(
-                    "Errors and torque",
-                    f"{table.name} largest error, at most the torque",
-                    "printed <= computed",
-                    max(errors) <= rms,
-                    max(errors),
-                    rms,
-                    trajectory=trajectory,
-                    joint=name,
-                    unit=table.unit,
-                    comment=f"worse than no model: parameters of {', '.join(bad)}" if bad else "",
-                )
+                quantity = f"{table.name} largest error, at most the torque"
+                subject = Subject("Errors and torque", quantity, trajectory, name, table.unit)
+                words = f"worse than no model: parameters of {', '.join(bad)}" if bad else ""
+                yield inequality(subject, "printed <= computed", max(errors) <= rms, max(errors), rms, words)
 
 
 def statements() -> Iterator[Check]:
@@ -205,45 +157,29 @@ def statements() -> Iterator[Check]:
     for joint, name in enumerate(JOINTS):
         along = np.array(TABLE_2.column_average[joint])[order]
         wrong = int(np.sum(np.diff(along) >= 0.0))
-        yield inequality(
-            section,
-            "average error falls as J_d grows: steps that rise",
-            "computed = 0",
-            wrong == 0,
-            None,
-            wrong,
-            joint=name,
-            comment=" > ".join(TRAJECTORIES[k] for k in order),
-        )
+        subject = Subject(section, "average error falls as J_d grows: steps that rise", joint=name)
+        words = " > ".join(TRAJECTORIES[k] for k in order)
+        yield inequality(subject, "computed = 0", wrong == 0, None, wrong, words)
     for joint, name in enumerate(JOINTS):
         easiest = int(np.argmin(TABLE_3.row_average[joint]))
         hardest = int(np.argmax(TABLE_3.row_average[joint]))
         for kind, found, expected in (("easiest", easiest, "L2"), ("most difficult", hardest, "OJD")):
             yield inequality(
-                section,
-                f"{expected} is the {kind} to be predicted",
+                Subject(section, f"{expected} is the {kind} to be predicted", TRAJECTORIES[found], name),
                 "equal",
                 TRAJECTORIES[found] == expected,
                 TABLE_3.row_average[joint][TRAJECTORIES.index(expected)],
                 TABLE_3.row_average[joint][found],
-                trajectory=TRAJECTORIES[found],
-                joint=name,
-                comment="row average of Table 3",
+                "row average of Table 3",
             )
     for joint, name in enumerate(JOINTS):
         for column, trajectory in enumerate(TRAJECTORIES):
             complete, reduced = (_mean_of_others(table, joint, column) for table in (TABLE_2, TABLE_4))
-            yield inequality(
-                section,
-                "error on the other trajectories, reduced over complete model",
-                "computed <= 1",
-                reduced <= complete + ROUNDING + _FLOAT,
-                None,
-                reduced / complete,
-                trajectory=trajectory,
-                joint=name,
-                comment=f"means of four errors: {reduced:.4f} and {complete:.4f} N m",
-            )
+            quantity = "error on the other trajectories, reduced over complete model"
+            holds = reduced <= complete + ROUNDING + _FLOAT
+            words = f"means of four errors: {reduced:.4f} and {complete:.4f} N m"
+            subject = Subject(section, quantity, trajectory, name)
+            yield inequality(subject, "computed <= 1", holds, None, reduced / complete, words)
 
 
 def _mean_of_others(table: ErrorTable, joint: int, column: int) -> float:

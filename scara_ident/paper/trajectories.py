@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scara_ident.arrays import Array
 from scara_ident.paper.model import LINK_LENGTH
 
 SAMPLES = 2500
@@ -34,11 +35,11 @@ class Trajectory:
     amplitude: tuple[tuple[float, ...], tuple[float, ...]]
     omega: tuple[tuple[float, ...], tuple[float, ...]]
 
-    def times(self, count: int = SAMPLES) -> NDArray[np.float64]:
+    def times(self, count: int = SAMPLES) -> Array:
         """Return equally spaced times over the duration, both ends included, shape (count,)."""
         return np.linspace(0.0, self.duration, count)
 
-    def motion(self, time: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def motion(self, time: ArrayLike) -> tuple[Array, Array, Array]:
         """Position, velocity and acceleration of both joints.
 
         Parameters
@@ -83,13 +84,7 @@ OJD = Trajectory(
 """One harmonic, chosen by the paper for the greatest determinant J_d."""
 
 
-def tool_acceleration(
-    q: NDArray[np.float64],
-    v: NDArray[np.float64],
-    a: NDArray[np.float64],
-    *,
-    link_length: float = LINK_LENGTH,
-) -> NDArray[np.float64]:
+def tool_acceleration(q: Array, v: Array, a: Array, *, link_length: float = LINK_LENGTH) -> Array:
     """Horizontal acceleration of the gripper.
 
     Parameters

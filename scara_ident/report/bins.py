@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scara_ident.arrays import Array
 
 MEAN_BINS = 24
 LEAST_COUNT = 8
@@ -92,11 +92,7 @@ def _means(place: NDArray[np.intp], y: Array, centres: Array) -> Means:
     spread = np.bincount(place[inside], (y[inside] - mean[place[inside]]) ** 2, minlength=bins) / size
     # Few visits do not show their own scatter: then that of the samples stands for it.
     variance = np.where(visits >= LEAST_VISITS, scatter / size**2, spread / np.maximum(visits, 1))
-    return Means(
-        centres,
-        np.where(enough, mean, np.nan),
-        np.where(enough, np.sqrt(variance), np.nan),
-    )
+    return Means(centres, np.where(enough, mean, np.nan), np.where(enough, np.sqrt(variance), np.nan))
 
 
 def density(x: Array, y: Array, x_limits: tuple[float, float], y_limits: tuple[float, float]) -> Array:

@@ -54,11 +54,7 @@ def comparison_dict(comparison: Comparison) -> dict[str, Any]:
         },
         "parameters": {
             summary.name: {
-                column.name: {
-                    "value": summary.estimate.value[k],
-                    "std": summary.estimate.std[k],
-                    "unit": column.unit,
-                }
+                column.name: {"value": summary.estimate.value[k], "std": summary.estimate.std[k], "unit": column.unit}
                 for k, column in enumerate(comparison.model.columns)
             }
             for summary in comparison.trajectories

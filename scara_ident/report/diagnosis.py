@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.diagnose import Diagnosis
@@ -15,8 +14,6 @@ from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
 from scara_ident.model.terms.friction import Friction
-
-Array = NDArray[np.float64]
 
 
 def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -39,10 +36,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
                 "effect": effect.effect,
                 "joint": effect.joint,
                 "description": effect.description,
-                "parameters": {
-                    name: {"value": parameter.value, "std": parameter.std, "unit": parameter.unit}
-                    for name, parameter in effect.parameters.items()
-                },
+                "parameters": {name: dict(vars(parameter)) for name, parameter in effect.parameters.items()},
                 "confounded_with": list(dict.fromkeys(confounder.effect for confounder in effect.confounded_with)),
                 "confounders": [
                     {"effect": confounder.effect, "joint": confounder.joint, "gain": confounder.gain}
@@ -55,20 +49,8 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for effect in diagnosis.effects
         ],
-        "training": _before_after(
-            joints,
-            diagnosis.before.value,
-            diagnosis.training_before,
-            diagnosis.after.value,
-            diagnosis.training_after,
-        ),
-        "validation": _before_after(
-            joints,
-            diagnosis.before.value,
-            diagnosis.validation_before,
-            diagnosis.after.value,
-            diagnosis.validation_after,
-        ),
+        "training": _before_after(diagnosis, diagnosis.training_before, diagnosis.training_after),
+        "validation": _before_after(diagnosis, diagnosis.validation_before, diagnosis.validation_after),
         "recordings": {
             kind: {
                 item.name: {
@@ -84,14 +66,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "moved": moved(diagnosis),
         "parameters": [
-            {
-                "name": column.name,
-                "joint": column.joint,
-                "value": diagnosis.after.value[k],
-                "std": diagnosis.after.std[k],
-                "unit": column.unit,
-                "meaning": column.meaning,
-            }
+            column.entry(value=diagnosis.after.value[k], std=diagnosis.after.std[k])
             for k, column in enumerate(diagnosis.after.model.columns)
         ],
         "not_identifiable": [
@@ -149,15 +124,12 @@ def _unexplained(diagnosis: Diagnosis) -> dict[str, Any] | None:
     }
 
 
-def _before_after(
-    joints: Sequence[str], before: Array, old: Observations, after: Array, new: Observations
-) -> dict[str, dict[str, float | None]]:
+def _before_after(diagnosis: Diagnosis, old: Observations, new: Observations) -> dict[str, dict[str, float | None]]:
     if not old.data.recordings:
         return {"before": {}, "after": {}}
     result: dict[str, dict[str, float | None]] = {}
-    for name, value, observations in (("before", before, old), ("after", after, new)):
-        errors = joint_errors(value, observations)
-        pairs = list(zip(joints, errors, strict=True))
+    for name, estimate, observations in (("before", diagnosis.before, old), ("after", diagnosis.after, new)):
+        pairs = list(zip(diagnosis.robot.joints, joint_errors(estimate.value, observations), strict=True))
         result[name] = {joint: error.rms if error else None for joint, error in pairs}
         result[f"{name}_relative"] = {joint: error.relative if error else None for joint, error in pairs}
         result[f"{name}_unfiltered"] = {joint: error.rms_unfiltered if error else None for joint, error in pairs}

@@ -24,15 +24,8 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         "method": estimate.method,
         "samples": identification.training.samples,
         "parameters": [
-            {
-                "name": column.name,
-                "joint": column.joint,
-                "value": estimate.value[k],
-                "std": estimate.std[k],
-                "unit": column.unit,
-                "meaning": column.meaning,
-                "undetermined": bool(estimate.undetermined[k]),
-            }
+            column.entry(value=estimate.value[k], std=estimate.std[k])
+            | {"undetermined": bool(estimate.undetermined[k])}
             for k, column in enumerate(identification.model.columns)
         ],
         "std_from": estimate.std_kind,
@@ -86,10 +79,7 @@ def _error(error: JointError | None) -> dict[str, float | None]:
 
 
 def _left_out(robot: Robot, item: Observations) -> dict[str, Any]:
-    return {
-        "ends_s": item.left_out_ends,
-        "at_rest_share": dict(zip(robot.joints, item.left_out_rest, strict=True)),
-    }
+    return {"ends_s": item.left_out_ends, "at_rest_share": dict(zip(robot.joints, item.left_out_rest, strict=True))}
 
 
 def sentences(identification: Identification) -> tuple[str, ...]:

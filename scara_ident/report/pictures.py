@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scara_ident.excitation.design import Design
 from scara_ident.excitation.tool import tool_motion, tool_of
@@ -19,8 +18,6 @@ from scara_ident.report.html.story import chapter_group, moment_group
 from scara_ident.report.html.torque import torque_plot
 from scara_ident.report.plot import DASHES, Dots, Figure, Layer, Line, Panel, Plot, single, style
 from scara_ident.threads import one_blas_thread
-
-Array = NDArray[np.float64]
 
 # Recordings shown, at the most; the first held-out ones before the fitted ones.
 MOST_RECORDINGS = 4

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from scara_ident.arrays import Array
 
 # Arrays longer than this become 16-bit integers, which resolve 1/65000 of their range.
 MOST_PLAIN = 400

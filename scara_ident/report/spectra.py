@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.report.traces import Trace
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 ORDER_WORDS = "Within the band: a ripple that passes faster than the band is not in it."
 SEGMENT_SECONDS = 4.0

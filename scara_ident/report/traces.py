@@ -7,18 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects.effect import EffectTerm
 from scara_ident.estimation.observations import Observations
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
 from scara_ident.motion.motion import Motion, low_pass
 from scara_ident.motion.prepared import PreparedStretch
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,3 +173,22 @@ def _trace(
 
 def _banded(part: PreparedStretch, rows: Array) -> Array:
     return np.array([low_pass(row, part.rate, band) for row, band in zip(rows, part.bands, strict=True)])
+
+
+class FittedContext:
+    """What reports of fitted models draw from: the traces of their recordings by role, those held out first."""
+
+    @cached_property
+    def groups(self) -> dict[str, list[tuple[Trace, ...]]]:
+        """Traces by recording."""
+        raise NotImplementedError
+
+    @property
+    def parts(self) -> list[tuple[str, tuple[Trace, ...]]]:
+        """Traces of every recording by its name and role, those held out first."""
+        return [(f"{found[0].recording} ({role})", found) for role, group in self.groups.items() for found in group]
+
+    @property
+    def sets(self) -> dict[str, list[Trace]]:
+        """Traces of the recordings that were fitted and of those held out."""
+        return {role: list(chain.from_iterable(group)) for role, group in reversed(self.groups.items())}

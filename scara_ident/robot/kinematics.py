@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.robot import Robot
 
@@ -20,7 +20,7 @@ def parent(robot: Robot, joint: int) -> int:
     return place_of(robot, int(robot.model.parents[int(robot.order[joint]) + 1]))
 
 
-def axis(robot: Robot, data: pin.Data, joint: int) -> NDArray[np.float64]:
+def axis(robot: Robot, data: pin.Data, joint: int) -> Array:
     """Return the axis of a revolute joint in the base frame, at the configuration last computed."""
     joint_id = int(robot.order[joint]) + 1
     subspace = robot.model.joints[joint_id].createData().S
@@ -53,3 +53,10 @@ def tool_frame(robot: Robot, link: str | None = None) -> pin.Frame:
     if found.parentJoint == 0:
         raise RobotError(f"{robot.urdf}: no identified joint moves {link!r}; name a link that moves")
     return found
+
+
+def farthest_point(robot: Robot) -> Array:
+    """Return the farthest frame that the last joint carries, in that joint's frame, m, shape (3,)."""
+    model = robot.model
+    points = [np.array(frame.placement.translation) for frame in model.frames if frame.parentJoint == model.njoints - 1]
+    return max(points, key=lambda point: float(np.linalg.norm(point)), default=np.zeros(3))

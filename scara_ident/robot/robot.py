@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
 from scara_ident.robot.examples import example_urdf, is_name
 from scara_ident.robot.signal_map import Channels, build_channels
 from scara_ident.robot.transmissions import reductions, rotor_inertias
 from scara_ident.robot.urdf_validation import urdf_fault
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 MOVABLE = ("revolute", "continuous", "prismatic")
 
@@ -74,14 +72,14 @@ class Robot:
     links: tuple[str, ...]
     order: NDArray[np.intp]
     prismatic: NDArray[np.bool_]
-    reduction: NDArray[np.float64]
-    rotor_inertia: NDArray[np.float64]
+    reduction: Array
+    rotor_inertia: Array
     effort_side: Literal["motor", "joint"]
-    effort_gain: NDArray[np.float64]
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
-    velocity_limit: NDArray[np.float64]
-    effort_limit: NDArray[np.float64]
+    effort_gain: Array
+    lower: Array
+    upper: Array
+    velocity_limit: Array
+    effort_limit: Array
     locked: tuple[tuple[str, float], ...]
     channels: Channels | None = None
 
@@ -91,17 +89,17 @@ class Robot:
         return len(self.joints)
 
     @property
-    def row_scale(self) -> NDArray[np.float64]:
+    def row_scale(self) -> Array:
         """Recorded torque per joint torque, shape (n,): 1/N on the motor side, else 1."""
         return 1.0 / self.reduction if self.effort_side == "motor" else np.ones(self.n)
 
     @property
-    def drive_sign(self) -> NDArray[np.float64]:
+    def drive_sign(self) -> Array:
         """Direction of the recorded torque relative to the joint's, shape (n,)."""
         return np.sign(self.row_scale)
 
     @property
-    def torque_limit(self) -> NDArray[np.float64]:
+    def torque_limit(self) -> Array:
         """Effort limit on the side where effort is recorded, shape (n,)."""
         return self.effort_limit * np.abs(self.row_scale)
 
@@ -113,7 +111,7 @@ class Robot:
         """Return the unit of a joint's position."""
         return "m" if self.prismatic[joint] else "rad"
 
-    def standard_parameters(self) -> NDArray[np.float64]:
+    def standard_parameters(self) -> Array:
         """Return the nominal standard parameters of the URDF, shape (11 n,).
 
         Ten per body in the order of ``joints``, each in Pinocchio's order (m, m c, Ixx, Ixy, Iyy, Ixz, Iyz, Izz,
@@ -214,18 +212,18 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
     )
 
 
-def _upper(model: pin.Model, kind: Literal["Velocity", "Effort"]) -> NDArray[np.float64]:
+def _upper(model: pin.Model, kind: Literal["Velocity", "Effort"]) -> Array:
     # Older releases of Pinocchio have velocityLimit and effortLimit.
     name = f"upper{kind}Limit"
     return np.asarray(getattr(model, name if hasattr(model, name) else f"{kind.lower()}Limit"))
 
 
-def _given(limit: NDArray[np.float64]) -> NDArray[np.float64]:
+def _given(limit: Array) -> Array:
     # Pinocchio writes the largest double where the URDF has no limit.
     return np.where(np.abs(limit) > 1e300, np.copysign(np.inf, limit), limit)
 
 
-def _positive_or_inf(limit: NDArray[np.float64]) -> NDArray[np.float64]:
+def _positive_or_inf(limit: Array) -> Array:
     limit = _given(np.array(limit, dtype=float))
     return np.where(limit > 0.0, limit, np.inf)
 

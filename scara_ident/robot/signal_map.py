@@ -8,14 +8,10 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn
 
-import numpy as np
-from numpy.typing import NDArray
-
+from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.description import MotionDescription, RecordingDescription, SignalDescription, TimeDescription
 from scara_ident.robot.units import COUNT, Unit, find_unit, table_of
-
-Array = NDArray[np.float64]
 
 SIGNALS = ("position", "velocity", "acceleration", "effort", "temperature")
 # What a pattern may hold: the joint's name, its place in the robot description from 0, and from 1.

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.description import JointDescription
 
 
 def reductions(
     names: Sequence[str], joints: Sequence[JointDescription], urdf: Path, tree: ElementTree.Element
-) -> NDArray[np.float64]:
+) -> Array:
     """Return the reduction of each joint, shape (n,): the description's, else the URDF's, else 1."""
     from_urdf = _actuator_numbers(tree, urdf, ("mechanicalReduction", "mechanical_reduction"))
     for name, value in from_urdf.items():
@@ -27,7 +27,7 @@ def reductions(
 
 def rotor_inertias(
     names: Sequence[str], joints: Sequence[JointDescription], urdf: Path, tree: ElementTree.Element
-) -> NDArray[np.float64]:
+) -> Array:
     """Return the rotor inertia of each joint, kg m^2 at the motor, shape (n,): where none is stated, 0."""
     from_urdf = _actuator_numbers(tree, urdf, ("rotorInertia",))
     given = [joint.rotor_inertia for joint in joints]

@@ -8,22 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def visual_boxes(robot: Robot) -> tuple[tuple[Array, Array], ...]:
     """Return the bounding box of each body's visual shapes, along the axes of its link.
 
     A body is the link that a joint moves with all that is fixed or locked to it.
-
-    Parameters
-    ----------
-    robot : Robot
 
     Returns
     -------

@@ -6,8 +6,6 @@
 'scara03'
 """
 
-from __future__ import annotations
-
 from scara_ident.simulation.arm import Controller, VirtualArm, ideal, on_side
 from scara_ident.simulation.defaults import virtual_arm
 from scara_ident.simulation.effects import CATALOGUE, EFFECTS, Effect, parse_effect

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, UsageError
 from scara_ident.robot.robot import Robot
 from scara_ident.simulation.plant import PlantDraft, empty_draft
 
 if TYPE_CHECKING:
     from scara_ident.simulation.loop import Gains
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

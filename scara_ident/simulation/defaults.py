@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
+from scara_ident.robot.kinematics import farthest_point
 from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation.arm import Controller, VirtualArm
-
-Array = NDArray[np.float64]
 
 # Table 5, column OJD (a0, a1, a2 of the two joints; cubic friction left out) and sigma of Table 1, row L1.
 SCARA_FRICTION = ((0.210, 0.093, -0.016, 0.0), (0.088, 0.049, -0.007, 0.0))
@@ -67,21 +66,13 @@ def virtual_arm(robot: Robot | None = None) -> VirtualArm:
         torque_noise=noise,
         controller=placed_poles(inertia),
         torque_scale=scale,
-        tool=tool_point(robot),
+        tool=farthest_point(robot),
     )
 
 
 def placed_poles(inertia: Array, pole: float = POLE) -> Controller:
     """Return PID gains that give each joint of this inertia, alone, three poles at ``-pole`` rad/s."""
     return Controller(3.0 * pole**2 * inertia, pole**3 * inertia, 3.0 * pole * inertia)
-
-
-def tool_point(robot: Robot) -> Array:
-    """Return the farthest frame that the last joint carries, in that joint's frame, shape (3,)."""
-    model = robot.model
-    last = model.njoints - 1
-    points = [np.array(frame.placement.translation) for frame in model.frames if frame.parentJoint == last]
-    return max(points, key=lambda point: float(np.linalg.norm(point)), default=np.zeros(3))
 
 
 def _usual(robot: Robot) -> tuple[Array, Array]:
@@ -95,11 +86,7 @@ def _usual(robot: Robot) -> tuple[Array, Array]:
     for _ in range(poses):
         q = np.empty(robot.n)
         q[robot.order] = random.uniform(lower, upper)
-        full = _configuration(model, q)
+        full = pin.integrate(model, pin.neutral(model), q)
         inertia += np.diag(pin.crba(model, data, full))[robot.order] / poses
         gravity += pin.computeGeneralizedGravity(model, data, full)[robot.order] ** 2 / poses
     return inertia, np.sqrt(gravity)
-
-
-def _configuration(model: pin.Model, q: Array) -> Array:
-    return np.asarray(pin.integrate(model, pin.neutral(model), q))

@@ -15,13 +15,25 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
 from scara_ident.simulation.plant import Plant
 from scara_ident.simulation.spatial import dynamics
 
-Array = NDArray[np.float64]
+
+class State(NamedTuple):
+    """Positions and velocities of links (q, v) and drives (theta, omega), sliding modes and presliding states.
+
+    A drive slides in the direction of its mode, +1 or -1, and sticks where that is 0.
+    """
+
+    q: Array
+    v: Array
+    theta: Array
+    omega: Array
+    mode: Array
+    dahl: Array
 
 
 class Room(NamedTuple):
@@ -95,10 +107,9 @@ def _spring_torque(plant: Plant, j: int, stretch: float, rate: float) -> float:
 
 
 @compiled
-def _friction(
-    plant: Plant, room: Room, t: float, theta: Array, omega: Array, mode: Array, dahl: Array, start: Array
-) -> None:
+def _friction(plant: Plant, room: Room, t: float, x: State, start: Array) -> None:
     """Fill the torques that do not depend on acceleration: ``smooth``, ``dry`` and ``direction``."""
+    theta, omega, mode, dahl = x.theta, x.omega, x.mode, x.dahl
     n = theta.shape[0]
     for j in range(n):
         w = omega[j]
@@ -154,41 +165,28 @@ def _loss(plant: Plant, j: int, load: float, direction: float) -> float:
 
 @compiled
 def accelerate(
-    plant: Plant,
-    room: Room,
-    t: float,
-    q: Array,
-    v: Array,
-    theta: Array,
-    omega: Array,
-    mode: Array,
-    dahl: Array,
-    start: Array,
-    drive: Array,
-    a: Array,
-    alpha: Array,
+    plant: Plant, room: Room, t: float, x: State, start: Array, drive: Array, a: Array, alpha: Array
 ) -> None:
     """Fill the accelerations of links ``a`` and drives ``alpha``, and ``room.load``, at fixed modes.
 
     Parameters
     ----------
     t : float
-    q, v, theta, omega : ndarray, shape (n,)
-        Positions and velocities of links and drives.
-    mode : ndarray, shape (n,)
-        Direction in which a drive slides, +1 or -1; 0 where it sticks.
-    dahl, start : ndarray, shape (n,)
-        Presliding state and drive position at the start of the step.
+    x : State
+        Its presliding states are those at the start of the step.
+    start : ndarray, shape (n,)
+        Drive position at the start of the step.
     drive : ndarray, shape (n,)
         Torque of the drive, N m at the joint.
     """
+    q, v, theta, omega, mode = x.q, x.v, x.theta, x.omega, x.mode
     n = q.shape[0]
     bodies = plant.bodies if t < plant.payload_time else plant.bodies_after
     dynamics(
         plant.parent, plant.prismatic, plant.rotation, plant.offset, bodies, plant.gravity,
         q, v, room.mass, room.bias, room.e, room.p, room.state, room.composite,
     )  # fmt: skip
-    _friction(plant, room, t, theta, omega, mode, dahl, start)
+    _friction(plant, room, t, x, start)
     lossy = False
     for j in range(n):
         if plant.elastic[j]:
@@ -247,27 +245,15 @@ def accelerate(
 
 
 @compiled
-def settle(
-    plant: Plant,
-    room: Room,
-    t: float,
-    q: Array,
-    v: Array,
-    theta: Array,
-    omega: Array,
-    mode: Array,
-    dahl: Array,
-    drive: Array,
-    a: Array,
-    alpha: Array,
-) -> None:
-    """Find which joints stick, and the accelerations; ``mode`` is updated.
+def settle(plant: Plant, room: Room, t: float, x: State, drive: Array, a: Array, alpha: Array) -> None:
+    """Find which joints stick, and the accelerations; ``x.mode`` is updated.
 
     A standing joint is first held. If the friction that this takes exceeds its bound the joint is let go in that
     direction; if it then moves the other way it is held again. The lowest such joint changes at a time, the rule
     that ends for the complementarity problem of a mass matrix (Murty's least-index rule).
     """
-    n = q.shape[0]
+    omega, mode = x.omega, x.mode
+    n = omega.shape[0]
     for j in range(n):
         if plant.direction_matters[j]:
             if omega[j] > 0.0:
@@ -277,7 +263,7 @@ def settle(
             else:
                 mode[j] = 0.0
     for _ in range(16 * n):
-        accelerate(plant, room, t, q, v, theta, omega, mode, dahl, theta, drive, a, alpha)
+        accelerate(plant, room, t, x, x.theta, drive, a, alpha)
         changed = False
         for j in range(n):
             if not plant.direction_matters[j] or omega[j] != 0.0:

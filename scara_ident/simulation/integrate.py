@@ -5,44 +5,25 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
-from scara_ident.simulation.forces import Room, accelerate, settle
+from scara_ident.simulation.forces import Room, State, accelerate, settle
 from scara_ident.simulation.plant import Plant
-
-Array = NDArray[np.float64]
 
 # Within one step every joint may stop and start again a few times; more would be an error of the model.
 EVENTS_PER_JOINT = 4
 
 
-class State(NamedTuple):
-    """Positions and velocities of links (q, v) and drives (theta, omega), sliding modes and presliding states."""
-
-    q: Array
-    v: Array
-    theta: Array
-    omega: Array
-    mode: Array
-    dahl: Array
-
-
 class Stages(NamedTuple):
-    """Room for the stages of the Runge-Kutta step, each of shape (4, n) or (n,)."""
+    """Room for the stages of the Runge-Kutta step, each of shape (4, n), and the states that it passes and reaches."""
 
     v: Array
     a: Array
     omega: Array
     alpha: Array
-    trial_q: Array
-    trial_v: Array
-    trial_theta: Array
-    trial_omega: Array
-    new_q: Array
-    new_v: Array
-    new_theta: Array
-    new_omega: Array
+    trial: State
+    new: State
 
 
 def make_state(n: int) -> State:
@@ -50,43 +31,43 @@ def make_state(n: int) -> State:
     return State(*(np.zeros(n) for _ in range(6)))
 
 
-def make_stages(n: int) -> Stages:
-    """Allocate the stages."""
-    return Stages(*(np.zeros((4, n)) for _ in range(4)), *(np.zeros(n) for _ in range(8)))
+def make_stages(x: State) -> Stages:
+    """Allocate the stages of steps from a state; modes and presliding states, which a step keeps, are its own."""
+    n = len(x.q)
+    trial, new = (State(q, v, theta, omega, x.mode, x.dahl) for q, v, theta, omega in np.zeros((2, 4, n)))
+    v, a, omega, alpha = np.zeros((4, 4, n))
+    return Stages(v, a, omega, alpha, trial, new)
 
 
 @compiled
 def _runge_kutta(plant: Plant, room: Room, x: State, s: Stages, t: float, h: float, drive: Array) -> None:
-    """Fill ``s.new_*`` by one step of the classical method; stage 0 is there already."""
+    """Fill ``s.new`` by one step of the classical method; stage 0 is there already."""
     n = x.q.shape[0]
     for stage in range(1, 4):
         part = h if stage == 3 else 0.5 * h
         for j in range(n):
-            s.trial_theta[j] = x.theta[j] + part * s.omega[stage - 1, j]
-            s.trial_omega[j] = x.omega[j] + part * s.alpha[stage - 1, j]
+            s.trial.theta[j] = x.theta[j] + part * s.omega[stage - 1, j]
+            s.trial.omega[j] = x.omega[j] + part * s.alpha[stage - 1, j]
             if plant.elastic[j]:
-                s.trial_q[j] = x.q[j] + part * s.v[stage - 1, j]
-                s.trial_v[j] = x.v[j] + part * s.a[stage - 1, j]
+                s.trial.q[j] = x.q[j] + part * s.v[stage - 1, j]
+                s.trial.v[j] = x.v[j] + part * s.a[stage - 1, j]
             else:
-                s.trial_q[j] = s.trial_theta[j]
-                s.trial_v[j] = s.trial_omega[j]
-        accelerate(
-            plant, room, t + part, s.trial_q, s.trial_v, s.trial_theta, s.trial_omega,
-            x.mode, x.dahl, x.theta, drive, s.a[stage], s.alpha[stage],
-        )  # fmt: skip
+                s.trial.q[j] = s.trial.theta[j]
+                s.trial.v[j] = s.trial.omega[j]
+        accelerate(plant, room, t + part, s.trial, x.theta, drive, s.a[stage], s.alpha[stage])
         for j in range(n):
-            s.v[stage, j] = s.trial_v[j]
-            s.omega[stage, j] = s.trial_omega[j]
+            s.v[stage, j] = s.trial.v[j]
+            s.omega[stage, j] = s.trial.omega[j]
     w = h / 6.0
     for j in range(n):
-        s.new_theta[j] = x.theta[j] + w * (s.omega[0, j] + 2.0 * (s.omega[1, j] + s.omega[2, j]) + s.omega[3, j])
-        s.new_omega[j] = x.omega[j] + w * (s.alpha[0, j] + 2.0 * (s.alpha[1, j] + s.alpha[2, j]) + s.alpha[3, j])
+        s.new.theta[j] = x.theta[j] + w * (s.omega[0, j] + 2.0 * (s.omega[1, j] + s.omega[2, j]) + s.omega[3, j])
+        s.new.omega[j] = x.omega[j] + w * (s.alpha[0, j] + 2.0 * (s.alpha[1, j] + s.alpha[2, j]) + s.alpha[3, j])
         if plant.elastic[j]:
-            s.new_q[j] = x.q[j] + w * (s.v[0, j] + 2.0 * (s.v[1, j] + s.v[2, j]) + s.v[3, j])
-            s.new_v[j] = x.v[j] + w * (s.a[0, j] + 2.0 * (s.a[1, j] + s.a[2, j]) + s.a[3, j])
+            s.new.q[j] = x.q[j] + w * (s.v[0, j] + 2.0 * (s.v[1, j] + s.v[2, j]) + s.v[3, j])
+            s.new.v[j] = x.v[j] + w * (s.a[0, j] + 2.0 * (s.a[1, j] + s.a[2, j]) + s.a[3, j])
         else:
-            s.new_q[j] = s.new_theta[j]
-            s.new_v[j] = s.new_omega[j]
+            s.new.q[j] = s.new.theta[j]
+            s.new.v[j] = s.new.omega[j]
 
 
 @compiled
@@ -103,11 +84,9 @@ def first_stage(plant: Plant, room: Room, x: State, s: Stages, t: float, drive: 
         s.v[0, j] = x.v[j]
         s.omega[0, j] = x.omega[j]
     if standing:
-        settle(plant, room, t, x.q, x.v, x.theta, x.omega, x.mode, x.dahl, drive, s.a[0], s.alpha[0])
+        settle(plant, room, t, x, drive, s.a[0], s.alpha[0])
     else:
-        accelerate(
-            plant, room, t, x.q, x.v, x.theta, x.omega, x.mode, x.dahl, x.theta, drive, s.a[0], s.alpha[0]
-        )  # fmt: skip
+        accelerate(plant, room, t, x, x.theta, drive, s.a[0], s.alpha[0])
 
 
 @compiled
@@ -115,8 +94,8 @@ def _first_to_stop(plant: Plant, x: State, s: Stages) -> int:
     """Return the joint whose velocity left its direction earliest in the step, by linear interpolation; -1: none."""
     first, earliest = -1, 2.0
     for j in range(x.q.shape[0]):
-        if plant.direction_matters[j] and x.mode[j] != 0.0 and s.new_omega[j] * x.mode[j] < 0.0:
-            part = x.omega[j] / (x.omega[j] - s.new_omega[j])
+        if plant.direction_matters[j] and x.mode[j] != 0.0 and s.new.omega[j] * x.mode[j] < 0.0:
+            part = x.omega[j] / (x.omega[j] - s.new.omega[j])
             if part < earliest:
                 first, earliest = j, part
     return first
@@ -126,10 +105,10 @@ def _first_to_stop(plant: Plant, x: State, s: Stages) -> int:
 def _instant_of_stop(
     plant: Plant, room: Room, x: State, s: Stages, t: float, left: float, drive: Array, stopping: int
 ) -> tuple[int, float]:
-    """Return the first joint to stop and the length of the step that takes it there; ``s.new_*`` is then its end."""
+    """Return the first joint to stop and the length of the step that takes it there; ``s.new`` is then its end."""
     taken = left
     low, low_value = 0.0, x.omega[stopping]
-    high, high_value = left, s.new_omega[stopping]
+    high, high_value = left, s.new.omega[stopping]
     for _ in range(20):
         taken = low - low_value * (high - low) / (high_value - low_value)
         _runge_kutta(plant, room, x, s, t, taken, drive)
@@ -138,9 +117,9 @@ def _instant_of_stop(
             # Another joint has stopped even before.
             stopping = other
             low, low_value = 0.0, x.omega[stopping]
-            high, high_value = taken, s.new_omega[stopping]
+            high, high_value = taken, s.new.omega[stopping]
             continue
-        value = s.new_omega[stopping]
+        value = s.new.omega[stopping]
         if abs(value) <= 1e-13 + 1e-12 * abs(x.omega[stopping]):
             break
         # False position, with the end that stays halved so that it too moves (the Illinois rule).
@@ -173,18 +152,16 @@ def step(plant: Plant, room: Room, x: State, s: Stages, t: float, h: float, driv
             if x.omega[stopping] == 0.0:
                 # Let go and turned back within one step: it is held for the rest of it.
                 x.mode[stopping] = 0.0
-                accelerate(
-                    plant, room, t, x.q, x.v, x.theta, x.omega, x.mode, x.dahl, x.theta, drive, s.a[0], s.alpha[0]
-                )  # fmt: skip
+                accelerate(plant, room, t, x, x.theta, drive, s.a[0], s.alpha[0])
                 continue
             stopping, taken = _instant_of_stop(plant, room, x, s, t, left, drive, stopping)
         for j in range(n):
             if plant.presliding[j] > 0.0:
-                way = s.new_theta[j] - x.theta[j]
+                way = s.new.theta[j] - x.theta[j]
                 end = 1.0 if way > 0.0 else -1.0
                 x.dahl[j] = end - (end - x.dahl[j]) * np.exp(-abs(way) / plant.presliding[j])
-            turned = plant.direction_matters[j] and s.new_omega[j] * x.mode[j] < 0.0
-            x.q[j], x.v[j], x.theta[j], x.omega[j] = s.new_q[j], s.new_v[j], s.new_theta[j], s.new_omega[j]
+            turned = plant.direction_matters[j] and s.new.omega[j] * x.mode[j] < 0.0
+            x.q[j], x.v[j], x.theta[j], x.omega[j] = s.new.q[j], s.new.v[j], s.new.theta[j], s.new.omega[j]
             if j == stopping or turned:
                 x.omega[j] = 0.0
                 if not plant.elastic[j]:

@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
-from scara_ident.simulation.forces import Room, make_room
-from scara_ident.simulation.integrate import Stages, State, first_stage, make_stages, make_state, step
+from scara_ident.simulation.forces import Room, State, make_room
+from scara_ident.simulation.integrate import Stages, first_stage, make_stages, make_state, step
 from scara_ident.simulation.plant import Plant, Sensors
-
-Array = NDArray[np.float64]
 
 
 class Gains(NamedTuple):
@@ -180,7 +178,7 @@ def track(
     out = make_trace(samples, n)
     room = make_room(n)
     status = _track(
-        plant, sensors, gains, room, x, make_stages(n), period, substeps, np.ascontiguousarray(reference),
+        plant, sensors, gains, room, x, make_stages(x), period, substeps, np.ascontiguousarray(reference),
         np.ascontiguousarray(feed), start, controlled, out,
     )  # fmt: skip
     return out, -1 - status

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.robot.kinematics import farthest_point
 from scara_ident.robot.robot import Robot
-from scara_ident.simulation.defaults import tool_point
 from scara_ident.simulation.laws import MotionLaw
 from scara_ident.simulation.reference import ReferenceMotion
-
-Array = NDArray[np.float64]
 
 # A pose whose smallest singular value is this share of the largest is taken for singular.
 SINGULAR = 5e-3
@@ -91,7 +89,7 @@ class Tool:
 def tool_of(robot: Robot, point: Array | None = None) -> Tool:
     """Describe the tool of an arm; ``point`` defaults to the farthest frame that the last joint carries."""
     model = robot.model
-    chosen = tool_point(robot) if point is None else np.asarray(point, dtype=float)
+    chosen = farthest_point(robot) if point is None else np.asarray(point, dtype=float)
     lengths = [float(np.linalg.norm(placement.translation)) for placement in model.jointPlacements]
     reach = max(sum(lengths) + float(np.linalg.norm(chosen)), 1e-3)
     tool = Tool(robot, chosen, robot.n >= 6, 0, reach)
@@ -133,10 +131,6 @@ def line(
     rate : float
         Samples per second.
     name : str
-
-    Returns
-    -------
-    ReferenceMotion
 
     Raises
     ------

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scara_ident.arrays import Array
 
 
 class Plant(NamedTuple):
@@ -103,7 +103,7 @@ class PlantDraft:
     n: int
     scale: Array
     reduction: Array
-    arrays: dict[str, NDArray[np.float64]]
+    arrays: dict[str, Array]
     sensors: dict[str, Array]
     delay: Array
     gain: Array
@@ -111,7 +111,7 @@ class PlantDraft:
     drift: Array
     pickup: list[tuple[int, float, float, float]]
 
-    def array(self, name: str) -> NDArray[np.float64]:
+    def array(self, name: str) -> Array:
         """Return an array of the plant, or of the torque's measurement."""
         return self.arrays[name] if name in self.arrays else np.asarray(getattr(self, name))
 
@@ -157,7 +157,7 @@ def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
         "constant stribeck_amplitude asymmetry presliding warm_share position_share position_phase spring "
         "spring_rest elastic stiffness damping width signed_sine swinging_viscous"
     )
-    arrays: dict[str, NDArray[np.float64]] = {name: zero.copy() for name in per_joint.split()}
+    arrays: dict[str, Array] = {name: zero.copy() for name in per_joint.split()}
     arrays |= {name: np.ones(n) for name in ("stribeck_velocity", "warm_time", "efficiency")}
     arrays |= {name: np.zeros((n, n)) for name in ("coupling_viscous", "coupling_coulomb")}
     arrays |= {name: zero.copy() for name in ("signed_sine_of", "swinging_viscous_of")}

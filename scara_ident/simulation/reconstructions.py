@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scara_ident.errors import UsageError
 from scara_ident.paper import LINK_LENGTH, TABLE_1, TRAJECTORIES, criteria, regressor
@@ -22,8 +21,6 @@ from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation.laws import MotionLaw
 from scara_ident.simulation.paths import circle, line
 from scara_ident.simulation.reference import ReferenceMotion
-
-Array = NDArray[np.float64]
 
 # Where the elbow is sought: q2 is positive on all three.
 ELBOW = (1.2, 1.3)
@@ -58,13 +55,7 @@ RECONSTRUCTIONS: dict[str, LinePath | CirclePath] = {
 
 @dataclass(frozen=True)
 class Match:
-    """One figure of the paper and the reconstruction's.
-
-    Attributes
-    ----------
-    trajectory, quantity, unit : str
-    printed, reconstructed : float
-    """
+    """One figure of the paper and the reconstruction's."""
 
     trajectory: str
     quantity: str
@@ -104,17 +95,9 @@ def reconstruction(name: str, robot: Robot | None = None, *, rate: float = 1000.
     if isinstance(path, LinePath):
         return line(robot, path.start, path.end, duration, near=ELBOW, law=path.law, rate=rate, name=name)
     return circle(
-        robot,
-        path.centre,
-        path.radius,
-        duration,
-        near=ELBOW,
-        start_angle=path.start_angle,
-        turns=path.turns,
-        law=path.law,
-        rate=rate,
-        name=name,
-    )
+        robot, path.centre, path.radius, duration, near=ELBOW, start_angle=path.start_angle, turns=path.turns,
+        law=path.law, rate=rate, name=name,
+    )  # fmt: skip
 
 
 def reconstruction_match(names: tuple[str, ...] = ("L1", "L2", "CI"), *, samples: int = SAMPLES) -> tuple[Match, ...]:
@@ -125,10 +108,6 @@ def reconstruction_match(names: tuple[str, ...] = ("L1", "L2", "CI"), *, samples
     names : tuple of str
     samples : int
         Equally spaced samples for J_d and J_k, 2500 as for the paper's other trajectories.
-
-    Returns
-    -------
-    tuple of Match
     """
     found: list[Match] = []
     for name in names:

@@ -8,16 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.plant import PlantDraft
 from scara_ident.simulation.reference import ReferenceMotion
-
-Array = NDArray[np.float64]
 
 # Integration steps per controller period: on the SCARA03 the energy then drifts by 4e-15 in 10 s, and friction that
 # depends on speed, spring and ripple effects are resolved with a margin.

@@ -11,11 +11,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.model.regressor.recursion import joint_geometry
 from scara_ident.simulation.compiled import compiled
-
-Array = NDArray[np.float64]
 
 # Largest difference from Pinocchio, relative to the largest torque or inertia of the state.
 TOLERANCE = 1e-12

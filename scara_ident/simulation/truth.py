@@ -40,16 +40,7 @@ def truth(arm: VirtualArm, effects: Sequence[Effect] = ()) -> dict[str, Any]:
         "effort_side": robot.effort_side,
         "joints": list(robot.joints),
         "reduction": robot.reduction.tolist(),
-        "parameters": [
-            {
-                "name": column.name,
-                "joint": column.joint,
-                "value": values[place],
-                "unit": column.unit,
-                "meaning": column.meaning,
-            }
-            for place, column in enumerate(model.columns)
-        ],
+        "parameters": [column.entry(value=value) for column, value in zip(model.columns, values, strict=True)],
         "standard_parameters": {
             name: row.tolist() for name, row in zip(robot.links, np.asarray(arm.bodies), strict=True)
         },

@@ -18,9 +18,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.model.base_parameters import pseudo_inertia
-
-Array = NDArray[np.float64]
 
 
 @cache

@@ -13,13 +13,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.estimation.consistent.bodies import pack, unpack, unpacking
 from scara_ident.estimation.consistent.options import ConsistentOptions, Ellipsoid
 from scara_ident.robot.robot import Robot
 from scara_ident.robot.visual_boxes import visual_boxes
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,11 +198,6 @@ def _face(value: Array, multiplier: Array) -> Array:
 
 def body_limits(robot: Robot, options: ConsistentOptions) -> tuple[Cone, ...]:
     """Collect what the options say of masses and centres of mass.
-
-    Parameters
-    ----------
-    robot : Robot
-    options : ConsistentOptions
 
     Returns
     -------

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation.consistent.bodies import LinkInertia, link_inertia
 from scara_ident.estimation.consistent.constraints import active_set
@@ -22,7 +22,6 @@ from scara_ident.threads import one_blas_thread
 
 __all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "physical_consistency"]
 
-Array = NDArray[np.float64]
 
 # Directions that active constraints allow by less than this are what the solver's digits leave of forbidden ones.
 DIGITS = 1e-6
@@ -58,10 +57,7 @@ class ConsistentEstimate(Estimate):
 
 @one_blas_thread()
 def consistent(
-    observations: Observations,
-    *,
-    options: ConsistentOptions | None = None,
-    problem: Problem | None = None,
+    observations: Observations, *, options: ConsistentOptions | None = None, problem: Problem | None = None
 ) -> ConsistentEstimate:
     """Estimate by least squares among all arms that can exist.
 
@@ -126,10 +122,6 @@ def consistent(
 def links(estimate: ConsistentEstimate) -> tuple[LinkInertia, ...]:
     """Return mass, centre of mass and inertia of every identified link.
 
-    Parameters
-    ----------
-    estimate : ConsistentEstimate
-
     Returns
     -------
     tuple of LinkInertia
@@ -141,16 +133,7 @@ def links(estimate: ConsistentEstimate) -> tuple[LinkInertia, ...]:
 
 
 def physical_consistency(estimate: Estimate) -> PhysicalConsistency:
-    """Say whether an arm with the estimated parameters can exist, for any method.
-
-    Parameters
-    ----------
-    estimate : Estimate
-
-    Returns
-    -------
-    PhysicalConsistency
-    """
+    """Say whether an arm with the estimated parameters can exist, for any method."""
     return check_consistency(estimate.model, estimate.value, information=estimate.information)
 
 

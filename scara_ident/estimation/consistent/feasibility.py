@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation.consistent.friction import FrictionFault, friction_faults
 from scara_ident.estimation.consistent.options import ConsistentOptions
@@ -24,8 +25,6 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.constraints import BrakingPolynomial
 from scara_ident.model.terms.term import Column
 from scara_ident.threads import one_blas_thread
-
-Array = NDArray[np.float64]
 
 # A body that lacks less than this share of the nominal one lacks nothing but the solver's digits.
 ROUNDING = 1e-7
@@ -160,10 +159,6 @@ def furthest_inside(unknowns: Unknowns, value: Array, given: Fixed) -> BestArm:
     given : Fixed
         The combinations that are given. What they leave free among friction and other columns keeps its own
         constraints; what they fix there is not judged.
-
-    Returns
-    -------
-    BestArm
     """
     u, start, free = unknowns, given.shortest(value), given.free
     total, count = u.size + u.auxiliary, free.shape[1]
@@ -255,11 +250,7 @@ def _gap(result: Any) -> float:
 
 @one_blas_thread()
 def check_consistency(
-    model: TorqueModel,
-    value: Array,
-    *,
-    information: Information | None = None,
-    unknowns: Unknowns | None = None,
+    model: TorqueModel, value: Array, *, information: Information | None = None, unknowns: Unknowns | None = None
 ) -> PhysicalConsistency:
     """Check whether a physically consistent arm has these parameters.
 
@@ -276,10 +267,6 @@ def check_consistency(
         The rows that they came from, to give the distance in standard deviations.
     unknowns : Unknowns, optional
         Of the same model, to spare building them again; limits on masses and centres of mass in them count too.
-
-    Returns
-    -------
-    PhysicalConsistency
 
     Raises
     ------

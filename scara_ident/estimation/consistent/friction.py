@@ -12,13 +12,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.estimation.consistent.constraints import Cone
 from scara_ident.model.terms.constraints import BrakingPolynomial
 
-Array = NDArray[np.float64]
 Shape = Literal["dissipative", "lubricated"]
 
 # Distance that a solved polynomial keeps from 0 and from the limit, as a share of the limit: above what the solver
@@ -61,10 +60,6 @@ def certificate(polynomial: BrakingPolynomial, shape: Shape, margin: float = MAR
         range (shear thinning).
     margin : float, optional
         Distance kept from 0 and the limit, as a share of the limit.
-
-    Returns
-    -------
-    Certificate
 
     Raises
     ------

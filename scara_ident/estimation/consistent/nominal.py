@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.estimation.consistent.bodies import PACKED_IDENTITY, pack, packed_pseudo_inertia, unpacking
 from scara_ident.model.base_parameters import pseudo_inertia
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 # A nominal body's smallest second moment about its centre of mass is at least this share of its largest: the
 # prior is then finite, and a plate or rod stays one to 3 % of its length.
@@ -58,16 +56,7 @@ class Nominal:
 
 
 def nominal(robot: Robot) -> Nominal:
-    """Take the nominal bodies of a robot and make them physical.
-
-    Parameters
-    ----------
-    robot : Robot
-
-    Returns
-    -------
-    Nominal
-    """
+    """Take the nominal bodies of a robot and make them physical."""
     standard = robot.standard_parameters()
     bodies = standard[: 10 * robot.n].reshape(robot.n, 10)
     length = _length(robot)

@@ -6,12 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-import numpy as np
-from numpy.typing import NDArray
-
+from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 
-Array = NDArray[np.float64]
 FrictionShape = Literal["free", "dissipative", "lubricated"]
 Weighting = Literal["auto", "equal", "noise"]
 

@@ -27,14 +27,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError
 from scara_ident.estimation.consistent.bodies import PACKED_IDENTITY, unpack
 from scara_ident.estimation.consistent.constraints import Cone
 from scara_ident.estimation.consistent.problem import Unknowns
-
-Array = NDArray[np.float64]
 
 # The data distinguish a direction from nominal at this many standard deviations; then the prior moves it by this share
 # of one.

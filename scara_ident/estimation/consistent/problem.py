@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation.consistent.constraints import Cone, Statement, body_limits
 from scara_ident.estimation.consistent.friction import certificate
@@ -28,8 +29,6 @@ from scara_ident.estimation.consistent.nominal import Nominal, nominal
 from scara_ident.estimation.consistent.options import ConsistentOptions
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.constraints import BrakingPolynomial, Nonnegative, constraints_of
-
-Array = NDArray[np.float64]
 
 # Every body keeps this share of its nominal pseudo-inertia: above what the solver leaves of its constraints, and small
 # enough that no estimate moves by more than about this share of the nominal.
@@ -148,15 +147,6 @@ class Unknowns:
 
 def build_unknowns(model: TorqueModel, options: ConsistentOptions) -> Unknowns:
     """Collect the unknowns and the constraints that the model's terms and the options declare.
-
-    Parameters
-    ----------
-    model : TorqueModel
-    options : ConsistentOptions
-
-    Returns
-    -------
-    Unknowns
 
     Raises
     ------
@@ -298,10 +288,6 @@ class Problem:
         target : ndarray, shape (r,)
         prior : ndarray, shape (size, size)
             Rows W on the unknowns' distance from their reference; of full rank, so that there is one solution.
-
-        Returns
-        -------
-        Point
 
         Raises
         ------

@@ -13,15 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError, UsageError
-from scara_ident.estimation.consistent.feasibility import (
-    ROUNDING,
-    fixed,
-    fixed_columns,
-    furthest_inside,
-)
+from scara_ident.estimation.consistent.feasibility import ROUNDING, fixed, fixed_columns, furthest_inside
 from scara_ident.estimation.consistent.friction import friction_faults, shape_faults
 from scara_ident.estimation.consistent.options import FrictionShape
 from scara_ident.estimation.consistent.prior import nearest_to_nominal, prior_rows
@@ -36,8 +31,6 @@ from scara_ident.estimation.information import (
     weighted,
 )
 from scara_ident.threads import one_blas_thread
-
-Array = NDArray[np.float64]
 
 # The solver's constraints are kept to this, relative to the nominal bodies.
 DIGITS = 1e-6
@@ -160,10 +153,6 @@ def solve_consistent(
         All rows, weighted, with those of priors on the model's parameters.
     standard_prior : StandardPrior, optional
 
-    Returns
-    -------
-    ConsistentSolution
-
     Raises
     ------
     EstimationError
@@ -187,15 +176,6 @@ def solve_consistent(
 
 def least_squares_arm(problem: Problem, information: Information) -> ConsistentSolution | None:
     """Return an arm that plain least squares describes, None where there is none or the solver finds none.
-
-    Parameters
-    ----------
-    problem : Problem
-    information : Information
-
-    Returns
-    -------
-    ConsistentSolution or None
 
     Raises
     ------
@@ -224,11 +204,7 @@ def _best(problem: Problem, information: Information, standard_prior: StandardPr
 
 @one_blas_thread()
 def nearest_arm(
-    problem: Problem,
-    information: Information,
-    x: Array,
-    *,
-    standard_prior: StandardPrior | None = None,
+    problem: Problem, information: Information, x: Array, *, standard_prior: StandardPrior | None = None
 ) -> Array:
     """Find the arm nearest to the nominal one among those that give the same torque.
 

@@ -13,11 +13,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RegressorMismatch
 from scara_ident.model.regressor.recursion import JointGeometry, joint_geometry, trace_regressor
 from scara_ident.model.regressor.tracing import Program, compile_program
-
-Array = NDArray[np.float64]
 
 PARAMETERS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """Standard parameters of a body in Pinocchio's order; the inertia is about the origin of the joint's frame."""

@@ -19,12 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.model.regressor.tracing import Expr, Scalar, Trace, cos, sin, vanishing
 
-Array = NDArray[np.float64]
 Vector = tuple[Scalar, Scalar, Scalar]
 Jacobian = dict[int, tuple[Vector, Vector]]
 

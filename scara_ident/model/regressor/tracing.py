@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scara_ident.arrays import Array
 
 VAR, SIN, COS, ADD, SUB, MUL, ADD_CONST, MUL_CONST = range(8)
 
@@ -144,10 +143,6 @@ def vanishing(trace: Trace, values: Sequence[Scalar], inputs: Array) -> list[boo
     values : sequence of Expr or float
     inputs : ndarray (inputs, states)
         Random states.
-
-    Returns
-    -------
-    list of bool
     """
     found: list[Array] = []
     sizes: list[Array] = []
@@ -208,10 +203,6 @@ def compile_program(trace: Trace, outputs: Sequence[tuple[int, Scalar]]) -> Prog
         The graph in which the expressions were recorded.
     outputs : sequence of (int, Expr or float)
         Index of each target vector and what to write there, in the order of evaluation.
-
-    Returns
-    -------
-    Program
     """
     return _Emitter(trace, outputs).program()
 

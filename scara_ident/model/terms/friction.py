@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.model.terms.constraints import BrakingPolynomial, Constraint
 from scara_ident.model.terms.term import Column, Filled, per_speed
 from scara_ident.motion.motion import Motion
@@ -73,7 +74,7 @@ class Friction(Filled):
             for i, joint in enumerate(self.robot.joints)
         )
 
-    def fill(self, motion: Motion, rows: Sequence[NDArray[np.float64]]) -> None:
+    def fill(self, motion: Motion, rows: Sequence[Array]) -> None:
         """Write the powers of each joint's speed."""
         for i, columns in enumerate(rows):
             v = self.robot.drive_sign[i] * motion.v[i]
@@ -108,7 +109,7 @@ class Offset(Filled):
         """Each joint's offset acts on that joint only."""
         return np.eye(self.robot.n, dtype=bool)
 
-    def fill(self, motion: Motion, rows: Sequence[NDArray[np.float64]]) -> None:
+    def fill(self, motion: Motion, rows: Sequence[Array]) -> None:
         """Write ones."""
         for row in rows:
             row.fill(1.0)

@@ -9,6 +9,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.model.base_parameters import BaseParameters, find_base_parameters
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
 from scara_ident.model.terms.constraints import Constraint, RealBodies
@@ -56,7 +57,7 @@ class RigidBody(Filled):
         """Return that the columns belong to bodies that can exist."""
         return (RealBodies(),)
 
-    def fill(self, motion: Motion, rows: Sequence[NDArray[np.float64]]) -> None:
+    def fill(self, motion: Motion, rows: Sequence[Array]) -> None:
         """Write the columns that links and rotors lead."""
         robot = self.robot
         if self.kernel is not None:
@@ -88,7 +89,7 @@ class RigidBody(Filled):
         joints = [int(standard[column]) - 10 * self.robot.n for column in rotors]
         return [(joint, int(place[joint, column])) for joint, column in zip(joints, rotors, strict=True)]
 
-    def torque(self, motion: Motion, value: NDArray[np.float64]) -> NDArray[np.float64]:
+    def torque(self, motion: Motion, value: Array) -> Array:
         """Return the torque of parameters ``value`` (p,) on a motion, shape (n, N), without keeping any column."""
         active = [np.flatnonzero(row) for row in self.pattern]
         buffers = [np.empty((len(own), min(CHUNK, motion.samples))) for own in active]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
@@ -36,6 +37,10 @@ class Column:
     meaning: str
     nonnegative: bool = False
 
+    def entry(self, **numbers: float) -> dict[str, Any]:
+        """Return what result files say of the parameter, with its numbers."""
+        return {"name": self.name, "joint": self.joint, **numbers, "unit": self.unit, "meaning": self.meaning}
+
 
 class Term(Protocol):
     """A named block of columns of the torque equation."""
@@ -55,7 +60,7 @@ class Term(Protocol):
         """Which entries can differ from zero, shape (n, p)."""
         ...
 
-    def fill(self, motion: Motion, rows: Sequence[NDArray[np.float64]]) -> None:
+    def fill(self, motion: Motion, rows: Sequence[Array]) -> None:
         """Write the columns on a stretch of motion, on the side of the recorded torque.
 
         Parameters
@@ -67,7 +72,7 @@ class Term(Protocol):
         """
         ...
 
-    def regressor(self, motion: Motion) -> NDArray[np.float64]:
+    def regressor(self, motion: Motion) -> Array:
         """Return the columns on a stretch of motion, shape (n, p, N), on the side of the recorded torque."""
         ...
 
@@ -75,7 +80,7 @@ class Term(Protocol):
 class Filled:
     """A term whose dense regressor is made of what it fills in."""
 
-    def regressor(self: Term, motion: Motion) -> NDArray[np.float64]:
+    def regressor(self: Term, motion: Motion) -> Array:
         """Return the columns on a stretch of motion, shape (n, p, N), zero where the pattern says so."""
         pattern = self.pattern
         rows = [np.empty((np.count_nonzero(row), motion.samples)) for row in pattern]

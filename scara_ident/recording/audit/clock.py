@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.recording.audit.samples import GAP_STEPS, Array, Finding, Samples, runs, several
+from scara_ident.arrays import Array
+from scara_ident.recording.audit.samples import GAP_STEPS, Finding, Samples, runs, several
 
 Checked = tuple[Samples, list[Finding]]
 

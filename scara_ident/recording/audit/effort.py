@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.recording.audit.samples import IDLE_TRAVEL, Array, Finding, Samples, joint_range, runs, several
+from scara_ident.arrays import Array
+from scara_ident.recording.audit.samples import IDLE_TRAVEL, Finding, Samples, joint_range, runs, several
 
 Checked = tuple[Samples, list[Finding]]
 

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.recording.audit.samples import (
     GAP_STEPS,
     IDLE_TRAVEL,
-    Array,
     Finding,
     Samples,
     joint_range,
     several,
     speed_limit,
 )
-
-if TYPE_CHECKING:
-    from scara_ident.robot.robot import Robot
+from scara_ident.robot.robot import Robot
 
 Checked = tuple[Samples, list[Finding]]
 

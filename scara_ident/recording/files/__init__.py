@@ -11,12 +11,10 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.registry import Registry
-
-Array = NDArray[np.float64]
 
 
 class Importer(Protocol):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
 
 # A matrix with more channels than this is a picture or a table of something else, not a log of joints.
 MOST_CHANNELS = 128
@@ -25,7 +26,7 @@ def channels(name: str, shape: tuple[int, ...]) -> list[str]:
     return []
 
 
-def column(array: Any, name: str, wanted: str) -> NDArray[np.float64]:
+def column(array: Any, name: str, wanted: str) -> Array:
     """Take the column ``wanted`` of the array called ``name``, as float64."""
     values = np.squeeze(np.asarray(array))
     if wanted == name:

@@ -7,9 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.recording.files import arrays
 from scara_ident.recording.files.files import absent, check_file, damaged, optional_module, refuse_no_numbers
@@ -39,7 +37,7 @@ def column_names(path: Path, *, separator: str = "/") -> tuple[str, ...]:
     return tuple(names)
 
 
-def read_columns(path: Path, names: Sequence[str], *, separator: str = "/") -> dict[str, NDArray[np.float64]]:
+def read_columns(path: Path, names: Sequence[str], *, separator: str = "/") -> dict[str, Array]:
     """Read some columns as float64.
 
     Raises
@@ -47,7 +45,7 @@ def read_columns(path: Path, names: Sequence[str], *, separator: str = "/") -> d
     RecordingError
         The file is damaged or lacks a column.
     """
-    found: dict[str, NDArray[np.float64]] = {}
+    found: dict[str, Array] = {}
     with _opened(path) as file:
         for key, data, field, shape in _sets(file, separator):
             wanted = [name for name in arrays.channels(key, shape) if name in names]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.recording.files import arrays, hdf5
 from scara_ident.recording.files.files import absent, check_file, damaged, refuse_no_numbers
@@ -32,7 +33,7 @@ def column_names(path: Path) -> tuple[str, ...]:
     return tuple(names)
 
 
-def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
     """Read some columns as float64.
 
     Raises
@@ -42,7 +43,7 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
     """
     if _is_hdf5(path):
         return hdf5.read_columns(path, names, separator=".")
-    found: dict[str, NDArray[np.float64]] = {}
+    found: dict[str, Array] = {}
     for key, array in _arrays(path):
         for name in arrays.channels(key, array.shape):
             if name in names:

@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.recording.files.files import check_file
 
 if TYPE_CHECKING:
     import polars as pl
@@ -43,20 +42,16 @@ def column_names(path: Path) -> tuple[str, ...]:
     import polars as pl
 
     check_suffix(path)
+    check_file(path)
     try:
-        with path.open("rb") as file:
-            if not file.read(1):
-                raise RecordingError(f"{path}: the file is empty; record it again")
-            if path.suffix.lower() == ".csv":
-                names = [name.strip() for name in _csv_header(path)]
-            else:
-                file.seek(0)
+        if path.suffix.lower() == ".csv":
+            names = [name.strip() for name in _csv_header(path)]
+        else:
+            with path.open("rb") as file:
                 names = list(pl.read_parquet_schema(file))
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
     except UnicodeDecodeError as error:
         raise RecordingError(f"{path}: not a text file in UTF-8; save the CSV again in UTF-8") from error
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
         raise _damaged(path, error) from error
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
@@ -64,7 +59,7 @@ def column_names(path: Path) -> tuple[str, ...]:
     return tuple(names)
 
 
-def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
     """Read some columns of a file as float64, and only those.
 
     Parameters
@@ -96,7 +91,7 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
     return {name: _numbers(path, frame[name]) for name in names}
 
 
-def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
+def write_columns(path: Path, columns: Mapping[str, Array]) -> None:
     """Write columns to a file, whole or not at all.
 
     Parameters
@@ -160,19 +155,14 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
         # Something is not a number: read the words themselves, so that it can be named.
         _refuse_long_rows(path, separator)
         frame = pl.read_csv(
-            path,
-            columns=list(raw.values()),
-            infer_schema=False,
-            separator=separator,
-            null_values=MISSING,
-            glob=False,
+            path, columns=list(raw.values()), infer_schema=False, separator=separator, null_values=MISSING, glob=False
         )
         if decimal_comma:
             frame = frame.with_columns(pl.all().str.replace(",", ".", literal=True))
     return frame.rename({file_name: name for name, file_name in raw.items()})
 
 
-def _numbers(path: Path, series: pl.Series) -> NDArray[np.float64]:
+def _numbers(path: Path, series: pl.Series) -> Array:
     import polars as pl
 
     if series.dtype == pl.String:
@@ -189,7 +179,7 @@ def _numbers(path: Path, series: pl.Series) -> NDArray[np.float64]:
     elif not series.dtype.is_numeric():
         hint = "time in seconds" if series.name == "time" else "numbers"
         raise RecordingError(f"{path}: column {series.name!r} holds {series.dtype}; it must hold {hint}")
-    values: NDArray[np.float64] = series.cast(pl.Float64).to_numpy()
+    values: Array = series.cast(pl.Float64).to_numpy()
     return values
 
 

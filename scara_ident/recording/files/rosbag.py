@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.recording.files.files import absent, check_file, damaged, optional_module
 
@@ -18,8 +18,6 @@ JOINT_STATE = "sensor_msgs/msg/JointState"
 SIGNALS = ("position", "velocity", "effort")
 # When the state was measured (the header's stamp), and when the recorder received it.
 TIME, RECEIVED = "time", "receive_time"
-
-Array = NDArray[np.float64]
 
 
 def topics(path: Path) -> dict[str, int]:

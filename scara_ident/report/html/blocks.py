@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from scara_ident.report.plot import Array, Figure
+from scara_ident.arrays import Array
+from scara_ident.report.plot import Figure
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
-import numpy as np
-from numpy.typing import NDArray
-
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.diagnose import Diagnosis, FoundEffect
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.effects.effect import OWN, View
 from scara_ident.report.traces import Trace, traces
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,14 +17,13 @@ from scara_ident.report.html.blocks import (
     Paragraph,
     Scale,
     Table,
-    listing,
     name,
     number,
     superscripts,
 )
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.parameters import digits
-from scara_ident.report.html.section import NamedSection, Section
+from scara_ident.report.html.section import NamedSection, Section, notes_section
 from scara_ident.report.plot import Figure, Layer, Line, Panel, Plot, single, style
 
 # Ratio to the own error at which a cell has its full colour.
@@ -157,17 +156,12 @@ def _friction_curves(context: ComparisonContext) -> list[Block]:
     return [Paragraph(words), Group("friction-group", figures, (), "two")]
 
 
-def _notes(context: ComparisonContext) -> list[Block]:
-    """What there is to know of the data."""
-    return [listing(context.content["notes"])] if context.content.get("notes") else []
-
-
 SECTIONS: tuple[Section, ...] = (
     NamedSection("trajectories", "Trajectories", _trajectories),
     NamedSection("errors", "Every trajectory from every other", _errors),
     NamedSection("parameters", "Parameters", _parameters),
     NamedSection("friction", "Friction", _friction_curves),
-    NamedSection("notes", "Notes on the data", _notes),
+    notes_section(lambda context: context.content.get("notes")),
 )
 
 

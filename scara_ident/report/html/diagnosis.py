@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -36,17 +35,17 @@ from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.parameters import digits
 from scara_ident.report.html.remainder import remainder_group
 from scara_ident.report.html.residual import residual_blocks
-from scara_ident.report.html.section import NamedSection, Section
+from scara_ident.report.html.section import NamedSection, Section, notes_section
 from scara_ident.report.html.story import chapter_group, moment_group
 from scara_ident.report.html.torque import torque_group
-from scara_ident.report.traces import Trace, traces
+from scara_ident.report.traces import FittedContext, Trace, traces
 from scara_ident.threads import one_blas_thread
 
 KINDS = (("validation", "held out"), ("training", "training"))
 
 
 @dataclass(frozen=True, eq=False)
-class DiagnosisContext:
+class DiagnosisContext(FittedContext):
     """What the sections of a diagnosis draw from."""
 
     diagnosis: Diagnosis
@@ -57,17 +56,8 @@ class DiagnosisContext:
         return diagnosis_dict(self.diagnosis)
 
     @cached_property
-    def parts(self) -> list[tuple[str, tuple[Trace, ...]]]:
-        """Traces of every recording, as corrected, by its name and role, those held out first."""
-        return [(f"{found[0].recording} ({role})", found) for role, group in self._traces.items() for found in group]
-
-    @property
-    def sets(self) -> dict[str, list[Trace]]:
-        """Traces of the training and of the held-out recordings."""
-        return {role: list(chain.from_iterable(self._traces[role])) for role in ("training", "held out")}
-
-    @cached_property
-    def _traces(self) -> dict[str, list[tuple[Trace, ...]]]:
+    def groups(self) -> dict[str, list[tuple[Trace, ...]]]:
+        """Traces by recording, as corrected."""
         found, value = self.diagnosis, self.diagnosis.after.value
         return {"held out": traces(found.validation_after, value), "training": traces(found.training_after, value)}
 
@@ -279,11 +269,6 @@ def _unknowable(context: DiagnosisContext) -> list[Block]:
     return blocks
 
 
-def _notes(context: DiagnosisContext) -> list[Block]:
-    """What there is to know of the data."""
-    return [listing(context.diagnosis.notes)] if context.diagnosis.notes else []
-
-
 SECTIONS: tuple[Section, ...] = (
     NamedSection("gain", "Before and after", _gain),
     NamedSection("story", "The story", _story),
@@ -292,17 +277,12 @@ SECTIONS: tuple[Section, ...] = (
     NamedSection("torque-section", "Torque", _torque),
     NamedSection("candidates", "Candidates", _candidates),
     NamedSection("limits", "What cannot be known", _unknowable),
-    NamedSection("notes", "Notes on the data", _notes),
+    notes_section(lambda context: context.diagnosis.notes),
 )
 
 
 def diagnosis_report(path: Path, context: DiagnosisContext) -> None:
     """Write the report of a diagnosis as one HTML file.
-
-    Parameters
-    ----------
-    path : Path
-    context : DiagnosisContext
 
     Raises
     ------

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.motion.motion import Motion
 from scara_ident.report.html.blocks import (
     Arm,
@@ -22,17 +22,15 @@ from scara_ident.report.html.blocks import (
     Table,
     Tag,
     count,
-    listing,
     name,
     number,
     superscripts,
 )
 from scara_ident.report.html.page import Page, parts
-from scara_ident.report.html.section import NamedSection, Section
+from scara_ident.report.html.section import NamedSection, Section, notes_section
 from scara_ident.report.plot import Figure, Grid, Layer, Level, Line, Mark, Panel, Plot, single
+from scara_ident.robot.kinematics import farthest_point
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Pictures of the arm per second, and at the most.
 FRAME_RATE = 25.0
@@ -92,22 +90,8 @@ def _limits(context: ExcitationContext) -> list[Block]:
     return [words, Table(("limit", "reached", "bound", "unit", "used"), rows, (1, 2))] if rows else []
 
 
-def _notes(context: ExcitationContext) -> list[Block]:
-    """What the design rests on."""
-    return [listing(context.content["notes"])] if context.content.get("notes") else []
-
-
 def excitation_report(path: Path, content: Mapping[str, Any], robot: Robot, motions: Sequence[Motion]) -> None:
-    """Write the report of designed trajectories as one HTML file.
-
-    Parameters
-    ----------
-    path : Path
-    content : mapping
-        The content of ``excitation.json``.
-    robot : Robot
-    motions : sequence of Motion
-        The trajectories; torque, where there is one, is what the design expects.
+    """Write the report of designed trajectories as one HTML file; arguments are those of `ExcitationContext`.
 
     Raises
     ------
@@ -133,18 +117,16 @@ def excitation_report(path: Path, content: Mapping[str, Any], robot: Robot, moti
         subtitle += f"; parameters of the {content['model']} model"
     if content.get("log_det") is not None:
         subtitle += f"; {criteria.replace('J_d', 'J_d (information)').replace('J_k', 'J_k (condition)')}"
-    found = parts(
-        "excitation",
-        (*sections, NamedSection("limits", "Limits", _limits), NamedSection("notes", "Notes", _notes)),
-        context,
-    )
+    sections.append(NamedSection("limits", "Limits", _limits))
+    sections.append(notes_section(lambda context: context.content.get("notes"), "Notes"))
+    found = parts("excitation", sections, context)
     Page(f"Excitation of {robot.name}", subtitle, verdict, found, bool(broken)).write(path)
 
 
 def _joint_figure(robot: Robot, motion: Motion, j: int, place: int, bounds: Mapping[str, float]) -> Figure:
     every = max(1, motion.samples // MOST_POINTS)
     grid = Grid(float(motion.time[0]), every / motion.rate, -(-motion.samples // every))
-    length = "m" if robot.prismatic[j] else "rad"
+    length = robot.position_unit(j)
     lower, upper, speed, torque = _joint_limits(robot, j, bounds)
     panels = []
     for label, signal, ends in (
@@ -162,7 +144,7 @@ def _joint_figure(robot: Robot, motion: Motion, j: int, place: int, bounds: Mapp
 
 
 def _cover_figure(robot: Robot, motion: Motion, j: int, place: int, bounds: Mapping[str, float]) -> Figure:
-    length = "m" if robot.prismatic[j] else "rad"
+    length = robot.position_unit(j)
     every = max(1, motion.samples // MOST_POINTS)
     layers: list[Layer] = [Line(motion.q[j, ::every], motion.v[j, ::every], "blue", path=True)]
     lower, upper, speed, _ = _joint_limits(robot, j, bounds)
@@ -229,8 +211,7 @@ def joint_points(robot: Robot, q: Array) -> Array:
     model = robot.model
     data = model.createData()
     last = model.njoints - 1
-    ends = [frame.placement.translation for frame in model.frames if frame.parentJoint == last]
-    end = max(ends, key=lambda point: float(np.linalg.norm(point)), default=np.zeros(3))
+    end = farthest_point(robot)
     neutral, velocity = pin.neutral(model), np.zeros(model.nv)
     frames = []
     for column in q.T:

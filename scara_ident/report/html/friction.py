@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.estimation import Estimate
 from scara_ident.model.terms import Friction
 from scara_ident.report.bins import binned_means, middle_range
 from scara_ident.report.html.blocks import Group
 from scara_ident.report.plot import Band, Dots, Figure, Layer, Line, Panel, Plot, Region, single
 from scara_ident.report.traces import Trace, kept
-
-Array = NDArray[np.float64]
 
 # How far beyond the data the curve is drawn, and points on each side of standstill.
 BEYOND = 1.3

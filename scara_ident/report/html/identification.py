@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
 from pathlib import Path
 
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.identification.identify import Identification, undetermined
-from scara_ident.report.html.blocks import Block, Heading, Paragraph, count, listing
+from scara_ident.report.html.blocks import Block, Heading, Paragraph, count
 from scara_ident.report.html.friction import friction_group
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.parameters import (
@@ -21,10 +20,10 @@ from scara_ident.report.html.parameters import (
     strongest_pairs,
 )
 from scara_ident.report.html.residual import residual_blocks
-from scara_ident.report.html.section import NamedSection, Section
+from scara_ident.report.html.section import NamedSection, Section, notes_section
 from scara_ident.report.html.torque import error_table, torque_group
 from scara_ident.report.identification import sentences
-from scara_ident.report.traces import Trace, traces
+from scara_ident.report.traces import FittedContext, Trace, traces
 from scara_ident.threads import one_blas_thread
 
 # Joints whose errors the first sentence lists; of more it gives the range.
@@ -40,23 +39,14 @@ STD_WORDS = {
 
 
 @dataclass(frozen=True, eq=False)
-class IdentificationContext:
+class IdentificationContext(FittedContext):
     """What the sections of an identification draw from."""
 
     identification: Identification
 
     @cached_property
-    def parts(self) -> list[tuple[str, tuple[Trace, ...]]]:
-        """Traces of every recording by its name and role, those held out first."""
-        return [(f"{found[0].recording} ({role})", found) for role, group in self._traces.items() for found in group]
-
-    @property
-    def sets(self) -> dict[str, list[Trace]]:
-        """Traces of the fitted and of the held-out recordings."""
-        return {role: list(chain.from_iterable(self._traces[role])) for role in ("fitted", "held out")}
-
-    @cached_property
-    def _traces(self) -> dict[str, list[tuple[Trace, ...]]]:
+    def groups(self) -> dict[str, list[tuple[Trace, ...]]]:
+        """Traces by recording."""
         found, value = self.identification, self.identification.estimate.value
         return {"held out": traces(found.validation, value), "fitted": traces(found.training, value)}
 
@@ -121,28 +111,18 @@ def _convergence(context: IdentificationContext) -> list[Block]:
     return [Paragraph(words), convergence_group(found.estimate, history, found.training)]
 
 
-def _notes(context: IdentificationContext) -> list[Block]:
-    """What there is to know of the data."""
-    return [listing(context.identification.notes)] if context.identification.notes else []
-
-
 SECTIONS: tuple[Section, ...] = (
     NamedSection("prediction", "Prediction", _prediction),
     NamedSection("parameters", "Parameters", _parameters),
     NamedSection("friction", "Friction", _friction_curves),
     NamedSection("residual", "Residual", _residual),
     NamedSection("convergence", "Convergence", _convergence),
-    NamedSection("notes", "Notes on the data", _notes),
+    notes_section(lambda context: context.identification.notes),
 )
 
 
 def identification_report(path: Path, context: IdentificationContext) -> None:
     """Write the report of an identification as one HTML file.
-
-    Parameters
-    ----------
-    path : Path
-    context : IdentificationContext
 
     Raises
     ------

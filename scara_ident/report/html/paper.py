@@ -38,11 +38,6 @@ def _checks(section: str, report: PaperReport) -> list[Block]:
 def paper_report(path: Path, report: PaperReport) -> None:
     """Write the report of the paper's checks as one HTML file.
 
-    Parameters
-    ----------
-    path : Path
-    report : PaperReport
-
     Raises
     ------
     ScaraIdentError

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scara_ident.estimation import Estimate, History, rls
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, links
@@ -14,8 +13,6 @@ from scara_ident.estimation.observations import Observations
 from scara_ident.report.html.blocks import Cell, Group, Selector, Table, Tag, name, number, superscripts
 from scara_ident.report.plot import Band, Drawing, Figure, Layer, Level, Line, Mark, Matrix, Panel, Plot, single
 from scara_ident.threads import one_blas_thread
-
-Array = NDArray[np.float64]
 
 # Steps of a recursion that is made for the picture only.
 MOST_STEPS = 48

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.model_selection import Unexplained
 from scara_ident.report.bins import binned_means, middle_range
 from scara_ident.report.html.blocks import Group
@@ -15,8 +15,6 @@ from scara_ident.report.html.residual import scatter
 from scara_ident.report.plot import Figure, Matrix, rounded, single
 from scara_ident.report.traces import Trace, kept
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Bins of each signal of a pair.
 PAIR_BINS = 12

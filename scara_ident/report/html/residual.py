@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.report.bins import MEAN_BINS, binned_means, density, middle_range
 from scara_ident.report.html.blocks import Block, Group, Heading, Paragraph, Selector
 from scara_ident.report.plot import Band, Density, Drawing, Figure, Layer, Level, Line, Mark, Panel, Plot, Region
@@ -15,7 +15,6 @@ from scara_ident.report.spectra import ORDER_WORDS, autocorrelation, orders, spe
 from scara_ident.report.traces import Trace, kept
 from scara_ident.robot.robot import Robot
 
-Array = NDArray[np.float64]
 Sets = Mapping[str, Sequence[Trace]]
 Variants = dict[tuple[int, ...], Drawing]
 

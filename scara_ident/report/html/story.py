@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.report.bins import binned_means, middle_range, tail_means
 from scara_ident.report.html.blocks import Group
 from scara_ident.report.html.chapters import Chapter
@@ -15,8 +15,6 @@ from scara_ident.report.plot import Band, Figure, Layer, Line, Panel, Plot, sing
 from scara_ident.report.spectra import ORDER_WORDS, orders, spectrum
 from scara_ident.report.traces import Trace, kept
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def _since_reversal(trace: Trace, j: int) -> Array:
@@ -130,11 +128,7 @@ def _own(robot: Robot, chapter: Chapter) -> Figure | None:
 
 
 def _means_plot(
-    robot: Robot,
-    chapter: Chapter,
-    x_before: Sequence[Array],
-    x_after: Sequence[Array],
-    label: str,
+    robot: Robot, chapter: Chapter, x_before: Sequence[Array], x_after: Sequence[Array], label: str
 ) -> Plot:
     j, view = chapter.joint, chapter.view
     after = kept(chapter.after, x_after, j)

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.estimation import JointError
 from scara_ident.report.html.blocks import Cell, Group, Selector, Table, name, number
 from scara_ident.report.plot import Drawing, Figure, Grid, Layer, Line, Panel, Plot, Region
 from scara_ident.report.traces import Trace
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Samples per period of the band that are drawn of signals within it: straight lines between them then show its shape.
 DRAWN_PER_PERIOD = 16.0

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from scara_ident.errors import UsageError
-
-if TYPE_CHECKING:
-    from scara_ident.simulation.arm import VirtualArm
-    from scara_ident.simulation.plant import PlantDraft
+from scara_ident.simulation.arm import VirtualArm
+from scara_ident.simulation.plant import PlantDraft
 
 # A size that is left to the arm: `Effect.resolve` puts a number that suits the arm's torques in its place.
 BY_ARM = math.nan

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from scara_ident.errors import UsageError
+from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects.effect import BY_ARM, Effect, vacant
-
-if TYPE_CHECKING:
-    from scara_ident.simulation.arm import VirtualArm
-    from scara_ident.simulation.plant import PlantDraft
+from scara_ident.simulation.plant import PlantDraft
 
 
 @dataclass(frozen=True)

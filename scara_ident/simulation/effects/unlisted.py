@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
+from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects.effect import BY_ARM, Effect
-
-if TYPE_CHECKING:
-    from scara_ident.simulation.arm import VirtualArm
-    from scara_ident.simulation.plant import PlantDraft
+from scara_ident.simulation.plant import PlantDraft
 
 
 def _other(arm: VirtualArm, joint: str | None) -> int:

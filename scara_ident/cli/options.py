@@ -1,0 +1,72 @@
+"""Arguments and options that several commands have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand, TyperOption
+
+from scara_ident.identification import ESTIMATORS
+from scara_ident.model import MODELS
+
+Recordings = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="RECORDING...",
+        help="Recordings (.parquet, .csv, .mat, .h5, .mcap, .db3, a rosbag2 folder), folders or globs of them.",
+    ),
+]
+Robot = Annotated[
+    Path | None,
+    typer.Option(
+        "--robot",
+        metavar="FILE",
+        help="robot.yaml, a URDF, or a robot of example-robot-data by its name, as ur5; default: the embedded SCARA03.",
+    ),
+]
+Model = Annotated[
+    str,
+    typer.Option(
+        "--model",
+        metavar="NAME",
+        callback=MODELS.check,
+        autocompletion=MODELS.names,
+        help="Terms of the torque equation: {models}.",
+    ),
+]
+Method = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        metavar="NAME",
+        callback=ESTIMATORS.check,
+        autocompletion=ESTIMATORS.names,
+        help="Estimator: {methods}; consistent: an arm that can exist.",
+    ),
+]
+Band = Annotated[
+    float | None,
+    typer.Option("--band", metavar="HZ", min=1e-3, help="Low-pass for all joints; default: chosen from the data."),
+]
+Validate = Annotated[
+    list[str] | None, typer.Option("--validate", metavar="RECORDING", help="Recording held out; may be repeated.")
+]
+Output = Annotated[Path | None, typer.Option("--output", metavar="DIR", help="Folder for the results; made if needed.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, and nothing else there.")]
+Verbose = Annotated[bool, typer.Option("--verbose", help="Also list what every file holds and what its audit found.")]
+Folder = Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")]
+
+
+class Command(TyperCommand):
+    """A command whose help lists what the registries hold; they are asked then only, as finding out takes time."""
+
+    def get_help(self, ctx: Any) -> str:
+        """Return the help."""
+        lists = {"{models}": MODELS, "{methods}": ESTIMATORS}
+        for option in self.params:
+            for word, registry in lists.items():
+                if isinstance(option, TyperOption) and word in (option.help or ""):
+                    option.help = str(option.help).replace(word, ", ".join(registry.names()))
+        return super().get_help(ctx)
