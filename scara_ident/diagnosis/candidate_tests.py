@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Rows
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel, Products, products_of
 from scara_ident.threads import one_blas_thread
-
-Array = NDArray[np.float64]
 
 # Columns whose products are made together: more of them take more memory than time.
 _COLUMNS = 96
@@ -79,10 +77,6 @@ def examine(
     candidates : sequence of mapping of int to ndarray, shape (k, N)
         Columns of each on the rows of every joint that it acts on.
     criteria : SelectionCriteria, optional
-
-    Returns
-    -------
-    list of Examination
     """
     widths = [len(next(iter(rows.values()))) for rows in candidates]
     found: dict[int, Examination] = {}

@@ -6,15 +6,14 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
 from scara_ident.estimation.observations import JointRows, Observations
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import PreparedStretch
 from scara_ident.threads import side_by_side
 
-Array = NDArray[np.float64]
 # Columns of a candidate, shape (k, N) on the N rows of each joint that it acts on.
 Rows = dict[int, Array]
 # Effect, member, and the estimate where its columns follow that.
@@ -26,13 +25,7 @@ AT_ONCE = 16
 
 @dataclass(frozen=True)
 class Candidate:
-    """A member of a family that might be what the model lacks.
-
-    Attributes
-    ----------
-    effect : Effect
-    member : Member
-    """
+    """A member of a family that might be what the model lacks."""
 
     effect: Effect
     member: Member

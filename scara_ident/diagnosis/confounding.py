@@ -42,10 +42,6 @@ def confounders(step: SelectionStep, decisions: Sequence[Decision]) -> list[tupl
         The model with the effects that stayed.
     decisions : sequence of Decision
         On the candidates that were tried beside it.
-
-    Returns
-    -------
-    list of tuple of Confounder
     """
     pool = [decision.candidate for decision in decisions]
     return [_confounders_of(step.without(k), candidate, pool) for k, candidate in enumerate(step.chosen)]

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.confounding import Confounder, confounders
@@ -32,7 +31,6 @@ from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 
-Array = NDArray[np.float64]
 Verdict = Literal["complete", "explained", "unexplained"]
 # Dependences that are handed on: further ones are pairs that only repeat the first.
 NAMED_DEPENDENCES = 12

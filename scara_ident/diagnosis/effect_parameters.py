@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, Rows
 from scara_ident.diagnosis.nonlinear_fit import DERIVATIVE_STEP, Linearised, linearise
@@ -12,8 +12,6 @@ from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Parameter
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.information import merge
-
-Array = NDArray[np.float64]
 
 
 def physical_parameters(step: SelectionStep) -> list[dict[str, Parameter]]:

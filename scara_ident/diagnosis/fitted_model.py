@@ -14,12 +14,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Rows
 from scara_ident.estimation.information import orthonormal, weighted
 from scara_ident.estimation.observations import JointRows
 from scara_ident.threads import side_by_side
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.motion.prepared import PreparedStretch
 from scara_ident.motion.repeatability import LARGEST_SHIFT, SAME_RATE, alignment
 
-Array = NDArray[np.float64]
 # Residual of every joint, where it was used, and samples per second.
 Aligned = tuple[Array, NDArray[np.bool_], float]
 
@@ -47,10 +47,6 @@ def lack_of_fit(residuals: Residuals) -> tuple[LackOfFit, ...]:
     Repetitions of a trajectory are aligned in time. The residual's mean over R repetitions holds what repeats and
     1/R of the noise; its scatter about the mean is the noise. A residual low-passed at f over T seconds has about
     2 f T independent values, which are the degrees of freedom.
-
-    Parameters
-    ----------
-    residuals : Residuals
 
     Returns
     -------

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.effects import Effect, Scene, SpectralLine
@@ -22,8 +22,6 @@ from scara_ident.effects.spectra import (
     whitened,
 )
 from scara_ident.estimation.residuals import Residuals
-
-Array = NDArray[np.float64]
 
 # Points of the spectra per width of a line, so that its peak is hardly missed between two.
 POINTS_PER_WIDTH = 3.0

@@ -6,8 +6,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
@@ -19,8 +19,6 @@ from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.motion.prepared import PreparedData
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

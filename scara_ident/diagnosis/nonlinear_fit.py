@@ -12,15 +12,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
 from scara_ident.effects import Scene
 from scara_ident.estimation.information import Information, weighted
 from scara_ident.estimation.observations import JointRows
 from scara_ident.threads import one_blas_thread
-
-Array = NDArray[np.float64]
 
 # Step for the derivative by a nonlinear parameter, as a share of it: small beside its curvature, large beside rounding.
 DERIVATIVE_STEP = 1e-3

@@ -8,13 +8,12 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
@@ -23,8 +23,6 @@ from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import HIGHEST_CUT, Motion
 from scara_ident.motion.prepared import PreparedData
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,10 +161,6 @@ def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[s
         On the rows of the base model, with what is known already from an earlier search on them.
     without : collection of str, optional
         Labels of candidates that are not to be tried.
-
-    Returns
-    -------
-    Search
     """
     criteria = task.criteria
     observations = uncorrected = columns.observations

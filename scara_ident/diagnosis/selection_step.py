@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision, decide
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
@@ -18,8 +19,6 @@ from scara_ident.effects import Scene
 from scara_ident.estimation.observations import JointRows, Observations
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.prepared import PreparedData
-
-Array = NDArray[np.float64]
 
 # Points on a line from one neighbouring scan point to the other: with the middle one three on either side.
 LINE_POINTS = 7

@@ -13,16 +13,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Stretch, motion_of, torque_of
 from scara_ident.motion.prepared import PreparedData
 from scara_ident.threads import side_by_side
-
-Array = NDArray[np.float64]
 
 # The first fit uses the band that holds this share of the torque's power.
 FIRST_POWER = 0.95
@@ -76,10 +74,6 @@ def choose_bands(model: TorqueModel, data: PreparedData) -> BandChoice:
     model : TorqueModel
     data : PreparedData
         With effort; in any bands. The first repetition of each trajectory is looked at first.
-
-    Returns
-    -------
-    BandChoice
     """
     chosen = _sample(data)
     parts = [part.stretch for part in chosen.stretches]

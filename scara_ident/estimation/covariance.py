@@ -16,9 +16,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.estimation.observations import JointRows
-
-Array = NDArray[np.float64]
 
 # With fewer blocks than this many per parameter the matrix of scores is too noisy to stand for itself.
 BLOCKS_PER_PARAMETER = 2.5
@@ -65,10 +64,6 @@ def block_covariance(
         Recording of each block; blocks of one recording follow each other in time.
     weights : ndarray, shape (n,)
         Weight of each joint's rows in the estimate.
-
-    Returns
-    -------
-    Covariance
     """
     root = _square_root(inverse)
     scores = [_scores(rows, weight, root, value) for rows, weight in zip(joints, weights, strict=True)]

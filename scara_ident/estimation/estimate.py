@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
-
-Array = NDArray[np.float64]
 
 # The paper takes its criteria over this many samples, whatever the recording's length.
 PAPER_SAMPLES = 2500

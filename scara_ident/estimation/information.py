@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scara_ident.arrays import Array
 
 # Rounds in which joints are weighted by what they leave, and the least that one may leave, as a share of its torque.
 WEIGHTING_ROUNDS = 3

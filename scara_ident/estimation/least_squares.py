@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, merge, weighted
 from scara_ident.estimation.observations import Observations
 from scara_ident.threads import one_blas_thread
-
-Array = NDArray[np.float64]
 
 
 def ols(observations: Observations) -> Estimate:

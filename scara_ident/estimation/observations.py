@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.estimation.information import Information
 from scara_ident.estimation.residuals import Residuals
@@ -21,7 +22,6 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
 from scara_ident.threads import side_by_side
 
-Array = NDArray[np.float64]
 # Columns of every joint at every sample of a stretch, (k, N) each.
 Raw = tuple[Array, ...]
 

@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.least_squares import least_squares
 from scara_ident.estimation.observations import Observations
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

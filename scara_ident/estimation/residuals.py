@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.motion.prepared import PreparedData
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

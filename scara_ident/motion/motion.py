@@ -13,13 +13,11 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 # Longer parts are cut, so that memory does not grow with the length of a recording.
 MOST_SAMPLES = 60_000

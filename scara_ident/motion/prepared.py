@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.motion.motion import (
     HIGHEST_CUT,
     Motion,
@@ -27,7 +28,6 @@ from scara_ident.motion.motion import (
 )
 from scara_ident.recording.recording import Recording
 
-Array = NDArray[np.float64]
 Bands = Sequence[float | None]
 
 # Positions pass a filter three times as wide as the band: inside the band it then changes them by under 2e-4.

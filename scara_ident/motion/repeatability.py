@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scara_ident.arrays import Array
 from scara_ident.motion.motion import Stretch, torque_of
 from scara_ident.motion.prepared import PreparedData
-
-Array = NDArray[np.float64]
 
 # Repetitions start within this many seconds of each other after alignment; more is another motion.
 LARGEST_SHIFT = 1.0
