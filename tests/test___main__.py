@@ -8,13 +8,16 @@ import sys
 import pytest
 
 import scara_ident
+from tests.shared import PATIENCE
 
 
 @pytest.mark.parametrize(
     ("words", "status"), [(["--version"], 0), (["base", "--robot", "nowhere.yaml"], 1), (["nothing"], 2)]
 )
 def test_it_is_the_command(words: list[str], status: int):
-    done = subprocess.run([sys.executable, "-m", "scara_ident", *words], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "scara_ident", *words], capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
     assert done.returncode == status
     if status:
         assert done.stderr.startswith("scara-ident: ")

@@ -8,6 +8,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from scara_ident.threads import one_blas_thread, side_by_side
+from tests.shared import PATIENCE
 
 
 def blas_threads() -> set[int]:
@@ -19,7 +20,7 @@ def test_results_come_in_the_order_of_the_items_whichever_is_done_first():
 
     def work(item: int, other: int) -> int:
         if item == 0:
-            assert first.wait(60.0)
+            assert first.wait(PATIENCE)
         else:
             first.set()
         return 10 * item + other

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from scara_ident.cli.console import number, output_console, progress, table
 from tests.made_recordings import columns, save
+from tests.shared import PATIENCE
 
 
 @pytest.mark.parametrize(
@@ -46,7 +47,7 @@ def test_results_are_written_though_nobody_reads_the_output(tmp_path: Path, form
     os.close(reader)
     done = subprocess.run(
         [*program, "base", "--output", str(tmp_path), *form],
-        stdout=writer, stderr=subprocess.PIPE, text=True, timeout=60, check=False,
+        stdout=writer, stderr=subprocess.PIPE, text=True, timeout=PATIENCE, check=False,
     )  # fmt: skip
     os.close(writer)
     assert (done.returncode, done.stderr) == (0, "")

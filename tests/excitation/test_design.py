@@ -43,6 +43,7 @@ def shares(trajectory: ExcitationTrajectory, limits: Limits, robot: Robot, times
     }
 
 
+@pytest.mark.slow
 def test_25_s_of_the_scara_reach_a_log_det_of_92_within_all_limits(paper_length):
     trajectory = paper_length.trajectories[0]
     log_det, condition = criteria(regressor(*trajectory.at(np.linspace(0.0, 25.0, 2500))))
@@ -61,6 +62,7 @@ def test_25_s_of_the_scara_reach_a_log_det_of_92_within_all_limits(paper_length)
     assert np.max(np.abs(np.einsum("ipN,p->iN", regressor(*fine), table5_parameters("OJD")))) <= 2.0
 
 
+@pytest.mark.slow
 def test_what_is_reported_as_reached_is_reached_between_samples_too(short):
     limits, trajectory = short.limits, short.trajectories[0]
     time = np.linspace(0.0, trajectory.duration, 200_001)
@@ -75,6 +77,7 @@ def test_what_is_reported_as_reached_is_reached_between_samples_too(short):
     assert told["joint1.torque"].bound == limits.torque[0] == 2.0
 
 
+@pytest.mark.slow
 def test_the_std_of_repetitions_falls_against_ojd_as_the_log_det_promises(paper_length):
     """White noise on exact regressors, estimated by least squares, 400 times each."""
     trajectory = paper_length.trajectories[0]
@@ -99,6 +102,7 @@ def test_the_std_of_repetitions_falls_against_ojd_as_the_log_det_promises(paper_
     assert np.exp(np.mean(np.log(spreads[1] / spreads[0]))) < 0.6
 
 
+@pytest.mark.slow
 def test_a_block_can_be_preferred_to_the_rest(short):
     wanted = block_of(COMPLETE, ["P_d2", "P_d3", "P_d4"])
     made = design_excitation(COMPLETE, **SHORT, criterion=wanted, effort=short.effort)
@@ -109,12 +113,14 @@ def test_a_block_can_be_preferred_to_the_rest(short):
     assert costs[0] < costs[1] - 0.5
 
 
+@pytest.mark.slow
 def test_the_condition_can_be_preferred_to_the_log_det(short):
     made = design_excitation(COMPLETE, **SHORT, criterion=Condition(), effort=short.effort)
     assert made.condition < 0.5 * short.condition
     assert made.log_det < short.log_det
 
 
+@pytest.mark.slow
 def test_a_design_fills_what_existing_recordings_lack():
     still = information_of(COMPLETE, design_excitation(COMPLETE, **SHORT, effort=QUICK).trajectories[0], 400)
     # Recordings in which friction was seen a thousand times better than bodies.
@@ -136,6 +142,7 @@ def test_a_design_fills_what_existing_recordings_lack():
     assert np.linalg.slogdet(together["after"])[1] > np.linalg.slogdet(together["alone"])[1]
 
 
+@pytest.mark.slow
 def test_trajectories_designed_together_share_the_work(short):
     two = design_excitation(COMPLETE, **SHORT, trajectories=2, effort=short.effort)
     assert [each.name for each in two.trajectories] == ["excitation-a", "excitation-b"]
@@ -147,6 +154,7 @@ def test_trajectories_designed_together_share_the_work(short):
     assert two.log_det > short.log_det + 15.0 * np.log(2.0)
 
 
+@pytest.mark.slow
 def test_noise_of_the_torques_weights_the_rows(short):
     std = np.array([0.04, 0.012])
     made = design_excitation(COMPLETE, **SHORT, torque_std=std, effort=QUICK)
@@ -156,6 +164,7 @@ def test_noise_of_the_torques_weights_the_rows(short):
     np.testing.assert_allclose(made.std(), np.sqrt(np.diag(np.linalg.inv(stacked.T @ stacked))), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_an_arm_of_six_joints_is_excited_within_its_limits():
     robot = load_robot(example_urdf("ur5_joint_limited_robot.urdf"))
     model = rigid_model(robot)
@@ -168,6 +177,7 @@ def test_an_arm_of_six_joints_is_excited_within_its_limits():
     assert max(shares(made.trajectories[0], limits, robot, 2001).values()) <= 1.0
 
 
+@pytest.mark.slow
 def test_splines_do_as_harmonics_do():
     made = design_excitation(COMPLETE, **SHORT, family="spline", effort=QUICK)
     assert all(each.kept for each in made.reached)
@@ -175,6 +185,7 @@ def test_splines_do_as_harmonics_do():
     assert np.max(np.abs(v)) < 1e-12 and np.max(np.abs(a)) < 1e-10
 
 
+@pytest.mark.slow
 def test_the_start_can_be_given():
     start = np.array([1.0, -0.5])
     made = design_excitation(COMPLETE, **SHORT, start=start, effort=QUICK)
@@ -204,6 +215,7 @@ def test_limits_that_cannot_hold_the_arm_are_said(tmp_path):
         design_excitation(COMPLETE, limits=limits_of(SCARA, floor=2.0))
 
 
+@pytest.mark.slow
 def test_friction_counts_in_the_torque_also_where_a_joint_turns_back():
     limits = limits_of(SCARA, torques={"joint1": 1.0})
     known = {"a01": 0.3, "a11": 0.05, "a21": -0.01, "a02": 0.1}
@@ -237,6 +249,7 @@ def test_arguments_that_do_not_fit_are_said(given, said):
         design_excitation(COMPLETE, **given)
 
 
+@pytest.mark.slow
 def test_a_multisine_has_the_chosen_harmonics_alone():
     made = design_excitation(COMPLETE, duration=4.0, samples=400, harmonics=(1, 2, 3, 5, 7), effort=QUICK)
     (trajectory,) = made.trajectories

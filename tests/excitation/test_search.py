@@ -16,12 +16,14 @@ from tests.excitation.designs import COMPLETE, QUICK, SCARA, SHORT
 from tests.excitation.made import scara_with_quill
 
 
+@pytest.mark.slow
 def test_the_design_depends_on_the_seed_alone(short):
     again = design_excitation(COMPLETE, **SHORT, effort=Effort(starts=2, rounds=0, seed=3, processes=2))
     np.testing.assert_array_equal(again.trajectories[0].coefficients, short.trajectories[0].coefficients)
     assert short.costs[0] != short.costs[1]
 
 
+@pytest.mark.slow
 def test_progress_is_told_after_every_search():
     seen = []
     effort = replace(QUICK, rounds=1, seed=4)

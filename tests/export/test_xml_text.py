@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from scara_ident.errors import ScaraIdentError
@@ -37,7 +37,6 @@ TEXT = b"""<?xml version='1.0'?>
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
-@settings(deadline=None)
 @given(numbers=st.lists(FINITE, max_size=4))
 def test_numbers_read_back_as_they_are(numbers: list[float]):
     text = format_numbers(numbers)
@@ -47,7 +46,6 @@ def test_numbers_read_back_as_they_are(numbers: list[float]):
     assert not same_numbers(f"{text} 1.0", numbers)
 
 
-@settings(deadline=None)
 @given(value=FINITE, more=FINITE)
 def test_a_number_that_is_set_reads_back_and_nothing_else_changes(value: float, more: float):
     mass = next(parse(TEXT, PATH).descendants("mass"))
@@ -86,7 +84,6 @@ def test_children_are_added_and_taken_laid_out_like_their_neighbours():
     assert [child.tag for child in parse(on_one_line, PATH).find("link").children] == ["a", "mass"]
 
 
-@settings(deadline=None)
 @given(data=st.data(), text=st.binary(max_size=20))
 def test_edits_in_any_order_replace_their_places(data: st.DataObject, text: bytes):
     cuts = (

@@ -24,7 +24,7 @@ def torque_scale(w: NDArray[np.float64], parameters: NDArray[np.float64]) -> flo
     return float(np.max(np.einsum("ipn,p->in", np.abs(w), np.abs(parameters))))
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(seed=SEEDS)
 def test_closed_form_torque_is_pinocchios_for_any_two_bodies(arm: pin.Model, seed: int) -> None:
     q, v, a = random_states(seed)
@@ -86,7 +86,7 @@ def test_the_motion_determines_five_inertial_parameters_and_fifteen_in_all() -> 
     assert np.linalg.matrix_rank(scaled[:, :5]) == 5
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=SEEDS)
 def test_friction_and_offset_act_on_their_own_joint_alone(seed: int) -> None:
     q, v, a = random_states(seed, 5)

@@ -45,7 +45,7 @@ def test_friction_is_never_negative_where_it_was_measured_and_four_times_beyond(
     assert driving == {("CI", "joint1"), ("L2", "joint1"), ("L2", "joint2"), ("OJK", "joint1")}
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     coefficients=st.tuples(*[st.floats(-1, 1)] * 4),
     top=st.floats(0.1, 5.0),

@@ -34,7 +34,7 @@ def test_motion_starts_at_the_printed_centre_with_the_printed_harmonics() -> Non
     np.testing.assert_array_equal(a[:, 0], 0.0)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=SEEDS)
 def test_tool_acceleration_is_pinocchios(arm: pin.Model, seed: int) -> None:
     q, v, a = random_states(seed, 4)

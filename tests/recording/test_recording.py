@@ -49,7 +49,7 @@ def test_a_stem_is_a_trajectory_and_a_repetition(stem, trajectory, repetition):
     assert split_name(stem) == (trajectory, repetition)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(trajectory=st.text(min_size=1), repetition=st.integers(0, 10**9))
 def test_split_name_undoes_the_contract(trajectory, repetition):
     assert split_name(f"{trajectory}_{repetition}") == (trajectory, repetition)
@@ -206,7 +206,7 @@ def test_two_files_of_one_name_are_refused_by_both_names(tmp_path):
 SIGNAL = arrays(np.float64, (2, 60), elements=st.floats(-2.0, 2.0, width=64))
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(
     suffix=st.sampled_from([".parquet", ".csv"]),
     effort=SIGNAL,

@@ -102,6 +102,7 @@ def test_a_joint_at_rest_is_drawn_too(tmp_path: Path):
     assert share(tmp_path / "torque.png", "blue") > 2e-4
 
 
+@pytest.mark.slow
 def test_a_design_is_a_picture(tmp_path: Path):
     effort = Effort(starts=1, rounds=0, processes=1)
     design = design_excitation(

@@ -29,7 +29,7 @@ def trees(draw: st.DrawFn) -> tuple[list[str], list[tuple[str, str, str]]]:
     return draw(st.permutations([f"l{k}" for k in range(count)])), draw(st.permutations(joints))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(tree=trees(), data=st.data())
 def test_a_tree_has_no_fault_and_one_more_joint_in_it_closes_a_loop(tree, data: st.DataObject):
     links, joints = tree
@@ -40,7 +40,7 @@ def test_a_tree_has_no_fault_and_one_more_joint_in_it_closes_a_loop(tree, data: 
     assert "a URDF has no loops" in fault
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(tree=trees(), data=st.data())
 def test_a_tree_cut_in_two_is_told(tree, data: st.DataObject):
     links, joints = tree

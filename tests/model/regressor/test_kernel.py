@@ -62,13 +62,13 @@ def test_kernel_agrees_with_pinocchio_and_knows_its_structural_zeros(name: str) 
     np.testing.assert_array_equal(build_kernel(model).pattern, expected > 1e-12)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(seed=st.integers(0, 2**32 - 1), bodies=st.integers(1, 6))
 def test_kernel_agrees_with_pinocchio_on_random_trees(seed: int, bodies: int) -> None:
     assert_agrees(random_model(seed, bodies), samples=10)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), bodies=st.integers(1, 6))
 def test_regressor_times_parameters_is_inverse_dynamics(seed: int, bodies: int) -> None:
     model = random_model(seed, bodies)
@@ -81,7 +81,7 @@ def test_regressor_times_parameters_is_inverse_dynamics(seed: int, bodies: int) 
         np.testing.assert_allclose(torque[:, k], expected, rtol=0, atol=1e-11 * (1 + np.abs(expected).max()))
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1), bodies=st.integers(1, 5))
 def test_work_of_the_torques_is_the_gain_of_energy(seed: int, bodies: int) -> None:
     model = random_model(seed, bodies)

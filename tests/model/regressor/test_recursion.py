@@ -33,7 +33,7 @@ def moved(joint: JointGeometry, q: float) -> pin.SE3:
     return zero * pin.SE3(pin.exp3(q * joint.axis), np.zeros(3))
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(seed=SEEDS, bodies=st.integers(1, 6))
 def test_joints_stand_where_pinocchio_has_them(seed: int, bodies: int) -> None:
     model = random_model(seed, bodies)
@@ -46,7 +46,7 @@ def test_joints_stand_where_pinocchio_has_them(seed: int, bodies: int) -> None:
         np.testing.assert_allclose(placed[index].homogeneous, data.oMi[index].homogeneous, atol=1e-12)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=SEEDS, bodies=st.integers(1, 5))
 def test_a_lift_under_the_arm_cannot_be_told_from_gravity(seed: int, bodies: int) -> None:
     """An arm that a slide without gravity pushes up at g feels what it feels at rest under gravity."""
@@ -68,7 +68,7 @@ def test_a_lift_under_the_arm_cannot_be_told_from_gravity(seed: int, bodies: int
     np.testing.assert_allclose(regressor(lifted, q, v, a), expected, rtol=0, atol=1e-11 * (1 + np.abs(expected).max()))
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=SEEDS, bodies=st.integers(1, 5))
 def test_at_rest_it_is_the_slope_of_the_potential_energy(seed: int, bodies: int) -> None:
     model = random_model(seed, bodies)

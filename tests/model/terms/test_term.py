@@ -32,7 +32,7 @@ class Numbered(Filled):
                 target[:] = 100.0 * j + p + motion.q[j]
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(pattern=arrays(np.bool_, st.tuples(st.integers(1, 4), st.integers(0, 6))), samples=st.integers(0, 5))
 def test_every_entry_stands_where_the_pattern_has_it_and_all_others_are_zero(pattern: np.ndarray, samples: int):
     n, p = pattern.shape
