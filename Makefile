@@ -4,10 +4,13 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test lint types unit clean
+.PHONY: demo check test lint types fast unit clean
 
 demo: $(STAMP)
 	$(BIN)/scara-ident demo --output demo-output
+
+# While working: a minute or so. Before a change lands: everything.
+check: lint types fast
 
 test: lint types unit
 
@@ -17,6 +20,9 @@ lint: $(STAMP)
 
 types: $(STAMP)
 	$(BIN)/mypy
+
+fast: $(STAMP)
+	$(BIN)/python -m pytest -n 2 -m "not slow"
 
 unit: $(STAMP)
 	$(BIN)/python -m pytest -n 2

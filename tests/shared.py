@@ -8,6 +8,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared"
+# Seconds after which another program hangs; no measure of speed, which is that of the machine.
+PATIENCE = 1800
 
 
 def shared_path(*parts: str) -> Path:

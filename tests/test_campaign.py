@@ -94,6 +94,7 @@ def test_sizes_cover_every_effect_of_the_catalogue_and_its_joints(campaign: Modu
     assert not campaign_effects.can_be(arm, warm_up, -5.0)
 
 
+@pytest.mark.slow
 def test_a_tiny_campaign_runs_and_a_strong_effect_changes_the_tables(campaign: ModuleType) -> None:
     kinds = [kind for kind in CATALOGUE if kind.name == "time_delay"]
     names = ("L2", "L1")
@@ -109,6 +110,7 @@ def test_a_tiny_campaign_runs_and_a_strong_effect_changes_the_tables(campaign: M
     assert np.all((share > 0.97) & (share < 1.15))
 
 
+@pytest.mark.slow
 def test_encoder_steps_alone_make_the_inertia_of_l2_negative(campaign: ModuleType) -> None:
     from dataclasses import replace
 

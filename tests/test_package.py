@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.shared import ROOT
+from tests.shared import PATIENCE, ROOT
 
 PACKAGE = ROOT / "scara_ident"
 
@@ -46,7 +46,7 @@ def outside(installed: Path, folder: Path, *words: str) -> str:
     """Run Python on the installed files, in a folder that is not the checkout."""
     done = subprocess.run(
         [sys.executable, *words], cwd=folder, env={**os.environ, "PYTHONPATH": str(installed)},
-        capture_output=True, text=True, timeout=120, check=False,
+        capture_output=True, text=True, timeout=PATIENCE, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout

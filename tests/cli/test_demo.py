@@ -5,6 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
+pytestmark = pytest.mark.slow
+
 
 def test_the_demo_writes_every_result_and_finds_what_it_hid(command, tmp_path: Path):
     answer = command("demo", "--output", tmp_path / "demo")

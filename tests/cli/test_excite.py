@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
+import pytest
 
 
+@pytest.mark.slow
 def test_a_small_design_keeps_its_limits_and_writes_its_files(command, tmp_path: Path):
     result = command(
         "excite", "--duration", "4", "--harmonics", "3", "--starts", "1", "--model", "basic", "--rate", "200",
@@ -37,6 +39,7 @@ def test_a_small_design_keeps_its_limits_and_writes_its_files(command, tmp_path:
 QUICK = ("--duration", "4", "--harmonics", "4", "--starts", "1", "--model", "basic")
 
 
+@pytest.mark.slow
 def test_start_limits_block_and_known_torques_are_heeded(command, tmp_path: Path):
     parameters = tmp_path / "identification.json"
     parameters.write_text(json.dumps({"parameters": [{"name": "a01", "value": 0.3}, {"name": "a02", "value": 0.1}]}))
@@ -63,6 +66,7 @@ def test_start_limits_block_and_known_torques_are_heeded(command, tmp_path: Path
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_recordings_at_hand_count(command, tmp_path: Path, folder: Path):
     alone = command("excite", *QUICK, "--json", "--output", tmp_path)
     filled = command("excite", *QUICK, "--json", "--known", folder / "OJD_1.parquet", "--output", tmp_path)

@@ -87,6 +87,7 @@ def test_wrong_words_and_files_end_in_a_line_and_nothing_written(
     assert sorted(path.name for path in tmp_path.iterdir()) == before
 
 
+@pytest.mark.slow
 def test_the_ur10e_goes_from_a_file_and_a_urdf_to_an_identification(tmp_path, capsys):
     urdf, file = shared_path("data", "ur10e", "ur10e.urdf"), shared_path("data", "ur10e", "ident_20s_5harm.parquet")
     assert answer(capsys, file, "--urdf", urdf, "--output", tmp_path)[0] == 0

@@ -12,6 +12,7 @@ import pytest
 import scara_ident
 from scara_ident.cli.main import app, main, run
 from scara_ident.errors import ScaraIdentError, UsageError
+from tests.shared import PATIENCE
 
 COMMANDS = tuple(command.name or command.callback.__name__ for command in app.registered_commands)
 
@@ -95,7 +96,7 @@ def user(*words: str | Path, **options) -> subprocess.CompletedProcess[str]:
         capture_output=True,
         text=True,
         env=environment,
-        timeout=60,
+        timeout=PATIENCE,
         check=False,
         **options,
     )
@@ -152,7 +153,7 @@ def test_a_reader_that_goes_away_is_no_trouble():
         ["bash", "-c", f"set -o pipefail; {program} | head -n 1"],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.stderr == ""
@@ -164,7 +165,7 @@ def test_importing_the_package_is_quick():
     """Heavy libraries wait until they are needed."""
     heavy = ("cvxpy", "matplotlib", "polars", "pandas", "pinocchio", "numba", "yourdfpy", "rich")
     code = f"import sys, scara_ident; print([name for name in {heavy!r} if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, check=True)
     assert done.stdout.strip() == "[]"
 
 

@@ -1,8 +1,7 @@
-"""Results reach the disk whole or not at all, scripts get JSON, and tables fit 80 columns."""
+"""Results reach the disk whole or not at all."""
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -16,7 +15,6 @@ import pytest
 from scara_ident.cli.main import run
 from scara_ident.files import check_output, written_together
 from scara_ident.robot.robot import embedded_urdf
-from tests.made_recordings import columns, save
 
 SMALL = 65536
 
@@ -197,70 +195,3 @@ def test_looking_at_an_output_folder_leaves_it_as_it_was(tmp_path: Path):
     check_output(tmp_path)
     check_output(tmp_path / "a" / "b" / "c")
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("words", "file", "key"),
-    [
-        (["identify", "{runs}/OJD_1.parquet", "--band", "15"], "identification.json", "parameters"),
-        (["diagnose", "{short}", "--model", "basic"], "diagnosis.json", "verdict"),
-        (["compare", "{runs}"], "comparison.json", "errors"),
-        (["base"], "base.json", "base_parameters"),
-    ],
-    ids=lambda words: words[0] if isinstance(words, list) else "",
-)
-def test_json_on_stdout_is_all_there_is_and_what_is_in_the_file(
-    command, folder: Path, tmp_path: Path, words: list[str], file: str, key: str
-):
-    short = save(tmp_path / "short_1.parquet", columns(1500))
-    given = [word.replace("{runs}", str(folder)).replace("{short}", str(short)) for word in words]
-    out = tmp_path / "results"
-    result = command(*given, "--json", "--output", out)
-    assert result.status == 0
-    content = json.loads(result.out)
-    assert key in content
-    assert content == json.loads((out / file).read_text())
-
-
-@pytest.mark.parametrize("form", [[], ["--json"]], ids=["tables", "json"])
-def test_results_are_written_though_nobody_reads_the_output(tmp_path: Path, form: list[str]):
-    program = [sys.executable, "-c", "from scara_ident.cli import main; main()"]
-    reader, writer = os.pipe()
-    os.close(reader)
-    done = subprocess.run(
-        [*program, "base", "--output", str(tmp_path), *form],
-        stdout=writer, stderr=subprocess.PIPE, text=True, timeout=60, check=False,
-    )  # fmt: skip
-    os.close(writer)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert json.loads((tmp_path / "base.json").read_text())["count"] == 5
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["identify", "{runs}", "--verbose"],
-        ["diagnose", "{short}", "--verbose"],
-        ["compare", "{runs}", "--verbose"],
-        ["base"],
-        ["paper"],
-    ],
-    ids=lambda words: words[0],
-)
-def test_tables_fit_80_columns(command, folder: Path, tmp_path: Path, words: list[str]):
-    short = save(tmp_path / "short_1.parquet", columns(1500))
-    result = command(*(word.replace("{runs}", str(folder)).replace("{short}", str(short)) for word in words))
-    assert result.status == 0
-    assert max(len(line) for line in result.out.splitlines()) <= 80
-
-
-def test_verbose_lists_what_every_file_holds(command, folder: Path, tmp_path: Path):
-    made = columns(3000)
-    gap = save(tmp_path / "gap_1.parquet", {name: values[made["time"] != 1.0] for name, values in made.items()})
-    terse = command("identify", folder / "OJD_1.parquet", gap, "--band", "15")
-    verbose = command("identify", folder / "OJD_1.parquet", gap, "--band", "15", "--verbose")
-    assert (terse.status, verbose.status) == (0, 0)
-    assert terse.out in verbose.out
-    listing = verbose.out.removesuffix(terse.out)
-    assert ["OJD_1", "3000", "12", "250", "0"] in [line.split() for line in listing.splitlines()]
-    assert ["gap_1", "2999", "2.999", "1000"] in [line.split()[:4] for line in listing.splitlines()]

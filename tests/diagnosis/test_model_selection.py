@@ -35,6 +35,7 @@ def widest(runs) -> tuple[float, float]:
     return (max(choose_bands(MODEL, prepare(runs)).bands),) * 2
 
 
+@pytest.mark.slow
 def test_a_joint_that_swings_within_the_band_is_found_below_it() -> None:
     runs = virtual_runs("joint_elasticity:joint1:stiffness=20000")
     bands = widest(runs)
@@ -48,6 +49,7 @@ def test_a_joint_that_swings_within_the_band_is_found_below_it() -> None:
     assert kept.search.bands == bands
 
 
+@pytest.mark.slow
 def test_what_was_found_shows_that_the_band_is_wider() -> None:
     runs = virtual_runs("presliding:joint1:presliding_distance=0.0075", "vibration:joint2:amplitude=0.02")
     outcome = selected(runs, Presliding(), Vibration(), bands=(4.0, 4.0), free=True)
@@ -55,6 +57,7 @@ def test_what_was_found_shows_that_the_band_is_wider() -> None:
     assert max(band or 0.0 for band in outcome.search.bands) > 6.0
 
 
+@pytest.mark.slow
 def test_an_effect_that_stands_for_one_outside_the_catalogue_is_not_counted() -> None:
     runs = virtual_runs("unlisted_2:joint2:viscous=0.02")
     bands = widest(runs)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.shared import ROOT
+from tests.shared import PATIENCE, ROOT
 
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
 
@@ -66,7 +66,7 @@ def run_bash(page: Path, block: Block, folder: Path) -> None:
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     done = subprocess.run(
         ["bash", "-euo", "pipefail", "-c", block.commands],
-        cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=300, check=False,
+        cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=PATIENCE, check=False,
     )  # fmt: skip
     where = f"{page.relative_to(ROOT)}, line {block.line}"
     assert done.returncode == 0, f"{where}: exit status {done.returncode}\n{done.stdout}{done.stderr}"

@@ -41,6 +41,7 @@ def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     pytest.importorskip("mkdocs", reason="the documentation is built by MkDocs: pip install '.[docs]'")
     done = subprocess.run(
@@ -61,6 +62,7 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
         assert f'id="scara_ident.{public}"' in api
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if page not in APART], ids=name_of)
 def test_what_a_page_says_to_type_runs(page: Path, reader: Path) -> None:
     found = blocks(page)
@@ -69,6 +71,7 @@ def test_what_a_page_says_to_type_runs(page: Path, reader: Path) -> None:
     run(page, reader)
 
 
+@pytest.mark.slow
 def test_the_tutorial_finds_what_it_hid(reader: Path) -> None:
     names = run(TUTORIAL, reader)
     diagnosis = json.loads((reader / "out" / "diagnose" / "diagnosis.json").read_text())
@@ -92,6 +95,7 @@ def test_the_tutorial_finds_what_it_hid(reader: Path) -> None:
     assert np.linalg.norm(identified) < 0.5 * np.linalg.norm(mine)
 
 
+@pytest.mark.slow
 def test_a_users_own_effect_takes_under_20_lines_and_is_found(reader: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = DOCS / "howto" / "my-own-effect.md"
     (own,) = (block for block in blocks(page) if "class CableFriction" in block.text)
@@ -104,12 +108,14 @@ def test_a_users_own_effect_takes_under_20_lines_and_is_found(reader: Path, caps
     assert capsys.readouterr().out == "".join(block.text for block in blocks(page) if block.language == "text")
 
 
+@pytest.mark.slow
 def test_a_known_payload_gives_the_torque_constant(reader: Path) -> None:
     names = run(DOCS / "howto" / "known-payload.md", reader)
     assert names["gain"] == pytest.approx(0.8, rel=0.05)
     assert "common_torque_scale" in {alias.effect for alias in names["found"].aliases}
 
 
+@pytest.mark.slow
 def test_what_the_readme_says_to_type_runs(reader: Path) -> None:
     # The reader's own arm and recordings, by the names that the README gives them.
     shutil.copy(embedded_urdf(), reader / "my_arm.urdf")

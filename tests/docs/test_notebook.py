@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.shared import ROOT
+from tests.shared import PATIENCE, ROOT
 
 NOTEBOOK = ROOT / "docs" / "tutorial.ipynb"
 
@@ -42,6 +42,7 @@ def test_what_the_notebook_points_to_is_there() -> None:
     assert [target for target in targets if not (NOTEBOOK.parent / target).is_file()] == []
 
 
+@pytest.mark.slow
 def test_the_notebook_runs_top_to_bottom_and_finds_what_it_hid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     nbformat = pytest.importorskip("nbformat", reason="needs the extra test: pip install '.[test]'")
     nbclient = pytest.importorskip("nbclient", reason="needs the extra test: pip install '.[test]'")
@@ -54,7 +55,7 @@ def test_the_notebook_runs_top_to_bottom_and_finds_what_it_hid(tmp_path: Path, m
     notebook.cells.append(nbformat.v4.new_code_cell(ASK))
     place = tmp_path / "reader"
     place.mkdir()
-    nbclient.NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(place)}}).execute()
+    nbclient.NotebookClient(notebook, timeout=PATIENCE, resources={"metadata": {"path": str(place)}}).execute()
 
     outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     assert [output.text for output in outputs if output.output_type == "stream" and output.name == "stderr"] == []

@@ -28,7 +28,7 @@ def stepped(q: np.ndarray, distance: float, start: float = 0.0) -> np.ndarray:
     return np.array(z)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=40), st.floats(0.02, 2.0), st.floats(-1.0, 1.0))
 def test_the_state_is_that_of_the_differential_equation(steps: list[float], distance: float, start: float):
     q = np.concatenate([[0.3], 0.3 + np.cumsum(steps)])

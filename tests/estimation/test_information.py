@@ -45,7 +45,7 @@ def test_the_factor_stands_for_the_normal_equations():
     assert batch(w, u).rows == 700
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000), st.integers(1, 6), st.lists(st.integers(0, 40), min_size=1, max_size=6))
 def test_merging_parts_in_any_order_is_the_batch(seed: int, p: int, sizes: list[int]):
     w, u = rows(seed, sum(sizes), p)
@@ -57,7 +57,7 @@ def test_merging_parts_in_any_order_is_the_batch(seed: int, p: int, sizes: list[
     assert_same(merge([merge(shuffled[:1]), *shuffled[1:]]), batch(w, u))
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(st.integers(0, 10_000), st.integers(1, 5), st.integers(8, 60))
 def test_row_by_row_gives_the_batch_estimate_to_1e_10(seed: int, p: int, count: int):
     w, u = rows(seed, count, p)
@@ -229,7 +229,7 @@ def test_a_zero_column_is_undetermined_and_changes_nothing_else():
     assert_allclose(np.abs(solution.null), [[0.0], [1.0], [0.0], [0.0]])
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.integers(0, 10_000), st.floats(-4, 4))
 def test_a_combination_that_rows_leave_open_is_found_whatever_the_units(seed: int, decades: float):
     rng = np.random.default_rng(seed)
@@ -259,7 +259,7 @@ def test_fewer_rows_than_parameters_leave_some_open():
     assert (found.log_det(), found.condition()) == (-np.inf, np.inf)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.integers(0, 10_000), st.floats(-6, 6))
 def test_units_of_parameters_do_not_change_what_is_known(seed: int, decades: float):
     w, u = rows(seed, 40, 3)

@@ -239,7 +239,7 @@ def several(model: TorqueModel) -> Observations:
     return seen(model, *runs)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(order=st.permutations(range(4)), count=st.integers(1, 4))
 def test_recordings_together_are_those_absorbed_apart(several: Observations, order: list[int], count: int):
     model, places = several.model, order[:count]

@@ -24,7 +24,7 @@ def regressor(seed: int) -> np.ndarray:
 
 
 @given(seed=st.integers(0, 2**31), place=st.integers(0, len(CRITERIA) - 1))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_gradients_are_those_of_differences(seed, place):
     criterion = CRITERIA[place]
     h = regressor(seed)

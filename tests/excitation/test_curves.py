@@ -15,7 +15,7 @@ def trajectory(family: str, seed: int, *, fixed_start: bool = False, duration: f
 
 
 @given(family=st.sampled_from(["fourier", "spline"]), seed=st.integers(0, 2**31), duration=st.floats(0.5, 60.0))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_every_motion_starts_and_ends_at_rest(family, seed, duration):
     made = trajectory(family, seed, duration=duration)
     _, v, a = made.at(np.array([0.0, duration]))

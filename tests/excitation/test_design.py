@@ -1,13 +1,14 @@
+"""Designed motions: how much they show, within which limits."""
+
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from scara_ident.errors import RobotError, UsageError
+from scara_ident.errors import UsageError
 from scara_ident.estimation.information import Information
 from scara_ident.excitation import (
     Condition,
-    Effort,
     ExcitationTrajectory,
     InfeasibleLimits,
     Limits,
@@ -16,28 +17,18 @@ from scara_ident.excitation import (
     design_excitation,
     information_of,
     limits_of,
-    nominal_parameters,
 )
 from scara_ident.model.model import build_model
 from scara_ident.paper import OJD, criteria, regressor, table5_parameters, tool_acceleration
 from scara_ident.robot.robot import Robot, load_robot
-from tests.arms import PLANAR_2R, Link, example_urdf, rnea, write_urdf
-from tests.excitation.made import panda, rigid_model, scara_with_quill
-
-SCARA = load_robot()
-COMPLETE = build_model(SCARA)
-QUICK = Effort(starts=1, rounds=0, processes=1)
-SHORT = {"duration": 4.0, "harmonics": 6, "samples": 400}
+from tests.arms import PLANAR_2R, example_urdf, rnea, write_urdf
+from tests.excitation.designs import COMPLETE, QUICK, SCARA, SHORT
+from tests.excitation.made import rigid_model
 
 
 @pytest.fixture(scope="module")
 def paper_length():
     return design_excitation(COMPLETE, effort=QUICK)
-
-
-@pytest.fixture(scope="module")
-def short():
-    return design_excitation(COMPLETE, **SHORT, effort=Effort(starts=2, rounds=0, seed=3, processes=1))
 
 
 def shares(trajectory: ExcitationTrajectory, limits: Limits, robot: Robot, times: int) -> dict[str, float]:
@@ -52,6 +43,7 @@ def shares(trajectory: ExcitationTrajectory, limits: Limits, robot: Robot, times
     }
 
 
+@pytest.mark.slow
 def test_25_s_of_the_scara_reach_a_log_det_of_92_within_all_limits(paper_length):
     trajectory = paper_length.trajectories[0]
     log_det, condition = criteria(regressor(*trajectory.at(np.linspace(0.0, 25.0, 2500))))
@@ -70,6 +62,7 @@ def test_25_s_of_the_scara_reach_a_log_det_of_92_within_all_limits(paper_length)
     assert np.max(np.abs(np.einsum("ipN,p->iN", regressor(*fine), table5_parameters("OJD")))) <= 2.0
 
 
+@pytest.mark.slow
 def test_what_is_reported_as_reached_is_reached_between_samples_too(short):
     limits, trajectory = short.limits, short.trajectories[0]
     time = np.linspace(0.0, trajectory.duration, 200_001)
@@ -84,20 +77,7 @@ def test_what_is_reported_as_reached_is_reached_between_samples_too(short):
     assert told["joint1.torque"].bound == limits.torque[0] == 2.0
 
 
-def test_the_design_depends_on_the_seed_alone(short):
-    again = design_excitation(COMPLETE, **SHORT, effort=Effort(starts=2, rounds=0, seed=3, processes=2))
-    np.testing.assert_array_equal(again.trajectories[0].coefficients, short.trajectories[0].coefficients)
-    assert short.costs[0] != short.costs[1]
-
-
-def test_progress_is_told_after_every_search():
-    seen = []
-    effort = replace(QUICK, rounds=1, seed=4)
-    made = design_excitation(COMPLETE, **SHORT, effort=effort, progress=seen.append)
-    assert [(each.done, each.total) for each in seen] == [(1, 2), (2, 2)]
-    assert seen[-1].cost == min(made.costs)
-
-
+@pytest.mark.slow
 def test_the_std_of_repetitions_falls_against_ojd_as_the_log_det_promises(paper_length):
     """White noise on exact regressors, estimated by least squares, 400 times each."""
     trajectory = paper_length.trajectories[0]
@@ -122,6 +102,7 @@ def test_the_std_of_repetitions_falls_against_ojd_as_the_log_det_promises(paper_
     assert np.exp(np.mean(np.log(spreads[1] / spreads[0]))) < 0.6
 
 
+@pytest.mark.slow
 def test_a_block_can_be_preferred_to_the_rest(short):
     wanted = block_of(COMPLETE, ["P_d2", "P_d3", "P_d4"])
     made = design_excitation(COMPLETE, **SHORT, criterion=wanted, effort=short.effort)
@@ -132,12 +113,14 @@ def test_a_block_can_be_preferred_to_the_rest(short):
     assert costs[0] < costs[1] - 0.5
 
 
+@pytest.mark.slow
 def test_the_condition_can_be_preferred_to_the_log_det(short):
     made = design_excitation(COMPLETE, **SHORT, criterion=Condition(), effort=short.effort)
     assert made.condition < 0.5 * short.condition
     assert made.log_det < short.log_det
 
 
+@pytest.mark.slow
 def test_a_design_fills_what_existing_recordings_lack():
     still = information_of(COMPLETE, design_excitation(COMPLETE, **SHORT, effort=QUICK).trajectories[0], 400)
     # Recordings in which friction was seen a thousand times better than bodies.
@@ -159,6 +142,7 @@ def test_a_design_fills_what_existing_recordings_lack():
     assert np.linalg.slogdet(together["after"])[1] > np.linalg.slogdet(together["alone"])[1]
 
 
+@pytest.mark.slow
 def test_trajectories_designed_together_share_the_work(short):
     two = design_excitation(COMPLETE, **SHORT, trajectories=2, effort=short.effort)
     assert [each.name for each in two.trajectories] == ["excitation-a", "excitation-b"]
@@ -170,6 +154,7 @@ def test_trajectories_designed_together_share_the_work(short):
     assert two.log_det > short.log_det + 15.0 * np.log(2.0)
 
 
+@pytest.mark.slow
 def test_noise_of_the_torques_weights_the_rows(short):
     std = np.array([0.04, 0.012])
     made = design_excitation(COMPLETE, **SHORT, torque_std=std, effort=QUICK)
@@ -179,6 +164,7 @@ def test_noise_of_the_torques_weights_the_rows(short):
     np.testing.assert_allclose(made.std(), np.sqrt(np.diag(np.linalg.inv(stacked.T @ stacked))), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_an_arm_of_six_joints_is_excited_within_its_limits():
     robot = load_robot(example_urdf("ur5_joint_limited_robot.urdf"))
     model = rigid_model(robot)
@@ -191,6 +177,7 @@ def test_an_arm_of_six_joints_is_excited_within_its_limits():
     assert max(shares(made.trajectories[0], limits, robot, 2001).values()) <= 1.0
 
 
+@pytest.mark.slow
 def test_splines_do_as_harmonics_do():
     made = design_excitation(COMPLETE, **SHORT, family="spline", effort=QUICK)
     assert all(each.kept for each in made.reached)
@@ -198,6 +185,7 @@ def test_splines_do_as_harmonics_do():
     assert np.max(np.abs(v)) < 1e-12 and np.max(np.abs(a)) < 1e-10
 
 
+@pytest.mark.slow
 def test_the_start_can_be_given():
     start = np.array([1.0, -0.5])
     made = design_excitation(COMPLETE, **SHORT, start=start, effort=QUICK)
@@ -227,6 +215,7 @@ def test_limits_that_cannot_hold_the_arm_are_said(tmp_path):
         design_excitation(COMPLETE, limits=limits_of(SCARA, floor=2.0))
 
 
+@pytest.mark.slow
 def test_friction_counts_in_the_torque_also_where_a_joint_turns_back():
     limits = limits_of(SCARA, torques={"joint1": 1.0})
     known = {"a01": 0.3, "a11": 0.05, "a21": -0.01, "a02": 0.1}
@@ -237,50 +226,6 @@ def test_friction_counts_in_the_torque_also_where_a_joint_turns_back():
     assert told.active and torque.max() > 0.9
     with pytest.raises(InfeasibleLimits, match=r"joint1: a torque of 1 N m does not overcome its friction of 1\.5 N m"):
         design_excitation(COMPLETE, limits=limits, known={"a01": -1.5})
-
-
-def test_a_joint_without_limits_is_said(tmp_path):
-    urdf = write_urdf(tmp_path / "arm.urdf", [Link(kind="continuous"), Link(xyz=(0.3, 0.0, 0.0))])
-    with pytest.raises(RobotError, match=r"joint 'j1' has no position limits.*range for j1"):
-        design_excitation(build_model(load_robot(urdf)))
-    given = limits_of(load_robot(urdf), ranges={"j1": (-3.0, 3.0)})
-    assert given.upper[0] == 3.0
-    urdf.write_text(urdf.read_text().replace(' velocity="4"', ' velocity="0"'))
-    with pytest.raises(RobotError, match="joint 'j1' has no velocity limit"):
-        limits_of(load_robot(urdf), ranges={"j1": (-3.0, 3.0)})
-
-
-def test_parameters_that_no_motion_tells_apart_are_said():
-    robot = scara_with_quill()
-    with pytest.raises(InfeasibleLimits, match=r"no motion can tell .*m3, Ia3, p_o3 apart"):
-        design_excitation(build_model(robot), duration=6.0)
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"ranges": {"joint9": (0.0, 1.0)}}, "'joint9': the robot has no such joint; its joints: joint1, joint2"),
-        ({"ranges": {"joint1": (1.0, 1.0)}}, "range of joint1"),
-        ({"velocities": {"joint1": 0.0}}, "velocity limit of joint1"),
-        ({"tool_acceleration": -1.0}, "tool acceleration -1"),
-        ({"share": 1.5}, "share of the limits 1.5"),
-        ({"share": np.nan}, "share of the limits nan"),
-        ({"floor": np.nan}, "floor nan: expected a height"),
-        ({"tool_speed": 0.0}, "tool speed 0"),
-    ],
-)
-def test_limits_that_make_no_sense_are_said(given, said):
-    with pytest.raises(UsageError, match=said):
-        limits_of(SCARA, **given)
-
-
-def test_the_scara_has_the_papers_tool_acceleration_and_other_arms_none():
-    assert limits_of(SCARA).tool_acceleration == 9.0
-    assert limits_of(SCARA, tool_acceleration=np.inf).tool is None
-    assert limits_of(panda()).tool_acceleration == np.inf
-    half = limits_of(SCARA, share=0.5)
-    np.testing.assert_allclose(half.velocity, 0.5 * SCARA.velocity_limit)
-    np.testing.assert_allclose(half.centre, limits_of(SCARA).centre)
 
 
 @pytest.mark.parametrize(
@@ -304,19 +249,7 @@ def test_arguments_that_do_not_fit_are_said(given, said):
         design_excitation(COMPLETE, **given)
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"tool_acceleration": 1e-4}, r"tightest is the tool acceleration limit of 0\.0001 m/s\^2"),
-        ({"ranges": {"joint1": (0.0, 1e-5)}}, r"tightest is the range of joint1, 1e-05 rad"),
-        ({"torques": {"joint1": 0.2101}}, r"tightest is the torque limit of joint1, 0\.0001 N m"),
-    ],
-)
-def test_limits_too_tight_for_any_motion_are_named(given, said):
-    with pytest.raises(InfeasibleLimits, match=f"no motion within the limits shows all parameters; the {said}"):
-        design_excitation(COMPLETE, **SHORT, limits=limits_of(SCARA, **given), effort=QUICK)
-
-
+@pytest.mark.slow
 def test_a_multisine_has_the_chosen_harmonics_alone():
     made = design_excitation(COMPLETE, duration=4.0, samples=400, harmonics=(1, 2, 3, 5, 7), effort=QUICK)
     (trajectory,) = made.trajectories
@@ -326,17 +259,6 @@ def test_a_multisine_has_the_chosen_harmonics_alone():
     lines = np.abs(np.fft.rfft(q, axis=1))
     others = np.setdiff1d(np.arange(33), (0, 1, 2, 3, 5, 7))
     assert np.max(lines[:, others]) < 1e-10 * np.max(lines)
-
-
-def test_the_scara_is_foreseen_with_the_papers_friction_unless_told_better():
-    names = COMPLETE.names
-    value = nominal_parameters(COMPLETE)
-    np.testing.assert_array_equal(value[5:], table5_parameters("OJD")[5:])
-    assert nominal_parameters(COMPLETE, {"a01": 0.3})[5:].tolist() == [0.3] + [0.0] * 9
-    assert not np.any(nominal_parameters(COMPLETE, {})[5:])
-    assert dict(zip(names, value, strict=True))["a31"] == 0.0
-    joint_side = replace(SCARA, effort_side="joint")
-    assert not np.any(nominal_parameters(build_model(joint_side))[5:])
 
 
 def test_harmonics_are_fewer_for_more_joints():

@@ -103,6 +103,7 @@ def test_the_json_says_what_was_designed(made):
     assert any("the friction of the paper's Table 5 (OJD)" in line for line in content["notes"])
 
 
+@pytest.mark.slow
 def test_friction_that_is_known_counts_in_the_torque():
     model = build_model(load_robot())
     made = design_excitation(

@@ -17,6 +17,8 @@ from scara_ident.model.model import build_model
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import Link, rnea, write_urdf
 
+pytestmark = pytest.mark.slow
+
 CRITERIA = {"logdet": LogDet(), "cond": Condition(), "block": BlockLogDet((0, 1))}
 
 

@@ -27,7 +27,7 @@ def pseudo_matrix(parameters: Array) -> Array:
 
 
 @given(seed=SEEDS, light=st.sampled_from([1e-3, 0.3, 3.0, 30.0]), empty=st.booleans())
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_shares_add_up_and_each_can_exist(seed: int, light: float, empty: bool) -> None:
     rng = np.random.default_rng(seed)
     own = np.zeros(10) if empty else possible_body(rng, 2.0)
@@ -65,7 +65,7 @@ def test_the_shape_of_the_shares_does_not_depend_on_the_frame() -> None:
 
 
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_a_body_that_was_stretched_has_its_links_stretched_alike(seed: int) -> None:
     """A stretch without rotation is the shortest way from one mass distribution to another, so it is found."""
     rng = np.random.default_rng(seed)
@@ -93,7 +93,7 @@ def test_a_point_mass_beside_a_nominal_tool_is_the_moving_link_s_alone_when_the_
 
 
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_a_body_about_its_centre_of_mass_is_pinocchio_s_inertia(seed: int) -> None:
     parameters = possible_body(np.random.default_rng(seed), 2.0)
     body, reference = body_about_com(parameters), pin.Inertia.FromDynamicParameters(parameters)

@@ -49,7 +49,7 @@ def mujoco_torque(robot: Robot, model: Any, q: Array, v: Array, a: Array) -> Arr
 
 
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_mujoco_gets_the_identified_torque_and_damping(robot: Robot, seed: int) -> None:
     standard = random_standard(robot, seed)
     rng = np.random.default_rng(seed)
@@ -82,7 +82,7 @@ def test_the_arm_s_own_parameters_give_its_own_torque(robot: Robot) -> None:
 
 
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=4)
+@settings(max_examples=4)
 def test_every_link_has_its_name_and_stands_where_it_stood(robot: Robot, seed: int) -> None:
     model = compiled(mjcf_text(robot, random_standard(robot, seed))[0])
     data, ours = mujoco.MjData(model), robot.model.createData()
@@ -160,7 +160,7 @@ def test_a_free_arm_keeps_its_energy_in_simulation() -> None:
 
 @pytest.mark.parametrize("kind", ["point", "rod", "plate", "just outside"])
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=8)
+@settings(max_examples=8)
 def test_a_body_on_the_edge_of_the_possible_is_taken_and_told(kind: str, seed: int) -> None:
     robot = load_robot()
     rng = np.random.default_rng(seed)

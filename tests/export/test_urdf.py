@@ -78,7 +78,7 @@ def stripped(text: str) -> str:
 
 
 @given(seed=SEEDS, like_nominal=st.booleans())
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_pinocchio_gets_the_identified_torque_from_the_export(robot: Robot, seed: int, like_nominal: bool) -> None:
     if like_nominal and robot.name in ("carriage", "branched"):
         like_nominal = False  # they have links without inertial
@@ -91,7 +91,7 @@ def test_pinocchio_gets_the_identified_torque_from_the_export(robot: Robot, seed
 
 
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_the_bodies_read_back_are_the_identified_ones(robot: Robot, seed: int) -> None:
     standard = random_standard(robot, seed)
     model = reloaded(robot, urdf_text(robot, standard)[0])
@@ -102,7 +102,7 @@ def test_the_bodies_read_back_are_the_identified_ones(robot: Robot, seed: int) -
 
 
 @given(seed=SEEDS, like_nominal=st.booleans())
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_every_exported_link_can_exist(robot: Robot, seed: int, like_nominal: bool) -> None:
     standard = random_standard(robot, seed, like_nominal=like_nominal and robot.name not in ("carriage", "branched"))
     root = ElementTree.fromstring(urdf_text(robot, standard)[0].encode())
@@ -121,7 +121,7 @@ def test_every_exported_link_can_exist(robot: Robot, seed: int, like_nominal: bo
 
 
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=12)
 def test_only_inertials_and_joint_dynamics_change(robot: Robot, seed: int) -> None:
     friction = JointFriction(np.full(robot.n, 0.3), np.full(robot.n, 0.2))
     before = robot.urdf.read_bytes().decode()

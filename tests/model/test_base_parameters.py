@@ -270,7 +270,7 @@ def trees(draw: st.DrawFn) -> tuple[Link, ...]:
     )
 
 
-@settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(trees(), st.booleans())
 def test_any_tree_has_as_many_base_parameters_as_its_regressor_has_rank(
     tmp_path: Path, links: tuple[Link, ...], rotor_inertia: bool

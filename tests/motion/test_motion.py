@@ -81,7 +81,7 @@ def test_a_delay_is_kept_as_it_is():
     assert_allclose(late[1050:2950], prompt[1000:2900], atol=1e-9)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.floats(5.0, 300.0), st.sampled_from([0.5, 1.0, 2.0]))
 def test_half_the_amplitude_is_left_at_the_cut_off(cut: float, ratio: float):
     time = np.arange(6000) / RATE
@@ -96,7 +96,7 @@ def test_no_cut_off_leaves_the_signal_alone():
     assert low_pass(signal, RATE, None) is signal
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(count=st.integers(4, 3000), cut=st.floats(2.0, 100.0), step=st.integers(1, 8), seed=st.integers(0, 2**16))
 def test_the_low_pass_at_kept_samples_is_the_low_pass(count: int, cut: float, step: int, seed: int):
     rate = 500.0
@@ -136,7 +136,7 @@ def test_short_signals_give_finite_numbers(count: int):
             assert np.all(np.isfinite(part))
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 1000), st.floats(-5, 5), st.floats(-5, 5))
 def test_the_filter_is_linear_and_works_row_by_row(seed: int, a: float, b: float):
     x, y = np.random.default_rng(seed).standard_normal((2, 300))

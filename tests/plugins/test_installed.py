@@ -17,7 +17,9 @@ from scara_ident import Identification, Recording, identify, load_robot, write_r
 from tests.diagnosis.made import BANDS, exact_runs, virtual_runs, with_torque
 from tests.docs.pages import blocks
 from tests.plugins.made import make_installed
-from tests.shared import ROOT
+from tests.shared import PATIENCE, ROOT
+
+pytestmark = pytest.mark.slow
 
 Program = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -28,7 +30,7 @@ def program_beside(place: Path) -> Program:
     def call(*words: str | Path) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
             [sys.executable, "-m", "scara_ident", *map(str, words)], capture_output=True, text=True, check=False,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (place, ROOT)))}, timeout=120,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (place, ROOT)))}, timeout=PATIENCE,
         )  # fmt: skip
 
     return call

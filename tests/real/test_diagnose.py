@@ -10,6 +10,8 @@ from scara_ident import load_robot, read_recordings
 from scara_ident.diagnosis import Diagnosis, diagnose
 from tests.shared import shared_path
 
+pytestmark = pytest.mark.slow
+
 # How far a parameter may be off, where a share of it is not the measure.
 ABSOLUTE = {"tilt_x": 0.005, "tilt_y": 0.005, "delay": 0.001}
 RELATIVE = 0.15

@@ -36,11 +36,13 @@ def test_emps_parameters_and_errors_are_the_published_ones():
     assert relative(result, "validation_pulses")[0] <= 0.07
 
 
+@pytest.mark.slow
 def test_ur10e_predicts_a_held_out_run():
     result = run("ur10e", ["ident_50s_12harm", "ident_50s_14harm_noload"], ["ident_40s_12harm"], "basic")
     assert np.all(np.array(relative(result, "ident_40s_12harm")) <= [0.11, 0.06, 0.06, 0.10, 0.12, 0.17])
 
 
+@pytest.mark.slow
 def test_double_pendulum_predicts_a_held_out_swing_up():
     names = sorted(path.stem for path in shared_path("data", "double_pendulum_c1").glob("*.parquet"))
     held_out = ["C1_154548", "C1_143601"]

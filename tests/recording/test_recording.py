@@ -1,3 +1,5 @@
+"""Recordings: their names, channels and places, read and written."""
+
 from __future__ import annotations
 
 import os
@@ -22,26 +24,10 @@ from scara_ident.recording.recording import (
     split_name,
     write_recording,
 )
-from scara_ident.robot.robot import Robot, load_robot
+from scara_ident.robot.robot import load_robot
 from tests.made_recordings import columns, save
+from tests.recording.made import csv_lines, refusal, write_text
 from tests.shared import shared_path
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return load_robot()
-
-
-def refusal(path: Path, robot: Robot) -> str:
-    with pytest.raises(RecordingError) as caught:
-        read_recording(path, robot)
-    message = str(caught.value)
-    assert "\n" not in message
-    assert path.name in message
-    return message
-
-
-# names
 
 
 @pytest.mark.parametrize(
@@ -63,13 +49,10 @@ def test_a_stem_is_a_trajectory_and_a_repetition(stem, trajectory, repetition):
     assert split_name(stem) == (trajectory, repetition)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(trajectory=st.text(min_size=1), repetition=st.integers(0, 10**9))
 def test_split_name_undoes_the_contract(trajectory, repetition):
     assert split_name(f"{trajectory}_{repetition}") == (trajectory, repetition)
-
-
-# reading
 
 
 def test_rows_stand_in_the_robots_order_whatever_the_files(robot, tmp_path):
@@ -155,152 +138,6 @@ def test_an_effort_of_one_joint_only_is_left_out_where_none_is_needed(robot, tmp
     assert [finding.kind for finding in recording.findings] == ["missing_column"]
 
 
-def test_files_that_are_no_recordings_are_refused_in_a_line(robot, tmp_path):
-    whole = save(tmp_path / "whole.parquet", columns()).read_bytes()
-    made = {
-        "empty.parquet": (b"", "empty"),
-        "empty.csv": (b"", "empty"),
-        "blank.csv": (b"\n\n", "no column 'time'"),
-        "text.parquet": (b"this is no parquet file at all", "not a whole parquet file"),
-        "cut.parquet": (whole[: len(whole) // 2], "not a whole parquet file"),
-        "header.csv": (b"time,joint1.position,joint2.position,joint1.effort,joint2.effort\n", "0 usable samples"),
-        "numbers.csv": (b"0.0,1.0,2.0,0.1,0.2\n0.1,1.0,2.0,0.1,0.2\n", "first line holds numbers"),
-        "latin.csv": ("time,größe\n0,1\n".encode("latin-1"), "UTF-8"),
-        "log.xlsx": (b"PK", "suffix '.xlsx'"),
-        "log": (b"PK", "suffix ''"),
-        "twice.csv": (b"time,joint1.position,joint1.position\n0,1,1\n", "'joint1.position' stands in the header twice"),
-    }
-    for name, (content, expected) in made.items():
-        path = tmp_path / name
-        path.write_bytes(content)
-        assert expected in refusal(path, robot), name
-    assert "no such file" in refusal(tmp_path / "absent.parquet", robot)
-    (tmp_path / "folder.parquet").mkdir()
-    assert "is a directory" in refusal(tmp_path / "folder.parquet", robot)
-
-
-def test_damage_anywhere_in_a_parquet_file_never_ends_in_another_exception(robot, tmp_path):
-    whole = save(tmp_path / "whole.parquet", columns(300)).read_bytes()
-    random = np.random.default_rng(0)
-    path = tmp_path / "damaged.parquet"
-    refused = 0
-    for start in random.integers(4, len(whole) - 8, 40).tolist():
-        damaged = bytearray(whole)
-        damaged[start : start + 8] = random.bytes(8)
-        path.write_bytes(damaged)
-        try:
-            read_recording(path, robot)
-        except RecordingError as error:
-            refused += 1
-            assert "\n" not in str(error)
-    assert refused > 0
-
-
-def test_a_file_without_permission_is_refused(robot, tmp_path, monkeypatch):
-    path = save(tmp_path / "a.parquet", columns())
-
-    def denied(*_args: object, **_options: object) -> None:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(Path, "open", denied)
-    assert "permission denied" in refusal(path, robot)
-
-
-def test_dates_and_texts_in_a_parquet_file_are_refused(robot, tmp_path):
-    frame = pl.DataFrame(columns())
-    path = tmp_path / "a.parquet"
-    frame.with_columns((pl.col("time") * 1e6).cast(pl.Datetime("us"))).write_parquet(path)
-    message = refusal(path, robot)
-    assert "'time' holds Datetime" in message
-    assert "seconds" in message
-    frame.with_columns(
-        pl.when(pl.int_range(pl.len()) == 41)
-        .then(pl.lit("off"))
-        .otherwise(pl.col("joint1.effort").cast(pl.String))
-        .alias("joint1.effort")
-    ).write_parquet(path)
-    assert "'joint1.effort', row 42: 'off' is not a number" in refusal(path, robot)
-
-
-# comma-separated values
-
-
-def csv_lines(samples: int = 200) -> list[str]:
-    made = columns(samples)
-    return [",".join(made)] + [",".join(f"{v:.17g}" for v in row) for row in zip(*made.values(), strict=True)]
-
-
-def write_text(path: Path, lines: list[str], end: str = "\n", encoding: str = "utf-8") -> Path:
-    path.write_bytes((end.join(lines) + end).encode(encoding))
-    return path
-
-
-@pytest.mark.parametrize(
-    ("change", "end", "encoding"),
-    [
-        (lambda line: line, "\n", "utf-8"),
-        (lambda line: line, "\r\n", "utf-8-sig"),
-        (lambda line: line.replace(",", ", "), "\n", "utf-8"),
-        (lambda line: line.replace(",", "\t"), "\n", "utf-8"),
-        (lambda line: line.replace(",", ";"), "\n", "utf-8"),
-        (lambda line: ",".join(f'"{word}"' for word in line.split(",")), "\n", "utf-8"),
-    ],
-)
-def test_the_dialects_of_csv_read_alike(robot, tmp_path, change, end, encoding):
-    path = write_text(tmp_path / "a.csv", [change(line) for line in csv_lines()], end, encoding)
-    recording = read_recording(path, robot)
-    made = columns(200)
-    np.testing.assert_array_equal(recording.time, made["time"])
-    np.testing.assert_array_equal(recording.effort[1], made["joint2.effort"])
-    assert recording.findings == ()
-
-
-def test_a_decimal_comma_is_read_behind_semicolons(robot, tmp_path):
-    head, *body = csv_lines()
-    lines = [head.replace(",", ";"), *(line.replace(",", ";").replace(".", ",") for line in body)]
-    recording = read_recording(write_text(tmp_path / "a.csv", lines), robot)
-    np.testing.assert_array_equal(recording.position[0], columns(200)["joint1.position"])
-
-
-def test_a_text_in_a_number_column_is_refused_by_row_and_value(robot, tmp_path):
-    lines = csv_lines()
-    lines[31] = "0.030,oops,0.1,0.1,0.1"
-    lines[40] = "0.039,oops,0.1,0.1,0.1"
-    message = refusal(write_text(tmp_path / "a.csv", lines), robot)
-    assert "column 'joint1.position', row 31: 'oops' is not a number (and 1 more)" in message
-
-
-def test_a_text_in_a_column_that_is_not_needed_is_no_matter(robot, tmp_path):
-    lines = csv_lines()
-    lines = [f"{lines[0]},note", *(f"{line},running" for line in lines[1:])]
-    assert read_recording(write_text(tmp_path / "a.csv", lines), robot).findings == ()
-
-
-def test_empty_values_and_words_for_them_count_as_missing(robot, tmp_path):
-    lines = csv_lines()
-    lines[11] = lines[11].rpartition(",")[0] + ","
-    lines[21] = lines[21].rpartition(",")[0] + ",NA"
-    lines[31] = lines[31].rpartition(",")[0] + ",nan"
-    recording = read_recording(write_text(tmp_path / "a.csv", lines), robot)
-    assert [(finding.kind, finding.count) for finding in recording.findings] == [("nan", 3)]
-    assert "joint2.effort" in recording.findings[0].message
-    assert "first in row 11" in recording.findings[0].message
-
-
-def test_a_last_line_cut_short_is_left_out_and_a_line_too_long_refused(robot, tmp_path):
-    lines = csv_lines()
-    path = tmp_path / "a.csv"
-    path.write_text("\n".join(lines) + "\n0.2,1.5")
-    recording = read_recording(path, robot)
-    assert len(recording.time) == 200
-    assert "row 201" in recording.findings[0].message
-    lines[50] += ",1.0"
-    assert "row 50 has 6 values for 5 columns" in refusal(write_text(path, lines), robot)
-
-
-# gathering
-
-
 def test_words_are_files_folders_and_globs_in_order_of_appearance_and_once(tmp_path, monkeypatch):
     made = columns(60)
     for name in ("OJD_10.parquet", "OJD_2.parquet", "OJD_1.csv", "CI_1.parquet"):
@@ -366,12 +203,10 @@ def test_two_files_of_one_name_are_refused_by_both_names(tmp_path):
     assert str(tmp_path / "b" / "OJD_1.parquet") in str(caught.value)
 
 
-# writing
-
 SIGNAL = arrays(np.float64, (2, 60), elements=st.floats(-2.0, 2.0, width=64))
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(
     suffix=st.sampled_from([".parquet", ".csv"]),
     effort=SIGNAL,

@@ -13,7 +13,6 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation import Effort, design_excitation
 from scara_ident.model.model import build_model
 from scara_ident.report.diagnosis import diagnosis_markdown
-from scara_ident.report.drawing import COLORS
 from scara_ident.report.html import DiagnosisContext, IdentificationContext, diagnosis_report
 from scara_ident.report.html.remainder import signal_of
 from scara_ident.report.pictures import (
@@ -25,15 +24,8 @@ from scara_ident.report.pictures import (
 )
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, with_torque
+from tests.report.pixels import share
 from tests.report.simulated import made, run
-
-
-def _share(path: Path, color: str) -> float:
-    """Return the share of a picture's pixels that have a colour."""
-    from matplotlib.image import imread
-
-    wanted = np.array([int(COLORS[color][k : k + 2], 16) / 255.0 for k in (1, 3, 5)])
-    return float(np.mean(np.all(np.abs(imread(path)[..., :3] - wanted) < 0.02, axis=-1)))
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +47,7 @@ def test_an_effect_is_drawn_before_and_after_and_stands_in_the_story(with_spring
     assert [path.name for path in tmp_path.iterdir()] == ["effect_1.png"]
     # Before, after, and what is measured of the effect; a stroke of the legend alone has not half as many pixels.
     for color in ("vermillion", "blue", "green"):
-        assert _share(tmp_path / "effect_1.png", color) > 2e-4
+        assert share(tmp_path / "effect_1.png", color) > 2e-4
     text = diagnosis_markdown(found, pictures)
     assert "![spring on joint2](effect_1.png)" in text
     assert "png" not in diagnosis_markdown(found)
@@ -66,7 +58,7 @@ def test_a_remainder_is_drawn_over_what_it_depends_on(with_remainder, tmp_path):
     assert diagnosis_pictures(tmp_path, DiagnosisContext(found)) == (
         ("what no effect accounts for on joint2", "unexplained.png"),
     )
-    assert _share(tmp_path / "unexplained.png", "vermillion") > 2e-4
+    assert share(tmp_path / "unexplained.png", "vermillion") > 2e-4
     diagnosis_report(tmp_path / "report.html", DiagnosisContext(found))
     assert 'data-figure="remainder-0"' in (tmp_path / "report.html").read_text(encoding="utf-8")
 
@@ -101,15 +93,16 @@ def test_held_out_runs_are_drawn_first_and_not_too_many(tmp_path: Path, monkeypa
     assert said[1:3] == ["CI_1 (held out), joint1", "OJD_1 (fitted), joint1"]
     assert sum("joint2" in text for text in said) == MOST_RECORDINGS
     for color in ("blue", "vermillion", "green"):
-        assert _share(tmp_path / "torque.png", color) > 2e-4
+        assert share(tmp_path / "torque.png", color) > 2e-4
 
 
 def test_a_joint_at_rest_is_drawn_too(tmp_path: Path):
     fit = [run("OJD_1", 1, still=True, seconds=6.0)]
     torque_picture(tmp_path / "torque.png", IdentificationContext(made(fit)))
-    assert _share(tmp_path / "torque.png", "blue") > 2e-4
+    assert share(tmp_path / "torque.png", "blue") > 2e-4
 
 
+@pytest.mark.slow
 def test_a_design_is_a_picture(tmp_path: Path):
     effort = Effort(starts=1, rounds=0, processes=1)
     design = design_excitation(
@@ -117,7 +110,7 @@ def test_a_design_is_a_picture(tmp_path: Path):
     )
     design_picture(tmp_path / "new" / "preview.png", design)
     for color in ("blue", "vermillion", "sky"):
-        assert _share(tmp_path / "new" / "preview.png", color) > 2e-4
+        assert share(tmp_path / "new" / "preview.png", color) > 2e-4
     with pytest.raises(ScaraIdentError, match="cannot be written"):
         design_picture(tmp_path / "preview.docx", design)
     assert [path.name for path in tmp_path.iterdir()] == ["new"]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scara_ident.report.plot import Grid, Line, envelope, packed
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=60),
     st.integers(1, 9),
@@ -25,7 +25,7 @@ def test_an_envelope_loses_no_peak(values, bucket):
         assert sorted(pair) == [part.min(), part.max()]
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 2**31 - 1), st.floats(-1e6, 1e6), st.floats(1e-6, 1e6))
 def test_packed_numbers_are_within_a_65000th_of_their_range(seed, middle, size):
     values = middle + size * np.random.default_rng(seed).standard_normal(1000)

@@ -44,7 +44,7 @@ def test_yourdfpy_finds_nothing_to_complain_about(description: yourdfpy.URDF) ->
     assert description.validate()
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.tuples(st.floats(-0.61, 3.75), st.floats(-2.18, 2.18), st.floats(-0.15, 0.0)))
 @example((1.5457207815996857e-11, 1.0, 0.0))
 def test_pinocchio_and_yourdfpy_agree_on_forward_kinematics(

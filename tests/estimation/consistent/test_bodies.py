@@ -30,7 +30,7 @@ def thin_rod(mass: float, length: float) -> np.ndarray:
     return np.array([mass, mass * length / 2.0, 0.0, 0.0, 0.0, 0.0, about, 0.0, 0.0, about])
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000))
 def test_packing_keeps_matrices_and_their_inner_product(seed):
     rng = np.random.default_rng(seed)

@@ -45,7 +45,7 @@ def on_grid(p: BrakingPolynomial, values: np.ndarray, end: float) -> tuple[float
     return float(np.min(f)), float(np.max(f))
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 100_000), st.sampled_from([(0, 1), (0, 1, 2), (0, 1, 2, 3)]))
 def test_the_certificate_says_what_a_fine_grid_says(seed, powers):
     rng = np.random.default_rng(seed)
@@ -62,7 +62,7 @@ def test_the_certificate_says_what_a_fine_grid_says(seed, powers):
         assert (friction_faults(p, values) == ()) == (room > 0.0)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(st.integers(0, 100_000), st.sampled_from([(0, 1), (0, 1, 2), (0, 1, 2, 3)]))
 def test_without_a_velocity_limit_friction_brakes_at_every_speed(seed, powers):
     rng = np.random.default_rng(seed)
@@ -75,7 +75,7 @@ def test_without_a_velocity_limit_friction_brakes_at_every_speed(seed, powers):
         assert (slack(c.cones, values / c.unit, c.auxiliary) > -1e-9) == (low > 0.0 and not falls)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(st.integers(0, 100_000))
 def test_the_lubricated_shape_rises_ever_less(seed):
     rng = np.random.default_rng(seed)

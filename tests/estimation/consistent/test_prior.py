@@ -80,7 +80,7 @@ def test_the_nearest_bodies_are_those_of_a_general_solver():
     assert divergence(found) <= divergence(x.value) + 1e-6
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(st.integers(0, 100_000), st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
 def test_the_nearest_bodies_know_neither_frame_nor_unit(seed, length_unit, mass_unit):
     rng = np.random.default_rng(seed)
@@ -132,7 +132,7 @@ def test_the_nearest_bodies_within_limits_are_those_of_a_general_solver():
     np.testing.assert_allclose(found[: 10 * N], start[: 10 * N])
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 100_000), st.floats(0.0, 5.0))
 def test_a_determined_direction_is_moved_by_less_than_a_tenth_of_its_std(seed, wrong):
     """Directions that the data determine better than to nominal size, or tell from nominal, however wrong it is."""

@@ -28,6 +28,7 @@ from scara_ident.report.html import (
 from scara_ident.robot.robot import load_robot
 from tests.arms import noisy, recorded_torque, recording, sines
 from tests.report.simulated import made, run
+from tests.shared import PATIENCE
 
 
 @pytest.fixture(scope="session")
@@ -153,12 +154,13 @@ def opened(browser):
     def open_(path: Path, **options):
         context = browser.new_context(**{"viewport": {"width": 1180, "height": 900}, **options})
         contexts.append(context)
+        context.set_default_timeout(1000.0 * PATIENCE)
         page = context.new_page()
         page.on("console", lambda message: said.append(message.text) if message.type in ("error", "warning") else None)
         page.on("pageerror", lambda error: said.append(str(error)))
         page.on("request", lambda request: asked.append(request.url))
         page.goto(path.as_uri())
-        page.wait_for_selector("html[data-ready=true]", timeout=20_000)
+        page.wait_for_selector("html[data-ready=true]")
         return page
 
     yield open_

@@ -6,6 +6,8 @@ import pytest
 
 from tests.report.html.test_page import PAGES
 
+pytestmark = pytest.mark.slow
+
 EMPTY = """() => [...document.querySelectorAll("[data-figure], [data-arm]")].filter((figure) => {
   if (figure.hidden) return false;
   const svg = figure.querySelector("svg");
@@ -177,9 +179,7 @@ def test_the_arm_moves(excited, opened):
     page = opened(excited)
     before = page.locator("polyline.arm").get_attribute("points")
     page.locator("[data-arm] button").click()
-    page.wait_for_function(
-        f"document.querySelector('polyline.arm').getAttribute('points') !== '{before}'", timeout=5000
-    )
+    page.wait_for_function(f"document.querySelector('polyline.arm').getAttribute('points') !== '{before}'")
     page.locator("[data-arm] button").click()
 
 
@@ -191,7 +191,5 @@ def test_an_animation_frame_from_before_the_click_does_not_stop_the_arm(excited,
     )
     before = page.locator("polyline.arm").get_attribute("points")
     page.locator("[data-arm] button").click()
-    page.wait_for_function(
-        f"document.querySelector('polyline.arm').getAttribute('points') !== '{before}'", timeout=5000
-    )
+    page.wait_for_function(f"document.querySelector('polyline.arm').getAttribute('points') !== '{before}'")
     page.locator("[data-arm] button").click()

@@ -16,8 +16,15 @@ from scara_ident.errors import RegressorMismatch, RobotError
 from scara_ident.model.regressor import kernel as regressor
 from scara_ident.model.regressor.kernel import PARAMETERS, Array, RegressorKernel, build_kernel, pinocchio_regressor
 from scara_ident.model.regressor.recursion import joint_geometry
-
-LINK = 0.33
+from tests.model.regressor.made import (
+    LINK,
+    configuration,
+    consistent_inertia,
+    fill_inertias,
+    random_model,
+    scara,
+    states,
+)
 
 URDFS = {
     "ur5": "ur_description/urdf/ur5_robot.urdf",  # pi/2 written as 1.57079632679
@@ -35,67 +42,6 @@ def load(name: str) -> pin.Model:
         return scara()
     robots = Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots")))
     return pin.buildModelFromUrdf(str(robots / URDFS[name]))
-
-
-def scara() -> pin.Model:
-    model = pin.Model()
-    model.name = "scara"
-    first = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint1")
-    model.addJoint(first, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array([LINK, 0.0, 0.0])), "joint2")
-    return model
-
-
-def states(model: pin.Model, samples: int, seed: int = 7) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    generator = np.random.default_rng(seed)
-    q, v, a = (generator.uniform(-size, size, (model.nv, samples)) for size in (7.0, 2.0, 8.0))
-    return q, v, a
-
-
-def consistent_inertia(generator: np.random.Generator) -> pin.Inertia:
-    """Draw a body of a few point masses: physically consistent whatever they are."""
-    masses = generator.uniform(0.1, 2.0, 5)
-    points = generator.normal(scale=0.3, size=(5, 3))
-    com = masses @ points / masses.sum()
-    rotational = sum(m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in zip(masses, points - com, strict=True))
-    return pin.Inertia(masses.sum(), com, rotational)
-
-
-def fill_inertias(model: pin.Model, seed: int) -> np.ndarray:
-    """Give every body a random inertia; return the standard parameters."""
-    generator = np.random.default_rng(seed)
-    for body in range(1, model.njoints):
-        model.inertias[body] = consistent_inertia(generator)
-    return np.concatenate([model.inertias[body].toDynamicParameters() for body in range(1, model.njoints)])
-
-
-def random_model(seed: int, bodies: int) -> pin.Model:
-    """Build a tree of revolute, unbounded and prismatic joints, axes along coordinates or anywhere."""
-    generator = np.random.default_rng(seed)
-    plain = [
-        pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ, pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ,
-        pin.JointModelRUBX, pin.JointModelRUBY, pin.JointModelRUBZ,
-    ]  # fmt: skip
-    free = [pin.JointModelRevoluteUnaligned, pin.JointModelPrismaticUnaligned]
-    model = pin.Model()
-    model.name = "random"
-    model.gravity.linear = generator.normal(scale=6.0, size=3)
-    for body in range(bodies):
-        choice = generator.integers(len(plain) + len(free))
-        if choice < len(plain):
-            joint = plain[choice]()
-        else:
-            axis = generator.normal(size=3)
-            joint = free[choice - len(plain)](axis / np.linalg.norm(axis))
-        angles = generator.choice([0.0, np.pi / 2, np.pi, 1.57079632679, generator.uniform(-3, 3)], 3)
-        offset = generator.normal(scale=0.4, size=3) * generator.integers(0, 2, 3)
-        placement = pin.SE3(pin.rpy.rpyToMatrix(*angles), offset)
-        model.addJoint(int(generator.integers(max(0, body - 2), body + 1)), joint, placement, f"joint{body + 1}")
-    return model
-
-
-def configuration(model: pin.Model, q: np.ndarray) -> np.ndarray:
-    """Integrate from neutral: Pinocchio's own way from angles to a configuration."""
-    return pin.integrate(model, pin.neutral(model), q)
 
 
 def assert_agrees(model: pin.Model, samples: int = 40) -> None:
@@ -116,13 +62,13 @@ def test_kernel_agrees_with_pinocchio_and_knows_its_structural_zeros(name: str) 
     np.testing.assert_array_equal(build_kernel(model).pattern, expected > 1e-12)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(seed=st.integers(0, 2**32 - 1), bodies=st.integers(1, 6))
 def test_kernel_agrees_with_pinocchio_on_random_trees(seed: int, bodies: int) -> None:
     assert_agrees(random_model(seed, bodies), samples=10)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), bodies=st.integers(1, 6))
 def test_regressor_times_parameters_is_inverse_dynamics(seed: int, bodies: int) -> None:
     model = random_model(seed, bodies)
@@ -135,7 +81,7 @@ def test_regressor_times_parameters_is_inverse_dynamics(seed: int, bodies: int) 
         np.testing.assert_allclose(torque[:, k], expected, rtol=0, atol=1e-11 * (1 + np.abs(expected).max()))
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1), bodies=st.integers(1, 5))
 def test_work_of_the_torques_is_the_gain_of_energy(seed: int, bodies: int) -> None:
     model = random_model(seed, bodies)

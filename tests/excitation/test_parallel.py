@@ -1,0 +1,47 @@
+"""Work on several cores in one order."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from scara_ident.excitation import parallel
+from scara_ident.excitation.parallel import available_cores, map_in_order
+
+
+@pytest.mark.parametrize("processes", [1, 2, 3])
+def test_results_do_not_depend_on_the_number_of_processes(processes: int):
+    # A function that holds another cannot be sent to a process; a fork has it.
+    def work(item: int) -> tuple[int, int]:
+        return item, (lambda x: x**2)(item)
+
+    assert list(map_in_order(work, iter(range(7)), processes)) == [(k, k * k) for k in range(7)]
+
+
+def test_the_work_is_done_in_other_processes_where_there_may_be_several():
+    assert os.getpid() not in set(map_in_order(lambda _: os.getpid(), range(4), 2))
+    assert set(map_in_order(lambda _: os.getpid(), range(4), 1)) == {os.getpid()}
+
+
+def test_without_fork_the_items_are_worked_on_here(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(parallel.multiprocessing, "get_all_start_methods", lambda: ["spawn"])
+    assert set(map_in_order(lambda _: os.getpid(), range(4), 2)) == {os.getpid()}
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_an_error_reaches_the_caller_behind_the_results_before_it(processes: int):
+    results = map_in_order(lambda x: 6 // (2 - x), range(4), processes)
+    assert [next(results), next(results)] == [3, 6]
+    with pytest.raises(ZeroDivisionError):
+        next(results)
+
+
+def test_nothing_to_do_gives_nothing():
+    assert list(map_in_order(lambda x: x, [], 2)) == []
+
+
+def test_no_more_cores_are_used_than_this_process_may(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {3}, raising=False)
+    assert available_cores() == 1
+    assert set(map_in_order(lambda _: os.getpid(), range(3))) == {os.getpid()}

@@ -1,0 +1,51 @@
+"""What the search finds and what it says where there is nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.excitation import (
+    Effort,
+    InfeasibleLimits,
+    design_excitation,
+    limits_of,
+)
+from scara_ident.model.model import build_model
+from tests.excitation.designs import COMPLETE, QUICK, SCARA, SHORT
+from tests.excitation.made import scara_with_quill
+
+
+@pytest.mark.slow
+def test_the_design_depends_on_the_seed_alone(short):
+    again = design_excitation(COMPLETE, **SHORT, effort=Effort(starts=2, rounds=0, seed=3, processes=2))
+    np.testing.assert_array_equal(again.trajectories[0].coefficients, short.trajectories[0].coefficients)
+    assert short.costs[0] != short.costs[1]
+
+
+@pytest.mark.slow
+def test_progress_is_told_after_every_search():
+    seen = []
+    effort = replace(QUICK, rounds=1, seed=4)
+    made = design_excitation(COMPLETE, **SHORT, effort=effort, progress=seen.append)
+    assert [(each.done, each.total) for each in seen] == [(1, 2), (2, 2)]
+    assert seen[-1].cost == min(made.costs)
+
+
+def test_parameters_that_no_motion_tells_apart_are_said():
+    robot = scara_with_quill()
+    with pytest.raises(InfeasibleLimits, match=r"no motion can tell .*m3, Ia3, p_o3 apart"):
+        design_excitation(build_model(robot), duration=6.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"tool_acceleration": 1e-4}, r"tightest is the tool acceleration limit of 0\.0001 m/s\^2"),
+        ({"ranges": {"joint1": (0.0, 1e-5)}}, r"tightest is the range of joint1, 1e-05 rad"),
+        ({"torques": {"joint1": 0.2101}}, r"tightest is the torque limit of joint1, 0\.0001 N m"),
+    ],
+)
+def test_limits_too_tight_for_any_motion_are_named(given, said):
+    with pytest.raises(InfeasibleLimits, match=f"no motion within the limits shows all parameters; the {said}"):
+        design_excitation(COMPLETE, **SHORT, limits=limits_of(SCARA, **given), effort=QUICK)

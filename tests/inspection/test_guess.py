@@ -1,0 +1,83 @@
+"""Channels and units are found where names do not say them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from tests.arms import Link, write_urdf
+from tests.inspection.made import MADE, assert_same, inspected, read_back
+from tests.made_recordings import save
+from tests.recording.files.formats import DEGREE, write_bag, write_mat
+
+
+def test_units_are_told_by_limits_and_slopes_where_no_name_says_them(tmp_path):
+    made = {"clock": 1e3 * MADE["time"]}
+    for number, joint in enumerate(("joint1", "joint2")):
+        made[f"J{number} angle"] = MADE[f"{joint}.position"] / DEGREE
+        made[f"J{number} speed"] = MADE[f"{joint}.velocity"] * 100 * 60 / (2 * np.pi)
+        made[f"J{number} torque"] = MADE[f"{joint}.effort"]
+        made[f"J{number} target angle"] = np.zeros(600)
+    urdf = two_joints(tmp_path)
+    found = inspected(save(tmp_path / "a.csv", made), tmp_path, urdf)
+    assert found.problems == ()
+    assert found.mapping["time"] == {"column": "clock", "unit": "ms"}
+    assert found.mapping["position"] == {"column": "J{index} angle", "unit": "deg"}
+    assert found.mapping["velocity"] == {"column": "J{index} speed", "unit": "rpm", "side": "motor"}
+    assert any("order" in note for note in found.notes)
+    back = read_back(found, tmp_path)
+    np.testing.assert_allclose(back.position[1], MADE["joint2.position"], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(back.velocity[0], MADE["joint1.velocity"], rtol=1e-9, atol=1e-9)
+
+
+def two_joints(folder: Path, reduction: float = 100.0) -> Path:
+    links = (Link(), Link(xyz=(0.4, 0.0, 0.0)))
+    return write_urdf(folder / "arm.urdf", links, (reduction, reduction))
+
+
+def test_matrices_of_a_mat_file_are_matched_by_order(tmp_path):
+    q, tau = (np.array([MADE[f"{j}.{s}"] for j in ("joint1", "joint2")]) for s in ("position", "effort"))
+    path = write_mat(tmp_path / "log.mat", {"t": MADE["time"], "q": q.T, "tau": tau.T})
+    found = inspected(path, tmp_path, two_joints(tmp_path))
+    assert found.mapping["position"] == {"column": "q[{index}]", "unit": "rad"}
+    assert found.mapping["effort"] == {"column": "tau[{index}]", "unit": "N m"}
+    assert_same(read_back(found, tmp_path), tmp_path, signals=("position", "effort"))
+
+
+def test_the_topic_with_the_arms_joints_is_chosen(tmp_path):
+    other = {name.replace("joint", "finger"): values for name, values in MADE.items()}
+    bag = write_bag(tmp_path / "run", MADE | other, topics=("/b/joint_states",))
+    found = inspected(bag, tmp_path)
+    assert found.mapping == {}
+    two = write_bag(tmp_path / "two", MADE, topics=("/a/joint_states", "/b/joint_states"))
+    found = inspected(two, tmp_path)
+    assert set(found.topics) == {"/a/joint_states", "/b/joint_states"}
+    assert found.mapping == {"topic": found.topic}
+    assert_same(read_back(found, tmp_path), tmp_path)
+
+
+def test_a_current_asks_for_its_gain(tmp_path):
+    made = {name.replace("effort", "current"): values for name, values in MADE.items()}
+    found = inspected(save(tmp_path / "a.parquet", made), tmp_path, None)
+    assert found.mapping["effort"] == {"column": "{joint}.current", "unit": "A"}
+    assert "STATE effort_gain, N m per A" in (found.description or "")
+    assert_same(read_back(found, tmp_path), tmp_path)
+
+
+def test_encoder_counts_are_seen_and_their_number_a_turn_asked_for(tmp_path):
+    made = {n: np.rint(1e4 * v) if n.endswith("position") else v for n, v in MADE.items()}
+    found = inspected(save(tmp_path / "a.parquet", made), tmp_path)
+    assert any("counts_per_turn" in problem for problem in found.problems)
+    assert found.recording is None
+
+
+def test_a_file_without_an_arm_says_what_is_missing(tmp_path):
+    path = save(tmp_path / "a.parquet", {"x": np.arange(60.0) ** 2 % 7, "y": np.zeros(60)})
+    found = inspected(path, tmp_path)
+    assert len(found.problems) == 2
+    assert "time" in found.problems[0]
+    assert "position" in found.problems[1]
+    # The draft is still a description that loads, but for the side of effort.
+    assert yaml.safe_load(found.description or "")["urdf"]

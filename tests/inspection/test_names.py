@@ -1,0 +1,43 @@
+"""What the name of a column says."""
+
+from __future__ import annotations
+
+import pytest
+
+from scara_ident.inspection.names import meaning
+
+UR = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint")
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "joint", "number", "unit"),
+    [
+        ("shoulder_pan_joint.position", "position", 0, None, None),
+        ("/joint_states/wrist_1_joint/velocity", "velocity", 3, None, None),
+        ("elbow.pos [deg]", "position", 2, None, "deg"),
+        ("elbow_current_mA", "effort", 2, None, "mA"),
+        ("wrist_1_vel_rpm", "velocity", 3, None, "rpm"),
+        ("ShoulderLiftTorque", "effort", 1, None, None),
+        ("actual_q_0", "position", None, 0, None),
+        ("log.qd[3]", "velocity", None, 3, None),
+        ("tau_3 (Nm)", "effort", None, 3, "N m"),
+        ("joint_2_temperature", "temperature", None, 2, None),
+        ("I[2]", "effort", None, 2, None),
+        ("I", None, None, None, None),
+        ("t_ms", "time", None, None, "ms"),
+        ("__time", "time", None, None, None),
+        ("actual_TCP_speed_0", None, None, 0, None),
+        ("position_error_1", None, None, 1, None),
+        ("status", None, None, None, None),
+    ],
+)
+def test_a_name_says_quantity_joint_and_unit(name, quantity, joint, number, unit):
+    said = meaning(name, UR)
+    assert (said.quantity, said.joint, said.number, said.unit) == (quantity, joint, number, unit)
+
+
+def test_a_prefix_of_all_joints_may_be_left_out_and_ambiguous_short_names_count_for_none():
+    panda = ("panda_joint1", "panda_joint2")
+    assert meaning("joint2/pos", panda).joint == 1
+    assert meaning("elbow_pos", ("elbow_joint", "elbow_link")).joint is None
+    assert meaning("joint10_pos", tuple(f"joint{k}" for k in range(1, 11))).joint == 9

@@ -1,0 +1,44 @@
+"""The first description of an arm reads the file it was made from."""
+
+from __future__ import annotations
+
+import yaml
+
+from tests.arms import Link, write_urdf
+from tests.inspection.made import MADE, assert_same, inspected, read_back
+from tests.made_recordings import save
+from tests.recording.files.formats import write_plotjuggler
+
+
+def test_the_contracts_columns_need_no_mapping(tmp_path):
+    found = inspected(save(tmp_path / "a.parquet", MADE), tmp_path)
+    assert found.problems == ()
+    assert found.mapping == {}
+    assert found.recording is not None
+    assert found.recording.findings == ()
+    assert {column.name: (column.quantity, column.joint) for column in found.columns}["joint2.effort"] == (
+        "effort",
+        "joint2",
+    )
+    assert_same(read_back(found, tmp_path), tmp_path)
+
+
+def test_the_side_of_effort_is_asked_for_where_there_are_gears(tmp_path):
+    urdf = write_urdf(tmp_path / "arm.urdf", (Link(), Link(), Link()), (100.0, -50.5, 1.0))
+    made = {name.replace("joint", "j"): values for name, values in MADE.items()}
+    found = inspected(save(tmp_path / "a.parquet", made), tmp_path, urdf)
+    content = yaml.safe_load(found.description or "")
+    assert "effort_side" not in content
+    assert "# effort_side: motor" in (found.description or "")
+    assert [joint["reduction"] for joint in content["joints"].values()] == [100, -50.5]
+    assert content["locked"] == {"j3": 0.0}
+    assert any("j3: taken as locked" in note for note in found.notes)
+
+
+def test_plotjugglers_export_maps_by_one_pattern_a_signal(tmp_path):
+    found = inspected(write_plotjuggler(tmp_path / "log.csv", MADE), tmp_path)
+    assert found.mapping["time"] == {"column": "__time", "unit": "s"}
+    assert found.mapping["position"] == {"column": "/joint_states/{joint}/position", "unit": "rad"}
+    assert found.mapping["velocity"] == {"column": "/joint_states/{joint}/velocity", "unit": "rad/s"}
+    assert found.recording is not None
+    assert_same(read_back(found, tmp_path), tmp_path)

@@ -1,0 +1,62 @@
+"""Dead, stuck and saturated efforts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.made_recordings import columns
+from tests.recording.audit.made import kinds, only, refusal
+
+
+@pytest.mark.parametrize("value", [0.0, 0.173])
+def test_a_dead_effort_of_a_moving_joint_is_refused(read, value):
+    made = columns()
+    made["joint2.effort"][:] = value
+    message = refusal(read, made)
+    assert f"joint2.effort is {value:g} throughout" in message
+    assert "dead" in message
+
+
+def test_a_dead_effort_is_no_matter_where_the_joint_stands_still_or_efforts_are_not_needed(read):
+    made = columns()
+    made["joint2.effort"][:] = 0.0
+    assert read(made, need_effort=False).findings == ()
+    made["joint2.position"][:] = 0.4
+    assert kinds(read(made)) == ["idle_joint", "dead_effort"]
+
+
+def test_an_effort_that_dies_is_left_out_or_refused_with_its_place(read):
+    made = columns()
+    made["joint1.effort"][3000:] = 0.1
+    recording = read(made)
+    finding = only(recording, "stuck_effort")
+    assert finding.count == 1000
+    assert "row 3001" in finding.message
+    assert len(recording.time) == 3000
+    made["joint1.effort"][1500:] = 0.1
+    assert "row 1501" in refusal(read, made)
+
+
+def test_saturation_is_said_with_share_and_level(read, robot):
+    made = columns()
+    made["joint1.effort"] = np.clip(made["joint1.effort"], -10.0, 0.3)
+    share = np.mean(made["joint1.effort"] == 0.3)
+    recording = read(made, replace(robot, effort_gain=np.array([2.0, 1.0])))
+    finding = only(recording, "saturation")
+    assert finding.count == np.count_nonzero(made["joint1.effort"] == 0.3)
+    assert "extreme 0.3 (0.6 N m)" in finding.message
+    assert f"{100 * share:.2g} %" in finding.message
+    made["joint1.effort"] = np.clip(made["joint1.effort"], -0.35, 0.3)
+    assert kinds(read(made)) == ["saturation", "saturation"]
+
+
+def test_the_crests_of_a_quantised_effort_are_not_called_saturation(read):
+    made = columns()
+    phase = 2 * np.pi * 0.35 * made["time"]
+    made["joint1.effort"] = 0.01 * np.rint(0.4 * np.cos(phase) / 0.01)
+    assert "saturation" not in kinds(read(made))
+    made["joint1.effort"] = 0.01 * np.rint(columns()["joint1.effort"] / 0.01)
+    assert "saturation" not in kinds(read(made))

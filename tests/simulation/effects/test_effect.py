@@ -1,0 +1,136 @@
+"""What all effects share: sizes, places, refusals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from scara_ident.errors import UsageError
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import (
+    EFFECTS,
+    ideal,
+    on_side,
+    parse_effect,
+    simulate,
+    virtual_arm,
+)
+from scara_ident.simulation import effects as fx
+from tests.arms import example_urdf
+from tests.simulation.effects.runs import run
+from tests.simulation.made import left_over, scara, swing
+
+NOTHING = [
+    fx.TransmissionLoss(loss_coefficient=0.0),
+    fx.Stribeck(amplitude=0.0),
+    fx.AsymmetricFriction(viscous_difference=0.0),
+    fx.Presliding(presliding_distance=0.0),
+    fx.WarmUp(share=0.0),
+    fx.TorqueRipple(amplitude=0.0),
+    fx.PositionDependentFriction(share=0.0),
+    fx.Spring(stiffness=0.0),
+    fx.BaseTilt(tilt_x=0.0, tilt_y=0.0),
+    fx.PayloadChange(mass=0.0, time=0.3),
+    fx.TimeDelay(delay=0.0),
+    fx.TorqueSensorNonlinearity(cubic=0.0),
+    fx.TorqueGainMismatch(ratio=1.0),
+    fx.Backlash(width=0.0),
+    fx.EncoderEccentricity(amplitude=0.0),
+    fx.FrictionCoupling(viscous=0.0, coulomb=0.0),
+    fx.OffsetDrift(rate=0.0),
+    fx.Vibration(amplitude=0.0),
+    fx.UnlistedSignedSine(amplitude=0.0),
+    fx.UnlistedSwingingViscous(viscous=0.0),
+]
+
+
+def test_an_effect_of_no_size_is_no_effect_at_all() -> None:
+    # A rigid joint is an elastic one of infinite stiffness, the only size that is not a number here.
+    assert {type(effect) for effect in NOTHING} == set(EFFECTS.values()) - {fx.JointElasticity}
+    plain = run(duration=0.6)
+    for effect in NOTHING:
+        result = run(effect, duration=0.6)
+        np.testing.assert_array_equal(result.true.effort, plain.true.effort, err_msg=effect.name)
+        np.testing.assert_array_equal(result.true.position, plain.true.position, err_msg=effect.name)
+        np.testing.assert_array_equal(result.recording.effort, plain.recording.effort, err_msg=effect.name)
+
+
+@pytest.mark.parametrize("urdf", [None, "ur5_robot.urdf"])
+def test_every_effect_runs_with_its_own_sizes_and_is_felt(urdf: str | None) -> None:
+    arm = scara() if urdf is None else ideal(virtual_arm(load_robot(example_urdf(urdf))))
+    motion = swing(arm.robot, 0.5, amplitude=0.2)
+    plain = simulate(arm, motion)
+    for name, kind in EFFECTS.items():
+        effect = kind(time=0.2) if kind is fx.PayloadChange else kind()
+        result = simulate(arm, motion, effects=[effect])
+        assert all(math.isfinite(value) for value in result.effects[0].as_dict()["parameters"].values()), name
+        changed = np.abs(result.recording.effort - plain.recording.effort).max(axis=1) / arm.torque_scale
+        assert 1e-4 < changed.max() < 1.5, name
+
+
+def test_effects_act_together() -> None:
+    chosen = [
+        fx.Spring("joint1", 0.05, 0.2),
+        fx.TorqueRipple("joint1", 1.0, 0.03),
+        fx.TorqueRipple("joint1", 2.0, 0.02),
+    ]
+    chosen = [effect.resolve(scara()) for effect in chosen]
+    result = simulate(scara(), swing(scara().robot, 1.0), effects=chosen)
+    q = result.true.position[0]
+    expected = 0.05 * (q - 0.2) + sum(e.amplitude * np.sin(100 * e.order * q + e.phase) for e in chosen[1:])
+    extra = left_over(result.arm, result.true)[0]
+    moving = np.isfinite(extra)
+    np.testing.assert_allclose(extra[moving], expected[moving], atol=1e-10)
+
+
+def test_sizes_on_the_joint_side_are_n_times_the_motors() -> None:
+    motor, joint = scara(), on_side(scara(), "joint")
+    sized = {"spring": "stiffness", "stribeck": "amplitude", "torque_ripple": "amplitude", "offset_drift": "rate"}
+    for name, key in sized.items():
+        one, other = (EFFECTS[name]().resolve(arm).as_dict()["parameters"][key] for arm in (motor, joint))
+        assert other == pytest.approx(100.0 * one), name
+
+
+@pytest.mark.parametrize(
+    ("effects", "said"),
+    [
+        (["spring:joint9"], "its joints are joint1, joint2"),
+        (["base_tilt:joint1"], "belongs to the whole arm"),
+        (["transmission_loss:loss_coefficient=-0.1"], "expected 0 to 5"),
+        (["warm_up:time_constant=0"], "or more s"),
+        (["torque_gain_mismatch:joint1"], "a joint other than joint1"),
+        (["spring", "spring:joint1"], "given twice for joint1"),
+        (["presliding:presliding_distance=1e-12"], "so stiff"),
+        (["offset_drift:rate=nan"], None),
+    ],
+)
+def test_an_effect_that_does_not_fit_is_one_line(effects: list[str], said: str | None) -> None:
+    chosen = [parse_effect(text) for text in effects]
+    if said is None:  # nan is how a size is left to the arm
+        simulate(scara(), swing(scara().robot, 0.1), effects=chosen)
+        return
+    with pytest.raises(UsageError, match=said) as caught:
+        simulate(scara(), swing(scara().robot, 0.1), effects=chosen)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_any_mix_of_effects_leaves_the_arm_on_its_way(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    arm = virtual_arm()
+    for _ in range(4):
+        kinds = random.permutation(list(EFFECTS.values()))[:5]
+        chosen = [
+            kind(
+                joint=None
+                if kind.whole_arm != "never" or kind is fx.TorqueGainMismatch
+                else random.choice(["joint1", "joint2"])
+            )
+            for kind in kinds
+        ]
+        motion = swing(arm.robot, 1.0, amplitude=float(random.choice([0.002, 0.3])))
+        result = simulate(arm, motion, effects=chosen)
+        assert np.abs(result.true.position - motion.position).max() < 0.05
+        assert result.stops < 200

@@ -1,0 +1,45 @@
+"""Two threads over items, and one BLAS thread."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from scara_ident.threads import one_blas_thread, side_by_side
+from tests.shared import PATIENCE
+
+
+def blas_threads() -> set[int]:
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+def test_results_come_in_the_order_of_the_items_whichever_is_done_first():
+    first = threading.Event()
+
+    def work(item: int, other: int) -> int:
+        if item == 0:
+            assert first.wait(PATIENCE)
+        else:
+            first.set()
+        return 10 * item + other
+
+    assert side_by_side(work, range(4), range(4)) == [0, 11, 22, 33]
+
+
+def test_an_error_reaches_the_caller():
+    with pytest.raises(ZeroDivisionError):
+        side_by_side(lambda x: 1 / x, [1, 0, 2])
+
+
+def test_blas_has_one_thread_inside_and_its_own_again_outside():
+    with threadpool_limits(limits=2, user_api="blas"):
+        before = blas_threads()
+        with one_blas_thread():
+            assert blas_threads() == {1}
+        assert blas_threads() == before
+        assert set().union(*side_by_side(lambda _: blas_threads(), range(3))) == {1}
+        with pytest.raises(KeyError), one_blas_thread():
+            raise KeyError
+        assert blas_threads() == before
