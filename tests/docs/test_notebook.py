@@ -18,7 +18,7 @@ import json
 print(json.dumps({
     "verdict": found.verdict,
     "effects": [[e.effect, e.joint, e.parameters["loss_coefficient"].value] for e in found.effects],
-    "held_out": [estimate.errors(evidence[0])[0].rms for estimate, evidence in (
+    "held_out": [estimate.errors(observations)[0].rms for estimate, observations in (
         (found.before, found.validation_before), (found.after, found.validation_after))],
     "parameters": [(base.grouping @ one.standard_parameters()).tolist() for one in (robot, identified, arm.robot)],
 }))
@@ -42,6 +42,7 @@ def test_what_the_notebook_points_to_is_there() -> None:
     assert [target for target in targets if not (NOTEBOOK.parent / target).is_file()] == []
 
 
+@pytest.mark.slow
 def test_the_notebook_runs_top_to_bottom_and_finds_what_it_hid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     nbformat = pytest.importorskip("nbformat", reason="needs the extra test: pip install '.[test]'")
     nbclient = pytest.importorskip("nbclient", reason="needs the extra test: pip install '.[test]'")
