@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from scara_ident.simulation.named import named_motion
     from scara_ident.simulation.simulate import SimulationResult, simulate
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _NAMES = {
     "errors": ("ScaraIdentError", "RecordingError", "RobotError", "UsageError", "EstimationError"),

@@ -1,21 +1,34 @@
-"""The code blocks of a page, and running them as a reader would: in order, in one folder."""
+"""The code blocks of a page, run as a reader would, in order, in one folder, and what they print beside what it shows.
+
+- ``bash`` and ``python`` are run; so are lines of a ``text`` block that begin with ``$``.
+- ``text`` is what the block before it prints, or these lines do, or a part of that.
+- ``sh`` is only read: commands for data or places that a test does not have.
+- A block with a title is a file.
+"""
 
 from __future__ import annotations
 
+import io
 import os
 import re
+import shlex
 import subprocess
 import sys
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tests.shared import PATIENCE, ROOT
 
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+PAGES = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md")))
 
 _BLOCK = re.compile(r"^```(?P<head>[^\n]*)\n(?P<text>.*?)^```[ \t]*$", re.DOTALL | re.MULTILINE)
 _TITLE = re.compile(r'title="([^"]+)"')
+# A command behind a prompt, with the lines that a backslash joins to it.
+_PROMPTED = re.compile(r"^\$ ((?:\\\n|[^\n])*)", re.MULTILINE)
+# Not the digit of a name such as joint1 or P_d1.
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -28,10 +41,14 @@ class Block:
     line: int
 
     @property
-    def commands(self) -> str:
-        """Commands of a bash block; where some stand behind a prompt, the other lines are what they print."""
-        prompted = [line[2:] for line in self.text.splitlines() if line.startswith("$ ")]
-        return "\n".join(prompted) if prompted else self.text
+    def prompted(self) -> str:
+        """Commands behind a prompt, with the lines that a backslash joins to them."""
+        return "\n".join(_PROMPTED.findall(self.text))
+
+    @property
+    def shown(self) -> list[str]:
+        """Lines that are shown as printed."""
+        return [line for line in _PROMPTED.sub("", self.text).splitlines() if line]
 
 
 def blocks(page: Path) -> list[Block]:
@@ -47,27 +64,95 @@ def blocks(page: Path) -> list[Block]:
 
 
 def run(page: Path, folder: Path) -> dict[str, Any]:
-    """Run a page in a folder, which is the working directory; return the names that its Python made."""
+    """Run a page in a folder, which is the working directory; return the names that its Python made.
+
+    Fails where a block fails or prints something else than the page shows.
+    """
     names: dict[str, Any] = {"__name__": "__main__"}
+    printed: str | None = None
     for block in blocks(page):
+        where = f"{page.relative_to(ROOT) if page.is_relative_to(ROOT) else page}, line {block.line}"
         if block.title is not None:
             (folder / block.title).write_text(block.text, encoding="utf-8")
         elif block.language == "bash":
-            run_bash(page, block, folder)
+            printed = run_bash(where, block.text, folder)
         elif block.language == "python":
             # So that a traceback names the page and its line.
             code = compile("\n" * (block.line - 1) + block.text, str(page), "exec")
-            exec(code, names)
+            with redirect_stdout(io.StringIO()) as out:
+                exec(code, names)
+            printed = out.getvalue()
+        elif block.language == "text":
+            printed = run_bash(where, block.prompted, folder) if block.prompted else printed
+            assert printed is not None, f"{where}: no block before it prints this"
+            missing = not_printed(block.shown, printed)
+            assert missing is None, f"{where}: {missing!r} is not printed; this is:\n{printed}"
     return names
 
 
-def run_bash(page: Path, block: Block, folder: Path) -> None:
-    """Run a bash block as one script that stops at the first command that fails."""
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+def run_bash(where: str, commands: str, folder: Path) -> str:
+    """Run commands as one script that stops at the first that fails; return what they print."""
+    search = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    modules = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
     done = subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", block.commands],
-        cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=PATIENCE, check=False,
+        ["bash", "-euo", "pipefail", "-c", commands], cwd=folder, capture_output=True, text=True, timeout=PATIENCE,
+        env={**os.environ, "PATH": search, "PYTHONPATH": modules}, check=False,
     )  # fmt: skip
-    where = f"{page.relative_to(ROOT)}, line {block.line}"
     assert done.returncode == 0, f"{where}: exit status {done.returncode}\n{done.stdout}{done.stderr}"
     assert "Traceback" not in done.stderr, f"{where}:\n{done.stderr}"
+    return done.stdout
+
+
+def not_printed(shown: list[str], printed: str) -> str | None:
+    """Return the first shown line that was not printed in its place, or None.
+
+    Lines may be left out between those shown, and wrapped elsewhere; spaces do not count.
+    """
+    lines = [line.split() for line in printed.splitlines()]
+    words = [word for line in lines for word in line]
+    starts = [sum(map(len, lines[:k])) for k in range(len(lines))]
+    here = 0
+    for line in shown:
+        wanted = line.split()
+        places = [here, *(start for start in starts if start > here)]
+        fits = (
+            place
+            for place in places
+            if len(words) >= place + len(wanted) and all(map(same, wanted, words[place : place + len(wanted)]))
+        )
+        found = next(fits, None)
+        if found is None:
+            return line
+        here = found + len(wanted)
+    return None
+
+
+def same(shown: str, printed: str) -> bool:
+    """Whether two words are the same: numbers to two digits, or to one unit in the last digit shown."""
+    if _NUMBER.sub("#", shown) != _NUMBER.sub("#", printed):
+        return False
+    return all(map(_near, _NUMBER.findall(shown), _NUMBER.findall(printed)))
+
+
+def _near(shown: str, printed: str) -> bool:
+    if re.fullmatch(r"[-+]?\d+", shown):
+        return shown == printed
+    mantissa, _, power = shown.partition("e")
+    unit = 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))
+    # Two digits: half a unit of the second is at most 5 % of the number.
+    return abs(float(shown) - float(printed)) <= max(0.05 * abs(float(shown)), 1.01 * unit)
+
+
+def commands_in(page: Path) -> list[list[str]]:
+    """Return the words of every command line of ``scara-ident`` or ``python -m scara_ident`` in the blocks of a page."""
+    found = []
+    for block in blocks(page):
+        if block.language in ("bash", "sh", "text"):
+            text = block.prompted if block.language == "text" else block.text
+            for line in text.replace("\\\n", " ").splitlines():
+                words = shlex.split(line, comments=True)
+                if words[:1] == ["scara-ident"]:
+                    found.append(words[1:])
+                elif words[:3] == ["python", "-m", "scara_ident"]:
+                    found.append(words[3:])
+    return found

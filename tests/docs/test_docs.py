@@ -6,28 +6,38 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from typer.core import TyperGroup as Group
+from typer.main import get_command
 
+import scara_ident
 from scara_ident.cli.main import app
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.effects import CATALOGUE
 from scara_ident.effects.aliases import HIDDEN
 from scara_ident.model.base_parameters import find_base_parameters
-from scara_ident.paper import OJD, OJK
+from scara_ident.paper import OJD
 from scara_ident.recording.recording import write_recording
 from scara_ident.robot.robot import embedded_urdf, load_robot
 from scara_ident.simulation import sampled, simulate, virtual_arm
-from tests.docs.pages import PAGES, Block, blocks, run, run_bash
+from tests.docs.pages import PAGES, Block, blocks, commands_in, not_printed, run, run_bash
 from tests.shared import ROOT
+from tests.test_layers import ROOMS
 
 DOCS = ROOT / "docs"
 README = ROOT / "README.md"
 TUTORIAL = DOCS / "tutorial.md"
 # These are run, and looked at, by tests of their own.
 APART = (README, TUTORIAL, DOCS / "howto" / "my-own-effect.md", DOCS / "howto" / "known-payload.md")
+
+
+# Options of the program itself.
+GENERAL = {"--help", "--install-completion", "--show-completion", "--version"}
 
 
 def name_of(page: Path) -> str:
@@ -66,7 +76,7 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
 @pytest.mark.parametrize("page", [page for page in PAGES if page not in APART], ids=name_of)
 def test_what_a_page_says_to_type_runs(page: Path, reader: Path) -> None:
     found = blocks(page)
-    known = {"bash", "python", "yaml", "toml", "text", "json"}
+    known = {"bash", "python", "yaml", "toml", "text", "sh"}
     assert {block.language for block in found} <= known, "a block that is neither run nor known not to be"
     run(page, reader)
 
@@ -96,7 +106,7 @@ def test_the_tutorial_finds_what_it_hid(reader: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_users_own_effect_takes_under_20_lines_and_is_found(reader: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_users_own_effect_takes_under_20_lines_and_is_found(reader: Path) -> None:
     page = DOCS / "howto" / "my-own-effect.md"
     (own,) = (block for block in blocks(page) if "class CableFriction" in block.text)
     assert sum(bool(line.strip()) for line in own.text.splitlines()) < 20
@@ -104,8 +114,6 @@ def test_a_users_own_effect_takes_under_20_lines_and_is_found(reader: Path, caps
     (effect,) = found.effects
     assert (found.verdict, effect.effect, effect.joint) == ("explained", "cable_friction", "joint1")
     assert effect.parameters["amplitude"].value == pytest.approx(0.06, rel=0.05)
-    # What the page prints is what it says it prints.
-    assert capsys.readouterr().out == "".join(block.text for block in blocks(page) if block.language == "text")
 
 
 @pytest.mark.slow
@@ -117,40 +125,95 @@ def test_a_known_payload_gives_the_torque_constant(reader: Path) -> None:
 
 @pytest.mark.slow
 def test_what_the_readme_says_to_type_runs(reader: Path) -> None:
-    # The reader's own arm and recordings, by the names that the README gives them.
+    # The reader's own arm and log, by the names that the README gives them.
     shutil.copy(embedded_urdf(), reader / "my_arm.urdf")
-    description = next(block.text for block in blocks(README) if block.language == "yaml")
-    (reader / "robot.yaml").write_text(description, encoding="utf-8")
-    arm = virtual_arm(load_robot(reader / "robot.yaml"))
-    for folder, name, motion, repetitions in (
-        ("train", "OJD", OJD.motion, (1, 2)), ("train", "OJK", OJK.motion, (1,)), ("test", "OJK", OJK.motion, (2,)),
-    ):  # fmt: skip
-        (reader / folder).mkdir(exist_ok=True)
-        path = sampled(name, arm.robot, motion, 12.0)
-        for repetition in repetitions:
-            recording = simulate(arm, path, rate=250.0, repetition=repetition).recording
-            write_recording(recording, reader / folder / f"{recording.name}.parquet")
-    assert any(block.language in ("bash", "python") for block in blocks(README))
+    arm = virtual_arm()
+    log = simulate(arm, sampled("OJD", arm.robot, OJD.motion, 12.0), rate=250.0).recording
+    (reader / "logs").mkdir()
+    write_recording(log, reader / "logs" / "run_1.csv")
+    # The recordings are made before the block in which they are first used.
+    first, second, *_ = blocks(README)
+    assert first.prompted.startswith("scara-ident diagnose")
+    run_bash("README.md", second.text, reader)
     run(README, reader)
+    assert (reader / "out" / "identify" / "scara03_identified.urdf").is_file()
 
 
-def test_a_block_that_fails_is_a_failure(tmp_path: Path) -> None:
-    page = ROOT / "docs" / "index.md"
-    assert Block("bash", None, "$ scara-ident base\nprinted", 1).commands == "scara-ident base"
+def test_what_is_printed_is_compared_with_what_is_shown() -> None:
+    printed = "scara03: found\nnote: none\nspring on joint1; stiffness 0.0451 ± 2e-04\nN m/rad, 3 runs\n"
+    assert not_printed(["spring on joint1; stiffness", "0.0449 ± 1e-04 N m/rad, 3 runs"], printed) is None
+    for wrong in (
+        "spring on joint2", "stiffness 0.0451 ± 2e-04 N m", "spring on joint1; stiffness 0.0390",
+        "spring on joint1; stiffness 0.0451 ± 5e-04", "N m/rad, 4 runs",
+    ):  # fmt: skip
+        assert not_printed([wrong], printed) == wrong
+    assert not_printed(["note: none", "scara03: found"], printed) == "scara03: found"
+    block = Block("text", None, "$ scara-ident base \\\n  --robot ur5\n5 base parameters\n", 1)
+    assert (block.prompted, block.shown) == ("scara-ident base \\\n  --robot ur5", ["5 base parameters"])
+
+
+def test_a_block_that_fails_or_prints_something_else_is_a_failure(tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match=r"docs/index\.md, line 7: exit status 2"):
-        run_bash(page, Block("bash", None, "scara-ident identfy\necho reached", 7), tmp_path)
+        run_bash("docs/index.md, line 7", "scara-ident identfy\necho reached", tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text("```python\nprint(0.11)\n```\n\n```text\n0.21\n```\n", encoding="utf-8")
+    with pytest.raises(AssertionError, match=r"page\.md, line 6: '0\.21' is not printed"):
+        run(page, tmp_path)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_every_command_that_a_page_names_exists(page: Path) -> None:
-    commands = {command.name or command.callback.__name__ for command in app.registered_commands if command.callback}
-    named = re.findall(r"\bscara-ident ([a-z]+)\b", page.read_text(encoding="utf-8"))
-    assert set(named) <= commands
+def test_every_command_that_a_page_names_exists_and_has_its_options(page: Path) -> None:
+    program = get_command(app)
+    assert isinstance(program, Group)
+    assert set(re.findall(r"\bscara-ident ([a-z]+)\b", page.read_text(encoding="utf-8"))) <= set(program.commands)
+    for words in commands_in(page):
+        options = {option for each in program.commands.get(words[0], program).params for option in each.opts}
+        unknown = {word.partition("=")[0] for word in words if word.startswith("--")} - options - GENERAL
+        assert not unknown, " ".join(words)
+
+
+def test_the_makefile_has_what_pages_say_to_make() -> None:
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    for page in PAGES:
+        named = re.findall(r"(?:^|`)make ([a-z]+)(?:`|\s+#|$)", page.read_text(encoding="utf-8"), re.MULTILINE)
+        assert set(named) <= targets, page
 
 
 def test_the_theory_lists_every_effect() -> None:
     theory = (DOCS / "theory.md").read_text(encoding="utf-8")
     assert [effect.name for effect in CATALOGUE if f"| `{effect.name}` |" not in theory] == []
+
+
+def test_the_glossary_points_to_modules_that_exist() -> None:
+    page = (DOCS / "glossary.md").read_text(encoding="utf-8")
+    named = re.findall(r"`([a-z_]+(?:/[a-z_]+)*(?:/|\.py))`", page)
+    assert len(named) > 30
+    assert [name for name in named if not (ROOT / "scara_ident" / name).exists()] == []
+
+
+def test_the_architecture_page_lists_every_room_in_order() -> None:
+    page = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| `(\w+)/?` \|", page[page.index("## Rooms") :], re.MULTILINE)
+    assert listed == [room for room in ROOMS if room != "__main__"]
+
+
+def test_what_contributors_are_pointed_to_exists() -> None:
+    for page in (ROOT / "CONTRIBUTING.md", DOCS / "architecture.md"):
+        text = page.read_text(encoding="utf-8")
+        named = re.findall(r"`((?:scara_ident|tests|docs|benchmarks)/[\w/.-]+)`", text)
+        assert named, page
+        assert [name for name in named if not (ROOT / name).exists()] == [], page
+
+
+def test_version_citation_and_changes_agree() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    latest = re.search(
+        r"^## (\S+) \((\d{4}-\d\d-\d\d)\)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert latest is not None
+    assert {scara_ident.__version__, project["version"], citation["version"], latest[1]} == {project["version"]}
+    assert str(citation["date-released"]) == latest[2]
 
 
 def test_the_diagnosis_page_lists_every_alias_and_the_limits_of_the_program() -> None:

@@ -18,7 +18,7 @@ import json
 print(json.dumps({
     "verdict": found.verdict,
     "effects": [[e.effect, e.joint, e.parameters["loss_coefficient"].value] for e in found.effects],
-    "held_out": [estimate.errors(evidence[0])[0].rms for estimate, evidence in (
+    "held_out": [estimate.errors(observations)[0].rms for estimate, observations in (
         (found.before, found.validation_before), (found.after, found.validation_after))],
     "parameters": [(base.grouping @ one.standard_parameters()).tolist() for one in (robot, identified, arm.robot)],
 }))
