@@ -10,8 +10,8 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.effects import Effect, Scene, SpectralLine
-from scara_ident.effects.periodic import HIGHEST_FREQUENCY_SHARE
 from scara_ident.effects.spectra import (
+    HIGHEST_FREQUENCY_SHARE,
     NEIGHBOURS_IN_TIME,
     Line,
     frequency_spectrum,

@@ -16,6 +16,7 @@ from scara_ident.effects.links import rigid_slopes
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine
+from scara_ident.effects.spectra import HIGHEST_FREQUENCY_SHARE
 from scara_ident.model.terms import Column
 
 # Orders that gears and motors have; others are found in the residual's spectrum.
@@ -26,8 +27,6 @@ ENCODER_ORDERS = (1.0, 2.0)
 PERIODS_COVERED = 2.0
 # Share of the joint's largest speed at which an order must lie within the band: a joint is hardly ever slower for long.
 SLOW_SHARE = 0.03
-# Share of the sample rate above which a sampled sine is another one.
-HIGHEST_FREQUENCY_SHARE = 0.4
 # No encoder errs by more than this, rad of the motor; beyond it the linear form ends too.
 LARGEST_ECCENTRICITY = 0.1
 

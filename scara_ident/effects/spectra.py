@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 
+# Share of the sample rate above which a sampled sine is another one.
+HIGHEST_FREQUENCY_SHARE = 0.4
 # Points of the angle grid per period of twice the highest order; each sample is shared by its two neighbours.
 GRID_POINTS = 8
 # Points of the transform per line width: between them it is interpolated linearly.

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,8 +18,10 @@ from scara_ident.errors import RecordingError, UsageError
 from scara_ident.recording.audit import Finding, Samples, audit
 from scara_ident.recording.files import IMPORTERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
-from scara_ident.robot.robot import Robot
 from scara_ident.robot.signal_map import Channel, Channels, contract_channels
+
+if TYPE_CHECKING:
+    from scara_ident.robot.robot import Robot
 
 OPTIONAL = ("velocity", "acceleration", "temperature")
 

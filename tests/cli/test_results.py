@@ -160,9 +160,12 @@ def test_ctrl_c_in_the_middle_of_writing_leaves_all_as_it_was(
         raise AssertionError("the signal did not interrupt")
 
     given = [word.replace("{runs}", str(folder)).replace("{path}", str(path)) for word in words]
+    # A run in the background of a shell begins with interrupts ignored.
+    ignored = signal.signal(signal.SIGINT, signal.default_int_handler)
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_text", interrupted)
         status = run([*given, "--output", str(out)])
+    signal.signal(signal.SIGINT, ignored)
     assert status == 130
     assert len(written) == 1
     assert capfd.readouterr().err == "scara-ident: interrupted; no file is left half-written\n"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,9 @@ from scara_ident.recording.audit.samples import (
     several,
     speed_limit,
 )
-from scara_ident.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from scara_ident.robot.robot import Robot
 
 Checked = tuple[Samples, list[Finding]]
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
-from scara_ident.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from scara_ident.robot.robot import Robot
 
 # Travel below this share of its range (2 pi rad, 1 m where the URDF gives none) says nothing of a joint's inertia or
 # friction: the joint stands still and its servo hunts by a few counts.
