@@ -18,7 +18,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -59,7 +59,7 @@ def scaled(name: str, factor: float) -> Any:
 class NotedCriteria(SelectionCriteria):
     """Criteria that note which of them are read."""
 
-    read: set[str] = set()  # noqa: RUF012
+    read: ClassVar[set[str]] = set()
 
     def __getattribute__(self, name: str) -> Any:
         if name in NAMES:

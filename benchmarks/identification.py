@@ -229,8 +229,11 @@ def disagreement(robot: Robot, result: Any, value: Array, kept: Array) -> tuple[
     theirs = (rows[:, kept] @ value).reshape(-1, robot.n).T
     truth = true_torque(robot, q, v, a)
     size = np.sqrt(np.mean(truth**2, axis=1))
-    apart = [np.sqrt(np.mean((x - y) ** 2, axis=1)) / size for x, y in ((ours, theirs), (ours, truth), (theirs, truth))]
-    return tuple(float(item.max()) for item in apart)  # type: ignore[return-value]
+    first, second, third = (
+        float(np.max(np.sqrt(np.mean((x - y) ** 2, axis=1)) / size))
+        for x, y in ((ours, theirs), (ours, truth), (theirs, truth))
+    )
+    return first, second, third
 
 
 def measure(name: str, repeats: int, method: str) -> dict[str, Any]:

@@ -5,9 +5,9 @@ Motion and columns are those of the observations; nothing else in the report com
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import chain
 
 import numpy as np
@@ -175,13 +175,13 @@ def _banded(part: PreparedStretch, rows: Array) -> Array:
     return np.array([low_pass(row, part.rate, band) for row, band in zip(rows, part.bands, strict=True)])
 
 
-class FittedContext:
+class FittedContext(ABC):
     """What reports of fitted models draw from: the traces of their recordings by role, those held out first."""
 
-    @cached_property
+    @property
+    @abstractmethod
     def groups(self) -> dict[str, list[tuple[Trace, ...]]]:
-        """Traces by recording."""
-        raise NotImplementedError
+        """Traces of each recording, by role."""
 
     @property
     def parts(self) -> list[tuple[str, tuple[Trace, ...]]]:

@@ -41,12 +41,12 @@ class ComparisonContext:
     @property
     def trajectories(self) -> Sequence[str]:
         """Names of the trajectories."""
-        return self.content["trajectories"]  # type: ignore[no-any-return]
+        return tuple(self.content["trajectories"])
 
     @property
     def joints(self) -> Sequence[str]:
         """Names of the joints."""
-        return self.content["joints"]  # type: ignore[no-any-return]
+        return tuple(self.content["joints"])
 
     def unit(self, joint: str, kind: str) -> str:
         """Return the unit of a kind of quantity of a joint, as a label has it."""

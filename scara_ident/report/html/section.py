@@ -24,10 +24,14 @@ class Section(Protocol):
     """
 
     @property
-    def id(self) -> str: ...  # noqa: D102
+    def id(self) -> str:
+        """Name on the page."""
+        ...
 
     @property
-    def title(self) -> str: ...  # noqa: D102
+    def title(self) -> str:
+        """Heading."""
+        ...
 
     def build(self, context: Any) -> Sequence[Block]:
         """Return what is drawn of a result.
