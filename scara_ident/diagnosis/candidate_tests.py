@@ -9,6 +9,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Rows
+from scara_ident.diagnosis.cluster_test import cluster_test
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel, Products, products_of
 from scara_ident.threads import one_blas_thread
@@ -30,7 +31,7 @@ class Examination:
     covariance : ndarray, shape (k, k)
         Of the coefficients, from block scores.
     p_value : float
-        That all coefficients are zero; F test with block scores.
+        That all coefficients are zero, see `cluster_test`.
     outside : float
         Share of the candidate that the model does not span already.
     gain : float
@@ -104,7 +105,7 @@ def _examinations(model: FittedModel, found: Products, criteria: SelectionCriter
     value = _normal(whole, aim)
     predicted = np.einsum("gbij,gj->gbi", products, value)
     after = squares - np.einsum("gbi,gi->gb", 2.0 * scores - predicted, value)
-    p_value, covariance = _block_test(model, whole, scores - predicted, value)
+    test = cluster_test(model, found, whole, value, scores - predicted, products)
     in_fold = [model.fold == f for f in range(folds)]
     base = np.array([np.sum(squares[mask]) for mask in in_fold])
     fold_products = np.array([np.sum(products[:, mask], axis=1) for mask in in_fold])
@@ -128,8 +129,8 @@ def _examinations(model: FittedModel, found: Products, criteria: SelectionCriter
         results.append(
             Examination(
                 value[g],
-                covariance[g],
-                float(p_value[g]),
+                test.covariance[g],
+                float(test.p_value[g]),
                 float(outside[g]),
                 (before - float(np.sum(after[g]))) / before,
                 float(np.sum(saved[voting[:, g], g])) / before,
@@ -155,23 +156,3 @@ def _normal(product: Array, aim: Array) -> Array:
     product = np.where(np.eye(product.shape[-1], dtype=bool), np.maximum(product, 0.0), product)
     size, unit = _scaled(product)
     return np.asarray(np.einsum("...ij,...j->...i", np.linalg.pinv(unit, rcond=_RANK), aim / size) / size)
-
-
-def _block_test(model: FittedModel, product: Array, scores: Array, value: Array) -> tuple[Array, Array]:
-    """F tests that coefficients are zero, and their covariance, from scores of blocks with Bartlett's weights."""
-    from scipy.special import fdtrc
-
-    size, unit = _scaled(product)
-    score = scores / size[:, None]
-    follows = model.owner[1:] == model.owner[:-1]
-    cross = np.einsum("gbi,gbj->gij", score[:, 1:][:, follows], score[:, :-1][:, follows])
-    meat = np.einsum("gbi,gbj->gij", score, score) + 0.5 * (cross + cross.transpose(0, 2, 1))
-    blocks, k = scores.shape[1:]
-    freedom = max(1.0, blocks - model.parameters / 2.0 - k)
-    inverse = np.linalg.pinv(unit, rcond=_RANK)
-    covariance = inverse @ (meat * (blocks / freedom)) @ inverse
-    scaled = value * size
-    wald = np.einsum("gi,gij,gj->g", scaled, np.linalg.pinv(covariance, rcond=_RANK), scaled)
-    # Blocks of one recording are few and alike, so the tail is F's rather than chi-squared's.
-    p_value = fdtrc(k, freedom, np.maximum(wald, 0.0) / k)
-    return p_value, covariance / (size[:, :, None] * size[:, None, :])

@@ -20,6 +20,9 @@ from scara_ident.estimation.information import orthonormal, weighted
 from scara_ident.estimation.observations import JointRows
 from scara_ident.threads import side_by_side
 
+# What a block leaves to the others of a direction is at least this share: less is rounding.
+LEAST_REDUNDANCY = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class FittedModel:
@@ -101,6 +104,13 @@ class FittedModel:
         return np.asarray(np.sum([basis.transpose(0, 2, 1) @ basis for basis in self.basis_blocks], axis=0))
 
     @cached_property
+    def released(self) -> Array:
+        """Inverse of what each block leaves to the others of the orthonormal columns, shape (blocks, r, r)."""
+        held, directions = np.linalg.eigh(self.basis_products)
+        left = np.maximum(1.0 - held, LEAST_REDUNDANCY)
+        return np.asarray((directions / left[:, None]) @ directions.transpose(0, 2, 1))
+
+    @cached_property
     def basis_scores(self) -> Array:
         """Products of the orthonormal columns with the residual in every block, shape (blocks, r)."""
         parts = zip(self.basis_blocks, self.residual, self.in_blocks, strict=True)
@@ -134,12 +144,15 @@ class Products:
         Products of what lies outside the model.
     scores : ndarray, shape (g, blocks, k)
         Products of that with the residual.
+    cross : ndarray, shape (g, blocks, k, r)
+        Products of that with the orthonormal columns of the model.
     """
 
     sums: Array
     sizes: Array
     columns: Array
     scores: Array
+    cross: Array
 
 
 def products_of(model: FittedModel, candidates: Sequence[Rows]) -> Products:
@@ -179,10 +192,13 @@ def products_of(model: FittedModel, candidates: Sequence[Rows]) -> Products:
         scores[:, own] += score
     sums = np.sum(outer, axis=0)
     # S' (Z_b' Z_b S / 2 - Z_b' C_b) and its transpose are what the model takes from the products.
-    half = 0.5 * (sums.reshape(g * k, r) @ model.basis_products).reshape(blocks, g, k, r) - outer
+    spanned = (sums.reshape(g * k, r) @ model.basis_products).reshape(blocks, g, k, r)
+    half = 0.5 * spanned - outer
     change = half @ sums.transpose(0, 2, 1)
     inner += change + change.transpose(0, 1, 3, 2)
     scores -= (model.basis_scores @ sums.reshape(g * k, r).T).reshape(blocks, g, k)
     outside = np.diagonal(np.sum(inner, axis=0), axis1=1, axis2=2)
     sizes = np.sum(sums**2, axis=2) + outside
-    return Products(sums, sizes, inner.transpose(1, 0, 2, 3), scores.transpose(1, 0, 2))
+    return Products(
+        sums, sizes, inner.transpose(1, 0, 2, 3), scores.transpose(1, 0, 2), (outer - spanned).transpose(1, 0, 2, 3)
+    )

@@ -172,6 +172,44 @@ def test_what_is_left_is_the_residual_of_every_block():
         assert_allclose(left, np.sum(rest.reshape(-1, 40) ** 2, axis=1), rtol=1e-8)
 
 
+def by_leaving_out(
+    model: FittedModel, columns: np.ndarray, place: np.ndarray, torque: np.ndarray, size: int
+) -> tuple[np.ndarray, float]:
+    """Covariance and p-value of the last coefficients from fits of all parameters without one block after the other."""
+    blocks = len(model.owner)
+    everything = np.linalg.pinv(columns, rcond=1e-12)[-size:]
+    change = np.zeros((blocks, size, len(torque)))
+    for b in range(blocks):
+        kept = place != b
+        change[b] = everything
+        change[b][:, kept] -= np.linalg.pinv(columns[kept], rcond=1e-12)[-size:]
+    near = np.eye(blocks)
+    for b in range(1, blocks):
+        if model.owner[b] == model.owner[b - 1]:
+            near[b, b - 1] = near[b - 1, b] = 0.5
+    white = everything @ everything.T
+    # Directions in which the candidate is of unit size, as the test takes them.
+    scale = np.sqrt(np.diag(np.linalg.inv(white)))
+    values, vectors = np.linalg.eigh(np.linalg.inv(white) / np.outer(scale, scale))
+    into = vectors / np.sqrt(values) / scale[:, None]
+    turned = np.einsum("ki,bkn->bin", np.linalg.inv(into).T, change)
+    gamma = np.einsum("bin,cjn->bicj", turned, turned)
+    expected = np.einsum("bc,bicj->ij", near, gamma)
+    seen = np.einsum("bc,bi,cj->ij", near, turned @ torque, turned @ torque)
+    values, vectors = np.linalg.eigh(expected)
+    scaling = vectors / np.sqrt(values) @ vectors.T
+    unbiased = scaling @ seen @ scaling
+    freedom = min(
+        np.trace(near @ gamma[:, i, :, i]) ** 2 / np.trace(near @ gamma[:, i, :, i] @ near @ gamma[:, i, :, i])
+        for i in range(size)
+    )
+    value = np.linalg.inv(into) @ (everything @ torque)
+    wald = value @ np.linalg.solve(unbiased, value)
+    rest = freedom - size + 1.0
+    p_value = float(f.sf(wald * rest / (freedom * size), size, rest)) if rest > 0.0 else 1.0
+    return into @ unbiased @ into.T, p_value
+
+
 def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
     """The same examination from dense rows of all joints, the model projected out of them."""
     width = len(next(iter(candidate.values())))
@@ -197,21 +235,11 @@ def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
 
     value = without(np.ones(len(e), dtype=bool))
     left = e - x @ value
-    # Scores of blocks, neighbours of one recording with half the weight.
-    scores = by_block(x * left[:, None])
-    meat = scores.T @ scores
-    for b in range(1, blocks):
-        if model.owner[b] == model.owner[b - 1]:
-            cross = np.outer(scores[b], scores[b - 1])
-            meat += 0.5 * (cross + cross.T)
-    freedom = max(1.0, blocks - model.parameters / 2.0 - width)
-    inverse = np.zeros((width, width))
-    inverse[np.ix_(free, free)] = np.linalg.inv(x[:, free].T @ x[:, free])
-    covariance = blocks / freedom * inverse @ meat @ inverse
-    inner = covariance[np.ix_(free, free)]
-    p_value = (
-        float(f.sf(value[free] @ np.linalg.solve(inner, value[free]) / width, width, freedom)) if len(free) else 1.0
-    )
+    covariance, p_value = np.full((width, width), np.inf), 1.0
+    if len(free):
+        covariance = np.zeros((width, width))
+        inner, p_value = by_leaving_out(model, np.column_stack([own, x[:, free]]), place, rows[:, -1], len(free))
+        covariance[np.ix_(free, free)] = inner
     gains: list[float | None] = []
     saved = 0.0
     power = by_block(np.sum(x**2, axis=1))
@@ -228,7 +256,7 @@ def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
     torque = rows[:, -1] - rows[:, model.parameters : -1] @ value
     return Examination(
         value,
-        covariance if len(free) else np.full((width, width), np.inf),
+        covariance,
         p_value,
         outside,
         float(1.0 - after / before),

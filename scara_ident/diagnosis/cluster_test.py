@@ -1,0 +1,191 @@
+"""Tests of coefficients that stay honest with few blocks and with correlated residuals.
+
+Each block of time is a cluster. What the coefficients would be without a block follows in closed form from small
+products (delete-one jackknife, in which all parameters of the model are fitted again), and the scatter of these gives
+the covariance. It is scaled to be unbiased where residuals are white, and its degrees of freedom are those of
+Satterthwaite, from the candidate's own column as the model leaves it: a column that lives in three blocks has about
+two, however many blocks there are (Bell and McCaffrey 2002; Pustejovsky and Tipton 2018; MacKinnon, Nielsen and Webb
+2023). Neighbouring blocks are weighted in by Bartlett's kernel (Newey and West 1987), which costs freedom too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.fitted_model import FittedModel, Products
+
+# Share of a direction that the other blocks must hold, or it cannot be tested without this one.
+_LEAST_REDUNDANCY = 1e-6
+# Directions of a few columns below this share of the largest are not tested.
+_RANK = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class ClusterTest:
+    """Of g candidates with k columns each.
+
+    Attributes
+    ----------
+    p_value : ndarray, shape (g,)
+        That all coefficients of a candidate are zero.
+    covariance : ndarray, shape (g, k, k)
+        Of the coefficients.
+    freedom : ndarray, shape (g,)
+        Degrees of freedom of the covariance.
+    """
+
+    p_value: Array
+    covariance: Array
+    freedom: Array
+
+
+def cluster_test(
+    model: FittedModel, products: Products, whole: Array, value: Array, scores: Array, columns: Array
+) -> ClusterTest:
+    """Test coefficients against the scatter of the scores of blocks.
+
+    Parameters
+    ----------
+    model : FittedModel
+    products : Products
+        Of the candidates.
+    whole : ndarray, shape (g, k, k)
+        Products of what lies outside the model, over all blocks.
+    value : ndarray, shape (g, k)
+        Coefficients when a candidate is added to the model.
+    scores : ndarray, shape (g, blocks, k)
+        Products of what lies outside the model with the residual that the model with the candidate leaves.
+    columns : ndarray, shape (g, blocks, k, k)
+        Products of what lies outside the model, block by block.
+    """
+    from scipy.special import fdtrc
+
+    into, back, rank = _whitening(whole)
+    left = model.basis_scores - np.einsum("gbkr,gk->gbr", products.cross, value)
+    reach = products.cross @ model.released
+    score = np.einsum("gki,gbk->gbi", into, scores + np.einsum("gbkr,gbr->gbk", reach, left))
+    inside = _both_sides(into, columns + reach @ products.cross.transpose(0, 1, 3, 2))
+    strength, turn = np.linalg.eigh(np.eye(inside.shape[-1]) - inside)
+    release = (turn / np.maximum(strength, _LEAST_REDUNDANCY)[..., None, :]) @ turn.transpose(0, 1, 3, 2)
+    # What leaving a block out changes, and what that follows from where residuals are white.
+    change = np.einsum("gbij,gbj->gbi", release, score)
+    own = release @ inside
+    links = np.concatenate([release @ (into.transpose(0, 2, 1)[:, None] @ reach), own], axis=-1)
+    neighbours = _Neighbours.of(model)
+    pairs = neighbours.pairs(change)
+    expected, freedom = _if_white(neighbours, own, links)
+    scale = _inverse_root(expected)
+    unbiased = scale @ np.einsum("gpi,gpj->gij", pairs, pairs) @ scale
+    whitened = np.einsum("gij,gj->gi", back, value)
+    wald = np.einsum("gi,gij,gj->g", whitened, np.linalg.pinv(unbiased, rcond=_RANK, hermitian=True), whitened)
+    # Hotelling's T-squared where there are several coefficients.
+    second = freedom - rank + 1.0
+    tested = (second > 0.0) & (rank > 0) & np.all(strength > _LEAST_REDUNDANCY, axis=(1, 2))
+    second, first = np.where(tested, second, 1.0), np.maximum(rank, 1)
+    p_value = np.where(tested, fdtrc(first, second, np.maximum(wald, 0.0) * second / (freedom * first)), 1.0)
+    return ClusterTest(p_value, into @ unbiased @ into.transpose(0, 2, 1), freedom)
+
+
+def _whitening(whole: Array) -> tuple[Array, Array, Array]:
+    """Return A with ``A' W A = 1`` where W says something, its inverse there, and in how many directions that is."""
+    size = np.sqrt(np.diagonal(whole, axis1=1, axis2=2))
+    size = np.where(size == 0.0, 1.0, size)
+    values, vectors = np.linalg.eigh(whole / (size[:, :, None] * size[:, None, :]))
+    kept = values > _RANK * np.maximum(values[:, -1:], np.finfo(float).tiny)
+    root = np.sqrt(np.where(kept, values, 1.0))
+    into = np.where(kept[:, None], vectors / root[:, None] / size[:, :, None], 0.0)
+    back = np.where(kept[:, None], vectors * root[:, None] * size[:, :, None], 0.0)
+    return into, back.transpose(0, 2, 1), np.count_nonzero(kept, axis=1)
+
+
+def _both_sides(into: Array, products: Array) -> Array:
+    return np.asarray(into.transpose(0, 2, 1)[:, None] @ products @ into[:, None])
+
+
+def _inverse_root(matrix: Array) -> Array:
+    values, vectors = np.linalg.eigh(matrix)
+    kept = values > _RANK * np.maximum(values[:, -1:], np.finfo(float).tiny)
+    root = np.where(kept, 1.0 / np.sqrt(np.where(kept, values, 1.0)), 0.0)
+    return np.asarray((vectors * root[:, None]) @ vectors.transpose(0, 2, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Neighbours:
+    """Pairs of blocks that follow each other in a recording; its first and last block make a pair with nothing.
+
+    Bartlett's weights of a half for neighbours are half the sum of the squares of these pairs.
+
+    Attributes
+    ----------
+    before, after : ndarray of int, shape (pairs,)
+        Blocks of each pair; the number of blocks where there is none.
+    place : ndarray of int, shape (blocks,)
+        The pair in which each block is the later one; it is the earlier one in the next.
+    """
+
+    before: NDArray[np.intp]
+    after: NDArray[np.intp]
+    place: NDArray[np.intp]
+
+    @staticmethod
+    def of(model: FittedModel) -> _Neighbours:
+        """Return the pairs of a model's blocks."""
+        count = len(model.owner)
+        before, after, place = [], [], []
+        for block in range(count):
+            first = block == 0 or model.owner[block] != model.owner[block - 1]
+            place.append(len(before))
+            before.append(count if first else block - 1)
+            after.append(block)
+            if block + 1 == count or model.owner[block + 1] != model.owner[block]:
+                before.append(block)
+                after.append(count)
+        return _Neighbours(np.array(before, dtype=np.intp), np.array(after, dtype=np.intp), np.array(place, np.intp))
+
+    def pairs(self, signals: Array) -> Array:
+        """Return the sums of pairs over the square root of two, of signals of shape (g, blocks, ...)."""
+        padded = np.concatenate([signals, np.zeros_like(signals[:, :1])], axis=1)
+        return np.asarray(np.sqrt(0.5) * (padded[:, self.before] + padded[:, self.after]))
+
+    def back(self, pairs: Array) -> Array:
+        """Apply the transpose of `pairs`."""
+        return np.asarray(np.sqrt(0.5) * (pairs[:, self.place] + pairs[:, self.place + 1]))
+
+
+def _if_white(neighbours: _Neighbours, own: Array, links: Array) -> tuple[Array, Array]:
+    """Return what the scatter is expected to be where residuals are white of variance one, and its freedom.
+
+    The changes of blocks b and c have the covariance ``-links_b links_c'``, and that of a block with itself is
+    ``own_b``. Satterthwaite: the freedom is the squared trace of the covariance of all over its squared norm.
+
+    Parameters
+    ----------
+    neighbours : _Neighbours
+    own : ndarray, shape (g, blocks, k, k)
+    links : ndarray, shape (g, blocks, k, m)
+    """
+    alone = own + links @ links.transpose(0, 1, 3, 2)
+    paired = neighbours.pairs(links)
+    # A pair holds half of the square of either block.
+    expected = np.sum(alone, axis=1) - np.einsum("gpim,gpjm->gij", paired, paired)
+    size = np.diagonal(alone, axis1=2, axis2=3)
+    diagonal = np.sqrt(0.5) * neighbours.pairs(size)
+    norm = np.sum(diagonal**2, axis=1) + 0.5 * np.sum(size**2, axis=1)
+    norm -= 2.0 * np.einsum("gbi,gbim,gbim->gi", size, *(neighbours.back(paired),) * 2)
+    across = paired.transpose(0, 2, 1, 3)
+    narrow = (
+        across @ across.transpose(0, 1, 3, 2)
+        if across.shape[2] < across.shape[3]
+        else across.transpose(0, 1, 3, 2) @ across
+    )
+    norm += np.sum(narrow**2, axis=(2, 3))
+    trace = np.diagonal(expected, axis1=1, axis2=2)
+    shown = (trace > 0.0) & (norm > 0.0)
+    freedom = np.where(shown, trace**2 / np.where(shown, norm, 1.0), np.inf)
+    # The direction of which least is known; one without any column takes no part.
+    freedom = np.min(freedom, axis=1)
+    return expected, np.where(np.isfinite(freedom), freedom, 1.0)
