@@ -26,6 +26,9 @@ class Decision:
         In words.
     gain : float
         Share of the squared residual of its joints that it removes on rows that it was not fitted to.
+    tentative : bool
+        Not accepted, but worth a look: an arm can have it, it helps as much as is asked, and these recordings are too few
+        or too alike to be sure.
     """
 
     candidate: Candidate
@@ -34,6 +37,11 @@ class Decision:
     accepted: bool
     why: str
     gain: float
+    tentative: bool = False
+
+    def refused(self, why: str) -> Decision:
+        """Return it as one that may be looked at, and not believed."""
+        return replace(self, accepted=False, tentative=True, why=why)
 
 
 def decide(
@@ -53,31 +61,34 @@ def decide(
     joints = scene.robot.n if candidate.member.joint is None else 1
     # The residual is weighted so that every joint holds the same share of its square.
     gain = examination.held_out * scene.robot.n / joints
-    why = _objection(candidate, examination, scene, tried, gain, criteria)
+    unseen = _unseen(examination, criteria)
+    unphysical = unseen or _unphysical(candidate, examination, scene)
+    small = unphysical or _small(candidate, examination, scene, gain, criteria)
+    # The first reason that a person would give.
+    why = unseen or _insignificant(examination, tried, criteria) or small or _seldom(examination, criteria)
     words = why or f"removes {gain:.1%} of the squared residual on data that it was not fitted to"
-    return Decision(candidate, candidate.label(scene), examination, why is None, words, gain)
+    tentative = why is not None and small is None and examination.p_value <= criteria.family_error
+    return Decision(candidate, candidate.label(scene), examination, why is None, words, gain, tentative)
 
 
-def _objection(
-    candidate: Candidate,
-    examination: Examination,
-    scene: Scene,
-    tried: int,
-    gain: float,
-    criteria: SelectionCriteria,
-) -> str | None:
+def _unseen(examination: Examination, criteria: SelectionCriteria) -> str | None:
     if examination.outside < criteria.absorbed:
         return "the model absorbs it: these recordings cannot show it"
     if examination.outside < criteria.least_outside:
         return f"only {examination.outside:.1e} of it lies outside the model: these recordings cannot show it"
-    if examination.p_value * tried > criteria.family_error:
-        return f"not significant: p = {examination.p_value:.1e} with {tried} candidates tried"
+    return None
+
+
+def _unphysical(candidate: Candidate, examination: Examination, scene: Scene) -> str | None:
     std = np.sqrt(np.clip(np.diag(examination.covariance), 0.0, None))
     # Judged beside the parameters that the model has once the candidate is in it.
     after = replace(scene, value=examination.model_value[: len(scene.value)])
-    unphysical = candidate.effect.inadmissible(after, candidate.member, examination.value, std)
-    if unphysical is not None:
-        return unphysical
+    return candidate.effect.inadmissible(after, candidate.member, examination.value, std)
+
+
+def _small(
+    candidate: Candidate, examination: Examination, scene: Scene, gain: float, criteria: SelectionCriteria
+) -> str | None:
     # What is taken out of the recordings is taken out however small it is.
     small = None if candidate.corrects_data else candidate.effect.negligible(scene, candidate.member, examination.value)
     if small is not None:
@@ -87,6 +98,16 @@ def _objection(
             f"below the detection limit: removes {max(gain, 0.0):.1%} of the squared residual, "
             f"{criteria.least_gain:.0%} is asked"
         )
+    return None
+
+
+def _insignificant(examination: Examination, tried: int, criteria: SelectionCriteria) -> str | None:
+    if examination.p_value * tried > criteria.family_error:
+        return f"not significant: p = {examination.p_value:.1e} with {tried} candidates tried"
+    return None
+
+
+def _seldom(examination: Examination, criteria: SelectionCriteria) -> str | None:
     helps, voting = examination.votes
     if voting and helps < criteria.least_votes * voting:
         return f"helps in only {helps} of {voting} trajectories that it was not fitted to"

@@ -47,6 +47,10 @@ class Examination:
         The model's own parameters when the candidate is added.
     left : ndarray, shape (blocks,)
         Weighted squared residual of every block with the candidate in the model.
+    products : ndarray, shape (k, k)
+        Weighted products of what the model leaves of its columns.
+    freedom : float
+        Degrees of freedom of the covariance.
     """
 
     value: Array
@@ -59,6 +63,8 @@ class Examination:
     contribution: float
     model_value: Array
     left: Array
+    products: Array
+    freedom: float
 
     @property
     def votes(self) -> tuple[int, int]:
@@ -123,7 +129,20 @@ def _examinations(model: FittedModel, found: Products, criteria: SelectionCriter
             nothing, unknown = np.zeros(k), np.full((k, k), np.inf)
             alone = model.root @ model.projected
             results.append(
-                Examination(nothing, unknown, 1.0, float(outside[g]), 0.0, 0.0, (None,) * folds, 0.0, alone, squares)
+                Examination(
+                    nothing,
+                    unknown,
+                    1.0,
+                    float(outside[g]),
+                    0.0,
+                    0.0,
+                    (None,) * folds,
+                    0.0,
+                    alone,
+                    squares,
+                    whole[g],
+                    1.0,
+                )
             )
             continue
         results.append(
@@ -138,6 +157,8 @@ def _examinations(model: FittedModel, found: Products, criteria: SelectionCriter
                 float(value[g] @ whole[g] @ value[g]),
                 own[:, g],
                 after[g],
+                whole[g],
+                float(test.freedom[g]),
             )
         )
     return results

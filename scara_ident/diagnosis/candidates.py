@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
-from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.estimation.observations import JointRows, Observations, observe
 from scara_ident.motion.motion import Motion
+from scara_ident.motion.position_noise import noisier
 from scara_ident.motion.prepared import PreparedStretch
 from scara_ident.threads import side_by_side
 
@@ -77,6 +79,11 @@ class CandidateColumns:
     _raw: dict[Key, tuple[Rows, ...]] = field(default_factory=dict, repr=False)
     _signals: dict[Motion, Signals] = field(default_factory=dict, repr=False)
 
+    @cached_property
+    def noisier(self) -> CandidateColumns:
+        """Columns on the rows that positions with their noise once more on top would have given."""
+        return CandidateColumns(observe(self.observations.model, noisier(self.observations.data)))
+
     def beside(self, observations: Observations) -> CandidateColumns:
         """Return the same columns beside other torques on the same motion."""
         return CandidateColumns(observations, self._rows, self._raw, self._signals)
@@ -130,6 +137,12 @@ class CandidateColumns:
         for held in (self._rows, self._raw):
             for key in [key for key in held if key[2] not in current]:
                 del held[key]
+
+
+def columns_at_hand(observations: Observations) -> dict[Motion, tuple[Array, ...]]:
+    """Return the base model's columns on the motions of observations."""
+    raws = [raw for recording in observations.raw for raw in recording]
+    return {part.motion: raw for part, raw in zip(observations.data.stretches, raws, strict=True)}
 
 
 def _estimate(scene: Scene) -> Hashable:

@@ -62,8 +62,6 @@ def cluster_test(
     columns : ndarray, shape (g, blocks, k, k)
         Products of what lies outside the model, block by block.
     """
-    from scipy.special import fdtrc
-
     into, back, rank = _whitening(whole)
     left = model.basis_scores - np.einsum("gbkr,gk->gbr", products.cross, value)
     reach = products.cross @ model.released
@@ -81,16 +79,43 @@ def cluster_test(
     scale = _inverse_root(expected)
     unbiased = scale @ np.einsum("gpi,gpj->gij", pairs, pairs) @ scale
     whitened = np.einsum("gij,gj->gi", back, value)
-    wald = np.einsum("gi,gij,gj->g", whitened, np.linalg.pinv(unbiased, rcond=_RANK, hermitian=True), whitened)
-    # Hotelling's T-squared where there are several coefficients.
-    second = freedom - rank + 1.0
-    tested = (second > 0.0) & (rank > 0) & np.all(strength > _LEAST_REDUNDANCY, axis=(1, 2))
-    second, first = np.where(tested, second, 1.0), np.maximum(rank, 1)
-    p_value = np.where(tested, fdtrc(first, second, np.maximum(wald, 0.0) * second / (freedom * first)), 1.0)
+    known = np.all(strength > _LEAST_REDUNDANCY, axis=(1, 2))
+    p_value = np.where(known, _hotelling(whitened, unbiased, freedom, rank), 1.0)
     return ClusterTest(p_value, into @ unbiased @ into.transpose(0, 2, 1), freedom)
 
 
-def _whitening(whole: Array) -> tuple[Array, Array, Array]:
+def significance(value: Array, covariance: Array, freedom: float) -> float:
+    """Return the probability that coefficients of no size would be as large, Hotelling's test.
+
+    Parameters
+    ----------
+    value : ndarray, shape (k,)
+    covariance : ndarray, shape (k, k)
+    freedom : float
+        Degrees of freedom of the covariance.
+    """
+    if not np.all(np.isfinite(covariance)):
+        return 1.0
+    size = np.sqrt(np.diag(covariance))
+    size = np.where(size == 0.0, 1.0, size)
+    scaled = covariance / np.outer(size, size)
+    rank = np.atleast_1d(np.linalg.matrix_rank(scaled, rtol=_RANK, hermitian=True))
+    return float(_hotelling((value / size)[None], scaled[None], np.atleast_1d(freedom), rank)[0])
+
+
+def _hotelling(value: Array, covariance: Array, freedom: Array, rank: NDArray[np.intp]) -> Array:
+    """Return p-values of Hotelling's T-squared, which is Student's t where there is one coefficient, shape (g,)."""
+    from scipy.special import fdtrc
+
+    wald = np.einsum("gi,gij,gj->g", value, np.linalg.pinv(covariance, rcond=_RANK, hermitian=True), value)
+    second = freedom - rank + 1.0
+    tested = (second > 0.0) & (rank > 0)
+    second, first = np.where(tested, second, 1.0), np.maximum(rank, 1)
+    ratio = np.maximum(wald, 0.0) * second / (freedom * first)
+    return np.where(tested, fdtrc(first, second, ratio), 1.0)
+
+
+def _whitening(whole: Array) -> tuple[Array, Array, NDArray[np.intp]]:
     """Return A with ``A' W A = 1`` where W says something, its inverse there, and in how many directions that is."""
     size = np.sqrt(np.diagonal(whole, axis1=1, axis2=2))
     size = np.where(size == 0.0, 1.0, size)
@@ -99,7 +124,7 @@ def _whitening(whole: Array) -> tuple[Array, Array, Array]:
     root = np.sqrt(np.where(kept, values, 1.0))
     into = np.where(kept[:, None], vectors / root[:, None] / size[:, :, None], 0.0)
     back = np.where(kept[:, None], vectors * root[:, None] * size[:, :, None], 0.0)
-    return into, back.transpose(0, 2, 1), np.count_nonzero(kept, axis=1)
+    return into, back.transpose(0, 2, 1), np.sum(kept, axis=1, dtype=np.intp)
 
 
 def _both_sides(into: Array, products: Array) -> Array:
@@ -135,7 +160,9 @@ class _Neighbours:
     def of(model: FittedModel) -> _Neighbours:
         """Return the pairs of a model's blocks."""
         count = len(model.owner)
-        before, after, place = [], [], []
+        before: list[int] = []
+        after: list[int] = []
+        place: list[int] = []
         for block in range(count):
             first = block == 0 or model.owner[block] != model.owner[block - 1]
             place.append(len(before))
@@ -144,7 +171,9 @@ class _Neighbours:
             if block + 1 == count or model.owner[block + 1] != model.owner[block]:
                 before.append(block)
                 after.append(count)
-        return _Neighbours(np.array(before, dtype=np.intp), np.array(after, dtype=np.intp), np.array(place, np.intp))
+        return _Neighbours(
+            np.array(before, dtype=np.intp), np.array(after, dtype=np.intp), np.array(place, dtype=np.intp)
+        )
 
     def pairs(self, signals: Array) -> Array:
         """Return the sums of pairs over the square root of two, of signals of shape (g, blocks, ...)."""

@@ -102,6 +102,23 @@ class SelectionCriteria:
     alone: float = _criterion(
         0.8, "of what the best pair explains", "one signal that explains so much is named without the other"
     )
+    # Shown to be noise.
+    least_power: float = _criterion(
+        0.3,
+        "share of squared residual",
+        "where half of the effects would have to remove more to be significant, nothing found says nothing",
+        "docs/diagnosis.md",
+    )
+    least_colour: float = _criterion(
+        0.25,
+        "share of the residual's power",
+        "above white noise within the band: more may be a motion's doing, or noise with a memory",
+        "docs/diagnosis.md",
+    )
+    worse_held_out: float = _criterion(
+        1.5, "times the training error", "on recordings held out: the model does not hold there", "docs/diagnosis.md"
+    )
+    most_tentative: int = _criterion(6, "effects", "worth a look are listed, the most gaining first")
     # Choosing the band again.
     wider: float = _criterion(
         1.3, "of the band", "with an effect found the search is repeated where the band grows by so much"

@@ -8,15 +8,17 @@ from typing import Literal
 
 import numpy as np
 
-from scara_ident.diagnosis.candidates import CandidateColumns
+from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.confounding import Confounder, confounders
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import physical_parameters
+from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.model_selection import Unexplained, rms_of, select_model
 from scara_ident.diagnosis.screening import Dependence
-from scara_ident.diagnosis.search import Search, SearchTask, columns_at_hand, corrected
+from scara_ident.diagnosis.search import Search, SearchTask, corrected
 from scara_ident.diagnosis.selection_step import SelectionStep, observed_at_every_sample
+from scara_ident.diagnosis.tentative import TentativeEffect, tentative_effects
 from scara_ident.effects import Effect, Parameter
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.catalogue import available_effects
@@ -31,7 +33,7 @@ from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 
-Verdict = Literal["complete", "explained", "unexplained"]
+Verdict = Literal["complete", "explained", "unexplained", "undecided"]
 # Dependences that are handed on: further ones are pairs that only repeat the first.
 NAMED_DEPENDENCES = 12
 
@@ -76,7 +78,8 @@ class Diagnosis:
 
     Attributes
     ----------
-    verdict : {"complete", "explained", "unexplained"}
+    verdict : {"complete", "explained", "unexplained", "undecided"}
+        ``undecided``: what is left was not shown to be noise on every joint, nor to be anything else.
     search : Search
         Every candidate tried, with its statistics.
     before, after : Estimate
@@ -85,6 +88,11 @@ class Diagnosis:
     fit_before, fit_after : tuple of LackOfFit
         Per joint; empty without repetitions.
     effects : tuple of FoundEffect
+        Believed, and in the model.
+    tentative : tuple of TentativeEffect
+        Worth a look, and not in it.
+    evidence : tuple of Evidence
+        Per joint, whether what is left was shown to be noise.
     aliases : tuple of Alias
         Effects that the model absorbs on any data.
     unexplained : Unexplained or None
@@ -104,6 +112,8 @@ class Diagnosis:
     fit_before: tuple[LackOfFit, ...]
     fit_after: tuple[LackOfFit, ...]
     effects: tuple[FoundEffect, ...]
+    tentative: tuple[TentativeEffect, ...]
+    evidence: tuple[Evidence, ...]
     aliases: tuple[Alias, ...]
     unexplained: Unexplained | None
     dependences: tuple[Dependence, ...]
@@ -183,7 +193,14 @@ def diagnose(
     negligible = _negligible(found)
     if negligible is not None:
         notes.append(f"{negligible}; corrected in the data, not counted as an effect")
-    verdict: Verdict = "unexplained" if outcome.unexplained else ("explained" if effects else "complete")
+    validation_after = _with_effects(found, validation_before)
+    shown = held_out_evidence(
+        evidence(found, outcome.residuals, outcome.fit_after, criteria),
+        rms_of(after.value, outcome.training),
+        rms_of(after.value, validation_after),
+        criteria,
+    )
+    verdict = _verdict(outcome.unexplained is not None, bool(effects), shown)
     return Diagnosis(
         verdict,
         found,
@@ -192,15 +209,25 @@ def diagnose(
         found.uncorrected,
         outcome.training,
         validation_before,
-        _with_effects(found, validation_before),
+        validation_after,
         outcome.fit_before,
         outcome.fit_after,
         tuple(effects),
+        tentative_effects(found, {(item.effect, item.joint) for item in effects}),
+        shown,
         aliases(base),
         outcome.unexplained,
         outcome.dependences[:NAMED_DEPENDENCES],
         tuple(notes),
     )
+
+
+def _verdict(unexplained: bool, found: bool, shown: Sequence[Evidence]) -> Verdict:
+    if unexplained:
+        return "unexplained"
+    if not all(item.shown for item in shown):
+        return "undecided"
+    return "explained" if found else "complete"
 
 
 def _with_effects(found: Search, before: Observations) -> Observations:

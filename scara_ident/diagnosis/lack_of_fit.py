@@ -16,6 +16,9 @@ from scara_ident.motion.repeatability import LARGEST_SHIFT, SAME_RATE, alignment
 # Residual of every joint, where it was used, and samples per second.
 Aligned = tuple[Array, NDArray[np.bool_], float]
 
+# Of what may repeat at the most.
+CONFIDENCE = 0.95
+
 
 @dataclass(frozen=True)
 class LackOfFit:
@@ -28,6 +31,8 @@ class LackOfFit:
         What does not repeat: pure error within the band, N m or N.
     missing : float
         What repeats and the model lacks, rms within the band; 0 where it is below what noise alone would give.
+    most_missing : float
+        What may repeat at the most, with 95 % confidence.
     p_value : float
         That nothing repeats; F test with the band's degrees of freedom.
     by_trajectory : tuple of (str, float)
@@ -37,6 +42,7 @@ class LackOfFit:
     joint: str
     noise: float
     missing: float
+    most_missing: float
     p_value: float
     by_trajectory: tuple[tuple[str, float], ...]
 
@@ -66,7 +72,7 @@ def lack_of_fit(residuals: Residuals) -> tuple[LackOfFit, ...]:
 
 
 def _of_joint(j: int, joint: str, groups: dict[str, list[Aligned]], band: float | None) -> LackOfFit | None:
-    from scipy.special import fdtrc
+    from scipy.special import fdtrc, fdtri
 
     repeating = scatter = freedom = noise_freedom = samples = excess = 0.0
     by_trajectory = []
@@ -90,10 +96,14 @@ def _of_joint(j: int, joint: str, groups: dict[str, list[Aligned]], band: float 
     if not samples or scatter == 0.0:
         return None
     ratio = (repeating / freedom) / (scatter / noise_freedom)
+    # Means over repetitions have that much of the noise's variance less.
+    repetitions = 1.0 + noise_freedom / freedom
+    most = (ratio / float(fdtri(freedom, noise_freedom, 1.0 - CONFIDENCE)) - 1.0) / repetitions
     return LackOfFit(
         joint,
         float(np.sqrt(scatter / noise_freedom)),
         float(np.sqrt(max(excess / samples, 0.0))),
+        float(np.sqrt(max(most, 0.0) * scatter / noise_freedom)),
         float(fdtrc(freedom, noise_freedom, ratio)),
         tuple(by_trajectory),
     )

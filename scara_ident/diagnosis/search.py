@@ -9,10 +9,11 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import parameters_beside
 from scara_ident.diagnosis.lines import line_candidates
+from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, model_with, observed
 from scara_ident.effects import Effect, Scene
@@ -21,7 +22,7 @@ from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import HIGHEST_CUT, Motion
+from scara_ident.motion.motion import HIGHEST_CUT
 from scara_ident.motion.prepared import PreparedData
 
 
@@ -186,7 +187,8 @@ def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[s
         decisions += step.judge([item for item in seeds if item.label(scene) not in taken])
         if len(steps) >= criteria.most_effects:
             break
-        winner = _choose(step, decisions)
+        winner, refused = _choose(step, decisions)
+        decisions = [item for item in decisions if item.label not in refused] + list(refused.values())
         if winner is None:
             break
         candidate, found = winner.candidate, winner.examination
@@ -233,12 +235,6 @@ def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Sc
     return Scene(model, value, longest, slowest, band, travel, speed, start, columns=columns_at_hand(observations))
 
 
-def columns_at_hand(observations: Observations) -> dict[Motion, tuple[Array, ...]]:
-    """Return the base model's columns on the motions of observations."""
-    raws = [raw for recording in observations.raw for raw in recording]
-    return {part.motion: raw for part, raw in zip(observations.data.stretches, raws, strict=True)}
-
-
 def corrected(data: PreparedData, candidate: Candidate, value: Array) -> PreparedData:
     """Return recordings without an effect that is taken out of them."""
     effect, member = candidate.effect, candidate.member
@@ -246,29 +242,37 @@ def corrected(data: PreparedData, candidate: Candidate, value: Array) -> Prepare
     return replace(data, recordings=tuple(mended))
 
 
-def _choose(step: SelectionStep, decisions: Sequence[Decision]) -> Decision | None:
-    """Refine the best families and return the best acceptable member of them whose size is significant."""
+def _choose(step: SelectionStep, decisions: Sequence[Decision]) -> tuple[Decision | None, dict[str, Decision]]:
+    """Refine the best families; return the best acceptable member that is sound, and those better that are not."""
     criteria = step.criteria
     accepted = [item for item in best_of_each(decisions).values() if item.accepted]
     accepted.sort(key=lambda item: -item.examination.held_out)
+    refused: dict[str, Decision] = {}
     if not accepted:
-        return None
+        return None, refused
     enough = criteria.near_best * accepted[0].examination.held_out
     leaders = [item for item in accepted if item.examination.held_out >= enough][: criteria.most_refined]
     sound = sorted(
         (item for item in step.refine(leaders) if item.accepted), key=lambda item: -item.examination.held_out
     )
-    return next((item for item in sound if _is_significant(step, item.candidate)), None)
+    for decision in sound:
+        why = _insignificant(step, decision.candidate) or noise_objection(step, decision)
+        if why is None:
+            return decision, refused
+        refused[decision.label] = decision.refused(why)
+    return None, refused
 
 
-def _is_significant(step: SelectionStep, candidate: Candidate) -> bool:
-    """Whether an effect has a size beyond its uncertainty, that of its nonlinear parameters included."""
+def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:
+    """Say so where the size of an effect is within its uncertainty, that of its nonlinear parameters included."""
     if not candidate.effect.nonlinear:
-        return True
+        return None
     nonlinear = {parameter.name for parameter in candidate.effect.nonlinear}
     found = parameters_beside(step, candidate)
     sizes = [parameter for name, parameter in found.items() if name not in nonlinear and name != "phase"]
-    return any(abs(parameter.value) > step.criteria.least_size * parameter.std for parameter in sizes)
+    if any(abs(parameter.value) > step.criteria.least_size * parameter.std for parameter in sizes):
+        return None
+    return "its size is within its uncertainty once its other parameters are free"
 
 
 def _backward(step: SelectionStep) -> tuple[Candidate, ...]:

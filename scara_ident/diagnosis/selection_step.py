@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision, decide
 from scara_ident.diagnosis.candidate_tests import examine
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, columns_at_hand, with_columns
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.effects import Scene
@@ -60,6 +60,12 @@ class SelectionStep:
         """The base model with the chosen effects, fitted."""
         own = self.columns.rows(self.scene, self.chosen)
         return fitted_model(self.observations, own, self.weights, self.criteria.parts)
+
+    @cached_property
+    def noisier(self) -> SelectionStep:
+        """The same step had the positions their noise once more on top."""
+        twin = self.columns.noisier
+        return replace(self, scene=replace(self.scene, columns=columns_at_hand(twin.observations)), columns=twin)
 
     def judge(self, candidates: Sequence[Candidate], scene: Scene | None = None) -> list[Decision]:
         """Examine candidates, by the columns of another scene if one is given, and decide on each."""

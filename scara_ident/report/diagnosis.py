@@ -49,6 +49,17 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for effect in diagnosis.effects
         ],
+        "tentative": [dict(vars(item)) for item in diagnosis.tentative],
+        "events": [],
+        "evidence": {
+            item.joint: {
+                "noise": item.shown,
+                "by": item.by,
+                "why": item.why,
+                "detection_limit": None if np.isnan(item.limit) else item.limit,
+            }
+            for item in diagnosis.evidence
+        },
         "training": _before_after(diagnosis, diagnosis.training_before, diagnosis.training_after),
         "validation": _before_after(diagnosis, diagnosis.validation_before, diagnosis.validation_after),
         "recordings": {
@@ -172,6 +183,13 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     found = []
     if diagnosis.verdict == "complete":
         found.append("The model lacks nothing that these recordings can show.")
+    if diagnosis.verdict == "undecided":
+        found.append("These recordings cannot tell whether something is missing.")
+        by_why: dict[str, list[str]] = {}
+        for item in diagnosis.evidence:
+            if not item.shown:
+                by_why.setdefault(item.why, []).append(item.joint)
+        found += [f"On {', '.join(joints)}: {why}." for why, joints in by_why.items()]
     for effect in diagnosis.effects:
         where = f" on {effect.joint}" if effect.joint else ""
         values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())
@@ -179,6 +197,9 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         if effect.confounded_with:
             others = ", ".join(confounder.label for confounder in effect.confounded_with)
             found.append(f"These recordings cannot tell it from: {others}.")
+    for guess in diagnosis.tentative:
+        where = f" on {guess.joint}" if guess.joint else ""
+        found.append(f"Worth a look, not added: {guess.effect}{where}; {guess.why}; settled by: {guess.settled_by}.")
     kind, old, new = "held-out", diagnosis.validation_before, diagnosis.validation_after
     if not old.data.recordings:
         kind, old, new = "training", diagnosis.training_before, diagnosis.training_after

@@ -31,6 +31,8 @@ GOOD = Examination(
     contribution=1.0,
     model_value=SCENE.value,
     left=np.ones(4),
+    products=np.eye(2),
+    freedom=30.0,
 )
 
 

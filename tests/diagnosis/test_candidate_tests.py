@@ -174,8 +174,8 @@ def test_what_is_left_is_the_residual_of_every_block():
 
 def by_leaving_out(
     model: FittedModel, columns: np.ndarray, place: np.ndarray, torque: np.ndarray, size: int
-) -> tuple[np.ndarray, float]:
-    """Covariance and p-value of the last coefficients from fits of all parameters without one block after the other."""
+) -> tuple[np.ndarray, float, float]:
+    """Covariance, p-value and freedom of the last coefficients from fits of all parameters without one block after the other."""
     blocks = len(model.owner)
     everything = np.linalg.pinv(columns, rcond=1e-12)[-size:]
     change = np.zeros((blocks, size, len(torque)))
@@ -207,7 +207,7 @@ def by_leaving_out(
     wald = value @ np.linalg.solve(unbiased, value)
     rest = freedom - size + 1.0
     p_value = float(f.sf(wald * rest / (freedom * size), size, rest)) if rest > 0.0 else 1.0
-    return into @ unbiased @ into.T, p_value
+    return into @ unbiased @ into.T, p_value, float(freedom)
 
 
 def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
@@ -235,10 +235,12 @@ def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
 
     value = without(np.ones(len(e), dtype=bool))
     left = e - x @ value
-    covariance, p_value = np.full((width, width), np.inf), 1.0
+    covariance, p_value, freedom = np.full((width, width), np.inf), 1.0, 1.0
     if len(free):
         covariance = np.zeros((width, width))
-        inner, p_value = by_leaving_out(model, np.column_stack([own, x[:, free]]), place, rows[:, -1], len(free))
+        inner, p_value, freedom = by_leaving_out(
+            model, np.column_stack([own, x[:, free]]), place, rows[:, -1], len(free)
+        )
         covariance[np.ix_(free, free)] = inner
     gains: list[float | None] = []
     saved = 0.0
@@ -265,6 +267,8 @@ def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
         float(before - after),
         own @ np.linalg.lstsq(own, torque, rcond=1e-12)[0],
         by_block(left**2),
+        x.T @ x,
+        freedom,
     )
 
 
@@ -282,6 +286,7 @@ def test_it_is_what_all_rows_of_all_joints_say(seed: int):
             assert_allclose(item.value, dense.value, rtol=1e-9, atol=1e-9 * np.min(size))
             assert_allclose(item.covariance, dense.covariance, rtol=1e-8, atol=1e-9 * np.max(dense.covariance))
         assert_allclose(item.p_value, dense.p_value, rtol=1e-7)
+        assert item.freedom == pytest.approx(dense.freedom, rel=1e-7)
         assert item.outside == pytest.approx(dense.outside, rel=1e-9)
         for name in ("gain", "held_out", "contribution"):
             assert getattr(item, name) == pytest.approx(getattr(dense, name), rel=1e-9, abs=1e-9), name

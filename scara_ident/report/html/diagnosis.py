@@ -298,14 +298,14 @@ def diagnosis_report(path: Path, context: DiagnosisContext) -> None:
         f"{diagnosis.search.tried} candidates and scan points tried; verdict: {diagnosis.verdict}"
     )
     verdict = _verdict(diagnosis, content["summary"])
-    warn = diagnosis.verdict == "unexplained"
+    warn = diagnosis.verdict in ("unexplained", "undecided")
     Page(f"Diagnosis of {diagnosis.robot.name}", subtitle, verdict, found, warn).write(path)
 
 
 def _verdict(diagnosis: Diagnosis, summary: Sequence[str]) -> tuple[str, ...]:
     """The verdict in a sentence, then what it rests on."""
     found = " and ".join(_title(effect).replace("_", " ") for effect in diagnosis.effects)
-    if diagnosis.verdict == "complete":
+    if diagnosis.verdict in ("complete", "undecided"):
         # The first of the sentences says so already.
         return tuple(summary)
     if diagnosis.verdict == "explained":

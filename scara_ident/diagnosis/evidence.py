@@ -1,0 +1,178 @@
+"""Whether what is left on each joint was shown to be noise, and whether something else would have been seen.
+
+That nothing was found says little where nothing could have been found. A joint's residual is shown to be noise where
+repetitions bound what repeats of it, or where it is white within the band, so that no motion of the arm, whose power is
+not spread evenly over frequency, can be in more than a small share of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
+from scara_ident.diagnosis.lack_of_fit import LackOfFit
+from scara_ident.diagnosis.search import Search
+from scara_ident.estimation.bands import binned_power
+from scara_ident.estimation.residuals import Residuals
+
+# Bins of frequency within the band that a residual's power is compared in.
+BINS = 12
+# Share of the band in which the low-pass leaves the residual as it is.
+UNTOUCHED = 0.8
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What is known of one joint's residual.
+
+    Attributes
+    ----------
+    joint : str
+    shown : bool
+        Whether it was shown to be noise, by recordings that would have shown otherwise.
+    by : {"repetition", "whiteness", ""}
+        What showed it.
+    why : str
+        In words.
+    limit : float
+        Share of its square that half of the effects tried on it would have to remove to be significant; NaN where
+        none was tried.
+    """
+
+    joint: str
+    shown: bool
+    by: str
+    why: str
+    limit: float
+
+
+def evidence(
+    found: Search, residuals: Residuals, fit: Sequence[LackOfFit], criteria: SelectionCriteria = CRITERIA
+) -> tuple[Evidence, ...]:
+    """Return for each joint whether what is left was shown to be noise.
+
+    Parameters
+    ----------
+    found : Search
+    residuals : Residuals
+        What is left of the training recordings.
+    fit : sequence of LackOfFit
+        From repetitions; empty without.
+    criteria : SelectionCriteria, optional
+    """
+    limits = detection_limits(found, criteria)
+    coloured = coloured_shares(residuals)
+    repeated = {item.joint: item for item in fit}
+    return tuple(
+        _of_joint(joint, repeated.get(joint), float(coloured[j]), float(limits[j]), criteria)
+        for j, joint in enumerate(found.scene.robot.joints)
+    )
+
+
+def _of_joint(
+    joint: str, fit: LackOfFit | None, coloured: float, limit: float, criteria: SelectionCriteria
+) -> Evidence:
+    if limit > criteria.least_power:
+        share = "no share" if limit >= 1.0 else f"less than {limit:.0%}"
+        why = f"an effect that removes {share} of the squared residual would not have been significant: record more"
+        return Evidence(joint, False, "", why, limit)
+    if fit is not None and fit.most_missing <= criteria.remainder_to_noise * fit.noise:
+        why = f"repetitions leave at most {fit.most_missing:.3g} that repeats, and {fit.noise:.3g} that does not"
+        return Evidence(joint, True, "repetition", why, limit)
+    if coloured <= criteria.least_colour:
+        why = f"at most {max(coloured, 0.0):.0%} of its power stands out from white noise within the band"
+        return Evidence(joint, True, "whiteness", why, limit)
+    why = f"{coloured:.0%} of its power stands out from white noise within the band, and "
+    why += (
+        "no trajectory is repeated that would tell whether it repeats"
+        if fit is None
+        else f"up to {fit.most_missing:.3g} of it may repeat, where {fit.noise:.3g} does not"
+    )
+    return Evidence(joint, False, "", why, limit)
+
+
+def held_out_evidence(
+    shown: Sequence[Evidence],
+    training: Sequence[float | None],
+    held_out: Sequence[float | None],
+    criteria: SelectionCriteria = CRITERIA,
+) -> tuple[Evidence, ...]:
+    """Take back what the training recordings showed where the model does not hold on others.
+
+    Parameters
+    ----------
+    shown : sequence of Evidence
+    training, held_out : sequence of float or None
+        Rms error of each joint; None without rows.
+    criteria : SelectionCriteria, optional
+    """
+    found = []
+    for item, own, other in zip(shown, training, held_out, strict=True):
+        if item.shown and own and other is not None and other > criteria.worse_held_out * own:
+            why = f"the error on the recordings held out is {other / own:.2g} times that of the training"
+            item = replace(item, shown=False, by="", why=why)
+        found.append(item)
+    return tuple(found)
+
+
+def detection_limits(found: Search, criteria: SelectionCriteria = CRITERIA) -> Array:
+    """Return for each joint the share of its squared residual that half of the effects tried would have to remove.
+
+    An effect is significant where its coefficients, squared and over their variance, are beyond a quantile; times what
+    one standard deviation of them removes, that is the least that it must remove.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        NaN where no effect was tried.
+    """
+    from scipy.special import fdtri
+
+    robot = found.scene.robot
+    shares: list[list[float]] = [[] for _ in robot.joints]
+    total = float(np.sum(found.step.model.squares))
+    for decision in (*found.decisions, *(step.decision for step in found.steps)):
+        examined, joint = decision.examination, decision.candidate.member.joint
+        if joint is None or examined.outside < criteria.least_outside or total == 0.0:
+            continue
+        count = len(examined.value)
+        rest = examined.freedom - count + 1.0
+        if rest <= 0.0:
+            shares[joint].append(1.0)
+            continue
+        quantile = float(fdtri(count, rest, 1.0 - criteria.family_error / found.tried)) * examined.freedom / rest
+        noise = float(np.trace(examined.products @ examined.covariance))
+        shares[joint].append(min(1.0, quantile * noise / total * robot.n))
+    return np.array([float(np.median(item)) if item else np.nan for item in shares])
+
+
+def coloured_shares(residuals: Residuals) -> Array:
+    """Return for each joint the share of the residual's power within the band above that of white noise.
+
+    The power in bins of equal width is that of white noise at the level of the median bin, and what stands out from it.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        1 where nothing is left to look at.
+    """
+    data = residuals.data
+    found = []
+    for j, band in enumerate(data.bands):
+        slowest = min(part.rate for part in data.stretches)
+        highest = UNTOUCHED * (0.5 * slowest if band is None else band)
+        edges = np.linspace(0.0, highest, BINS + 1)
+        power = np.zeros(BINS + 1)
+        for part, predicted in zip(data.stretches, residuals.predicted, strict=True):
+            if part.usable and np.any(part.used[j]):
+                inside = slice(part.trim, part.samples - part.trim)
+                left = (part.fade[j] * (part.torque[j] - predicted[j]))[inside]
+                power += binned_power(left[None], part.rate, np.append(edges, 0.5 * part.rate))[0]
+        within = power[:BINS]
+        mean = float(np.mean(within))
+        found.append(1.0 if mean == 0.0 else 1.0 - float(np.median(within)) / mean)
+    return np.array(found)

@@ -1,0 +1,41 @@
+"""Whether the noise of positions, rather than the arm, makes an effect."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.candidate_tests import Examination, examine
+from scara_ident.diagnosis.cluster_test import significance
+from scara_ident.diagnosis.selection_step import SelectionStep
+
+
+def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
+    """Say so where an effect is no longer to be believed once the share of the positions' noise is taken from it.
+
+    What a candidate's column has in common with the residual grows linearly with the variance of the noise in both.
+    With the noise twice, the difference is the noise's share (Cook and Stefanski 1994).
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The model that the candidate was tried beside.
+    decision : Decision
+        That lets it in.
+    """
+    found, criteria = decision.examination, step.criteria
+    own = step.noisier.columns.rows(step.noisier.scene, [decision.candidate])
+    (again,) = examine(step.noisier.model, own, criteria)
+    left = without_noise(found, again)
+    share = float(left @ found.products @ left) / float(found.value @ found.products @ found.value)
+    p_value = significance(left, found.covariance, found.freedom)
+    if p_value * step.tried <= criteria.family_error and decision.gain * share >= criteria.least_gain:
+        return None
+    return f"the noise of the positions makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
+
+
+def without_noise(found: Examination, again: Examination) -> Array:
+    """Return coefficients without the share of the positions' noise, from two examinations, the second with it twice."""
+    share = again.products @ again.value - found.products @ found.value
+    return np.asarray(found.value - np.linalg.pinv(found.products, rcond=1e-9, hermitian=True) @ share)

@@ -1,0 +1,60 @@
+"""Effects worth a look that are not believed, and what would settle them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from scara_ident.diagnosis.search import Search
+from scara_ident.diagnosis.selection_step import best_of_each
+
+
+@dataclass(frozen=True)
+class TentativeEffect:
+    """An effect that is not in the model.
+
+    Attributes
+    ----------
+    effect : str
+    joint : str or None
+    description : str
+    why : str
+        Why it is not believed.
+    settled_by : str
+        What to record.
+    gain : float
+        Share of the squared residual of its joints that it would remove on data that it was not fitted to.
+    p_value : float
+        Corrected for the candidates tried.
+    """
+
+    effect: str
+    joint: str | None
+    description: str
+    why: str
+    settled_by: str
+    gain: float
+    p_value: float
+
+
+def tentative_effects(found: Search, believed: Collection[tuple[str, str | None]]) -> tuple[TentativeEffect, ...]:
+    """Return the effects that an arm could have and that these recordings do not settle, the most gaining first.
+
+    Parameters
+    ----------
+    found : Search
+    believed : collection of (str, str or None)
+        Name and joint of the effects in the model, which are not listed again.
+    """
+    scene = found.scene
+    # Scan points of an effect that was refined and refused must not bring it back.
+    best = [item for item in best_of_each(found.decisions).values() if item.tentative]
+    result = []
+    for decision in sorted(best, key=lambda item: -item.gain):
+        candidate = decision.candidate
+        name, joint = candidate.effect.name, candidate.joint(scene)
+        if (name, joint) not in believed:
+            p_value = min(1.0, decision.examination.p_value * found.tried)
+            words, settled = candidate.effect.description(scene, candidate.member), candidate.effect.experiment
+            result.append(TentativeEffect(name, joint, words, decision.why, settled, decision.gain, p_value))
+    return tuple(result[: found.step.criteria.most_tentative])

@@ -1,0 +1,103 @@
+"""The noise of recorded positions, and recordings that have it twice.
+
+Differentiated twice it stands in the regressor, and in the columns of some effects it is differentiated four times: what
+depends on it is the more wrong the larger it is. How wrong is seen by adding as much again (Cook and Stefanski 1994,
+"Simulation-extrapolation estimation in parametric measurement error models").
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.motion.motion import Stretch
+from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch, position_cuts
+
+# Positions have steps where their changes are whole multiples of the least one, but for this much of it in the mean:
+# numbers of random size leave a quarter.
+WHOLE = 0.1
+# The noise of an unfiltered joint is what a filter at this share of the rate takes out.
+WIDE = 0.2
+# Steps about two zeros that lie so much of a step apart are uncorrelated: ``1 - 6 x (1 - x)`` is zero.
+UNLIKE = 0.5 - np.sqrt(1.0 / 12.0)
+# Median of a normal variable's size.
+NORMAL_MEDIAN = 0.6745
+
+
+def encoder_step(position: Array) -> float | None:
+    """Return the step of an encoder; None where positions do not go in steps.
+
+    Parameters
+    ----------
+    position : ndarray, shape (N,)
+        rad or m.
+    """
+    change = np.abs(np.diff(position))
+    # What rounding of a number in single precision leaves is no change.
+    change = change[change > 4.0 * np.finfo(np.float32).eps * np.max(np.abs(position), initial=0.0)]
+    if len(change) < 4:
+        return None
+    least = float(np.min(change))
+    step = float(np.median(change[change < 1.5 * least]))
+    multiple = change / step
+    # Beyond so many steps at once the error of the step itself adds up.
+    near = multiple[multiple < 1.0 / WHOLE]
+    if len(near) < 4 or float(np.mean(np.abs(near - np.round(near)))) > WHOLE:
+        return None
+    return step
+
+
+def noise_level(part: PreparedStretch, joint: int) -> float:
+    """Return the standard deviation of a position's noise, taken as white, from what its filter took out.
+
+    Parameters
+    ----------
+    part : PreparedStretch
+    joint : int
+    """
+    stretch = part.stretch
+    cut = position_cuts(stretch.rate, part.bands)[joint]
+    if cut is None:
+        cut = WIDE * stretch.rate
+        smooth = stretch.filtered(joint, cut)[0]
+    else:
+        smooth = part.motion.q[joint]
+    # The median ignores the moments at which real motion is faster than the filter.
+    scatter = float(np.median(np.abs(stretch.position[joint] - smooth))) / NORMAL_MEDIAN
+    nyquist = 0.5 * stretch.rate
+    return float(scatter / np.sqrt(max(nyquist - cut, 0.1 * nyquist) / nyquist))
+
+
+def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
+    """Return recordings with the noise of their positions once more on top.
+
+    Where an encoder has steps, those of the same size about another zero are added, so that what follows the motion in
+    them does so again; else white noise of the size that the filter takes out.
+
+    Parameters
+    ----------
+    data : PreparedData
+    seed : int, optional
+        Of the draw.
+    """
+    rng = np.random.default_rng(seed)
+    recordings = []
+    for item in data.recordings:
+        steps = [encoder_step(row) for row in item.recording.position]
+        parts = tuple(PreparedStretch(_noisier(part, steps, rng), part.bands) for part in item.stretches)
+        recordings.append(PreparedRecording(item.recording, parts))
+    return replace(data, recordings=tuple(recordings))
+
+
+def _noisier(part: PreparedStretch, steps: list[float | None], rng: np.random.Generator) -> Stretch:
+    stretch = part.stretch
+    position = stretch.position.copy()
+    for joint, step in enumerate(steps):
+        if step is None:
+            position[joint] += noise_level(part, joint) * rng.standard_normal(position.shape[1])
+        else:
+            smooth = part.motion.q[joint] + step * rng.choice((UNLIKE, 1.0 - UNLIKE))
+            position[joint] += step * np.round(smooth / step) - smooth
+    return replace(stretch, position=position, _filtered={})

@@ -1,0 +1,69 @@
+"""What a residual is shown to be: noise, with the power to have found otherwise, or nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.diagnose import diagnose
+from scara_ident.diagnosis.evidence import Evidence, coloured_shares, held_out_evidence
+from scara_ident.estimation.residuals import Residuals
+from scara_ident.motion.prepared import prepare
+from scara_ident.robot.robot import load_robot
+from tests.diagnosis.made import BANDS, exact_runs, virtual_runs
+
+
+def left_of(noise: np.ndarray) -> np.ndarray:
+    """Coloured shares of a residual that is this noise on both joints of every run."""
+    data = prepare(exact_runs(), BANDS)
+    predicted = tuple(part.torque - noise[:, : part.samples] for part in data.stretches)
+    return coloured_shares(Residuals(data, predicted))
+
+
+def test_white_noise_stands_out_nowhere_and_slow_noise_does():
+    rng = np.random.default_rng(1)
+    white = rng.standard_normal((2, 5000))
+    white[1] = lfilter([1.0], [1.0, -0.99], white[1])
+    share = left_of(white)
+    assert share[0] < 0.15
+    assert share[1] > 0.5
+
+
+def test_units_of_torque_change_nothing():
+    white = np.random.default_rng(2).standard_normal((2, 5000))
+    assert left_of(1e6 * white) == pytest.approx(left_of(1e-6 * white), rel=1e-9)
+
+
+@pytest.fixture(scope="module")
+def nothing_missing():
+    return diagnose(load_robot(), "complete", virtual_runs(), bands=BANDS)
+
+
+def test_complete_is_earned_by_repetition(nothing_missing):
+    assert nothing_missing.verdict == "complete"
+    assert [item.by for item in nothing_missing.evidence] == ["repetition"] * 2
+    assert all(item.limit < CRITERIA.least_power for item in nothing_missing.evidence)
+
+
+def test_one_short_run_cannot_tell():
+    first = virtual_runs()[0]
+    assert first.effort is not None
+    short = replace(
+        first, time=first.time[:500], position=first.position[:, :500], effort=first.effort[:, :500], velocity=None
+    )
+    result = diagnose(load_robot(), "complete", [short], bands=BANDS)
+    assert result.verdict == "undecided"
+    assert not result.effects
+    assert any("would not have been significant" in item.why for item in result.evidence)
+
+
+def test_what_does_not_hold_on_other_recordings_is_not_shown():
+    shown = (Evidence("joint1", True, "whiteness", "", 0.1), Evidence("joint2", True, "whiteness", "", 0.1))
+    found = held_out_evidence(shown, (1.0, 1.0), (1.4, 1.6))
+    assert [item.shown for item in found] == [True, False]
+    assert "1.6 times" in found[1].why
+    assert held_out_evidence(shown, (1.0, 1.0), (None, None)) == shown

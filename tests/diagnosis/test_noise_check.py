@@ -1,0 +1,40 @@
+"""Noise of positions that stands in the residual and in a candidate's column, and what it makes of the candidate."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from scara_ident.diagnosis.candidate_tests import Examination, examine
+from scara_ident.diagnosis.cluster_test import significance
+from scara_ident.diagnosis.fitted_model import FittedModel
+from scara_ident.diagnosis.noise_check import without_noise
+from scara_ident.estimation.observations import JointRows
+
+BLOCKS, ROWS = 100, 12
+LENGTH = BLOCKS * ROWS
+
+
+def examined(base: np.ndarray, tried: np.ndarray, torque: np.ndarray) -> Examination:
+    starts = np.arange(0, LENGTH + 1, ROWS)
+    rows = JointRows(np.arange(2), np.vstack([base, np.ones(LENGTH), torque]), starts, np.full(BLOCKS, float(ROWS)))
+    model = FittedModel((rows,), 2, np.zeros(BLOCKS, dtype=int), np.arange(BLOCKS) * 4 // BLOCKS, np.ones(1))
+    return examine(model, [{0: tried[None]}])[0]
+
+
+@pytest.mark.parametrize("true", [0.0, 0.4])
+def test_what_the_noise_makes_is_taken_off_and_what_the_arm_does_is_left(true: float):
+    # The base column holds noise, the candidate's the same noise magnified, as derivatives of one position do.
+    rng = np.random.default_rng(4)
+    smooth, other = lfilter([1.0], [1.0, -0.9], rng.standard_normal((2, LENGTH)), axis=1)
+    torque = 2.0 * smooth + true * other + 0.1 * rng.standard_normal(LENGTH)
+    noise, again = 0.3 * rng.standard_normal((2, LENGTH))
+    once = examined(smooth + noise, other + 3.0 * noise, torque)
+    twice = examined(smooth + noise + again, other + 3.0 * (noise + again), torque)
+    assert abs(once.value[0] - true) > 0.05
+    assert once.p_value < 1e-12
+    left = without_noise(once, twice)
+    assert abs(left[0]) == pytest.approx(true, abs=0.07)
+    p_value = significance(left, once.covariance, once.freedom)
+    assert (p_value < 1e-6) if true else (p_value > 1e-3)

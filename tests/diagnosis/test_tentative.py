@@ -1,0 +1,44 @@
+"""Effects that a run shows and does not settle: listed with what would settle them, and not in the model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.diagnose import diagnose
+from scara_ident.diagnosis.tentative import tentative_effects
+from scara_ident.effects.position import Spring
+from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.robot.robot import load_robot
+from tests.diagnosis.made import BANDS, exact_runs, with_torque
+
+
+@pytest.fixture(scope="module")
+def doubtful():
+    """A spring that would have to help in more trajectories than there are."""
+    runs = with_torque(exact_runs(), 1, lambda motion: 0.05 * motion.q[1])
+    criteria = replace(CRITERIA, least_votes=1.01)
+    return diagnose(load_robot(), "complete", runs, bands=BANDS, catalogue=(Spring(),), criteria=criteria)
+
+
+def test_what_is_not_settled_is_listed_and_not_added(doubtful):
+    (spring,) = doubtful.tentative
+    assert (spring.effect, spring.joint) == ("spring", "joint2")
+    assert "helps in only" in spring.why
+    assert spring.settled_by == Spring.experiment
+    assert spring.gain > 0.5
+    assert not doubtful.effects
+    assert doubtful.after.model.names == doubtful.before.model.names
+
+
+def test_it_stands_in_the_results_as_the_contract_says(doubtful):
+    content = diagnosis_dict(doubtful)
+    (entry,) = content["tentative"]
+    assert {"effect", "joint", "why", "settled_by"} <= set(entry)
+    assert any("Worth a look, not added: spring on joint2" in sentence for sentence in content["summary"])
+
+
+def test_what_is_believed_is_not_listed_again(doubtful):
+    assert tentative_effects(doubtful.search, {("spring", "joint2")}) == ()

@@ -1,0 +1,67 @@
+"""The noise of positions: steps of encoders, white noise, and recordings that have it twice."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scara_ident.motion.position_noise import encoder_step, noise_level, noisier
+from scara_ident.motion.prepared import prepare
+from scara_ident.robot.robot import load_robot
+from tests.arms import recording
+
+TIME = np.arange(4000) / 500.0
+SMOOTH = np.vstack([np.sin(1.3 * TIME), 0.5 * np.cos(2.1 * TIME)])
+
+
+def prepared(position: np.ndarray):
+    made = recording(load_robot(), "M_1", TIME, position, np.zeros_like(position))
+    return prepare([made], (10.0, 10.0))
+
+
+@given(bits=st.integers(10, 16), zero=st.floats(-1.0, 1.0), single=st.booleans())
+def test_the_step_of_an_encoder_is_found(bits: int, zero: float, single: bool):
+    step = 2.0 * np.pi / 2**bits
+    position = step * np.round((SMOOTH[0] + zero) / step)
+    if single:
+        position = position.astype(np.float32).astype(float)
+    found = encoder_step(position)
+    # Finer steps are taken hundreds at a time, and are white noise.
+    assert found == pytest.approx(step, rel=0.02)
+
+
+def test_without_steps_there_are_none():
+    rng = np.random.default_rng(0)
+    assert encoder_step(SMOOTH[0]) is None
+    assert encoder_step(SMOOTH[0] + 1e-4 * rng.standard_normal(len(TIME))) is None
+    assert encoder_step(np.zeros(100)) is None
+
+
+@pytest.mark.parametrize("size", [1e-5, 1e-3])
+def test_white_noise_is_measured_and_added_once_more(size: float):
+    rng = np.random.default_rng(1)
+    data = prepared(SMOOTH + size * rng.standard_normal(SMOOTH.shape))
+    (part,) = data.stretches
+    for joint in range(2):
+        assert noise_level(part, joint) == pytest.approx(size, rel=0.1)
+    (more,) = noisier(data).stretches
+    added = more.stretch.position - part.stretch.position
+    assert np.std(added, axis=1) == pytest.approx([size, size], rel=0.1)
+    assert np.array_equal(more.torque, part.torque)
+
+
+def test_steps_are_added_about_another_zero_and_follow_the_motion():
+    step = 2.0 * np.pi / 2**12
+    data = prepared(step * np.round(SMOOTH / step))
+    (part,) = data.stretches
+    (more,) = noisier(data, seed=3).stretches
+    added = more.stretch.position - part.stretch.position
+    assert np.max(np.abs(added)) <= 0.5 * step * (1.0 + 1e-9)
+    assert np.std(added[0]) == pytest.approx(step / np.sqrt(12.0), rel=0.05)
+    assert abs(np.corrcoef(added[0], part.stretch.position[0] - SMOOTH[0])[0, 1]) < 0.2
+    again = noisier(replace(data), seed=3).stretches[0].stretch.position
+    assert np.array_equal(again, more.stretch.position)
