@@ -190,6 +190,8 @@ def diagnose(
     validation_before = observe(base, held_out.at(found.bands))
     effects = _effects(found, step)
     notes += outcome.demoted
+    if after.variation is not None:
+        notes += after.variation.sentences(robot)
     negligible = _negligible(found)
     if negligible is not None:
         notes.append(f"{negligible}; corrected in the data, not counted as an effect")

@@ -12,6 +12,7 @@ from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Parameter
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.information import merge
+from scara_ident.estimation.run_variation import run_variation
 
 
 def physical_parameters(step: SelectionStep) -> list[dict[str, Parameter]]:
@@ -73,5 +74,8 @@ def _covariance(step: SelectionStep, state: Linearised) -> Array:
     inverse = merge([state.information, state.prior]).inverse()
     value = np.concatenate([state.value, np.zeros(len(state.unknowns))])
     spread = block_covariance(inverse, value, state.joints, step.observations.owner, step.weights).matrix
+    spread = spread + run_variation(step.observations, state.joints, value).covariance(
+        inverse, state.joints, step.weights
+    )
     known = state.prior.factor[:, :-1]
     return np.asarray(spread + state.variance * inverse @ (known.T @ known) @ inverse)

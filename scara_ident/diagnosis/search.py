@@ -16,6 +16,7 @@ from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, model_with, observed
+from scara_ident.diagnosis.variation_check import variation_objection
 from scara_ident.effects import Effect, Scene
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.estimation import Estimate, wls
@@ -257,6 +258,7 @@ def _choose(step: SelectionStep, decisions: Sequence[Decision]) -> tuple[Decisio
     )
     for decision in sound:
         why = _insignificant(step, decision.candidate) or noise_objection(step, decision)
+        why = why or variation_objection(step, decision)
         if why is None:
             return decision, refused
         refused[decision.label] = decision.refused(why)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_variation import RunVariation
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 
@@ -58,6 +59,8 @@ class Estimate:
         Weight of each joint's rows.
     std_kind : str
         How the covariance was found, see `scara_ident.estimation.covariance`.
+    variation : RunVariation or None
+        How runs differ, which is part of the covariance; None where it was not looked for.
     """
 
     model: TorqueModel
@@ -68,6 +71,7 @@ class Estimate:
     information: Information
     weights: Array
     std_kind: str
+    variation: RunVariation | None = field(default=None, kw_only=True)
 
     @property
     def std(self) -> Array:

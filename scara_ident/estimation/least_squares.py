@@ -10,6 +10,7 @@ from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, merge, weighted
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_variation import run_variation
 from scara_ident.threads import one_blas_thread
 
 
@@ -71,14 +72,23 @@ def least_squares(
     inverse = information.inverse()
     with one_blas_thread():
         spread = block_covariance(inverse, solution.value, observations.joints, observations.owner, weights)
-    covariance = spread.matrix.copy()
+    variation = run_variation(observations, observations.joints, solution.value)
+    covariance = spread.matrix + variation.covariance(inverse, observations.joints, weights)
     if prior is not None:
         # The prior's own error, which no residual shows.
         precision = prior.regressor_factor.T @ prior.regressor_factor
         covariance += inverse @ precision @ inverse
     covariance[np.diag_indices_from(covariance)] = np.where(solution.undetermined, np.inf, np.diag(covariance))
     return Estimate(
-        observations.model, method, solution.value, covariance, solution.undetermined, information, weights, spread.kind
+        observations.model,
+        method,
+        solution.value,
+        covariance,
+        solution.undetermined,
+        information,
+        weights,
+        spread.kind,
+        variation=variation,
     )
 
 

@@ -80,6 +80,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
             column.entry(value=diagnosis.after.value[k], std=diagnosis.after.std[k])
             for k, column in enumerate(diagnosis.after.model.columns)
         ],
+        "run_variation": diagnosis.after.variation.sizes(diagnosis.robot) if diagnosis.after.variation else {},
         "not_identifiable": [
             {"effect": alias.effect, "absorbed_by": list(alias.absorbed_by), "opened_by": alias.opened_by}
             for alias in diagnosis.aliases

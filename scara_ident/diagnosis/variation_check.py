@@ -1,0 +1,47 @@
+"""Whether runs that differ from one another, rather than an effect of the arm, make an effect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.candidate_tests import examine
+from scara_ident.diagnosis.candidates import with_columns
+from scara_ident.diagnosis.fitted_model import FittedModel
+from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.estimation.run_variation import RunVariation, run_variation
+
+
+def variation_objection(step: SelectionStep, decision: Decision) -> str | None:
+    """Say so where an effect is not significant beside what runs differ by when it is in the model.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The model that the candidate was tried beside.
+    decision : Decision
+        That lets it in.
+    """
+    found = decision.examination
+    (own,) = step.columns.rows(step.scene, [decision.candidate])
+    chosen = step.columns.rows(step.scene, step.chosen)
+    value = np.concatenate([found.model_value, found.value])
+    variation = run_variation(step.observations, with_columns(step.observations, [*chosen, own]), value)
+    if not variation:
+        return None
+    (again,) = examine(
+        whitened(step.model, variation),
+        [{joint: variation.whitened(joint, rows) for joint, rows in own.items()}],
+        step.criteria,
+    )
+    if again.p_value * step.tried <= step.criteria.family_error:
+        return None
+    return f"runs differ from one another by as much: with that counted as noise p = {again.p_value:.1e}"
+
+
+def whitened(model: FittedModel, variation: RunVariation) -> FittedModel:
+    """Return a model fitted to rows on which what runs differ by is weighted as the noise it is."""
+    rows = tuple(replace(item, table=variation.whitened(joint, item.table)) for joint, item in enumerate(model.joints))
+    return replace(model, joints=rows)

@@ -1,0 +1,293 @@
+"""How recordings differ from one another beyond noise: friction, torque scale, offset and delay of each run.
+
+An arm is not quite the same from run to run and from day to day. What a run has more of than the others acts through the
+whole of it, so that blocks of one run say the same and their scatter knows nothing of it. Each kind of difference has a
+direction on the rows of a run, such as the friction that the model predicts; how far runs lie from one another along
+these directions is a variance component (Searle, Casella and McCulloch 1992, "Variance Components"), estimated by
+maximum likelihood. A component that chance explains is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.model.terms.friction import Friction, Offset
+from scara_ident.robot.robot import Robot
+
+KINDS = ("friction", "torque scale", "offset", "delay")
+
+# With fewer recordings than this none can be told from the parameters.
+LEAST_RUNS = 3
+# Rise of twice the logarithm of the likelihood below which chance explains a component, which cannot be negative: 1 %.
+CHANCE = 5.41
+# Steps of expectation and maximisation; each takes a share of what is left.
+STEPS = 40
+# Of differences below this share of the torque nothing is said in words.
+SPOKEN_OF = 0.01
+# Directions of a run below this share of the largest are not told apart.
+_RANK = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class JointVariation:
+    """How runs differ on one joint.
+
+    Attributes
+    ----------
+    directions : ndarray, shape (kinds, N)
+        Rows of what one unit of each kind does: the friction predicted, the torque predicted, 1 N m, 1 s.
+    std : ndarray, shape (kinds,)
+        Standard deviation between runs, in these units.
+    of_run : ndarray, shape (runs, kinds)
+        By how much each run lies off the mean, shrunken as its noise asks.
+    noise : float
+        Standard deviation of one row.
+    bounds : ndarray of int, shape (runs + 1,)
+        Where the rows of each run begin.
+    """
+
+    directions: Array
+    std: Array
+    of_run: Array
+    noise: float
+    bounds: NDArray[np.intp]
+
+    @cached_property
+    def shrinking(self) -> tuple[tuple[Array, Array], ...]:
+        """For each run orthonormal rows (r, N) and the share that stays of what lies along them (r,)."""
+        found = []
+        size = self.std / self.noise
+        for start, stop in zip(self.bounds[:-1], self.bounds[1:], strict=True):
+            rows = size[:, None] * self.directions[:, start:stop]
+            values, vectors = np.linalg.eigh(rows @ rows.T)
+            kept = values > _RANK * max(float(np.max(values, initial=0.0)), np.finfo(float).tiny)
+            root = np.sqrt(values[kept])
+            found.append(((vectors[:, kept] / root).T @ rows, 1.0 / np.sqrt(1.0 + values[kept])))
+        return tuple(found)
+
+    def whitened(self, signals: Array) -> Array:
+        """Return signals on the joint's rows, shape (k, N), with what runs differ by weighted as the noise it is."""
+        result = signals.copy()
+        for (rows, stays), start, stop in zip(self.shrinking, self.bounds[:-1], self.bounds[1:], strict=True):
+            part = signals[:, start:stop]
+            result[:, start:stop] -= ((part @ rows.T) * (1.0 - stays)) @ rows
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class RunVariation:
+    """How runs differ, joint by joint; None where they do not.
+
+    Attributes
+    ----------
+    joints : tuple of JointVariation or None
+    """
+
+    joints: tuple[JointVariation | None, ...]
+
+    def sizes(self, robot: Robot) -> dict[str, dict[str, float]]:
+        """Return the standard deviation of each kind by joint and kind, of those that differ."""
+        return {
+            joint: {kind: float(std) for kind, std in zip(KINDS, item.std, strict=True) if std > 0.0}
+            for joint, item in zip(robot.joints, self.joints, strict=True)
+            if item is not None
+        }
+
+    def sentences(self, robot: Robot) -> list[str]:
+        """Return in words what differs by more than a hundredth of the torque."""
+        found = []
+        for j, (joint, item) in enumerate(zip(robot.joints, self.joints, strict=True)):
+            if item is None:
+                continue
+            rms = np.sqrt(np.mean(item.directions**2, axis=1))
+            units = ("{:.2g} %", "{:.2g} %", "{:.2g} " + robot.torque_unit(j), "{:.2g} ms")
+            shown = [
+                f"its {kind} by {unit.format(std * scale)}"
+                for kind, std, size, unit, scale in zip(KINDS, item.std, rms, units, (100, 100, 1, 1000), strict=True)
+                if std * size > SPOKEN_OF * rms[KINDS.index("torque scale")]
+            ]
+            if shown:
+                found.append(f"{joint} differs from run to run (standard deviation): {', '.join(shown)}")
+        return found
+
+    def __bool__(self) -> bool:
+        return any(item is not None for item in self.joints)
+
+    def whitened(self, joint: int, signals: Array) -> Array:
+        """Return signals on a joint's rows, see `JointVariation.whitened`."""
+        item = self.joints[joint]
+        return signals if item is None else item.whitened(signals)
+
+    def covariance(self, inverse: Array, joints: Sequence[JointRows], weights: Array) -> Array:
+        """Return what the differences add to the covariance of a least-squares estimate, shape (p, p).
+
+        Parameters
+        ----------
+        inverse : ndarray, shape (p, p)
+            Inverse of ``W.T @ W`` of all weighted rows.
+        joints : sequence of JointRows
+            The rows that it was estimated from.
+        weights : ndarray, shape (n,)
+        """
+        from scipy.special import stdtrit
+
+        total = np.zeros_like(inverse)
+        for item, rows, weight in zip(self.joints, joints, weights, strict=True):
+            if item is None:
+                continue
+            for start, stop in zip(item.bounds[:-1], item.bounds[1:], strict=True):
+                pull = rows.table[:-1, start:stop] @ (item.std[:, None] * item.directions[:, start:stop]).T
+                # Of few runs the scatter is known badly; two of these standard deviations cover 95 % all the same.
+                wider = 0.5 * float(stdtrit(len(item.of_run) - 1, 0.975))
+                moved = wider * weight**2 * inverse[:, rows.columns] @ pull
+                total += moved @ moved.T
+        return total
+
+
+def run_variation(observations: Observations, joints: Sequence[JointRows], value: Array) -> RunVariation:
+    """Estimate how runs differ.
+
+    Parameters
+    ----------
+    observations : Observations
+        Of the base model.
+    joints : sequence of JointRows
+        Its rows, with those of further columns.
+    value : ndarray, shape (p,)
+        Parameters of all these columns.
+    """
+    runs = len(observations.data.recordings)
+    if runs < LEAST_RUNS:
+        return RunVariation((None,) * len(joints))
+    firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
+    found = []
+    for joint, rows in enumerate(joints):
+        bounds = rows.starts[firsts]
+        directions = _directions(observations, joint, rows, value)
+        left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
+        found.append(_estimated(directions, left, rows.starts, firsts, bounds))
+    return RunVariation(tuple(found))
+
+
+def _directions(observations: Observations, joint: int, rows: JointRows, value: Array) -> Array:
+    """Return what one unit of each kind does on the rows of a joint, shape (kinds, N); zero where it does nothing."""
+    model = observations.model
+    predicted = value[rows.columns] * rows.table[:-1].T
+    friction, offset = np.zeros(len(rows.columns), dtype=bool), np.zeros(len(rows.columns), dtype=bool)
+    for term in model.terms:
+        place = model.place(term)
+        own = (rows.columns >= place.start) & (rows.columns < place.stop)
+        friction |= own & isinstance(term, Friction)
+        offset |= own & isinstance(term, Offset)
+    found = np.zeros((len(KINDS), rows.table.shape[1]))
+    found[0] = np.sum(predicted[:, friction], axis=1)
+    found[1] = np.sum(predicted, axis=1)
+    found[2] = np.sum(rows.table[:-1][offset], axis=0)
+    # A torque that comes late lacks so much of its rate.
+    base = value[: observations.parameters]
+    parts = []
+    raws = (raw for recording in observations.raw for raw in recording)
+    for part, raw in zip(observations.data.stretches, raws, strict=True):
+        if part.usable:
+            torque = base[observations.joints[joint].columns] @ raw[joint]
+            parts.append(part.rows(joint, -np.gradient(torque, 1.0 / part.rate)[None])[0])
+    found[3] = np.concatenate(parts)
+    return found
+
+
+def _estimated(
+    directions: Array, left: Array, starts: NDArray[np.intp], firsts: NDArray[np.intp], bounds: NDArray[np.intp]
+) -> JointVariation | None:
+    runs, kinds = len(bounds) - 1, len(directions)
+    size = np.sqrt(np.sum(directions**2, axis=1) / runs)
+    shown = size > 0.0
+    if not np.any(shown) or not np.any(left):
+        return None
+    unit = directions[shown] / size[shown, None]
+    products, aims, noise, spread = _of_runs(unit, left, starts, firsts, bounds)
+    if noise == 0.0:
+        return None
+    # In units of the noise of one row; the memory of the noise makes directions less sure than white noise would.
+    scale = 1.0 / np.sqrt(spread)
+    products = products * np.outer(scale, scale)
+    aims = aims * scale / noise
+    active = list(range(int(np.count_nonzero(shown))))
+    variance, best = _most_likely(products, aims, active)
+    while active:
+        without = [_most_likely(products, aims, [k for k in active if k != out]) for out in active]
+        losses = [2.0 * (best - likelihood) for _, likelihood in without]
+        weakest = int(np.argmin(losses))
+        if losses[weakest] > CHANCE:
+            break
+        variance, best = without[weakest]
+        active.pop(weakest)
+    if not active:
+        return None
+    std, of_run = np.zeros(kinds), np.zeros((runs, kinds))
+    # Parameters are fitted to all runs, so that these lie about their own mean.
+    back = scale * noise / size[shown]
+    std[shown] = np.sqrt(variance * runs / (runs - 1.0)) * back
+    of_run[:, shown] = _expected(products, aims, variance)[0] * back
+    return JointVariation(directions, std, of_run, noise, bounds)
+
+
+def _of_runs(
+    unit: Array, left: Array, starts: NDArray[np.intp], firsts: NDArray[np.intp], bounds: NDArray[np.intp]
+) -> tuple[Array, Array, float, Array]:
+    """Return per run products of directions and with the residual, the noise of a row, and its spread by its memory."""
+    products, aims = [], []
+    squares = rows = 0.0
+    scatter, white = np.zeros(len(unit)), np.zeros(len(unit))
+    for run, (start, stop) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
+        own, rest = unit[:, start:stop], left[start:stop]
+        product, aim = own @ own.T, own @ rest
+        products.append(product)
+        aims.append(aim)
+        rest = rest - np.linalg.lstsq(product, aim, rcond=_RANK)[0] @ own
+        squares += float(rest @ rest)
+        rows += max(0.0, stop - start - len(unit))
+        blocks = starts[firsts[run] : firsts[run + 1] + 1]
+        scores = np.array([own[:, a - start : b - start] @ rest[a - start : b - start] for a, b in zip(blocks[:-1], blocks[1:], strict=True)])  # fmt: skip
+        scatter += np.sum(scores**2, axis=0)
+        white += np.diag(product)
+    variance = squares / rows if rows else 0.0
+    spread = np.maximum(1.0, scatter / np.maximum(variance * white, np.finfo(float).tiny))
+    return np.array(products), np.array(aims), float(np.sqrt(variance)), spread
+
+
+def _expected(products: Array, aims: Array, variance: Array) -> tuple[Array, Array]:
+    """Return how far each run lies off along each direction, and the variance of that."""
+    root = np.sqrt(variance)
+    inner = np.eye(len(variance)) + products * np.outer(root, root)
+    inverse = np.linalg.inv(inner)
+    spread = root[:, None] * inverse * root
+    return np.einsum("rij,rj->ri", spread, aims), np.diagonal(spread, axis1=1, axis2=2)
+
+
+def _most_likely(products: Array, aims: Array, active: Sequence[int]) -> tuple[Array, float]:
+    """Return the variances of the active kinds that are most likely, and the logarithm of their likelihood."""
+    kinds = products.shape[1]
+    variance = np.zeros(kinds)
+    if not len(active):
+        return variance, 0.0
+    own = list(active)
+    inner, aim = products[np.ix_(range(len(products)), own, own)], aims[:, own]
+    alone = np.diagonal(inner, axis1=1, axis2=2)
+    # The first guess leaves nothing to chance.
+    some = np.mean((aim / np.maximum(alone, np.finfo(float).tiny)) ** 2, axis=0)
+    for _ in range(STEPS):
+        mean, spread = _expected(inner, aim, some)
+        some = np.mean(mean**2 + spread, axis=0)
+    root = np.sqrt(some)
+    grown = np.eye(len(own)) + inner * np.outer(root, root)
+    mean, _ = _expected(inner, aim, some)
+    likelihood = 0.5 * float(np.sum(mean * aim)) - 0.5 * float(np.sum(np.linalg.slogdet(grown)[1]))
+    variance[own] = some
+    return variance, likelihood

@@ -1,0 +1,38 @@
+"""An effect beside runs that differ: refused where it stands for them, kept where it does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.variation_check import variation_objection
+from scara_ident.effects import Member
+from scara_ident.effects.position import Spring
+from tests.diagnosis.made import step_beside, with_torque
+from tests.estimation.test_run_variation import runs
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 0.05])
+def test_a_spring_of_the_arm_stands_beside_runs_that_differ(stiffness: float):
+    made = with_torque(runs(np.random.default_rng(1)), 1, lambda motion: stiffness * motion.q[1])
+    step = step_beside(made)
+    (decision,) = step.judge([Candidate(Spring(), Member(1))])
+    assert (variation_objection(step, decision) is None) is bool(stiffness)
+
+
+def test_what_differs_from_run_to_run_is_no_effect():
+    # A spring of another stiffness and sign in every run.
+    made = runs(np.random.default_rng(2), (0.0, 0.0, 0.05, 0.0))
+    step = step_beside(made)
+    (decision,) = step.judge([Candidate(Spring(), Member(1))])
+    why = variation_objection(step, decision)
+    assert why is not None
+    assert "runs differ" in why
+
+
+def test_where_runs_do_not_differ_there_is_no_objection():
+    made = with_torque(runs(np.random.default_rng(3), (0.0,) * 4), 1, lambda motion: 0.05 * motion.q[1])
+    step = step_beside(made)
+    (decision,) = step.judge([Candidate(Spring(), Member(1))])
+    assert variation_objection(step, decision) is None

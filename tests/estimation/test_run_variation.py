@@ -1,0 +1,121 @@
+"""Runs that differ: how far is found, what it makes of the parameters' errors, and nothing where they do not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from scara_ident.diagnosis.diagnose import diagnose
+from scara_ident.estimation import Estimate, wls
+from scara_ident.estimation.run_variation import KINDS, run_variation
+from scara_ident.paper import table5_parameters
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import load_robot
+from tests.arms import noisy, recorded_torque, recording
+from tests.diagnosis.made import NOISE, RATE, multisine, observed
+
+ROBOT = load_robot()
+TRUTH = np.array(table5_parameters("OJD"))
+FRICTION = [TRUTH[5 + 4 * j : 9 + 4 * j] for j in range(2)]
+# Friction, torque scale, offset [N m], delay [s].
+DIFFERENT = (0.06, 0.02, 0.02, 0.003)
+
+
+def runs(
+    rng: np.random.Generator, std: Sequence[float] = DIFFERENT, count: int = 8, seconds: float = 10.0
+) -> list[Recording]:
+    """Runs of four motions, each of which has its own friction, torque scale, offset and delay."""
+    made = []
+    time = np.arange(round(seconds * RATE)) / RATE
+    for run in range(count):
+        reference = multisine("ABCD"[run % 4], 3 + run % 4, seconds)
+        late = reference.at(time - std[3] * rng.standard_normal())
+        friction = [(*row * (1.0 + std[0] * rng.standard_normal()), 0.0) for row in FRICTION]
+        torque = recorded_torque(ROBOT, late.position, late.velocity, late.acceleration, friction)
+        torque = torque * (1.0 + std[1] * rng.standard_normal((2, 1))) + std[2] * rng.standard_normal((2, 1))
+        clean = recording(ROBOT, f"{reference.name}{run}_1", time, reference.at(time).position, torque)
+        made.append(noisy(clean, rng, NOISE))
+    return made
+
+
+def errors(estimate: Estimate) -> np.ndarray:
+    """Errors of parameters in their standard deviations."""
+    return np.asarray((estimate.value - np.concatenate([TRUTH[:13], [0.0, 0.0]])) / estimate.std)
+
+
+def test_how_far_runs_differ_is_found():
+    found = []
+    for seed in range(4):
+        estimate = wls(observed(runs(np.random.default_rng(seed))))
+        assert estimate.variation is not None
+        found += [item.std for item in estimate.variation.joints if item is not None]
+    assert len(found) == 8
+    assert_allclose(np.sqrt(np.mean(np.square(found), axis=0)), DIFFERENT, rtol=0.35)
+
+
+def test_two_standard_deviations_cover_the_parameters_of_runs_that_differ():
+    seen, alone = [], []
+    for seed in range(12):
+        seen_of = observed(runs(np.random.default_rng(100 + seed)))
+        estimate = wls(seen_of)
+        assert estimate.variation is not None
+        added = estimate.variation.covariance(estimate.information.inverse(), seen_of.joints, estimate.weights)
+        seen.append(np.abs(errors(estimate)) < 2.0)
+        alone.append(
+            np.abs(errors(estimate)) * np.sqrt(np.diag(estimate.covariance) / np.diag(estimate.covariance - added))
+            < 2.0
+        )
+    assert np.mean(seen) > 0.93
+    # Blocks alone know nothing of what acts through a whole run.
+    assert np.mean(alone) < 0.9
+
+
+def test_where_runs_do_not_differ_nothing_is_found():
+    found = [wls(observed(runs(np.random.default_rng(seed), (0.0, 0.0, 0.0, 0.0)))).variation for seed in range(4)]
+    assert not any(found)
+    assert all(item is not None and item.sizes(ROBOT) == {} and item.sentences(ROBOT) == [] for item in found)
+
+
+def test_of_two_runs_nothing_is_said():
+    assert not wls(observed(runs(np.random.default_rng(0), count=2))).variation
+
+
+def test_units_of_torque_change_nothing():
+    made = runs(np.random.default_rng(5))
+    one, two = (
+        wls(observed([replace(run, effort=unit * run.effort) for run in made])).variation for unit in (1.0, 1e3)
+    )
+    assert one is not None
+    assert two is not None
+    for a, b in zip(one.joints, two.joints, strict=True):
+        assert a is not None
+        assert b is not None
+        assert_allclose(b.std, a.std * [1.0, 1.0, 1e3, 1.0], rtol=1e-4)
+
+
+def test_weighing_what_differs_as_noise_leaves_white_rows():
+    seen = observed(runs(np.random.default_rng(6)))
+    value = wls(seen).value
+    variation = run_variation(seen, seen.joints, value)
+    rows = seen.joints[0]
+    left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
+    item = variation.joints[0]
+    assert item is not None
+    white = item.whitened(left[None])[0]
+    assert np.std(white) == pytest.approx(item.noise, rel=0.1)
+    assert np.std(left) > 1.3 * item.noise
+
+
+def test_no_effect_is_believed_that_stands_for_runs_that_differ():
+    result = diagnose(ROBOT, "complete", runs(np.random.default_rng(1002)))
+    assert not result.effects
+    assert result.verdict in ("undecided", "complete")
+    assert any("differs from run to run" in note and "friction by" in note for note in result.notes)
+
+
+def test_kinds_are_named():
+    assert KINDS == ("friction", "torque scale", "offset", "delay")
