@@ -2,7 +2,9 @@
 
 Half of the sets have repetitions of the same motion, three in ten of all have files that are numbered through and so do
 not tell which are. Half differ from run to run: in friction, in torque scale or offset by day, in delay, each with
-odds of two in three. The rotor's inertia is stated in half of the sets.
+odds of two in three. The rotor's inertia is stated in half of the sets. Where the controller is faster than the recording
+the torque is sampled in half of the sets and averaged in the other half. A third of the sets begin each recording with the
+motion, a third at any time within a sample before it, a third by hand.
 """
 
 from __future__ import annotations
@@ -28,6 +30,10 @@ HELD_OUT_DURATION = (8.0, 15.0)
 # the largest delay by run, s.
 FRICTION, SCALE, OFFSET, DELAY = 0.06, 0.02, 0.02, 0.005
 Noise = Literal["white", "coloured", "heavy"]
+# How a recording begins: with the motion, less than a sample before it, or up to `BY_HAND` before it, s.
+Start = Literal["with the motion", "within a sample", "by hand"]
+STARTS: tuple[Start, ...] = ("with the motion", "within a sample", "by hand")
+BY_HAND = 0.5
 
 
 @dataclass(frozen=True)
@@ -75,6 +81,10 @@ class Conditions:
         Of coloured noise, s.
     stated : bool
         Whether the robot's description states reductions and rotor inertias.
+    averaged : bool
+        Whether the recorded torque is the mean over a sample, not that of one period of the controller.
+    start : str
+        When recordings begin, see `Start`.
     numbered : bool
         Whether files are numbered through instead of named by motion and repetition.
     variation : Variation
@@ -87,6 +97,8 @@ class Conditions:
     noise_kind: Noise
     correlation_time: float
     stated: bool
+    averaged: bool
+    start: Start
     numbered: bool
     variation: Variation
     runs: tuple[Run, ...]
@@ -115,6 +127,8 @@ class Asked:
     noise: float | None = None
     noise_kind: Noise | None = None
     stated: bool | None = None
+    averaged: bool | None = None
+    start: Start | None = None
     recordings: int | None = None
     motions: int | None = None
     duration: tuple[float, float] | None = None
@@ -129,6 +143,7 @@ def draw_conditions(rng: np.random.Generator, asked: Asked) -> Conditions:
     noise_kind: Noise = ("white", "coloured", "heavy")[rng.integers(3)]
     correlation_time = float(np.exp(rng.uniform(np.log(0.002), np.log(0.03))))
     stated, numbered = bool(rng.random() < 0.5), bool(rng.random() < 0.3)
+    averaged, start = bool(rng.random() < 0.5), STARTS[rng.integers(len(STARTS))]
     drawn = Variation(
         friction=FRICTION * (rng.random() < 2 / 3),
         **{("scale", "offset")[rng.integers(2)]: 0.02 * (rng.random() < 2 / 3)},
@@ -144,6 +159,8 @@ def draw_conditions(rng: np.random.Generator, asked: Asked) -> Conditions:
         noise_kind=noise_kind if asked.noise_kind is None else asked.noise_kind,
         correlation_time=correlation_time,
         stated=stated if asked.stated is None else asked.stated,
+        averaged=averaged if asked.averaged is None else asked.averaged,
+        start=start if asked.start is None else asked.start,
         numbered=numbered,
         variation=variation,
         runs=_draw_runs(rng, asked, variation.days),
@@ -171,6 +188,14 @@ def _draw_runs(rng: np.random.Generator, asked: Asked, days: int) -> tuple[Run, 
         day = int(rng.integers(days))
         runs.append(Run(motion, kinds[motion], float(lengths[motion]), 1, day, held_out=True))
     return tuple(runs)
+
+
+def draw_lead(rng: np.random.Generator, conditions: Conditions) -> float:
+    """Draw for how long the arm rests in a recording before it moves, s."""
+    share = rng.uniform()
+    return float(
+        {"with the motion": 0.0, "within a sample": share / conditions.rate}.get(conditions.start, share * BY_HAND)
+    )
 
 
 def draw_states(

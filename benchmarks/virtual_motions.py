@@ -8,6 +8,7 @@ with itself is not looked for: the virtual arm has none.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -60,6 +61,20 @@ def random_motion(
         if np.all(np.abs(torque) <= EFFORT_SHARE * robot.effort_limit[:, None]):
             break
     return made
+
+
+def after_rest(motion: ReferenceMotion, lead: float) -> ReferenceMotion:
+    """Return a motion from rest after a rest of any length, s."""
+    if lead <= 0.0:
+        return motion
+    still = np.zeros((len(motion.joints), 1))
+    return replace(
+        motion,
+        time=np.concatenate([[0.0], motion.time + lead]),
+        position=np.concatenate([motion.position[:, :1], motion.position], axis=1),
+        velocity=np.concatenate([still, motion.velocity], axis=1),
+        acceleration=np.concatenate([still, motion.acceleration], axis=1),
+    )
 
 
 def ranges(robot: Robot) -> tuple[Array, Array]:

@@ -22,14 +22,15 @@ from typing import Any, get_args
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from virtual_conditions import Asked, Conditions, Noise, draw_conditions, draw_states
-from virtual_motions import random_motion
+from virtual_conditions import Asked, Conditions, Noise, Start, draw_conditions, draw_lead, draw_states
+from virtual_motions import after_rest, random_motion
 
 from scara_ident.recording.recording import Recording, split_name, write_recording
 from scara_ident.robot.examples import example_urdf
 from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation import (
     EFFECTS,
+    Controller,
     Effect,
     ReferenceMotion,
     RunState,
@@ -78,6 +79,8 @@ REDUCTIONS = (50.0, 80.0, 100.0, 120.0, 160.0)
 # Coulomb friction of an arm other than the SCARA03, as a share of the joint's effort limit, and viscous friction at
 # 1 rad/s as a multiple of it: gears of such arms have about this (Gaz et al. 2019 on the Panda).
 COULOMB_SHARE, VISCOUS_RATIO = (0.01, 0.04), (0.3, 1.2)
+# Controllers are up to this many times as fast as the virtual arm's own; with coarse encoders they would only shake.
+FASTEST, COARSE = 2.5, 15
 GRIPPERS = ("finger", "gripper")
 
 
@@ -143,6 +146,12 @@ def random_arm(name: str, stated: bool, bits: int, folder: Path, rng: np.random.
         scale = np.hypot(scale, coulomb)
     # The sixth digit is what a description has.
     rotor_inertia = np.array([float(f"{value:.6g}") for value in arm.rotor_inertia * rotors])
+    # The poles of a controller scale with its frequency: gains by its powers.
+    faster = rng.uniform(1.0, FASTEST) if bits == 0 or bits > COARSE else 1.0
+    control = arm.controller
+    control = Controller(
+        faster**2 * control.proportional, faster**3 * control.integral, faster * control.derivative, control.cutoff
+    )
     offset = 0.02 * rng.normal(size=n) * scale
     arm = replace(
         arm,
@@ -151,6 +160,7 @@ def random_arm(name: str, stated: bool, bits: int, folder: Path, rng: np.random.
         friction=friction,
         torque_offset=offset,
         torque_scale=scale,
+        controller=control,
         encoder_steps=np.full(n, 2.0**bits if bits else 0.0) / np.abs(robot.reduction),
     )
     if stated and name != "scara03":
@@ -251,9 +261,10 @@ def simulate_set(
     drawn = draw_states(states, arm, conditions, usual)
     recordings = []
     for k, (run, state) in enumerate(zip(conditions.runs, drawn, strict=True)):
+        motion = after_rest(motions[run.motion], draw_lead(states, conditions))
         result = simulate(
-            arm, motions[run.motion], effects=effects, seed=seed, repetition=run.repetition, rate=conditions.rate,
-            ticks=conditions.ticks, noise=noise, run=state,
+            arm, motion, effects=effects, seed=seed, repetition=run.repetition, rate=conditions.rate,
+            ticks=conditions.ticks, averaged=conditions.averaged, noise=noise, run=state,
         )  # fmt: skip
         name = f"run_{k + 1:02d}" if conditions.numbered else result.recording.name
         trajectory, repetition = split_name(name)
@@ -294,6 +305,8 @@ def add_conditions(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--noise", type=float, help="share of the joint's rms torque")
     parser.add_argument("--noise-kind", choices=get_args(Noise))
     parser.add_argument("--stated", action=argparse.BooleanOptionalAction, help="reductions and rotor inertias")
+    parser.add_argument("--averaged", action=argparse.BooleanOptionalAction, help="torque over a sample, or at a tick")
+    parser.add_argument("--start", choices=get_args(Start), help="when recordings begin")
     parser.add_argument("--recordings", type=int, help="number of training recordings")
     parser.add_argument("--motions", type=int, help="number of different ones among them")
     parser.add_argument("--duration", type=float, nargs=2, help="s, least and most")

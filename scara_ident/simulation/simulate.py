@@ -101,6 +101,7 @@ def simulate(
     repetition: int = 1,
     rate: float = 1000.0,
     ticks: int = 1,
+    averaged: bool = False,
     substeps: int | None = None,
     record_velocity: bool = False,
     noise: TorqueNoise = WHITE,
@@ -110,7 +111,7 @@ def simulate(
 
     The arm starts on the reference, at its speed, with the integral at the torque that this takes. Every sample the
     encoder is read, the PID computes a torque and the drive holds it until the next sample. The recorded effort is
-    the mean over one period centred on the sample, so that it does not lag position, plus white noise.
+    the mean over one period of the controller centred on the sample, so that it does not lag position, plus noise.
 
     Parameters
     ----------
@@ -126,7 +127,9 @@ def simulate(
     rate : float
         Samples per second of the recording.
     ticks : int
-        Periods of the controller per sample: it runs at ``ticks`` times the rate, and each of its last is recorded.
+        Periods of the controller per sample: it runs at ``ticks`` times the rate, and one of them is recorded.
+    averaged : bool
+        Whether the recorded effort is the mean over a whole sample instead, so that nothing of it is lost or aliased.
     substeps : int, optional
         Integration steps per period of the controller; by default 4, more where an elastic joint needs them.
     record_velocity : bool
@@ -173,7 +176,7 @@ def simulate(
         moved, draft, control, steps, np.stack([position.T, velocity.T]), feed, start[back],
         position[:, 0], velocity[:, 0], f"{motion.name} on {arm.robot.name}",
     )  # fmt: skip
-    effort = _recorded_effort(arm, draft, true, 1.0 / control)[:, ::ticks]
+    effort = _recorded_effort(arm, draft, true, 1.0 / control, ticks if averaged else 1)[:, ::ticks]
     effort = effort + arm.torque_noise[:, None] * noise.draw(random, effort.shape, rate)
     if ticks > 1:
         wanted, true = (_every(item, ticks) for item in (wanted, true))
@@ -342,8 +345,8 @@ def _substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
     return max(SUBSTEPS, needed)
 
 
-def _recorded_effort(arm: VirtualArm, draft: PlantDraft, true: TrueMotion, period: float) -> Array:
-    """Torque as its sensor gives it, without noise: the mean over a period centred on each sample, shape (n, N)."""
+def _recorded_effort(arm: VirtualArm, draft: PlantDraft, true: TrueMotion, period: float, window: int) -> Array:
+    """Torque as its sensor gives it, without noise: the mean over ``window`` periods about each tick, shape (n, N)."""
     order = arm.robot.order
     n, samples = true.effort.shape
     ticks = np.arange(samples + 1.0)
@@ -355,11 +358,11 @@ def _recorded_effort(arm: VirtualArm, draft: PlantDraft, true: TrueMotion, perio
         integral = np.concatenate([[0.0], np.cumsum(u)])
         middle = ticks[:-1] - draft.delay[row] / period
         ends = []
-        for edge in (middle - 0.5, middle + 0.5):
+        for edge in (middle - 0.5 * window, middle + 0.5 * window):
             inside = np.interp(edge, ticks, integral)
             inside += np.minimum(edge, 0.0) * u[0] + np.maximum(edge - samples, 0.0) * u[-1]
             ends.append(inside)
-        u = ends[1] - ends[0]
+        u = (ends[1] - ends[0]) / window
         for joint, per_turn, amplitude, phase in draft.pickup:
             if joint == row:
                 u = u + amplitude * np.sin(per_turn * true.position[i] + phase)
