@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +32,10 @@ from scara_ident.simulation import Effect
 Item = dict[str, Any]
 # Columns by what a covered parameter is of; the rest are inertial.
 FRICTION = ("a0", "a1", "a2", "a3")
+# What families call the effects' parameters.
+OTHER_NAMES = {"_lost_share": "loss_coefficient", "crossing_width": "width"}
 # Effects whose columns share something with the base model, so that its parameters mean something else beside them: the
-# loss scales what its gear transmits, and the spring's rest is an offset.
+# spring's rest is an offset, and a gain is one of all torques of its joint.
 SHARING = {
     "transmission_loss": ("inertial",),
     "spring": ("offset",),
@@ -144,37 +147,47 @@ def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, dict[str,
     """
     scene, bands = result.search.scene, result.search.bands
     joints = made.robot.joints
-    chosen, delay = [], 0.0
-    for effect in made.effects:
-        values = effect.as_dict()["parameters"]
-        if effect.name == "time_delay" and effect.joint is None:
-            delay = values["delay"]
-            continue
-        candidate = _candidate(effect, values, made)
-        if candidate is None:
-            return None
-        chosen.append(candidate)
-    fitted, tested = (
-        observe(model_with(scene, chosen), prepare([shifted(item, delay) for item in items], bands))
-        for items in (made.training, made.held_out)
+    delays = [effect.as_dict()["parameters"]["delay"] for effect in made.effects if effect.name == "time_delay"]
+    others = [_candidates(effect, made) for effect in made.effects if effect.name != "time_delay"]
+    training, held_out = (
+        prepare([shifted(item, sum(delays)) for item in items], bands) for items in (made.training, made.held_out)
     )
-    value = wls(fitted).value
-    return {
-        name: {joint: error.rms for joint, error in zip(joints, joint_errors(value, rows), strict=True) if error}
-        for name, rows in (("training", fitted), ("validation", tested))
-    }
-
-
-def _candidate(effect: Effect, values: Item, made: VirtualSet) -> Candidate | None:
-    """Return the family whose nonlinear parameters are those that the effect has, at their values."""
-    families = (family for family in CATALOGUE if family.name == effect.name)
-    family = next((f for f in families if all(parameter.name in values for parameter in f.nonlinear)), None)
-    if family is None:
+    best = None
+    for chosen in product(*others):
+        model = model_with(scene, chosen)
+        fitted = observe(model, training)
+        value = wls(fitted).value
+        errors = _errors(joints, joint_errors(value, fitted))
+        if best is None or np.prod(list(errors.values())) < np.prod(list(best[2].values())):
+            best = model, value, errors
+    if best is None:
         return None
+    model, value, errors = best
+    return {"training": errors, "validation": _errors(joints, joint_errors(value, observe(model, held_out)))}
+
+
+def _errors(joints: Sequence[str], errors: Sequence[Any]) -> dict[str, float]:
+    return {joint: error.rms for joint, error in zip(joints, errors, strict=True) if error}
+
+
+def _candidates(effect: Effect, made: VirtualSet) -> list[Candidate]:
+    """Return the member of the effect's family that has its nonlinear parameters, or several of which one is closest."""
+    values = effect.as_dict()["parameters"]
     joints = made.robot.joints
-    nonlinear = tuple(float(values[parameter.name]) for parameter in family.nonlinear)
+    place = None if effect.joint is None else joints.index(effect.joint)
     partner = joints.index(effect.other(made.arm)) if hasattr(effect, "other") else None
-    return Candidate(family, Member(None if effect.joint is None else joints.index(effect.joint), nonlinear, partner))
+    for family in (family for family in CATALOGUE if family.name == effect.name):
+        names = [OTHER_NAMES.get(parameter.name, parameter.name) for parameter in family.nonlinear]
+        if effect.name == "joint_elasticity" and place is not None:
+            # The frequency of the link against its held motor depends on the pose: the one that fits best.
+            usual = np.sqrt(values["stiffness"] / made.arm.link_inertia()[place]) / (2.0 * np.pi)
+            points = [(float(usual * factor), values["damping_ratio"]) for factor in np.geomspace(0.6, 1.7, 9)]
+        elif all(name in values for name in names):
+            points = [tuple(float(values[name]) for name in names)]
+        else:
+            continue
+        return [Candidate(family, Member(place, point, partner)) for point in points]
+    return []
 
 
 def worst_ratio(after: dict[str, float | None], reference: dict[str, float] | None) -> float | None:
