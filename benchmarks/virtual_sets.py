@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from virtual_conditions import Asked, Conditions, Noise, Start, draw_conditions, draw_lead, draw_states
 from virtual_motions import after_rest, random_motion
 
+from scara_ident.errors import ScaraIdentError
 from scara_ident.recording.recording import Recording, split_name, write_recording
 from scara_ident.robot.examples import example_urdf
 from scara_ident.robot.robot import Robot, load_robot
@@ -81,6 +82,7 @@ REDUCTIONS = (50.0, 80.0, 100.0, 120.0, 160.0)
 COULOMB_SHARE, VISCOUS_RATIO = (0.01, 0.04), (0.3, 1.2)
 # Controllers are up to this many times as fast as the virtual arm's own; with coarse encoders they would only shake.
 FASTEST, COARSE = 2.5, 15
+SLOWER, ATTEMPTS = 0.6, 5
 GRIPPERS = ("finger", "gripper")
 
 
@@ -146,12 +148,7 @@ def random_arm(name: str, stated: bool, bits: int, folder: Path, rng: np.random.
         scale = np.hypot(scale, coulomb)
     # The sixth digit is what a description has.
     rotor_inertia = np.array([float(f"{value:.6g}") for value in arm.rotor_inertia * rotors])
-    # The poles of a controller scale with its frequency: gains by its powers.
     faster = rng.uniform(1.0, FASTEST) if bits == 0 or bits > COARSE else 1.0
-    control = arm.controller
-    control = Controller(
-        faster**2 * control.proportional, faster**3 * control.integral, faster * control.derivative, control.cutoff
-    )
     offset = 0.02 * rng.normal(size=n) * scale
     arm = replace(
         arm,
@@ -160,7 +157,7 @@ def random_arm(name: str, stated: bool, bits: int, folder: Path, rng: np.random.
         friction=friction,
         torque_offset=offset,
         torque_scale=scale,
-        controller=control,
+        controller=_faster(arm.controller, faster),
         encoder_steps=np.full(n, 2.0**bits if bits else 0.0) / np.abs(robot.reduction),
     )
     if stated and name != "scara03":
@@ -257,21 +254,52 @@ def simulate_set(
             motions[run.motion] = random_motion(name, arm, run.kind, run.duration, moves)
     usual = usual_torque(arm, [motions[run.motion] for run in conditions.runs if not run.held_out])
     arm = replace(arm, torque_noise=conditions.noise * usual)
-    noise = TorqueNoise(conditions.noise_kind, conditions.correlation_time)
     drawn = draw_states(states, arm, conditions, usual)
+    leads = [draw_lead(states, conditions) for _ in conditions.runs]
+    for _ in range(ATTEMPTS):
+        try:
+            recordings = _recorded(arm, motions, conditions, effects, drawn, leads, seed)
+            break
+        except ScaraIdentError as error:
+            # An elastic joint may be more than a fast controller can hold, as on a real arm: then a slower one is taken.
+            lost, arm = error, replace(arm, controller=_faster(arm.controller, SLOWER))
+    else:
+        raise lost
+    count = sum(not run.held_out for run in conditions.runs)
+    return VirtualSet(
+        kind, seed, arm, described, effects, factors, conditions, drawn, recordings[:count], recordings[count:]
+    )
+
+
+def _recorded(
+    arm: VirtualArm,
+    motions: Mapping[int, ReferenceMotion],
+    conditions: Conditions,
+    effects: Sequence[Effect],
+    drawn: Sequence[RunState],
+    leads: Sequence[float],
+    seed: int,
+) -> list[Recording]:
+    noise = TorqueNoise(conditions.noise_kind, conditions.correlation_time)
     recordings = []
-    for k, (run, state) in enumerate(zip(conditions.runs, drawn, strict=True)):
-        motion = after_rest(motions[run.motion], draw_lead(states, conditions))
+    for k, (run, state, lead) in enumerate(zip(conditions.runs, drawn, leads, strict=True)):
         result = simulate(
-            arm, motion, effects=effects, seed=seed, repetition=run.repetition, rate=conditions.rate,
-            ticks=conditions.ticks, averaged=conditions.averaged, noise=noise, run=state,
+            arm, after_rest(motions[run.motion], lead), effects=effects, seed=seed, repetition=run.repetition,
+            rate=conditions.rate, ticks=conditions.ticks, averaged=conditions.averaged, noise=noise, run=state,
         )  # fmt: skip
         name = f"run_{k + 1:02d}" if conditions.numbered else result.recording.name
         trajectory, repetition = split_name(name)
         recordings.append(replace(result.recording, name=name, trajectory=trajectory, repetition=repetition))
-    count = sum(not run.held_out for run in conditions.runs)
-    return VirtualSet(
-        kind, seed, arm, described, effects, factors, conditions, drawn, recordings[:count], recordings[count:]
+    return recordings
+
+
+def _faster(control: Controller, factor: float) -> Controller:
+    """Return a controller with its poles times a factor: gains by its powers."""
+    return replace(
+        control,
+        proportional=factor**2 * control.proportional,
+        integral=factor**3 * control.integral,
+        derivative=factor * control.derivative,
     )
 
 
