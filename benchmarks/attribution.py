@@ -1,134 +1,113 @@
 """Recordings with an undeclared effect: what the diagnosis names, how often it is wrong, how small it can see.
 
-Every set is a random arm like the SCARA03 in closed loop, with none, one or two effects or one outside the
-catalogue, at a random size. The identifier is told nothing. Prints tables and writes JSON.
+Every set is a random arm in closed loop, with none, one, two or three effects or one outside the catalogue, at random
+sizes and under random conditions: see `virtual_sets`, `virtual_conditions` and `virtual_motions` for all that is drawn.
+The identifier is told nothing. Each set runs in a process of its own, and its result is written as it ends: the same
+command again goes on where it was stopped. Tables are printed at the end.
 
-    python benchmarks/attribution.py --sets 300 --output benchmarks/results/attribution.json
+    python benchmarks/attribution.py --robot ur5 --sets 300 --seed 5
+    python benchmarks/attribution.py --tables output/attribution/ur5_5_1a2b3c4d5e6f output/attribution/panda_5_1a2b3c4d5e6f
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
 import os
-import time
-from concurrent.futures import ProcessPoolExecutor
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict
 from pathlib import Path
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+from attribution_tables import describe, report
+from attribution_truth import Item, one_set
+from compare_commits import sources
+from virtual_conditions import Asked
+from virtual_sets import KINDS, add_conditions, asked_for, tasks
 
-import numpy as np
-from attribution_tables import report
-from virtual_sets import KINDS, simulate_set, tasks
+import scara_ident
 
-from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.selection_step import model_with
-from scara_ident.effects import CATALOGUE, Member
-from scara_ident.effects.measurement import shifted
-from scara_ident.estimation.estimate import joint_errors
-from scara_ident.estimation.least_squares import wls
-from scara_ident.estimation.observations import observe
-from scara_ident.motion.prepared import prepare
+# The package that runs, which need not be that beside this file.
+CHECKOUT = Path(scara_ident.__file__).resolve().parent.parent
 
 
-def one_set(task: tuple[str, int]) -> dict:
-    """Simulate a set, diagnose it, and compare with what the arm was."""
-    kind, seed = task
-    made = simulate_set(kind, seed)
-    robot, effects, training, held_out = made.arm.robot, made.effects, made.training, made.held_out
-    began = time.perf_counter()
-    result = diagnose(robot, "complete", training, held_out)
-    seconds = time.perf_counter() - began
-    before = [error.rms for error in joint_errors(result.before.value, result.validation_before)]
-    after = [error.rms for error in joint_errors(result.after.value, result.validation_after)]
-    return {
-        "kind": kind,
-        "seed": seed,
-        "factors": made.factors,
-        "true": [{"effect": e.name, "joint": e.joint, "parameters": e.as_dict()["parameters"]} for e in effects],
-        "verdict": result.verdict,
-        "found": [
-            {
-                "effect": e.effect,
-                "joint": e.joint,
-                "group": [confounder.effect for confounder in e.confounded_with],
-                "parameters": {k: [p.value, p.std] for k, p in e.parameters.items()},
-                "gain": e.gain,
-            }
-            for e in result.effects
-        ],
-        "unexplained": None if result.unexplained is None else result.unexplained.joint,
-        "before": before,
-        "after": after,
-        "noise": {fit.joint: fit.noise for fit in result.fit_after},
-        "missing": {fit.joint: fit.missing for fit in result.fit_after},
-        "true_model": true_model_error(result, training, held_out, effects),
-        "seconds": seconds,
-    }
+def results(folder: Path) -> list[Item]:
+    """Return all that a folder holds, by seed."""
+    items = [json.loads(path.read_text(encoding="utf-8")) for path in folder.glob("set_*.json")]
+    return sorted(items, key=lambda item: item["seed"])
 
 
-def true_model_error(result, training, held_out, effects) -> list[float] | None:
-    """Held-out error of the same recordings fitted with the true model and its true nonlinear parameters."""
-    scene, bands = result.search.scene, result.search.bands
-    chosen, delay = [], 0.0
-    for effect in effects:
-        values = effect.as_dict()["parameters"]
-        if effect.name == "time_delay":
-            delay = values["delay"]
-            continue
-        # The family whose nonlinear parameters are those that the effect has.
-        family = next(
-            (
-                f
-                for f in CATALOGUE
-                if f.name == effect.name and all(parameter.name in values for parameter in f.nonlinear)
-            ),
-            None,
-        )
-        if family is None:
-            return None
-        joint = None if effect.joint is None else scene.robot.joints.index(effect.joint)
-        nonlinear = tuple(float(values[parameter.name]) for parameter in family.nonlinear if parameter.name in values)
-        if len(nonlinear) != len(family.nonlinear):
-            return None
-        partner = None
-        if effect.name == "friction_coupling":
-            partner = 1 - joint
-        chosen.append(Candidate(family, Member(joint, nonlinear, partner)))
-    model = model_with(scene, chosen)
-    fitted, tested = (
-        observe(model, prepare([shifted(item, delay) for item in items], bands)) for items in (training, held_out)
-    )
-    return [error.rms for error in joint_errors(wls(fitted).value, tested)]
+def run(
+    folder: Path, wanted: Sequence[tuple[str, int]], robot: str, asked: Asked, jobs: int, limit: int
+) -> Iterator[Item]:
+    """Run the sets that the folder lacks, and write each as it ends."""
+    folder.mkdir(parents=True, exist_ok=True)
+    left = [(kind, seed) for kind, seed in wanted if not _place(folder, kind, seed).exists()]
+    for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
+    # Processes that are used once tell their peak memory; the server that they fork from has imported all once.
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["attribution_truth"])
+    with ProcessPoolExecutor(jobs, mp_context=context, max_tasks_per_child=1) as pool:
+        futures = {pool.submit(one_set, kind, seed, robot, asked, limit): (kind, seed) for kind, seed in left}
+        for future in as_completed(futures):
+            item = future.result()
+            place = _place(folder, *futures[future])
+            part = place.with_suffix(".part")
+            part.write_text(json.dumps(item) + "\n", encoding="utf-8")
+            part.replace(place)
+            yield item
+
+
+def _place(folder: Path, kind: str, seed: int) -> Path:
+    return folder / f"set_{seed}_{kind}.json"
+
+
+def _check_asked(folder: Path, asked: Asked, robot: str) -> None:
+    """Refuse to mix sets under other conditions into a folder."""
+    path = folder / "asked.json"
+    now = {"robot": robot} | asdict(asked)
+    if path.exists() and json.loads(path.read_text(encoding="utf-8")) != json.loads(json.dumps(now)):
+        raise SystemExit(f"{folder}: holds sets under other conditions ({path.name}); name another folder by --output")
+    folder.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(now) + "\n", encoding="utf-8")
 
 
 def main() -> None:
     """Run the benchmark."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--robot", default="scara03", help="scara03, a robot of example-robot-data or a URDF")
     parser.add_argument("--sets", type=int, default=300)
-    parser.add_argument("--only", nargs="*", default=None, help="kinds to run")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--output", type=Path, default=Path("benchmarks/results/attribution.json"))
-    parser.add_argument("--tables", type=Path, help="print the tables of an earlier run's JSON and stop")
-    arguments = parser.parse_args()
-    if arguments.tables:
-        report(json.loads(arguments.tables.read_text(encoding="utf-8")))
+    parser.add_argument("--only", nargs="*", choices=sorted(set(KINDS)), help="kinds to draw")
+    parser.add_argument("--jobs", type=int, default=2, help="sets side by side")
+    parser.add_argument("--limit", type=int, default=900, help="seconds after which a diagnosis is given up")
+    parser.add_argument("--output", type=Path, help="folder of the results; default: by robot, seed and sources")
+    parser.add_argument("--merged", type=Path, help="JSON of all results")
+    parser.add_argument("--tables", type=Path, nargs="+", help="print the tables of these folders, and stop")
+    add_conditions(parser)
+    options = parser.parse_args()
+    if options.tables:
+        report([item for folder in options.tables for item in results(folder)])
         return
-    with ProcessPoolExecutor(max_workers=2) as pool:
-        results = []
-        for k, item in enumerate(pool.map(one_set, tasks(arguments.sets, arguments.seed, arguments.only or KINDS))):
-            results.append(item)
-            found = ", ".join(f"{f['effect']}/{f['joint']}" for f in item["found"])
-            true = ", ".join(f"{t['effect']}/{t['joint']}" for t in item["true"])
-            factors = np.round(item["factors"], 2)
-            print(
-                f"{k + 1:4d} {true or '-'} {factors} -> {item['verdict']} {found or '-'} {item['seconds']:.1f} s",
-                flush=True,
-            )
-    report(results)
-    arguments.output.parent.mkdir(parents=True, exist_ok=True)
-    arguments.output.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    asked = asked_for(options)
+    name = f"{Path(options.robot).stem}_{options.seed}_{sources(CHECKOUT)}"
+    folder = options.output or Path("output/attribution") / name
+    _check_asked(folder, asked, options.robot)
+    wanted = tasks(options.sets, options.seed, options.only or KINDS)
+    done = sum(_place(folder, *task).exists() for task in wanted)
+    print(f"{folder}: {done} of {len(wanted)} sets are there", file=sys.stderr, flush=True)
+    for item in run(folder, wanted, options.robot, asked, options.jobs, options.limit):
+        done += 1
+        print(f"{done:4d} {describe(item)}", flush=True)
+    seeds = {seed for _, seed in wanted}
+    found = [item for item in results(folder) if item["seed"] in seeds]
+    report(found)
+    if options.merged:
+        options.merged.parent.mkdir(parents=True, exist_ok=True)
+        options.merged.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -3,16 +3,34 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-NOT_SINGLE = ("none", "pair", "unlisted")
-# Angles are compared on the circle, and tilt and delay by their size and not as a share.
-ANGLES = ("phase",)
-ABSOLUTE = ("tilt_x", "tilt_y", "delay", "ratio")
+NOT_SINGLE = ("none", "pair", "triple", "unlisted")
+SEVERAL = ("pair", "triple")
 Item = dict[str, Any]
+# What stands behind an effect that is named where runs differ: it is there, in each run or day with another size.
+BEHIND = {"time_delay": "delay", "torque_gain_mismatch": "scale"}
+# Ways to part the sets: a heading, and the class of a set.
+SPLITS: tuple[tuple[str, Callable[[Item], str]], ...] = (
+    ("robot", lambda item: item["robot"]),
+    ("effects", lambda item: item["kind"] if item["kind"] in NOT_SINGLE else "one"),
+    ("recordings", lambda item: _class(item["conditions"]["recordings"], (1, 2, 4, 6, 9))),
+    ("length of all, s", lambda item: _class(item["conditions"]["length"], (0, 20, 50, 100, 300))),
+    ("shortest recording, s", lambda item: _class(_shortest(item), (0, 10, 15, 20, 31))),
+    ("encoder, bits a turn", lambda item: _class(item["conditions"]["bits"], (0, 12, 15, 18, 21, 24))),
+    ("rate, Hz", lambda item: f"{item['conditions']['rate']:g}"),
+    ("noise, %", lambda item: _class(100.0 * item["conditions"]["noise"], (0, 0.5, 1, 2, 6))),
+    ("noise", lambda item: item["conditions"]["noise_kind"]),
+    ("runs differ in", lambda item: varies(item)),
+    ("rotor inertia", lambda item: "stated" if item["conditions"]["stated"] else "not stated"),
+    ("recorded torque", lambda item: _recorded(item)),
+    ("recordings begin", lambda item: item["conditions"]["start"]),
+    ("repetitions", lambda item: "some" if _repeated(item) else "none"),
+    ("names of files", lambda item: "numbered" if item["conditions"]["numbered"] else "by motion"),
+)
 
 
 def hits(item: Item) -> list[bool]:
@@ -28,126 +46,231 @@ def hits(item: Item) -> list[bool]:
 
 def right(item: Item) -> bool:
     """Return whether all that is there was found and nothing else."""
-    return all(hits(item)) and len(item["found"]) == len(item["true"])
+    return all(hits(item)) and not wrong(item)
 
 
 def wrong(item: Item) -> list[str]:
-    """Return the effects named that are not there, nor in a group with one that is."""
+    """Return the effects named that are not there, nor in a group with one that is, nor in how runs differ."""
     true = {(each["effect"], each["joint"]) for each in item["true"]}
     names = {each["effect"] for each in item["true"]}
+    variation = item.get("conditions", {}).get("variation", {})
     return [
         found["effect"]
         for found in item["found"]
-        if (found["effect"], found["joint"]) not in true and not names & set(found["group"])
+        if (found["effect"], found["joint"]) not in true
+        and not names & set(found["group"])
+        and not variation.get(BEHIND.get(found["effect"], ""), 0.0)
     ]
 
 
 def detection_limit(items: Sequence[Item]) -> float:
-    """Return the size, in multiples of the default, that splits found from missed with the fewest misjudged."""
-    sizes = np.array([item["factors"][0] for item in items])
-    found = np.array([all(hits(item)) for item in items])
+    """Return the strength that splits found from missed with the fewest misjudged; NaN where none has one."""
+    known = [item for item in items if item.get("strength") is not None]
+    if not known:
+        return np.nan
+    sizes = np.array([item["strength"] for item in known])
+    found = np.array([all(hits(item)) for item in known])
     cuts = np.concatenate([[0.0], np.sort(sizes)])
     errors = [np.sum(found[sizes <= cut]) + np.sum(~found[sizes > cut]) for cut in cuts]
     return float(cuts[int(np.argmin(errors))])
 
 
-def parameter_errors(items: Sequence[Item]) -> dict[str, list[float]]:
-    """Return the errors of the parameters of effects that were found, as shares but for angles, tilt and delay."""
-    errors: dict[str, list[float]] = defaultdict(list)
+def describe(item: Item) -> str:
+    """Return one line of a set."""
+    found = ", ".join(f"{each['effect']}/{each['joint']}" for each in item["found"])
+    true = ", ".join(
+        f"{each['effect']}/{each['joint']} x {factor:.2g}"
+        for each, factor in zip(item["true"], item["factors"], strict=True)
+    )
+    conditions = item["conditions"]
+    ratio = item.get("to_true_model")
+    return (
+        f"{item['seed']} {conditions['recordings']} x {conditions['rate']:g} Hz {conditions['length']:.0f} s "
+        f"{conditions['bits']} bits {100 * conditions['noise']:.1f} % {conditions['noise_kind']}, {varies(item)}: "
+        f"{true or '-'} -> {item['verdict']} {found or '-'} {'WRONG ' if wrong(item) else ''}"
+        f"{'' if ratio is None else f'held out {ratio:.3f} '}{item['seconds']:.1f} s {item['memory']:.0f} MB"
+        f"{' ' + item['said'] if item.get('said') else ''}"
+    )
+
+
+def report(items: Sequence[Item]) -> None:
+    """Print all tables."""
+    by_kind: dict[str, list[Item]] = defaultdict(list)
     for item in items:
-        for true in item["true"]:
-            for found in item["found"]:
-                if (found["effect"], found["joint"]) != (true["effect"], true["joint"]):
+        by_kind[item["kind"]].append(item)
+    limits = {kind: detection_limit(each) for kind, each in by_kind.items() if kind not in NOT_SINGLE}
+    _by_effect(by_kind, limits)
+    for heading, split in SPLITS:
+        _by_condition(heading, split, items, limits)
+    confusion(items)
+    _summary(items, limits)
+
+
+def above_limit(item: Item, limits: dict[str, float]) -> bool:
+    """Return whether every effect of a set is stronger than what its kind can be seen at."""
+    size = item.get("strength")
+    if item["kind"] in SEVERAL:
+        return True
+    return item["kind"] in limits and size is not None and size > limits[item["kind"]]
+
+
+def _by_effect(by_kind: dict[str, list[Item]], limits: dict[str, float]) -> None:
+    print("\nstrength: rms of what the effect adds over that of what the true model leaves")
+    print(f"{'effect':28} sets right miss wrong tentative  limit  parameters, |error| in std: median, over 2")
+    for kind, items in sorted(by_kind.items()):
+        errors = [error for item in items if right(item) for error in effect_errors(item)]
+        told = f"{np.median(errors):.2f}, {np.mean(np.array(errors) > 2.0):.0%} of {len(errors)}" if errors else "-"
+        print(
+            f"{kind:28} {len(items):4d} {sum(map(right, items)):5d} {sum(not all(hits(i)) for i in items):4d} "
+            f"{sum(bool(wrong(i)) for i in items):5d} {sum(bool(i['tentative']) for i in items):9d} "
+            f"{limits.get(kind, np.nan):6.2f}  {told}"
+        )
+
+
+def effect_errors(item: Item) -> list[float]:
+    """Return the errors of the parameters of true effects that were found, in standard deviations."""
+    errors = []
+    for true in item["true"]:
+        for found in item["found"]:
+            if (found["effect"], found["joint"]) != (true["effect"], true["joint"]):
+                continue
+            for name, (value, std) in found["parameters"].items():
+                exact = true["parameters"].get(name)
+                if exact is None or value is None or not std or not np.isfinite(std):
                     continue
-                for name, (value, std) in found["parameters"].items():
-                    exact = true["parameters"].get(name)
-                    if exact is None or std is None or not np.isfinite(std):
-                        continue
-                    if name in ANGLES:
-                        errors[name].append(abs(float(np.angle(np.exp(1j * (value - exact))))))
-                    elif name in ABSOLUTE:
-                        errors[name].append(abs(value - exact))
-                    elif exact:
-                        errors[name].append(abs(value / exact - 1.0))
+                error = float(np.angle(np.exp(1j * (value - exact)))) if name == "phase" else value - exact
+                errors.append(abs(error) / std)
     return errors
 
 
-def ratios_to(items: Sequence[Item], key: str) -> list[float]:
-    """Return the worst joint's held-out error after, over that of the true model or over the noise, set by set."""
-    found = []
+def _by_condition(heading: str, split: Callable[[Item], str], items: Sequence[Item], limits: dict[str, float]) -> None:
+    parts: dict[str, list[Item]] = defaultdict(list)
     for item in items:
-        reference = list(item[key].values()) if isinstance(item.get(key), dict) else item.get(key)
-        if reference:
-            found.append(max(a / b for a, b in zip(item["after"], reference, strict=True)))
-    return found
-
-
-def report(results: Sequence[Item]) -> None:
-    """Print all tables."""
-    by_kind: dict[str, list[Item]] = defaultdict(list)
-    for item in results:
-        by_kind[item["kind"]].append(item)
+        parts[split(item)].append(item)
+    if len(parts) < 2:
+        return
     print(
-        f"\n{'effect':28} sets right miss wrong  limit  after/true   after/noise  s   errors of parameters, median (95 %)"
+        f"\n{heading:24} sets  false  none: false unexpl.  above limit: right  held out <=1.05  within 2 std"
+        "     s    MB  verdicts"
     )
-    for kind, items in by_kind.items():
-        limit = detection_limit(items) if kind not in NOT_SINGLE else np.nan
-        good = [item for item in items if right(item)]
-        errors = parameter_errors(good)
-        told = ", ".join(
-            f"{name} {np.median(values):.2g} ({np.quantile(values, 0.95):.2g})" for name, values in errors.items()
-        )
+    for name, each in sorted(parts.items(), key=lambda part: _number_of(part[0])):
+        none = [item for item in each if item["kind"] == "none"]
+        above = [item for item in each if above_limit(item, limits)]
+        ratios = [item["to_true_model"] for item in each if item.get("to_true_model") is not None]
+        verdicts = Counter(item["verdict"] for item in each)
         print(
-            f"{kind:28} {len(items):4d} {len(good):5d} {sum(not all(hits(i)) for i in items):4d} "
-            f"{sum(bool(wrong(i)) for i in items):5d} {limit:6.2f} {_median(ratios_to(good, 'true_model')):11.3f} "
-            f"{_median(ratios_to(good, 'noise')):13.2f} {np.median([i['seconds'] for i in items]):4.1f}  {told}"
+            f"{name:24} {len(each):4d} {_rate([bool(wrong(i)) for i in each])}  {_of(none, lambda i: bool(wrong(i)))} "
+            f"{_of(none, lambda i: i['verdict'] == 'unexplained')}  {_of(above, right):>18} "
+            f"{_rate([ratio <= 1.05 for ratio in ratios]):>16} {covered(each):>13} "
+            f"{np.median([i['seconds'] for i in each]):5.1f} {np.median([i['memory'] for i in each]):5.0f}  "
+            + ", ".join(f"{verdict} {count}" for verdict, count in verdicts.most_common())
         )
-    confusion(results)
-    single = [item for item in results if item["kind"] not in NOT_SINGLE]
-    limits = {kind: detection_limit(items) for kind, items in by_kind.items() if kind not in NOT_SINGLE}
-    above = [item for item in single if item["factors"][0] > limits[item["kind"]]]
-    _share("right effect and joint, above the detection limit", [right(item) for item in above])
-    _share("the same counting what no limit excuses: all single effects", [right(item) for item in single])
-    _share("both of a pair", [right(item) for item in by_kind.get("pair", [])])
-    _share("a wrong effect named, all sets", [bool(wrong(item)) for item in results])
-    _share("false alarm on sets with nothing missing", [i["verdict"] != "complete" for i in by_kind.get("none", [])])
-    _share(
-        "effects outside the catalogue called unexplained",
-        [i["verdict"] == "unexplained" and not i["found"] for i in by_kind.get("unlisted", [])],
-    )
-    for key, words in (("true_model", "that of the true model"), ("noise", "the noise between repetitions")):
-        ratios = ratios_to([item for item in above if right(item)], key)
-        if ratios:
-            print(
-                f"held-out error after, worst joint, over {words}: median {np.median(ratios):.3f}, "
-                f"95 % {np.quantile(ratios, 0.95):.3f}, largest {max(ratios):.3f}"
-            )
-    seconds = [item["seconds"] for item in results]
-    print(f"seconds for one diagnosis: median {np.median(seconds):.1f}, largest {max(seconds):.1f}")
 
 
-def confusion(results: Sequence[Item]) -> None:
+def covered(items: Sequence[Item]) -> str:
+    """Return the share of inertial and friction parameters within two std of the truth, where the model is right."""
+    errors = [
+        error
+        for item in items
+        if right(item) and item.get("coverage")
+        for kind in ("inertial", "friction")
+        for error in item["coverage"][kind]
+    ]
+    return f"{np.mean(np.abs(errors) <= 2.0):.1%}" if errors else "-"
+
+
+def confusion(items: Sequence[Item]) -> None:
     """Print what is taken for what: one line per true effect with all that was named, but for its own name."""
     table: dict[str, Counter[str]] = defaultdict(Counter)
-    for item in results:
+    for item in items:
         names = " + ".join(sorted(each["effect"] for each in item["true"])) if item["true"] else "nothing missing"
-        if item["kind"] == "pair":
-            names = "a pair"
-        found = [each["effect"] for each in item["found"]]
+        if item["kind"] in SEVERAL:
+            names = f"a {item['kind']}"
         own = {(each["effect"], each["joint"]) for each in item["true"]}
         for each in item["found"]:
             exact = (each["effect"], each["joint"]) in own
             table[names]["itself" if exact else f"{each['effect']} on {each['joint']}"] += 1
-        if not found:
+        if not item["found"]:
             table[names][f"nothing ({item['verdict']})"] += 1
     print("\nnamed, for each true effect")
-    for names, counts in table.items():
+    for names, counts in sorted(table.items()):
         print(f"  {names:28} " + ", ".join(f"{name} {count}" for name, count in counts.most_common()))
+
+
+def _summary(items: Sequence[Item], limits: dict[str, float]) -> None:
+    none = [item for item in items if item["kind"] == "none"]
+    single = [item for item in items if item["kind"] not in NOT_SINGLE]
+    above = [item for item in single if above_limit(item, limits)]
     print()
+    _share("a believed effect that is not there, all sets", [bool(wrong(item)) for item in items])
+    _share("with nothing missing: a believed effect", [bool(wrong(item)) for item in none])
+    _share("with nothing missing: `unexplained`", [item["verdict"] == "unexplained" for item in none])
+    _share("right effect and joint, above the detection limit", [right(item) for item in above])
+    _share("the same counting what no limit excuses: all single effects", [right(item) for item in single])
+    for kind, words in (("pair", "both of a pair"), ("triple", "all of a triple")):
+        _share(words, [right(item) for item in items if item["kind"] == kind])
+    unlisted = [item for item in items if item["kind"] == "unlisted"]
+    _share("outside the catalogue: nothing believed that is not there", [not item["found"] for item in unlisted])
+    _share("outside the catalogue: `complete`", [item["verdict"] == "complete" for item in unlisted])
+    ratios = [item["to_true_model"] for item in items if item.get("to_true_model") is not None]
+    _share("held-out error of the worst joint at most 1.05 of the true model's", [ratio <= 1.05 for ratio in ratios])
+    if ratios:
+        print(
+            f"that ratio: median {np.median(ratios):.3f}, 95 % {np.quantile(ratios, 0.95):.3f}, largest {max(ratios):.3g}"
+        )
+    for words, chosen in (
+        ("runs the same", [i for i in items if varies(i) == "nothing"]),
+        ("runs differ", [i for i in items if varies(i) != "nothing"]),
+    ):
+        for kind in ("inertial", "friction", "offset"):
+            errors = [e for i in chosen if right(i) and i.get("coverage") for e in i["coverage"][kind]]
+            _share(f"{words}, model right: {kind} parameters within 2 std", [abs(error) <= 2.0 for error in errors])
+    for name, unit in (("seconds", "s"), ("memory", "MB")):
+        values = [item[name] for item in items if item.get(name) is not None]
+        if values:
+            print(f"{name} of a diagnosis: median {np.median(values):.1f}, largest {max(values):.1f} {unit}")
 
 
-def _median(values: Sequence[float]) -> float:
-    return float(np.median(values)) if values else float("nan")
+def varies(item: Item) -> str:
+    """Return in what the runs of a set differ."""
+    variation = item["conditions"]["variation"]
+    return ", ".join(key for key in ("friction", "scale", "offset", "delay") if variation[key]) or "nothing"
+
+
+def _recorded(item: Item) -> str:
+    if item["conditions"]["rate"] >= 500.0:
+        return "at the controller's rate"
+    return "averaged" if item["conditions"]["averaged"] else "sampled"
+
+
+def _repeated(item: Item) -> bool:
+    return bool(item["conditions"]["motions"] < item["conditions"]["recordings"])
+
+
+def _shortest(item: Item) -> float:
+    return min(run["duration"] for run in item["conditions"]["runs"] if not run["held_out"])
+
+
+def _class(value: float, edges: Sequence[float]) -> str:
+    for low, high in zip(edges, edges[1:], strict=False):
+        if low <= value < high:
+            return f"{low:g} to under {high:g}"
+    return f"{edges[-1]:g} and more"
+
+
+def _number_of(name: str) -> tuple[float, str]:
+    try:
+        return float(name.split()[0]), name
+    except ValueError:
+        return np.inf, name
+
+
+def _rate(flags: Sequence[bool]) -> str:
+    return f"{np.mean(flags):6.1%}" if flags else "     -"
+
+
+def _of(items: Sequence[Item], test: Callable[[Item], bool]) -> str:
+    return f"{sum(map(test, items))}/{len(items)}"
 
 
 def _share(words: str, flags: Sequence[bool]) -> None:

@@ -1,28 +1,50 @@
-"""Recordings of random arms like the SCARA03, each with none, one or two effects or one outside the catalogue.
+"""Recordings of random arms in closed loop, with none, one, two or three effects or one outside the catalogue.
 
-Written as folders that the command line reads, so that any two commits can be compared on the same recordings: ``train``
-and ``test`` of every set, with what the arm was in ``truth.json``. The same seed gives the same recordings.
+Any robot of example-robot-data, or the SCARA03: its masses, friction and rotors are drawn about what its URDF says; then
+the effects and their sizes, the conditions (see `virtual_conditions`) and the motions (see `virtual_motions`). Written as
+folders that the command line reads, so that any two commits can be compared on the same recordings: ``train`` and
+``test`` of every set, ``robot.yaml`` but for the SCARA03, with what the arm was in ``truth.json``. The same seed gives the
+same recordings; what is asked for instead of drawn leaves all other draws as they are.
 
     python benchmarks/virtual_sets.py SETS --count 60
+    python benchmarks/virtual_sets.py SETS --robot ur5 --count 2 --only none --bits 17 --rate 500
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, get_args
 
 import numpy as np
+import yaml
+from numpy.typing import NDArray
+from virtual_conditions import Asked, Conditions, Noise, Start, draw_conditions, draw_lead, draw_states
+from virtual_motions import after_rest, random_motion
 
-from scara_ident.paper import OJD, OJK
-from scara_ident.recording.recording import Recording, write_recording
-from scara_ident.robot.robot import load_robot
-from scara_ident.simulation import EFFECTS, Effect, ReferenceMotion, VirtualArm, sampled, simulate, virtual_arm
+from scara_ident.errors import ScaraIdentError
+from scara_ident.recording.recording import Recording, split_name, write_recording
+from scara_ident.robot.examples import example_urdf
+from scara_ident.robot.robot import Robot, load_robot
+from scara_ident.simulation import (
+    EFFECTS,
+    Controller,
+    Effect,
+    ReferenceMotion,
+    RunState,
+    TorqueNoise,
+    VirtualArm,
+    parse_effect,
+    simulate,
+    virtual_arm,
+)
+from scara_ident.simulation.inverse_dynamics import inverse_dynamics
 from scara_ident.simulation.truth import truth
 
-# Effects that are not told by one name: their size is this parameter, scaled by a random factor.
+# Every effect, with the parameter that a random factor scales its size by.
 SIZE = {
     "transmission_loss": "loss_coefficient",
     "stribeck": "amplitude",
@@ -48,83 +70,20 @@ SIZE = {
 INVERSE = ("joint_elasticity",)
 WHOLE_ARM = ("base_tilt", "payload_change", "time_delay")
 UNLISTED = ("unlisted_1", "unlisted_2")
-KINDS = (*SIZE, "none", "none", "none", "unlisted", "unlisted", "pair", "pair")
-
-
-def random_arm(rng: np.random.Generator):
-    """An arm like the SCARA03 with its own inertias and friction."""
-    arm = virtual_arm(load_robot())
-    scale = rng.uniform(0.85, 1.15, (arm.robot.n, 1))
-    return replace(
-        arm,
-        bodies=arm.bodies * scale,
-        rotor_inertia=arm.rotor_inertia * rng.uniform(0.9, 1.1, arm.robot.n),
-        friction=arm.friction * rng.uniform(0.75, 1.25, (arm.robot.n, 1)),
-        torque_offset=rng.normal(0.0, 0.005, arm.robot.n),
-        torque_noise=np.array([0.020, 0.008]),
-    )
-
-
-def multisine(name: str, robot, seed: int, duration: float) -> ReferenceMotion:
-    """A sum of five harmonics per joint with rest at both ends."""
-    rng = np.random.default_rng(seed)
-    order = np.arange(1, 6)
-    amplitude = rng.normal(0.0, 1.0, (robot.n, 5)) / order
-    phase = rng.uniform(0.0, 2.0 * np.pi, (robot.n, 5))
-    centre = np.array([1.57, 0.0])
-    omega = 2.0 * np.pi * order / duration
-    t = np.linspace(0.0, duration, 400)
-    wave = np.einsum("jk,jkt->jt", amplitude, np.cos(omega[:, None] * t + phase[:, :, None]))
-    # Fill the ranges but stay under 2.5 rad/s.
-    speed = np.einsum("jk,jkt->jt", amplitude * omega, -np.sin(omega[:, None] * t + phase[:, :, None]))
-    reach = np.minimum(1.9 / np.abs(wave).max(axis=1), 2.5 / np.abs(speed).max(axis=1))
-    amplitude = amplitude * reach[:, None]
-
-    def motion(time_):
-        angle = omega[:, None] * time_ + phase[:, :, None]
-        q = centre[:, None] + np.einsum("jk,jkt->jt", amplitude, np.cos(angle))
-        v = -np.einsum("jk,jkt->jt", amplitude * omega, np.sin(angle))
-        a = -np.einsum("jk,jkt->jt", amplitude * omega**2, np.cos(angle))
-        return q, v, a
-
-    return sampled(name, robot, motion, duration)
-
-
-def pick_effects(kind: str, arm, rng: np.random.Generator):
-    """Return effects of a random size and the size factor."""
-    names = {"none": [], "unlisted": [rng.choice(UNLISTED)]}.get(kind)
-    if names is None:
-        names = list(rng.choice(list(SIZE), 2, replace=False)) if kind == "pair" else [kind]
-    effects, factors = [], []
-    for name in names:
-        joint = None if name in WHOLE_ARM else str(rng.choice(arm.robot.joints))
-        if name == "torque_gain_mismatch":
-            joint = arm.robot.joints[1]
-        effect = EFFECTS[name](joint=joint).resolve(arm)
-        factor = float(np.exp(rng.uniform(np.log(0.25), np.log(3.0)))) if kind != "pair" else 1.5
-        key = SIZE.get(name)
-        if name == "torque_gain_mismatch":
-            effect = replace(effect, ratio=1.0 + factor * (effect.ratio - 1.0))
-        elif name == "base_tilt":
-            effect = replace(effect, tilt_x=factor * effect.tilt_x, tilt_y=factor * effect.tilt_y)
-        elif name == "friction_coupling":
-            effect = replace(effect, viscous=factor * effect.viscous, coulomb=factor * effect.coulomb)
-        elif name in INVERSE:
-            effect = replace(effect, stiffness=effect.stiffness / factor)
-        elif key:
-            value = factor * getattr(effect, key)
-            effect = replace(effect, **{key: min(value, 0.9) if key in ("share", "loss_coefficient") else value})
-        else:
-            effect = replace(
-                effect, **{k: factor * getattr(effect, k) for k in ("amplitude", "viscous") if hasattr(effect, k)}
-            )
-        if name == "payload_change":
-            effect = replace(effect, time=float(rng.uniform(3.0, 7.0)))
-        if name == "torque_ripple":
-            effect = replace(effect, order=float(rng.choice([1.0, 2.0, 4.0, 6.0])))
-        effects.append(effect)
-        factors.append(factor)
-    return effects, factors
+SEVERAL = {"pair": 2, "triple": 3}
+KINDS = (*SIZE, "none", "none", "none", "unlisted", "unlisted", "pair", "pair", "triple")
+# Size factors of single effects, evenly in their logarithm, and the factor of several at once.
+FACTORS, FACTOR_OF_SEVERAL = (0.25, 3.0), 1.5
+SHARES = ("share", "loss_coefficient")
+# Reductions of joints whose description states them.
+REDUCTIONS = (50.0, 80.0, 100.0, 120.0, 160.0)
+# Coulomb friction of an arm other than the SCARA03, as a share of the joint's effort limit, and viscous friction at
+# 1 rad/s as a multiple of it: gears of such arms have about this (Gaz et al. 2019 on the Panda).
+COULOMB_SHARE, VISCOUS_RATIO = (0.01, 0.04), (0.3, 1.2)
+# Controllers are up to this many times as fast as the virtual arm's own; with coarse encoders they would only shake.
+FASTEST, COARSE = 2.5, 15
+SLOWER, ATTEMPTS = 0.6, 5
+GRIPPERS = ("finger", "gripper")
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,30 +93,223 @@ class VirtualSet:
     kind: str
     seed: int
     arm: VirtualArm
+    # As the identifier is told of it.
+    robot: Robot
     effects: Sequence[Effect]
     factors: Sequence[float]
+    conditions: Conditions
+    states: Sequence[RunState]
     training: Sequence[Recording]
     held_out: Sequence[Recording]
 
+    def truth(self) -> dict[str, Any]:
+        """Return what the arm was, and how each recording differed from it."""
+        runs = [
+            {
+                "recording": recording.name,
+                "friction": state.friction.tolist(),
+                "torque_scale": state.torque_scale.tolist(),
+                "torque_offset": state.torque_offset.tolist(),
+                "delay": state.delay,
+            }
+            for recording, state in zip((*self.training, *self.held_out), self.states, strict=True)
+        ]
+        was = {"kind": self.kind, "seed": self.seed, "factors": list(self.factors)}
+        return was | {"conditions": self.conditions.as_dict(), "runs": runs} | truth(self.arm, self.effects)
 
-def simulate_set(kind: str, seed: int) -> VirtualSet:
-    """Simulate eight recordings of four motions, and one to hold out."""
-    rng = np.random.default_rng(seed)
-    arm = random_arm(rng)
-    robot = arm.robot
-    effects, factors = pick_effects(kind, arm, rng)
-    motions = [
-        sampled("OJD", robot, OJD.motion, 14.0),
-        sampled("OJK", robot, OJK.motion, 10.0),
-        multisine("F1", robot, seed + 10_000, 8.0),
-        multisine("F2", robot, seed + 20_000, 12.0),
-    ]
-    training = [
-        simulate(arm, motion, effects=effects, seed=seed, repetition=k).recording for motion in motions for k in (1, 2)
-    ]
-    test_motion = multisine("F3", robot, seed + 30_000, 10.0)
-    held_out = [simulate(arm, test_motion, effects=effects, seed=seed + 1).recording]
-    return VirtualSet(kind, seed, arm, effects, factors, training, held_out)
+
+def arm_joints(robot: Robot) -> list[str]:
+    """Return the joints that are not those of a gripper."""
+    return [name for name in robot.joints if not any(word in name for word in GRIPPERS)]
+
+
+def random_arm(name: str, stated: bool, bits: int, folder: Path, rng: np.random.Generator) -> tuple[VirtualArm, Robot]:
+    """Draw an arm, and describe it as the identifier is told of it, in ``folder`` but for the SCARA03."""
+    reductions = rng.choice(REDUCTIONS, size=32)
+    if name == "scara03":
+        robot = load_robot()
+    else:
+        known = load_robot(name)
+        joints = arm_joints(known)
+        described = {joint: {"reduction": float(reductions[k])} if stated else {} for k, joint in enumerate(joints)}
+        robot = _described(name, described, folder)
+    arm = virtual_arm(robot)
+    n = robot.n
+    bodies, rotors = rng.uniform(0.85, 1.15, (n, 1)), rng.uniform(0.5, 1.5, n)
+    friction, scale = arm.friction * rng.uniform(0.75, 1.25, (n, 1)), arm.torque_scale
+    shares = rng.uniform(*COULOMB_SHARE, n), rng.uniform(*VISCOUS_RATIO, n)
+    if name == "scara03":
+        rotors = 0.8 + 0.2 * rotors
+    else:
+        rated = np.where(np.isfinite(robot.effort_limit), robot.effort_limit, 5.0 * scale)
+        coulomb = shares[0] * rated
+        viscous = shares[1] * coulomb / np.where(robot.prismatic, 0.3, 1.0)
+        friction = np.column_stack([coulomb, viscous, np.zeros((n, 2))])
+        scale = np.hypot(scale, coulomb)
+    # The sixth digit is what a description has.
+    rotor_inertia = np.array([float(f"{value:.6g}") for value in arm.rotor_inertia * rotors])
+    faster = rng.uniform(1.0, FASTEST) if bits == 0 or bits > COARSE else 1.0
+    offset = 0.02 * rng.normal(size=n) * scale
+    arm = replace(
+        arm,
+        bodies=arm.bodies * bodies,
+        rotor_inertia=rotor_inertia,
+        friction=friction,
+        torque_offset=offset,
+        torque_scale=scale,
+        controller=_faster(arm.controller, faster),
+        encoder_steps=np.full(n, 2.0**bits if bits else 0.0) / np.abs(robot.reduction),
+    )
+    if stated and name != "scara03":
+        for joint, value in zip(robot.joints, rotor_inertia, strict=True):
+            described[joint]["rotor_inertia"] = float(value)
+        robot = _described(name, described, folder)
+        arm = replace(arm, robot=robot)
+    return arm, robot
+
+
+def _described(name: str, joints: dict[str, dict[str, float]], folder: Path) -> Robot:
+    """Write a description beside a copy of its URDF, and load it."""
+    source = Path(name) if Path(name).suffix else example_urdf(name)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / source.name).write_bytes(source.read_bytes())
+    content = {"urdf": source.name, "effort_side": "joint", "joints": joints}
+    (folder / "robot.yaml").write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    return load_robot(folder / "robot.yaml")
+
+
+def pick_effects(kind: str, arm: VirtualArm, rng: np.random.Generator) -> tuple[list[Effect], list[float]]:
+    """Return effects of a random size and the size factors."""
+    if kind == "none":
+        names = []
+    elif kind == "unlisted":
+        names = [str(rng.choice(UNLISTED))]
+    elif kind in SEVERAL:
+        names = [str(name) for name in rng.choice(list(SIZE), SEVERAL[kind], replace=False)]
+    else:
+        names = [kind]
+    effects, factors = [], []
+    for name in names:
+        factor = float(np.exp(rng.uniform(*np.log(FACTORS)))) if kind not in SEVERAL else FACTOR_OF_SEVERAL
+        effects.append(_random_effect(name, factor, arm, rng))
+        factors.append(factor)
+    return effects, factors
+
+
+def _random_effect(name: str, factor: float, arm: VirtualArm, rng: np.random.Generator) -> Effect:
+    joint = None if name in WHOLE_ARM else str(rng.choice(arm.robot.joints))
+    if name == "torque_gain_mismatch":
+        joint = str(rng.choice(arm.robot.joints[1:]))
+    effect: Any = EFFECTS[name](joint=joint).resolve(arm)
+    if name == "torque_gain_mismatch":
+        return replace(effect, ratio=1.0 + factor * (effect.ratio - 1.0))
+    if name == "base_tilt":
+        return replace(effect, tilt_x=factor * effect.tilt_x, tilt_y=factor * effect.tilt_y)
+    if name == "friction_coupling":
+        return replace(effect, viscous=factor * effect.viscous, coulomb=factor * effect.coulomb)
+    if name in INVERSE:
+        return replace(effect, stiffness=effect.stiffness / factor)
+    keys = [SIZE[name]] if name in SIZE else [key for key in ("amplitude", "viscous") if hasattr(effect, key)]
+    values = {key: factor * getattr(effect, key) for key in keys}
+    effect = replace(effect, **{key: min(value, 0.9) if key in SHARES else value for key, value in values.items()})
+    if name == "payload_change":
+        effect = replace(effect, time=float(rng.uniform(1.5, 4.0)))
+    if name == "torque_ripple":
+        effect = replace(effect, order=float(rng.choice([1.0, 2.0, 4.0, 6.0])))
+    return effect
+
+
+def simulate_set(
+    kind: str,
+    seed: int,
+    robot: str = "scara03",
+    folder: Path = Path("output/virtual"),
+    asked: Asked = Asked(),  # noqa: B008
+    given: Sequence[Effect] = (),
+) -> VirtualSet:
+    """Draw and simulate a set.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    seed : int
+    robot : str
+        ``scara03``, a robot of example-robot-data or a URDF.
+    folder : Path
+        For the description of a robot other than the SCARA03.
+    asked : Asked
+        Conditions that are not drawn.
+    given : sequence of Effect
+        Instead of drawn ones.
+    """
+    arms, sorts, sizes, moves, states = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5))
+    conditions = draw_conditions(sorts, asked)
+    arm, described = random_arm(robot, conditions.stated, conditions.bits, folder, arms)
+    effects, factors = (list(given), [1.0] * len(given)) if given else pick_effects(kind, arm, sizes)
+    motions: dict[int, ReferenceMotion] = {}
+    for run in conditions.runs:
+        if run.motion not in motions:
+            name = f"{'T' if run.held_out else 'M'}{run.motion + 1}"
+            motions[run.motion] = random_motion(name, arm, run.kind, run.duration, moves)
+    usual = usual_torque(arm, [motions[run.motion] for run in conditions.runs if not run.held_out])
+    arm = replace(arm, torque_noise=conditions.noise * usual)
+    drawn = draw_states(states, arm, conditions, usual)
+    leads = [draw_lead(states, conditions) for _ in conditions.runs]
+    for _ in range(ATTEMPTS):
+        try:
+            recordings = _recorded(arm, motions, conditions, effects, drawn, leads, seed)
+            break
+        except ScaraIdentError as error:
+            # An elastic joint may be more than a fast controller can hold, as on a real arm: then a slower one is taken.
+            lost, arm = error, replace(arm, controller=_faster(arm.controller, SLOWER))
+    else:
+        raise lost
+    count = sum(not run.held_out for run in conditions.runs)
+    return VirtualSet(
+        kind, seed, arm, described, effects, factors, conditions, drawn, recordings[:count], recordings[count:]
+    )
+
+
+def _recorded(
+    arm: VirtualArm,
+    motions: Mapping[int, ReferenceMotion],
+    conditions: Conditions,
+    effects: Sequence[Effect],
+    drawn: Sequence[RunState],
+    leads: Sequence[float],
+    seed: int,
+) -> list[Recording]:
+    noise = TorqueNoise(conditions.noise_kind, conditions.correlation_time)
+    recordings = []
+    for k, (run, state, lead) in enumerate(zip(conditions.runs, drawn, leads, strict=True)):
+        result = simulate(
+            arm, after_rest(motions[run.motion], lead), effects=effects, seed=seed, repetition=run.repetition,
+            rate=conditions.rate, ticks=conditions.ticks, averaged=conditions.averaged, noise=noise, run=state,
+        )  # fmt: skip
+        name = f"run_{k + 1:02d}" if conditions.numbered else result.recording.name
+        trajectory, repetition = split_name(name)
+        recordings.append(replace(result.recording, name=name, trajectory=trajectory, repetition=repetition))
+    return recordings
+
+
+def _faster(control: Controller, factor: float) -> Controller:
+    """Return a controller with its poles times a factor: gains by its powers."""
+    return replace(
+        control,
+        proportional=factor**2 * control.proportional,
+        integral=factor**3 * control.integral,
+        derivative=factor * control.derivative,
+    )
+
+
+def usual_torque(arm: VirtualArm, motions: Sequence[ReferenceMotion]) -> NDArray[np.float64]:
+    """Return the rms torque of each joint along motions, on the effort side, shape (n,)."""
+    square = []
+    for motion in motions:
+        signals = (x[:, ::10] for x in (motion.position, motion.velocity, motion.acceleration))
+        square.append(inverse_dynamics(arm, arm.bodies, *signals) ** 2)
+    return np.sqrt(np.concatenate(square, axis=1).mean(axis=1)) * np.abs(arm.robot.row_scale)
 
 
 def tasks(count: int, seed: int, kinds: Sequence[str] = KINDS) -> list[tuple[str, int]]:
@@ -171,20 +323,45 @@ def write_set(made: VirtualSet, folder: Path) -> None:
         (folder / part).mkdir(parents=True, exist_ok=True)
         for recording in recordings:
             write_recording(recording, folder / part / f"{recording.name}.parquet")
-    was = {"kind": made.kind, "seed": made.seed, "factors": list(made.factors)} | truth(made.arm, made.effects)
-    (folder / "truth.json").write_text(json.dumps(was, indent=1) + "\n", encoding="utf-8")
+    (folder / "truth.json").write_text(json.dumps(made.truth(), indent=1) + "\n", encoding="utf-8")
+
+
+def add_conditions(parser: argparse.ArgumentParser) -> None:
+    """Add the options that ask for conditions instead of drawing them."""
+    parser.add_argument("--rate", type=float, help="samples per second")
+    parser.add_argument("--bits", type=int, help="encoder steps per joint turn as a power of 2; 0 for none")
+    parser.add_argument("--noise", type=float, help="share of the joint's rms torque")
+    parser.add_argument("--noise-kind", choices=get_args(Noise))
+    parser.add_argument("--stated", action=argparse.BooleanOptionalAction, help="reductions and rotor inertias")
+    parser.add_argument("--averaged", action=argparse.BooleanOptionalAction, help="torque over a sample, or at a tick")
+    parser.add_argument("--start", choices=get_args(Start), help="when recordings begin")
+    parser.add_argument("--recordings", type=int, help="number of training recordings")
+    parser.add_argument("--motions", type=int, help="number of different ones among them")
+    parser.add_argument("--duration", type=float, nargs=2, help="s, least and most")
+    parser.add_argument("--varied", action=argparse.BooleanOptionalAction, help="whether runs differ")
+
+
+def asked_for(options: argparse.Namespace) -> Asked:
+    """Return what the options of `add_conditions` ask for."""
+    return Asked(**{name: getattr(options, name) for name in Asked.__dataclass_fields__})
 
 
 def main() -> None:
     """Write the sets."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("output", type=Path, help="folder of the sets; made if needed")
+    parser.add_argument("--robot", default="scara03", help="scara03, a robot of example-robot-data or a URDF")
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=9)
-    arguments = parser.parse_args()
-    for k, (kind, seed) in enumerate(tasks(arguments.count, arguments.seed)):
-        folder = arguments.output / f"{k:03d}_{kind}"
-        write_set(simulate_set(kind, seed), folder)
+    parser.add_argument("--only", nargs="*", choices=sorted(set(KINDS)), help="kinds to draw")
+    parser.add_argument("--effect", nargs="*", default=(), metavar="NAME:JOINT:KEY=VALUE", help="instead of drawn ones")
+    add_conditions(parser)
+    options = parser.parse_args()
+    given = [parse_effect(text) for text in options.effect]
+    for k, (kind, seed) in enumerate(tasks(options.count, options.seed, options.only or KINDS)):
+        label = "_".join(effect.name for effect in given) or kind
+        folder = options.output / f"{k:03d}_{label}"
+        write_set(simulate_set(kind, seed, options.robot, folder, asked_for(options), given), folder)
         print(folder, flush=True)
 
 

@@ -13,6 +13,7 @@ from scara_ident.simulation.laws import MotionLaw
 from scara_ident.simulation.paths import PathError, circle, line
 from scara_ident.simulation.reconstructions import RECONSTRUCTIONS, reconstruction, reconstruction_match
 from scara_ident.simulation.reference import ReferenceMotion, read_trajectory, sampled
+from scara_ident.simulation.runs import RunState, TorqueNoise
 from scara_ident.simulation.simulate import SimulationResult, TrueMotion, free_motion, simulate
 from scara_ident.simulation.truth import truth, write_simulation
 
@@ -25,7 +26,9 @@ __all__ = [
     "PathError",
     "RECONSTRUCTIONS",
     "ReferenceMotion",
+    "RunState",
     "SimulationResult",
+    "TorqueNoise",
     "TrueMotion",
     "VirtualArm",
     "circle",

@@ -96,6 +96,8 @@ class PlantDraft:
         1/(N m)^2, on the recorded side.
     drift : ndarray, shape (n,)
         Rate of the recorded torque's offset, N m/s.
+    shift : ndarray, shape (n,)
+        Offset of the recorded torque that the drive does not give, N m.
     pickup : list of (int, float, float, float)
         Joint, order per joint turn, amplitude and phase of a ripple that only the torque sensor sees.
     """
@@ -109,6 +111,7 @@ class PlantDraft:
     gain: Array
     cubic: Array
     drift: Array
+    shift: Array
     pickup: list[tuple[int, float, float, float]]
 
     def array(self, name: str) -> Array:
@@ -175,5 +178,6 @@ def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
         gain=np.ones(n),
         cubic=zero.copy(),
         drift=zero.copy(),
+        shift=zero.copy(),
         pickup=[],
     )

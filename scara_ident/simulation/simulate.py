@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import TypeVar
 
 import numpy as np
-import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
+from scara_ident.simulation.inverse_dynamics import nominal_torque, torque_at_start
 from scara_ident.simulation.plant import PlantDraft
 from scara_ident.simulation.reference import ReferenceMotion
+from scara_ident.simulation.runs import RunState, TorqueNoise
 
 # Integration steps per controller period: on the SCARA03 the energy then drifts by 4e-15 in 10 s, and friction that
 # depends on speed, spring and ripple effects are resolved with a margin.
@@ -23,6 +25,7 @@ SUBSTEPS = 4
 # Steps of this share of the fastest natural period's radian keep the Runge-Kutta step accurate and stable.
 STIFF_STEP = 0.4
 MOST_SUBSTEPS = 400
+WHITE = TorqueNoise()
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +39,8 @@ class TrueMotion:
     link_position, link_velocity, link_acceleration : ndarray
         Of the links.
     effort : ndarray
-        Torque of the drive held from this sample to the next, N m on the effort side. With the acceleration at this
-        sample it satisfies the equations of motion exactly.
+        Torque of the drive held from this sample to the controller's next, N m on the effort side. With the
+        acceleration at this sample it satisfies the equations of motion exactly.
     load : ndarray
         Torque through the gear, without the rotor's own inertia, at the joint.
     direction : ndarray
@@ -70,9 +73,9 @@ class SimulationResult:
     true : TrueMotion
     seed, repetition : int
     rate : float
-        Of controller and recording, Hz.
+        Of the recording, Hz.
     substeps : int
-        Integration steps per sample.
+        Integration steps per period of the controller.
     stops : int
         How often a joint came to a stop between the steps.
     """
@@ -97,14 +100,18 @@ def simulate(
     seed: int = 0,
     repetition: int = 1,
     rate: float = 1000.0,
+    ticks: int = 1,
+    averaged: bool = False,
     substeps: int | None = None,
     record_velocity: bool = False,
+    noise: TorqueNoise = WHITE,
+    run: RunState | None = None,
 ) -> SimulationResult:
     """Let the virtual arm follow a motion in closed loop.
 
     The arm starts on the reference, at its speed, with the integral at the torque that this takes. Every sample the
     encoder is read, the PID computes a torque and the drive holds it until the next sample. The recorded effort is
-    the mean over one period centred on the sample, so that it does not lag position, plus white noise.
+    the mean over one period of the controller centred on the sample, so that it does not lag position, plus noise.
 
     Parameters
     ----------
@@ -118,11 +125,19 @@ def simulate(
     repetition : int
         Number of the run; every one has its own noise.
     rate : float
-        Samples per second of controller and recording.
+        Samples per second of the recording.
+    ticks : int
+        Periods of the controller per sample: it runs at ``ticks`` times the rate, and one of them is recorded.
+    averaged : bool
+        Whether the recorded effort is the mean over a whole sample instead, so that nothing of it is lost or aliased.
     substeps : int, optional
-        Integration steps per sample; by default 4, more where an elastic joint needs them.
+        Integration steps per period of the controller; by default 4, more where an elastic joint needs them.
     record_velocity : bool
         Whether the recording has the velocity that the controller saw.
+    noise : TorqueNoise
+        Its distribution; its standard deviation is the arm's.
+    run : RunState, optional
+        In what this run differs from the arm; by default in nothing.
 
     Returns
     -------
@@ -131,40 +146,51 @@ def simulate(
     Raises
     ------
     UsageError
-        If the motion is not of this arm's joints, or an effect does not fit.
+        If the motion is not of this arm's joints, an effect does not fit, or ``ticks`` is not 1 or more.
     ScaraIdentError
         If the controller loses the arm.
     """
-    resolved, draft = _prepare(arm, effects)
-    wanted = _at_rate(arm, motion, rate)
+    if ticks < 1:
+        raise UsageError(f"ticks is {ticks}; expected 1 or more periods of the controller per sample")
+    moved, own = arm, resolved_effects(arm, effects)
+    if run is not None:
+        # Sizes that were left open are those of the arm, not of the run.
+        moved = run.of(arm)
+    draft = _draft(moved, own)
+    if run is not None:
+        run.measure(arm, draft)
+    control = ticks * rate
+    wanted = _at_rate(arm, motion, control)
     back = np.argsort(arm.robot.order)
     # The name takes part, so that no two trajectories share their noise.
     random = np.random.default_rng([seed, repetition, zlib.crc32(motion.name.encode())])
     draft.sensors["shift"] = random.uniform(size=arm.robot.n)[back]
-    start = _torque_at_start(arm, wanted)
+    start = torque_at_start(moved, wanted)
     feed = np.zeros((len(wanted.time), arm.robot.n))
     if arm.controller.feed_forward:
-        feed = _nominal_torque(arm, wanted)[back].T
+        feed = nominal_torque(moved, wanted)[back].T
         start = np.zeros(arm.robot.n)
     position, velocity = wanted.position[back], wanted.velocity[back]
-    steps = _substeps(arm, draft, rate) if substeps is None else substeps
+    steps = _substeps(moved, draft, control) if substeps is None else substeps
     measured, seen, true, stops = _run(
-        arm, draft, rate, steps, np.stack([position.T, velocity.T]), feed, start[back],
+        moved, draft, control, steps, np.stack([position.T, velocity.T]), feed, start[back],
         position[:, 0], velocity[:, 0], f"{motion.name} on {arm.robot.name}",
     )  # fmt: skip
-    noise = random.normal(size=(arm.robot.n, len(wanted.time)))
-    effort = _recorded_effort(arm, draft, true, 1.0 / rate) + arm.torque_noise[:, None] * noise
+    effort = _recorded_effort(arm, draft, true, 1.0 / control, ticks if averaged else 1)[:, ::ticks]
+    effort = effort + arm.torque_noise[:, None] * noise.draw(random, effort.shape, rate)
+    if ticks > 1:
+        wanted, true = (_every(item, ticks) for item in (wanted, true))
     recording = Recording(
         name=f"{motion.name}_{repetition}",
         trajectory=motion.name,
         repetition=repetition,
         joints=arm.robot.joints,
         time=wanted.time,
-        position=measured,
+        position=np.ascontiguousarray(measured[:, ::ticks]),
         effort=effort,
-        velocity=seen if record_velocity else None,
+        velocity=np.ascontiguousarray(seen[:, ::ticks]) if record_velocity else None,
     )
-    return SimulationResult(arm, resolved, wanted, recording, true, seed, repetition, rate, steps, stops)
+    return SimulationResult(arm, own, wanted, recording, true, seed, repetition, rate, steps, stops)
 
 
 def free_motion(
@@ -197,7 +223,7 @@ def free_motion(
     time : ndarray, shape (N,)
     motion : TrueMotion
     """
-    _, draft = _prepare(arm, effects)
+    draft = _draft(arm, resolved_effects(arm, effects))
     n, samples = arm.robot.n, round(duration * rate) + 1
     given = np.zeros((n, 1)) if torque is None else np.asarray(torque, dtype=float).reshape(n, -1)
     back = np.argsort(arm.robot.order)
@@ -211,12 +237,25 @@ def free_motion(
     return np.arange(samples) / rate, true
 
 
-def _prepare(arm: VirtualArm, effects: Sequence[Effect]) -> tuple[tuple[Effect, ...], PlantDraft]:
-    resolved = tuple(effect.resolve(arm) for effect in effects)
+def resolved_effects(arm: VirtualArm, effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return effects with all their sizes, those that were left open from the arm."""
+    return tuple(effect.resolve(arm) for effect in effects)
+
+
+def _draft(arm: VirtualArm, effects: Sequence[Effect]) -> PlantDraft:
     draft = arm.draft()
-    for effect in resolved:
+    for effect in effects:
         effect.apply(arm, draft)
-    return resolved, draft
+    return draft
+
+
+T = TypeVar("T", ReferenceMotion, TrueMotion)
+
+
+def _every(motion: T, ticks: int) -> T:
+    """Return each ``ticks``-th sample of all signals."""
+    signals = [field.name for field in fields(motion) if field.name not in ("name", "joints")]
+    return replace(motion, **{name: np.ascontiguousarray(getattr(motion, name)[..., ::ticks]) for name in signals})
 
 
 def _at_rate(arm: VirtualArm, motion: ReferenceMotion, rate: float) -> ReferenceMotion:
@@ -285,37 +324,6 @@ def _stretch(draft: PlantDraft, torque: Array) -> Array:
     return np.asarray(np.where(elastic, wound + 0.5 * draft.arrays["width"] * np.sign(torque), 0.0))
 
 
-def _torque_at_start(arm: VirtualArm, motion: ReferenceMotion) -> Array:
-    """Torque of the arm without effects at the first sample, at the joint; at rest it is gravity's alone."""
-    v = motion.velocity[:, 0]
-    a = np.where(v != 0.0, motion.acceleration[:, 0], 0.0)
-    return _inverse_dynamics(arm, arm.bodies, motion.position[:, :1], v[:, None], a[:, None])[:, 0]
-
-
-def _nominal_torque(arm: VirtualArm, motion: ReferenceMotion) -> Array:
-    nominal = arm.robot.standard_parameters()[: 10 * arm.robot.n].reshape(-1, 10)
-    return _inverse_dynamics(arm, nominal, motion.position, motion.velocity, motion.acceleration)
-
-
-def _inverse_dynamics(arm: VirtualArm, bodies: Array, q: Array, v: Array, a: Array) -> Array:
-    """Torque at the joints of bodies, rotors, friction and offset, shape (n, N)."""
-    from scara_ident.simulation.spatial import configuration, with_bodies
-
-    robot = arm.robot
-    back = np.argsort(robot.order)
-    model = with_bodies(robot.model, bodies[back])
-    data = model.createData()
-    torque = np.empty_like(q)
-    for k in range(q.shape[1]):
-        full = configuration(model, q[back, k])
-        torque[:, k] = pin.rnea(model, data, full, v[back, k], a[back, k])[robot.order]
-    size = np.abs(arm.scale)[:, None]
-    a0, a1, a2, a3 = (arm.friction[:, i, None] for i in range(4))
-    sign = np.sign(v)
-    torque += arm.armature[:, None] * a + size * (a0 * sign + a1 * v + a2 * sign * v * v + a3 * v**3)
-    return np.asarray(torque + (arm.scale * arm.torque_offset)[:, None])
-
-
 def _substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
     """Choose as many steps per sample as the stiffest elastic joint or presliding friction needs."""
     arrays = draft.arrays
@@ -337,8 +345,8 @@ def _substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
     return max(SUBSTEPS, needed)
 
 
-def _recorded_effort(arm: VirtualArm, draft: PlantDraft, true: TrueMotion, period: float) -> Array:
-    """Torque as its sensor gives it, without noise: the mean over a period centred on each sample, shape (n, N)."""
+def _recorded_effort(arm: VirtualArm, draft: PlantDraft, true: TrueMotion, period: float, window: int) -> Array:
+    """Torque as its sensor gives it, without noise: the mean over ``window`` periods about each tick, shape (n, N)."""
     order = arm.robot.order
     n, samples = true.effort.shape
     ticks = np.arange(samples + 1.0)
@@ -350,14 +358,14 @@ def _recorded_effort(arm: VirtualArm, draft: PlantDraft, true: TrueMotion, perio
         integral = np.concatenate([[0.0], np.cumsum(u)])
         middle = ticks[:-1] - draft.delay[row] / period
         ends = []
-        for edge in (middle - 0.5, middle + 0.5):
+        for edge in (middle - 0.5 * window, middle + 0.5 * window):
             inside = np.interp(edge, ticks, integral)
             inside += np.minimum(edge, 0.0) * u[0] + np.maximum(edge - samples, 0.0) * u[-1]
             ends.append(inside)
-        u = ends[1] - ends[0]
+        u = (ends[1] - ends[0]) / window
         for joint, per_turn, amplitude, phase in draft.pickup:
             if joint == row:
                 u = u + amplitude * np.sin(per_turn * true.position[i] + phase)
         u = u + draft.cubic[row] * u**3
-        recorded[i] = draft.gain[row] * u + draft.drift[row] * ticks[:-1] * period
+        recorded[i] = draft.gain[row] * u + draft.shift[row] + draft.drift[row] * ticks[:-1] * period
     return recorded

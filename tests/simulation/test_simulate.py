@@ -113,6 +113,30 @@ def test_recorded_effort_does_not_lag_position() -> None:
     assert errors[1] < 0.1 * min(errors[0], errors[2])
 
 
+def test_a_recording_slower_than_the_controller_holds_every_so_many_of_its_samples() -> None:
+    arm = scara()
+    motion = swing(arm.robot, 1.0)
+    whole, part = simulate(arm, motion, rate=1000.0), simulate(arm, motion, rate=200.0, ticks=5)
+    np.testing.assert_array_equal(part.recording.time, whole.recording.time[::5])
+    np.testing.assert_array_equal(part.recording.position, whole.recording.position[:, ::5])
+    np.testing.assert_array_equal(part.recording.effort, whole.recording.effort[:, ::5])
+    for name in ("velocity", "link_acceleration", "effort"):
+        np.testing.assert_array_equal(getattr(part.true, name), getattr(whole.true, name)[:, ::5])
+    np.testing.assert_array_equal(part.motion.position, whole.motion.position[:, ::5])
+
+
+def test_an_averaged_torque_keeps_its_integral() -> None:
+    arm = scara()
+    motion = swing(arm.robot, 1.0)
+    whole = simulate(arm, motion, rate=1000.0).recording.effort
+    averaged = simulate(arm, motion, rate=200.0, ticks=5, averaged=True).recording.effort
+    # Five whole samples about each of the slower ones.
+    expected = np.array([np.convolve(row, np.full(5, 0.2), mode="same") for row in whole])[:, ::5]
+    np.testing.assert_allclose(averaged[:, 1:-1], expected[:, 1:-1], atol=1e-12)
+    with pytest.raises(UsageError, match="ticks is 0"):
+        simulate(arm, motion, ticks=0)
+
+
 def test_velocity_is_recorded_only_when_asked_for() -> None:
     arm = virtual_arm()
     motion = swing(arm.robot, 1.0)

@@ -70,6 +70,21 @@ def test_every_effect_runs_with_its_own_sizes_and_is_felt(urdf: str | None) -> N
         assert 1e-4 < changed.max() < 1.5, name
 
 
+@pytest.mark.parametrize("joint", [1, 4])
+def test_an_effect_on_a_joint_of_a_six_axis_arm_is_its_equation_there_and_nothing_elsewhere(joint: int) -> None:
+    arm = ideal(virtual_arm(load_robot(example_urdf("ur5_robot.urdf"))))
+    name, other = arm.robot.joints[joint], arm.robot.joints[joint + 1]
+    spring, coupling = fx.Spring(name, 2.0, 0.1), fx.FrictionCoupling(name, 0.4, 0.3)
+    assert coupling.other(arm) == other
+    true = simulate(arm, swing(arm.robot, 1.5, amplitude=0.3), effects=[spring, coupling]).true
+    extra = left_over(arm, true)
+    expected = 2.0 * (true.position[joint] - 0.1)
+    expected += 0.4 * true.velocity[joint + 1] + 0.3 * true.direction[joint + 1]
+    moving = true.direction[joint] != 0.0
+    np.testing.assert_allclose(extra[joint, moving], expected[moving], atol=1e-9 * np.abs(true.effort).max())
+    assert np.nanmax(np.abs(np.delete(extra, joint, axis=0))) < 1e-9 * np.abs(true.effort).max()
+
+
 def test_effects_act_together() -> None:
     chosen = [
         fx.Spring("joint1", 0.05, 0.2),

@@ -1,0 +1,236 @@
+"""One set of the attribution benchmark: what the diagnosis says of it, beside what it was and what the true model reaches."""
+
+from __future__ import annotations
+
+import resource
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from virtual_conditions import Asked
+from virtual_sets import VirtualSet, simulate_set
+
+from scara_ident.diagnosis import Diagnosis, diagnose
+from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.selection_step import model_with
+from scara_ident.effects import CATALOGUE, Member
+from scara_ident.effects.measurement import shifted
+from scara_ident.errors import ScaraIdentError
+from scara_ident.estimation.estimate import joint_errors
+from scara_ident.estimation.least_squares import wls
+from scara_ident.estimation.observations import observe
+from scara_ident.motion.prepared import prepare
+from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.simulation import Effect
+
+Item = dict[str, Any]
+# Columns by what a covered parameter is of; the rest are inertial.
+FRICTION = ("a0", "a1", "a2", "a3")
+# What families call the effects' parameters.
+OTHER_NAMES = {"_lost_share": "loss_coefficient", "crossing_width": "width"}
+# Effects whose columns share something with the base model, so that its parameters mean something else beside them: the
+# spring's rest is an offset, and a gain is one of all torques of its joint.
+SHARING = {
+    "transmission_loss": ("inertial",),
+    "spring": ("offset",),
+    "torque_gain_mismatch": ("inertial", "friction", "offset"),
+}
+
+
+class OutOfTimeError(Exception):
+    """A diagnosis took longer than it may."""
+
+
+def one_set(kind: str, seed: int, robot: str, asked: Asked, limit: int) -> Item:
+    """Simulate a set, diagnose it, and compare with what the arm was.
+
+    Parameters
+    ----------
+    kind, seed, robot, asked
+        See `virtual_sets.simulate_set`.
+    limit : int
+        Seconds after which the diagnosis is given up.
+    """
+    with tempfile.TemporaryDirectory() as place:
+        began = time.perf_counter()
+        made = simulate_set(kind, seed, robot, Path(place) / "set", asked)
+        was = made.truth()
+        item: Item = {
+            "robot": robot,
+            "kind": kind,
+            "seed": seed,
+            "factors": list(made.factors),
+            "conditions": made.conditions.as_dict(),
+            "true": was["effects"],
+            "simulated_seconds": time.perf_counter() - began,
+            "found": [],
+            "tentative": [],
+        }
+        before = _peak_memory()
+        began = time.perf_counter()
+        result, item["verdict"], item["said"] = _diagnosed(made, limit)
+        # With the simulation before it: what the diagnosis adds to that is the difference.
+        item |= {"seconds": time.perf_counter() - began, "memory": _peak_memory(), "memory_before": before}
+        return item if result is None else item | _compared(result, made, was)
+
+
+def _diagnosed(made: VirtualSet, limit: int) -> tuple[Diagnosis | None, str, str]:
+    def give_up(*_: Any) -> None:
+        raise OutOfTimeError
+
+    signal.signal(signal.SIGALRM, give_up)
+    signal.alarm(limit)
+    try:
+        result = diagnose(made.robot, "complete", made.training, made.held_out)
+        return result, result.verdict, ""
+    except OutOfTimeError:
+        return None, "out of time", f"more than {limit} s"
+    except ScaraIdentError as error:
+        return None, "refused", str(error)
+    except Exception as error:
+        # A fault of the package: counted, and the run goes on.
+        return None, "crashed", f"{type(error).__name__}: {error}"
+    finally:
+        signal.alarm(0)
+
+
+def _compared(result: Diagnosis, made: VirtualSet, was: Item) -> Item:
+    told = diagnosis_dict(result)
+    oracle = true_model_error(result, made)
+    after, reference = told["validation"]["after"], oracle and oracle["validation"]
+    return {
+        "found": [_found(effect) for effect in told["effects"]],
+        "tentative": [
+            {"effect": _of(effect, "effect"), "joint": _of(effect, "joint")}
+            for effect in getattr(result, "tentative", ())
+        ],
+        "unexplained": told["unexplained"] and told["unexplained"]["joint"],
+        "band": list(told["band_hz"].values()),
+        "noise": told["noise_floor"],
+        "training": told["training"],
+        "validation": told["validation"],
+        "true_model": oracle,
+        "to_true_model": worst_ratio(after, reference),
+        "strength": strength(told["training"]["before"], oracle and oracle["training"]),
+        "coverage": coverage(told["parameters"], was["parameters"], [effect.name for effect in made.effects]),
+    }
+
+
+def _found(effect: Item) -> Item:
+    return {
+        "effect": effect["effect"],
+        "joint": effect["joint"],
+        "group": effect["confounded_with"],
+        "parameters": {name: [value["value"], value["std"]] for name, value in effect["parameters"].items()},
+        "p_value": effect["p_value"],
+        "gain": effect["gain"],
+    }
+
+
+def _of(effect: Any, name: str) -> Any:
+    return effect.get(name) if isinstance(effect, dict) else getattr(effect, name, None)
+
+
+def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, dict[str, float]] | None:
+    """Fit the true model, at its true nonlinear parameters, to the same recordings in the same bands.
+
+    Returns
+    -------
+    dict or None
+        Rms of each joint in training and validation; None where the catalogue has no family for an effect.
+    """
+    scene, bands = result.search.scene, result.search.bands
+    joints = made.robot.joints
+    delays = [effect.as_dict()["parameters"]["delay"] for effect in made.effects if effect.name == "time_delay"]
+    others = [_candidates(effect, made) for effect in made.effects if effect.name != "time_delay"]
+    training, held_out = (
+        prepare([shifted(item, sum(delays)) for item in items], bands) for items in (made.training, made.held_out)
+    )
+    best = None
+    for chosen in product(*others):
+        model = model_with(scene, chosen)
+        fitted = observe(model, training)
+        value = wls(fitted).value
+        errors = _errors(joints, joint_errors(value, fitted))
+        if best is None or np.prod(list(errors.values())) < np.prod(list(best[2].values())):
+            best = model, value, errors
+    if best is None:
+        return None
+    model, value, errors = best
+    return {"training": errors, "validation": _errors(joints, joint_errors(value, observe(model, held_out)))}
+
+
+def _errors(joints: Sequence[str], errors: Sequence[Any]) -> dict[str, float]:
+    return {joint: error.rms for joint, error in zip(joints, errors, strict=True) if error}
+
+
+def _candidates(effect: Effect, made: VirtualSet) -> list[Candidate]:
+    """Return the member of the effect's family that has its nonlinear parameters, or several of which one is closest."""
+    values = effect.as_dict()["parameters"]
+    joints = made.robot.joints
+    place = None if effect.joint is None else joints.index(effect.joint)
+    partner = joints.index(effect.other(made.arm)) if hasattr(effect, "other") else None
+    for family in (family for family in CATALOGUE if family.name == effect.name):
+        names = [OTHER_NAMES.get(parameter.name, parameter.name) for parameter in family.nonlinear]
+        if effect.name == "joint_elasticity" and place is not None:
+            # The frequency of the link against its held motor depends on the pose: the one that fits best.
+            usual = np.sqrt(values["stiffness"] / made.arm.link_inertia()[place]) / (2.0 * np.pi)
+            points = [(float(usual * factor), values["damping_ratio"]) for factor in np.geomspace(0.6, 1.7, 9)]
+        elif all(name in values for name in names):
+            points = [tuple(float(values[name]) for name in names)]
+        else:
+            continue
+        return [Candidate(family, Member(place, point, partner)) for point in points]
+    return []
+
+
+def worst_ratio(after: dict[str, float | None], reference: dict[str, float] | None) -> float | None:
+    """Return the held-out error over that of the true model on the joint where it is largest."""
+    if not reference or not after:
+        return None
+    ratios = [error / reference[joint] for joint, error in after.items() if error and reference.get(joint)]
+    return max(ratios, default=None)
+
+
+def strength(before: dict[str, float | None], oracle: dict[str, float] | None) -> float | None:
+    """Return the rms of what the effects add, over that of what the true model leaves, on the joint where it shows most.
+
+    This, and not the effect's parameter, is its size under conditions that differ from set to set: both are of the
+    training recordings within the band worked in.
+    """
+    if not oracle:
+        return None
+    excess = [(error / oracle[joint]) ** 2 - 1.0 for joint, error in before.items() if error and oracle.get(joint)]
+    return float(np.sqrt(max(0.0, *excess))) if excess else None
+
+
+def coverage(found: Sequence[Item], true: Sequence[Item], effects: Sequence[str]) -> dict[str, list[float]]:
+    """Return the errors of the base model's parameters in standard deviations, by kind of parameter.
+
+    The truth is that of the arm: its standard parameters, projected on the base parameters by the grouping of the model
+    (`simulation.truth`), its friction polynomial and its offsets; where runs differ, their mean over all possible runs.
+    Parameters that the recordings leave open have no standard deviation and are not counted, nor those of `SHARING`.
+    """
+    exact = {entry["name"]: entry["value"] for entry in true}
+    errors: dict[str, list[float]] = {"inertial": [], "friction": [], "offset": []}
+    shared = {kind for effect in effects for kind in SHARING.get(effect, ())}
+    for entry in found:
+        name, std = entry["name"], entry.get("std")
+        if name not in exact or std is None or not 0.0 < std < np.inf:
+            continue
+        kind = "offset" if name.startswith("p_o") else "friction" if name.startswith(FRICTION) else "inertial"
+        if kind not in shared:
+            errors[kind].append(round(float((entry["value"] - exact[name]) / std), 3))
+    return errors
+
+
+def _peak_memory() -> float:
+    """Return the largest memory that this process has had, MB."""
+    unit = 1024.0 if sys.platform == "linux" else 1024.0**2
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit

@@ -1,0 +1,158 @@
+"""How often the diagnosis' tests call noise an effect: the false-alarm rate of stated p-values, with coloured noise.
+
+Rows as a diagnosis has them: columns of a model, a candidate that is not there, and noise, in blocks of time within
+recordings. Noise is white, or remembers a tenth of a block or half of it. The candidate moves in all blocks, or in three of
+them only. A rate between a third of and three times the nominal one is what is asked for (`--check` fails otherwise); a
+test that cannot be made with so little, and says p = 1, is counted beside it.
+
+    python benchmarks/calibration.py --draws 4000
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import os
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from scara_ident.diagnosis.candidate_tests import examine
+from scara_ident.diagnosis.fitted_model import FittedModel
+from scara_ident.estimation.observations import JointRows
+
+Array = NDArray[np.float64]
+BLOCKS = (6, 12, 50, 300)
+# Rows of a block, and columns of the model; a regressor of a joint of a six-axis arm has about as many that matter.
+ROWS, COLUMNS = 40, 12
+# Blocks of a recording: each recording starts its noise anew.
+OF_A_RECORDING = 6
+# Share of a block after which noise has forgotten to 1/e.
+MEMORIES = (0.0, 0.1, 0.5)
+NOMINAL = 0.01
+ALLOWED = (0.3, 3.0)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One line of the table: number of blocks, memory of the noise, columns of the candidate, and where it lives."""
+
+    blocks: int
+    memory: float
+    width: int
+    everywhere: bool
+
+
+CASES = [
+    Case(blocks, memory, width, everywhere)
+    for blocks in BLOCKS
+    for memory in MEMORIES
+    for width, everywhere in ((1, True), (2, True), (1, False))
+]
+
+
+def smooth(rng: np.random.Generator, count: int, rows: int) -> Array:
+    """Return columns that move as regressors do, shape (count, rows): sums of sines, some slower than a block."""
+    t = np.arange(rows)
+    rate = 2.0 * np.pi * np.exp(rng.uniform(np.log(0.1), np.log(2.0), (count, 3, 1))) / ROWS
+    return np.sum(rng.normal(size=(count, 3, 1)) * np.sin(rate * t + rng.uniform(0.0, 6.3, (count, 3, 1))), axis=1)
+
+
+def noise(rng: np.random.Generator, rows: int, memory: float) -> Array:
+    """Return stationary noise of unit variance, shape (rows,)."""
+    white = rng.normal(size=rows)
+    if memory == 0.0:
+        return white
+    keep = float(np.exp(-1.0 / (memory * ROWS)))
+    drive = np.sqrt(1.0 - keep**2) * white
+    drive[0] = white[0]
+    return np.asarray(lfilter([1.0], [1.0, -keep], drive))
+
+
+def p_value(case: Case, rng: np.random.Generator) -> float:
+    """Draw rows in which nothing is missing, and test a candidate."""
+    rows = case.blocks * ROWS
+    starts = np.arange(0, rows + 1, ROWS)
+    owner = np.arange(case.blocks) // OF_A_RECORDING
+    lengths = [int(np.sum(owner == k)) * ROWS for k in range(owner[-1] + 1)]
+    torque = np.concatenate([noise(rng, length, case.memory) for length in lengths])
+    columns, candidate = smooth(rng, COLUMNS, rows), smooth(rng, case.width, rows)
+    if not case.everywhere:
+        kept = rng.choice(case.blocks, 3, replace=False)
+        candidate *= np.repeat(np.isin(np.arange(case.blocks), kept), ROWS)
+    table = np.concatenate([columns, (torque + columns.sum(axis=0))[None]])
+    joint = JointRows(np.arange(COLUMNS), table, starts, np.full(case.blocks, float(ROWS)))
+    folds = owner if owner[-1] > 0 else np.arange(case.blocks) % 2
+    model = FittedModel((joint,), COLUMNS, owner, folds, np.ones(1))
+    return examine(model, [{0: candidate}])[0].p_value
+
+
+def rates(task: tuple[Case, int, int]) -> dict[str, float]:
+    """Return the false-alarm rates of one case: number of draws and seed beside it."""
+    case, draws, seed = task
+    rng = np.random.default_rng([seed, CASES.index(case)])
+    began = time.perf_counter()
+    p = np.array([p_value(case, rng) for _ in range(draws)])
+    return asdict(case) | {
+        "draws": draws,
+        "at_1_percent": float(np.mean(p < NOMINAL)),
+        "at_5_percent": float(np.mean(p < 0.05)),
+        "at_0_1_percent": float(np.mean(p < 0.001)),
+        "not_testable": float(np.mean(p >= 1.0)),
+        "seconds": time.perf_counter() - began,
+    }
+
+
+def report(found: Sequence[dict[str, float]]) -> bool:
+    """Print the table and return whether all rates at the nominal level are allowed."""
+    low, high = (factor * NOMINAL for factor in ALLOWED)
+    print(
+        f"{'blocks':>6} {'memory':>7} {'columns':>8} {'lives in':>12} {'p<.001':>8} {'p<.01':>8} {'p<.05':>8} {'no test':>8}"
+    )
+    right = True
+    for item in found:
+        rate, draws = item["at_1_percent"], item["draws"]
+        # Two standard errors of the rate itself.
+        slack = 2.0 * np.sqrt(rate * (1.0 - rate) / draws)
+        good = item["not_testable"] > 0.5 or low - slack <= rate <= high + slack
+        right &= good
+        print(
+            f"{item['blocks']:6} {item['memory']:7.1f} {item['width']:8} "
+            f"{'all blocks' if item['everywhere'] else '3 blocks':>12} {item['at_0_1_percent']:8.2%} {rate:8.2%} "
+            f"{item['at_5_percent']:8.2%} {item['not_testable']:8.0%}{'' if good else '  <- outside'}"
+        )
+    return right
+
+
+def main() -> None:
+    """Run all cases."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--draws", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--blocks", type=int, nargs="+", choices=BLOCKS, default=list(BLOCKS))
+    parser.add_argument("--check", action="store_true", help="exit with 1 where a rate is outside of what is allowed")
+    parser.add_argument("--output", type=Path, help="JSON of the rates")
+    options = parser.parse_args()
+    # Processes are many and matrices small.
+    for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
+    chosen = [(case, options.draws, options.seed) for case in CASES if case.blocks in options.blocks]
+    with ProcessPoolExecutor(options.jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        found = list(pool.map(rates, chosen))
+    right = report(found)
+    if options.output:
+        options.output.parent.mkdir(parents=True, exist_ok=True)
+        options.output.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    raise SystemExit(1 if options.check and not right else 0)
+
+
+if __name__ == "__main__":
+    main()
