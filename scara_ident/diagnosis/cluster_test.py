@@ -11,6 +11,7 @@ two, however many blocks there are (Bell and McCaffrey 2002; Pustejovsky and Tip
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,7 @@ def cluster_test(
     """
     into, back, rank = _whitening(whole)
     left = model.basis_scores - np.einsum("gbkr,gk->gbr", products.cross, value)
-    reach = products.cross @ model.released
+    reach = _each_block(products.cross, model.released)
     score = np.einsum("gki,gbk->gbi", into, scores + np.einsum("gbkr,gbr->gbk", reach, left))
     inside = _both_sides(into, columns + reach @ products.cross.transpose(0, 1, 3, 2))
     strength, turn = np.linalg.eigh(np.eye(inside.shape[-1]) - inside)
@@ -127,6 +128,13 @@ def _whitening(whole: Array) -> tuple[Array, Array, NDArray[np.intp]]:
     return into, back.transpose(0, 2, 1), np.sum(kept, axis=1, dtype=np.intp)
 
 
+def _each_block(signals: Array, matrices: Array) -> Array:
+    """Multiply signals (g, blocks, k, r) by a matrix (blocks, r, r) each, all candidates of a block at once."""
+    g, blocks, k, r = signals.shape
+    found = signals.transpose(1, 0, 2, 3).reshape(blocks, g * k, r) @ matrices
+    return np.asarray(found.reshape(blocks, g, k, r).transpose(1, 0, 2, 3))
+
+
 def _both_sides(into: Array, products: Array) -> Array:
     return np.asarray(into.transpose(0, 2, 1)[:, None] @ products @ into[:, None])
 
@@ -177,8 +185,19 @@ class _Neighbours:
 
     def pairs(self, signals: Array) -> Array:
         """Return the sums of pairs over the square root of two, of signals of shape (g, blocks, ...)."""
-        padded = np.concatenate([signals, np.zeros_like(signals[:, :1])], axis=1)
-        return np.asarray(np.sqrt(0.5) * (padded[:, self.before] + padded[:, self.after]))
+        half = np.sqrt(0.5) * signals
+        found = np.zeros((len(signals), len(self.before), *signals.shape[2:]))
+        for blocks, place in self._runs:
+            found[:, place : place + blocks.stop - blocks.start] = half[:, blocks]
+            found[:, place + 1 : place + 1 + blocks.stop - blocks.start] += half[:, blocks]
+        return found
+
+    @cached_property
+    def _runs(self) -> list[tuple[slice, int]]:
+        """Blocks of each recording, and the first of its pairs."""
+        first = np.flatnonzero(np.diff(self.place, prepend=-2) > 1)
+        bounds = zip(first, [*first[1:], len(self.place)], strict=True)
+        return [(slice(int(start), int(stop)), int(self.place[start])) for start, stop in bounds]
 
     def back(self, pairs: Array) -> Array:
         """Apply the transpose of `pairs`."""
