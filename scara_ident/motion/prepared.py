@@ -161,6 +161,32 @@ class PreparedStretch:
         low = low_pass_every(self.fade[joint] * signals, self.rate, band, step)
         return np.asarray(np.sqrt(step) * low[:, self.kept[joint] // step])
 
+    def rows_of(self, signals: Sequence[tuple[int, Array]]) -> list[Array]:
+        """Return what `rows` does of single signals of several joints, which pass the filter together.
+
+        Parameters
+        ----------
+        signals : sequence of (int, ndarray)
+            Joint and signal (N,) of its equation.
+
+        Returns
+        -------
+        list of ndarray, shape (K,) each
+        """
+        alike: dict[tuple[int, float | None], list[int]] = {}
+        for place, (joint, _) in enumerate(signals):
+            alike.setdefault((self.steps[joint], self.bands[joint]), []).append(place)
+        found: dict[int, Array] = {}
+        for (step, band), places in alike.items():
+            faded = np.empty((len(places), self.samples))
+            for row, place in zip(faded, places, strict=True):
+                joint, signal = signals[place]
+                np.multiply(self.fade[joint], signal, out=row)
+            low = low_pass_every(faded, self.rate, band, step)
+            for row, place in zip(low, places, strict=True):
+                found[place] = np.sqrt(step) * row[self.kept[signals[place][0]] // step]
+        return [found[place] for place in range(len(signals))]
+
     def smooth(self, joint: int, signal: Array) -> Array:
         """Return a signal of a joint's equation, shape (..., N), faded out towards rest and within the joint's band."""
         return low_pass(self.fade[joint] * signal, self.rate, self.bands[joint], self.steps[joint])
