@@ -14,15 +14,14 @@ from scara_ident.estimation.observations import JointRows, Observations, observe
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.position_noise import noisier
 from scara_ident.motion.prepared import PreparedStretch
-from scara_ident.threads import side_by_side
 
 # Columns of a candidate, shape (k, N) on the N rows of each joint that it acts on.
 Rows = dict[int, Array]
 # Effect, member, and the estimate where its columns follow that.
 Key = tuple[Effect, Member, Hashable]
 
-# Columns that pass the low-pass together: more of them leave the cache.
-AT_ONCE = 16
+# Columns that pass the low-pass together: enough for two threads, and little memory.
+AT_ONCE = 32
 
 
 @dataclass(frozen=True)
@@ -115,7 +114,8 @@ class CandidateColumns:
         if not wanted:
             return
         stretches = self.observations.data.stretches
-        made = side_by_side(lambda part: _on_stretch(self._signals_of(scene, part), wanted, part, keep=keep), stretches)
+        # One after the other: effects are made of many short steps, for which two threads only wait for each other.
+        made = [_on_stretch(self._signals_of(scene, part), wanted, part, keep=keep) for part in stretches]
         for k, candidate in enumerate(wanted):
             key = _key(scene, candidate)
             parts = [rows[k] for rows, _ in made]
