@@ -15,7 +15,7 @@ from scara_ident.diagnosis.fitted_model import FittedModel, Products, products_o
 from scara_ident.threads import one_blas_thread
 
 # Columns whose products are made together: more of them take more memory than time.
-_COLUMNS = 96
+_COLUMNS = 32
 # Directions of a few columns below this share of the largest are not solved for.
 _RANK = 1e-9
 
