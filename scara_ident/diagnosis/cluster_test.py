@@ -11,7 +11,7 @@ two, however many blocks there are (Bell and McCaffrey 2002; Pustejovsky and Tip
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,54 +154,38 @@ class _Neighbours:
 
     Attributes
     ----------
-    before, after : ndarray of int, shape (pairs,)
-        Blocks of each pair; the number of blocks where there is none.
-    place : ndarray of int, shape (blocks,)
-        The pair in which each block is the later one; it is the earlier one in the next.
+    runs : tuple of (slice, slice)
+        Of each recording its blocks, and the pairs in which they are the later ones; they are the earlier ones in the next.
+    count : int
+        Number of pairs.
     """
 
-    before: NDArray[np.intp]
-    after: NDArray[np.intp]
-    place: NDArray[np.intp]
+    runs: tuple[tuple[slice, slice], ...]
+    count: int
 
     @staticmethod
     def of(model: FittedModel) -> _Neighbours:
         """Return the pairs of a model's blocks."""
-        count = len(model.owner)
-        before: list[int] = []
-        after: list[int] = []
-        place: list[int] = []
-        for block in range(count):
-            first = block == 0 or model.owner[block] != model.owner[block - 1]
-            place.append(len(before))
-            before.append(count if first else block - 1)
-            after.append(block)
-            if block + 1 == count or model.owner[block + 1] != model.owner[block]:
-                before.append(block)
-                after.append(count)
-        return _Neighbours(
-            np.array(before, dtype=np.intp), np.array(after, dtype=np.intp), np.array(place, dtype=np.intp)
-        )
+        bounds = [0, *(np.flatnonzero(np.diff(model.owner)) + 1).tolist(), len(model.owner)]
+        runs = [(slice(a, b), slice(a + k, b + k)) for k, (a, b) in enumerate(pairwise(bounds))]
+        return _Neighbours(tuple(runs), len(model.owner) + len(runs))
 
     def pairs(self, signals: Array) -> Array:
         """Return the sums of pairs over the square root of two, of signals of shape (g, blocks, ...)."""
         half = np.sqrt(0.5) * signals
-        found = np.zeros((len(signals), len(self.before), *signals.shape[2:]))
-        for blocks, place in self._runs:
-            found[:, place : place + blocks.stop - blocks.start] = half[:, blocks]
-            found[:, place + 1 : place + 1 + blocks.stop - blocks.start] += half[:, blocks]
+        found = np.zeros((len(signals), self.count, *signals.shape[2:]))
+        for blocks, later in self.runs:
+            found[:, later] = half[:, blocks]
+            found[:, later.start + 1 : later.stop + 1] += half[:, blocks]
         return found
-
-    @cached_property
-    def _runs(self) -> list[tuple[slice, int]]:
-        """Blocks of each recording, and the first of its pairs."""
-        first = np.flatnonzero(np.diff(self.place, prepend=-2) > 1)
-        bounds = zip(first, [*first[1:], len(self.place)], strict=True)
-        return [(slice(int(start), int(stop)), int(self.place[start])) for start, stop in bounds]
 
     def back(self, pairs: Array) -> Array:
         """Apply the transpose of `pairs`."""
-        return np.asarray(np.sqrt(0.5) * (pairs[:, self.place] + pairs[:, self.place + 1]))
+        found = np.empty((len(pairs), self.count - len(self.runs), *pairs.shape[2:]))
+        for blocks, later in self.runs:
+            np.add(pairs[:, later], pairs[:, later.start + 1 : later.stop + 1], out=found[:, blocks])
+        found *= np.sqrt(0.5)
+        return found
 
 
 def _if_white(neighbours: _Neighbours, own: Array, links: Array) -> tuple[Array, Array]:
