@@ -58,9 +58,7 @@ def decide(
         Candidates and scan points tried, for the correction of the p-value.
     criteria : SelectionCriteria
     """
-    joints = scene.robot.n if candidate.member.joint is None else 1
-    # The residual is weighted so that every joint holds the same share of its square.
-    gain = examination.held_out * scene.robot.n / joints
+    gain = share_of_joints(candidate, scene, examination.held_out)
     unseen = _unseen(examination, criteria)
     unphysical = unseen or _unphysical(candidate, examination, scene)
     small = unphysical or _small(candidate, examination, scene, gain, criteria)
@@ -69,6 +67,13 @@ def decide(
     words = why or f"removes {gain:.1%} of the squared residual on data that it was not fitted to"
     tentative = why is not None and small is None and examination.p_value <= criteria.family_error
     return Decision(candidate, candidate.label(scene), examination, why is None, words, gain, tentative)
+
+
+def share_of_joints(candidate: Candidate, scene: Scene, gain: float) -> float:
+    """Return a share of the squared residual of all joints as one of those that a candidate is of."""
+    joints = scene.robot.n if candidate.member.joint is None else 1
+    # The residual is weighted so that every joint holds the same share of its square.
+    return gain * scene.robot.n / joints
 
 
 def _unseen(examination: Examination, criteria: SelectionCriteria) -> str | None:

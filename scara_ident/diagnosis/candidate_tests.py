@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,8 +15,9 @@ from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel, Products, products_of
 from scara_ident.threads import one_blas_thread
 
+T = TypeVar("T")
 # Columns whose products are made together: more of them take more memory than time.
-_COLUMNS = 96
+_COLUMNS = 32
 # Directions of a few columns below this share of the largest are not solved for.
 _RANK = 1e-9
 
@@ -85,41 +87,75 @@ def examine(
         Columns of each on the rows of every joint that it acts on.
     criteria : SelectionCriteria, optional
     """
+    return _in_groups(candidates, lambda group: _examinations(model, products_of(model, group), criteria))
+
+
+def held_out_gains(
+    model: FittedModel, candidates: Sequence[Rows], criteria: SelectionCriteria = CRITERIA
+) -> list[float]:
+    """Return `Examination.held_out` of candidates alone, in less than half the time."""
+    before = float(np.sum(model.squares))
+
+    def gains(group: Sequence[Rows]) -> list[float]:
+        outside, products, scores = _outside(products_of(model, group), criteria)
+        _, saved, voting = _in_folds(model, products, scores, criteria)
+        seen = (outside >= criteria.absorbed) & (before > 0.0)
+        return [
+            float(gain) for gain in np.where(seen, np.sum(np.where(voting, saved, 0.0), axis=0) / (before or 1.0), 0.0)
+        ]
+
+    return _in_groups(candidates, gains)
+
+
+def _in_groups(candidates: Sequence[Rows], function: Callable[[Sequence[Rows]], Sequence[T]]) -> list[T]:
+    """Apply a function to candidates of as many columns each, and return the results in the order of the candidates."""
     widths = [len(next(iter(rows.values()))) for rows in candidates]
-    found: dict[int, Examination] = {}
+    found: dict[int, T] = {}
     with one_blas_thread():
         for k in dict.fromkeys(widths):
             same = [place for place, width in enumerate(widths) if width == k]
             size = max(1, _COLUMNS // k)
             for start in range(0, len(same), size):
                 group = same[start : start + size]
-                products = products_of(model, [candidates[place] for place in group])
-                found |= dict(zip(group, _examinations(model, products, criteria), strict=True))
+                found |= dict(zip(group, function([candidates[place] for place in group]), strict=True))
     return [found[place] for place in range(len(candidates))]
 
 
-def _examinations(model: FittedModel, found: Products, criteria: SelectionCriteria) -> list[Examination]:
-    """Examine candidates that have as many columns each."""
-    k, folds, squares = found.sizes.shape[1], model.folds, model.squares
+def _outside(found: Products, criteria: SelectionCriteria) -> tuple[Array, Array, Array]:
+    """Return the share of each candidate outside the model, and the products and scores of what is no rounding."""
     left = np.diagonal(np.sum(found.columns, axis=1), axis1=1, axis2=2)
     # What is left of a column that the model spans is rounding, and must not be scaled up.
     absorbed = left < criteria.absorbed * found.sizes
     outside = np.max(np.where(absorbed, 0.0, left) / np.maximum(found.sizes, np.finfo(float).tiny), axis=1)
     products = np.where((absorbed[:, :, None] | absorbed[:, None, :])[:, None], 0.0, found.columns)
-    scores = np.where(absorbed[:, None], 0.0, found.scores)
+    return outside, products, np.where(absorbed[:, None], 0.0, found.scores)
+
+
+def _in_folds(
+    model: FittedModel, products: Array, scores: Array, criteria: SelectionCriteria
+) -> tuple[Array, Array, Array]:
+    """Return the residual's squares (f,) of each fold, what coefficients of the others save of them, and who votes, (f, g)."""
+    in_fold = [model.fold == f for f in range(model.folds)]
+    base = np.array([np.sum(model.squares[mask]) for mask in in_fold])
+    fold_products = np.array([np.sum(products[:, mask], axis=1) for mask in in_fold])
+    aims = np.array([np.sum(scores[:, mask], axis=1) for mask in in_fold])
+    excited = np.trace(fold_products, axis1=2, axis2=3)
+    voting = (excited >= criteria.abstains * np.mean(excited, axis=0)) & (base[:, None] > 0.0)
+    guess = _normal(np.sum(products, axis=1) - fold_products, np.sum(scores, axis=1) - aims)
+    saved = np.einsum("fgi,fgi->fg", guess, 2.0 * aims - np.einsum("fgij,fgj->fgi", fold_products, guess))
+    return base, saved, voting
+
+
+def _examinations(model: FittedModel, found: Products, criteria: SelectionCriteria) -> list[Examination]:
+    """Examine candidates that have as many columns each."""
+    k, folds, squares = found.sizes.shape[1], model.folds, model.squares
+    outside, products, scores = _outside(found, criteria)
     whole, aim = np.sum(products, axis=1), np.sum(scores, axis=1)
     value = _normal(whole, aim)
     predicted = np.einsum("gbij,gj->gbi", products, value)
     after = squares - np.einsum("gbi,gi->gb", 2.0 * scores - predicted, value)
     test = cluster_test(model, found, whole, value, scores - predicted, products)
-    in_fold = [model.fold == f for f in range(folds)]
-    base = np.array([np.sum(squares[mask]) for mask in in_fold])
-    fold_products = np.array([np.sum(products[:, mask], axis=1) for mask in in_fold])
-    aims = np.array([np.sum(scores[:, mask], axis=1) for mask in in_fold])
-    excited = np.trace(fold_products, axis1=2, axis2=3)
-    voting = (excited >= criteria.abstains * np.mean(excited, axis=0)) & (base[:, None] > 0.0)
-    guess = _normal(whole - fold_products, aim - aims)
-    saved = np.einsum("fgi,fgi->fg", guess, 2.0 * aims - np.einsum("fgij,fgj->fgi", fold_products, guess))
+    base, saved, voting = _in_folds(model, products, scores, criteria)
     gains = saved / np.where(base > 0.0, base, 1.0)[:, None]
     before = float(np.sum(squares))
     own = model.root @ (model.projected[:, None] - np.einsum("gkr,gk->rg", found.sums, value))

@@ -14,15 +14,14 @@ from scara_ident.estimation.observations import JointRows, Observations, observe
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.position_noise import noisier
 from scara_ident.motion.prepared import PreparedStretch
-from scara_ident.threads import side_by_side
 
 # Columns of a candidate, shape (k, N) on the N rows of each joint that it acts on.
 Rows = dict[int, Array]
 # Effect, member, and the estimate where its columns follow that.
 Key = tuple[Effect, Member, Hashable]
 
-# Columns that pass the low-pass together: more of them leave the cache.
-AT_ONCE = 16
+# Columns that pass the low-pass together: enough for two threads, and little memory.
+AT_ONCE = 32
 
 
 @dataclass(frozen=True)
@@ -115,7 +114,8 @@ class CandidateColumns:
         if not wanted:
             return
         stretches = self.observations.data.stretches
-        made = side_by_side(lambda part: _on_stretch(self._signals_of(scene, part), wanted, part, keep=keep), stretches)
+        # One after the other: effects are made of many short steps, for which two threads only wait for each other.
+        made = [_on_stretch(self._signals_of(scene, part), wanted, part, keep=keep) for part in stretches]
         for k, candidate in enumerate(wanted):
             key = _key(scene, candidate)
             parts = [rows[k] for rows, _ in made]
@@ -128,7 +128,8 @@ class CandidateColumns:
         """Return the signals of a stretch; those of the last estimate are kept with all that was made of them."""
         held = self._signals.get(part.motion)
         if held is None or held.scene is not scene:
-            held = self._signals[part.motion] = Signals(scene, part.motion)
+            held = Signals(scene, part.motion) if held is None else held.at(scene)
+            self._signals[part.motion] = held
         return held
 
     def forget_all_but(self, *scenes: Scene) -> None:
@@ -158,32 +159,31 @@ def _on_stretch(
     signals: Signals, candidates: Sequence[Candidate], part: PreparedStretch, *, keep: bool
 ) -> tuple[list[Rows], list[Rows]]:
     """Return every candidate's columns within the bands and, if they are to be kept, as they are."""
-    scene = signals.scene
     kept: list[Rows] = [{} for _ in candidates]
     unfiltered: list[Rows] = [{} for _ in candidates]
-    waiting: dict[int, list[tuple[int, Array]]] = {}
+    # Candidate, joint, and columns that have not passed the low-pass yet.
+    waiting: list[tuple[int, int, list[Array]]] = []
 
-    def flush(joint: int) -> None:
-        held = waiting.pop(joint)
-        rows = part.rows(joint, np.concatenate([columns for _, columns in held]))
-        start = 0
-        for k, columns in held:
-            kept[k][joint] = rows[start : start + len(columns)]
-            start += len(columns)
+    def flush() -> None:
+        rows = iter(part.rows_of([(joint, column) for _, joint, columns in waiting for column in columns]))
+        for k, joint, columns in waiting:
+            kept[k][joint] = np.array([next(rows) for _ in columns])
+        waiting.clear()
 
+    count = 0
     for k, candidate in enumerate(candidates):
-        dense = candidate.effect.regressor(signals, candidate.member)
-        for joint in candidate.effect.rows(scene, candidate.member):
+        for joint, columns in candidate.effect.by_joint(signals, candidate.member).items():
             if keep:
-                unfiltered[k][joint] = dense[joint]
+                unfiltered[k][joint] = np.array(columns)
             if part.usable:
-                waiting.setdefault(joint, []).append((k, dense[joint]))
-                if sum(len(columns) for _, columns in waiting[joint]) >= AT_ONCE:
-                    flush(joint)
+                waiting.append((k, joint, columns))
+                count += len(columns)
             else:
-                kept[k][joint] = np.zeros((dense.shape[1], 0))
-    for joint in list(waiting):
-        flush(joint)
+                kept[k][joint] = np.zeros((len(columns), 0))
+        if count >= AT_ONCE:
+            flush()
+            count = 0
+    flush()
     return kept, unfiltered
 
 

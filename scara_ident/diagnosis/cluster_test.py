@@ -11,6 +11,7 @@ two, however many blocks there are (Bell and McCaffrey 2002; Pustejovsky and Tip
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,7 @@ def cluster_test(
     """
     into, back, rank = _whitening(whole)
     left = model.basis_scores - np.einsum("gbkr,gk->gbr", products.cross, value)
-    reach = products.cross @ model.released
+    reach = _each_block(products.cross, model.released)
     score = np.einsum("gki,gbk->gbi", into, scores + np.einsum("gbkr,gbr->gbk", reach, left))
     inside = _both_sides(into, columns + reach @ products.cross.transpose(0, 1, 3, 2))
     strength, turn = np.linalg.eigh(np.eye(inside.shape[-1]) - inside)
@@ -127,6 +128,13 @@ def _whitening(whole: Array) -> tuple[Array, Array, NDArray[np.intp]]:
     return into, back.transpose(0, 2, 1), np.sum(kept, axis=1, dtype=np.intp)
 
 
+def _each_block(signals: Array, matrices: Array) -> Array:
+    """Multiply signals (g, blocks, k, r) by a matrix (blocks, r, r) each, all candidates of a block at once."""
+    g, blocks, k, r = signals.shape
+    found = signals.transpose(1, 0, 2, 3).reshape(blocks, g * k, r) @ matrices
+    return np.asarray(found.reshape(blocks, g, k, r).transpose(1, 0, 2, 3))
+
+
 def _both_sides(into: Array, products: Array) -> Array:
     return np.asarray(into.transpose(0, 2, 1)[:, None] @ products @ into[:, None])
 
@@ -146,43 +154,38 @@ class _Neighbours:
 
     Attributes
     ----------
-    before, after : ndarray of int, shape (pairs,)
-        Blocks of each pair; the number of blocks where there is none.
-    place : ndarray of int, shape (blocks,)
-        The pair in which each block is the later one; it is the earlier one in the next.
+    runs : tuple of (slice, slice)
+        Of each recording its blocks, and the pairs in which they are the later ones; they are the earlier ones in the next.
+    count : int
+        Number of pairs.
     """
 
-    before: NDArray[np.intp]
-    after: NDArray[np.intp]
-    place: NDArray[np.intp]
+    runs: tuple[tuple[slice, slice], ...]
+    count: int
 
     @staticmethod
     def of(model: FittedModel) -> _Neighbours:
         """Return the pairs of a model's blocks."""
-        count = len(model.owner)
-        before: list[int] = []
-        after: list[int] = []
-        place: list[int] = []
-        for block in range(count):
-            first = block == 0 or model.owner[block] != model.owner[block - 1]
-            place.append(len(before))
-            before.append(count if first else block - 1)
-            after.append(block)
-            if block + 1 == count or model.owner[block + 1] != model.owner[block]:
-                before.append(block)
-                after.append(count)
-        return _Neighbours(
-            np.array(before, dtype=np.intp), np.array(after, dtype=np.intp), np.array(place, dtype=np.intp)
-        )
+        bounds = [0, *(np.flatnonzero(np.diff(model.owner)) + 1).tolist(), len(model.owner)]
+        runs = [(slice(a, b), slice(a + k, b + k)) for k, (a, b) in enumerate(pairwise(bounds))]
+        return _Neighbours(tuple(runs), len(model.owner) + len(runs))
 
     def pairs(self, signals: Array) -> Array:
         """Return the sums of pairs over the square root of two, of signals of shape (g, blocks, ...)."""
-        padded = np.concatenate([signals, np.zeros_like(signals[:, :1])], axis=1)
-        return np.asarray(np.sqrt(0.5) * (padded[:, self.before] + padded[:, self.after]))
+        half = np.sqrt(0.5) * signals
+        found = np.zeros((len(signals), self.count, *signals.shape[2:]))
+        for blocks, later in self.runs:
+            found[:, later] = half[:, blocks]
+            found[:, later.start + 1 : later.stop + 1] += half[:, blocks]
+        return found
 
     def back(self, pairs: Array) -> Array:
         """Apply the transpose of `pairs`."""
-        return np.asarray(np.sqrt(0.5) * (pairs[:, self.place] + pairs[:, self.place + 1]))
+        found = np.empty((len(pairs), self.count - len(self.runs), *pairs.shape[2:]))
+        for blocks, later in self.runs:
+            np.add(pairs[:, later], pairs[:, later.start + 1 : later.stop + 1], out=found[:, blocks])
+        found *= np.sqrt(0.5)
+        return found
 
 
 def _if_white(neighbours: _Neighbours, own: Array, links: Array) -> tuple[Array, Array]:

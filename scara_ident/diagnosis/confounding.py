@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.acceptance import Decision, share_of_joints
+from scara_ident.diagnosis.candidate_tests import held_out_gains
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 
@@ -50,8 +51,12 @@ def confounders(step: SelectionStep, decisions: Sequence[Decision]) -> list[tupl
 def _confounders_of(step: SelectionStep, found: Candidate, pool: Sequence[Candidate]) -> tuple[Confounder, ...]:
     scene, criteria = step.scene, step.criteria
     own = step.judge([found])[0]
-    judged = best_of_each(step.judge(pool)).values()
-    near = [item for item in judged if item.accepted and item.gain > criteria.near_confounder * own.gain]
+    # Those that remove too little, most of them, need no test.
+    least = criteria.near_confounder * own.gain
+    gains = held_out_gains(step.model, step.columns.rows(scene, pool), criteria)
+    enough = [item for item, gain in zip(pool, gains, strict=True) if share_of_joints(item, scene, gain) > least]
+    judged = best_of_each(step.judge(enough)).values()
+    near = [item for item in judged if item.accepted and item.gain > least]
     others = []
     for decision in step.refine(near):
         worse = decision.examination.left - own.examination.left

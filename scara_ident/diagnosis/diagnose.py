@@ -32,6 +32,7 @@ from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
+from scara_ident.threads import one_blas_thread
 
 Verdict = Literal["complete", "explained", "unexplained", "undecided"]
 # Dependences that are handed on: further ones are pairs that only repeat the first.
@@ -125,6 +126,8 @@ class Diagnosis:
         return self.before.model.robot
 
 
+# Matrices are small throughout: a second BLAS thread waits more than it works.
+@one_blas_thread()
 def diagnose(
     robot: Robot,
     model: str | TorqueModel,

@@ -20,6 +20,7 @@ from scara_ident.diagnosis.variation_check import variation_objection
 from scara_ident.effects import Effect, Scene
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.estimation import Estimate, wls
+from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
@@ -204,8 +205,7 @@ def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[s
             candidates = [item for item in candidates if item.label(scene) != winner.label]
         scene, chosen = tune(scene, columns, weights, chosen, criteria.rotor_inertia_std)
         fitted = observed(SelectionStep(scene, columns, chosen, weights, tried, criteria))
-        estimate = wls(fitted)
-        weights, value = estimate.weights, estimate.value
+        value, weights = value_and_weights(fitted)
         scene = replace(scene, value=value[: len(task.model.columns)])
         repeated = bool(steps) and steps[-1].decision.label == winner.label
         left = tuple(item.rms(value) if item.rows else None for item in fitted.by_joint)

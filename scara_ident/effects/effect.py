@@ -123,6 +123,14 @@ class Effect(ABC):
             result[member.place if np.ndim(column) == 1 else slice(None), k] = column
         return result
 
+    def by_joint(self, signals: Signals, member: Member) -> dict[int, list[Array]]:
+        """Return the k columns of a member, (N,) each, on every joint that they act on, by the joint's place."""
+        columns = [np.asarray(column) for column in self.signal_columns(signals, member)]
+        return {
+            joint: [column if column.ndim == 1 else column[joint] for column in columns]
+            for joint in self.rows(signals.scene, member)
+        }
+
     def fill(self, signals: Signals, member: Member, rows: Sequence[Array]) -> None:
         """Write the columns into those of each joint: (k, N) where they act, (0, N) where they do not."""
         columns = list(self.signal_columns(signals, member))

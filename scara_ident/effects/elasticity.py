@@ -89,7 +89,9 @@ class JointElasticity(BehindGear):
         inertia, usual = self.inertia(signals, member)
         if usual == 0.0:
             return [np.zeros_like(signals.motion.q)]
-        load = _differentiated(signals, _load(signals, j), LOAD_BAND)[0]
+        load = shared(
+            signals, ("smooth load", j), lambda: _differentiated(signals, _load(signals, j), LOAD_BAND)[0]
+        )  # fmt: skip
         stiffness = (2.0 * np.pi * member.nonlinear[0]) ** 2 * usual
         damping = 2.0 * member.nonlinear[1] * np.sqrt(stiffness * usual)
         return [stiffness * lagging(signals, j, swing(load, inertia, stiffness, damping, 1.0 / signals.motion.rate))]
@@ -196,8 +198,7 @@ class Backlash(BehindGear):
 
 def _load(signals: Signals, joint: int) -> Array:
     """Return the torque that a rigid gear passes on, at the joint, shape (N,)."""
-    scale = signals.scene.robot.row_scale[joint]
-    return shared(signals, ("load", joint), lambda: signals.load(joint) / scale)
+    return np.asarray(signals.load(joint) / signals.scene.robot.row_scale[joint])
 
 
 def _differentiated(signals: Signals, signal: Array, bands: float) -> tuple[Array, Array, Array]:

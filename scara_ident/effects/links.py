@@ -24,14 +24,14 @@ POSITION_STEP = 1e-5
 # Step that differentiates it by velocity, as a share of the largest speed or 1; it is quadratic, so that any is exact.
 SPEED_STEP = 1e-4
 
-_SHARED: WeakKeyDictionary[Signals | Scene, dict[Hashable, Array]] = WeakKeyDictionary()
+_SHARED: WeakKeyDictionary[Signals | Scene | Motion, dict[Hashable, Array]] = WeakKeyDictionary()
 
 # Of each motion and joint the estimate that slopes were taken at, and the slopes.
 _SLOPES: WeakKeyDictionary[Motion, dict[int, tuple[Array, tuple[Array, Array, Array]]]] = WeakKeyDictionary()
 
 
-def shared(owner: Signals | Scene, key: Hashable, make: Callable[[], Array]) -> Array:
-    """Return what several members of a family need of one stretch of motion, or of a scene, made once."""
+def shared(owner: Signals | Scene | Motion, key: Hashable, make: Callable[[], Array]) -> Array:
+    """Return what several members of a family need of a stretch of motion, with or without an estimate, or of a scene, made once."""
     held = _SHARED.setdefault(owner, {})
     if key not in held:
         held[key] = make()

@@ -14,6 +14,7 @@ from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.parameters import Coefficient, Member, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.motion.motion import HIGHEST_CUT, UNIFORM_TOLERANCE, differentiate
+from scara_ident.motion.spline import cubic_spline
 from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.recording import Recording
 
@@ -186,10 +187,8 @@ def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = N
         if np.max(np.abs(time - ideal)) <= UNIFORM_TOLERANCE * median:
             effort[rows, part] = _advanced(recording.effort[rows, part], delay / float(ideal[1] - ideal[0]))
         else:
-            from scipy.interpolate import CubicSpline
-
             at = np.clip(time + delay, time[0], time[-1])
-            effort[rows, part] = CubicSpline(time, recording.effort[rows, part], axis=1)(at)
+            effort[rows, part] = cubic_spline(time, recording.effort[rows, part], at)
     return replace(recording, effort=effort)
 
 

@@ -87,7 +87,9 @@ class FreePayloadChange(PayloadChange):
         """Return the torque per standard parameter of the payload from then on."""
         robot = signals.scene.robot
         columns = shared(
-            signals, "free payload", lambda: tool_of(robot).columns(robot, signals.motion)[:, list(_shown(robot))]
+            signals.motion,
+            "free payload",
+            lambda: tool_of(robot).columns(robot, signals.motion)[:, list(_shown(robot))],
         )
         return np.moveaxis(columns * _after(signals, member.nonlinear[0]), 1, 0)
 
@@ -186,7 +188,7 @@ def _at_tool(signals: Signals) -> Array:
         tool = tool_of(robot)
         return np.asarray(np.einsum("jkn,k->jn", tool.columns(robot, signals.motion), point_mass(tool.point)))
 
-    return shared(signals, "payload", make)
+    return shared(signals.motion, "payload", make)
 
 
 def _too_heavy(scene: Scene, mass: float, std: float) -> str | None:

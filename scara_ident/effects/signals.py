@@ -86,6 +86,15 @@ class Signals:
     scene: Scene
     motion: Motion
 
+    def at(self, scene: Scene) -> Signals:
+        """Return the signals at another estimate of the same base model; what does not follow from it is shared."""
+        found = Signals(scene, self.motion)
+        same = scene.value is self.scene.value
+        for name in ("time", "sign", "columns", "motor_turns", *(("predicted", "rigid") if same else ())):
+            if name in self.__dict__:
+                found.__dict__[name] = self.__dict__[name]
+        return found
+
     @cached_property
     def time(self) -> Array:
         """Seconds since the recording began, shape (N,)."""
@@ -121,8 +130,14 @@ class Signals:
 
     def load(self, joint: int) -> Array:
         """Torque that the gear of a joint transmits, recorded side, shape (N,): rigid torque without the own rotor's."""
-        own = self.scene.robot.row_scale[joint] * self.scene.armature(joint) * self.motion.a[joint]
-        return np.asarray(self.rigid[joint] - own)
+        if joint not in self._loads:
+            own = self.scene.robot.row_scale[joint] * self.scene.armature(joint) * self.motion.a[joint]
+            self._loads[joint] = np.asarray(self.rigid[joint] - own)
+        return self._loads[joint]
+
+    @cached_property
+    def _loads(self) -> dict[int, Array]:
+        return {}
 
     @cached_property
     def motor_turns(self) -> Array:

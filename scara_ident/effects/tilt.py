@@ -25,6 +25,8 @@ MOMENT_FACTOR = 2.0
 NEGLIGIBLE_TORQUE_SHARE = 1e-4
 # Known and newly entering parameters agree on the direction of gravity within this many standard deviations.
 AGREEMENT_STDS = 3.0
+# Samples whose columns are made at once.
+AT_ONCE = 2048
 AXES = ("x", "y")
 
 
@@ -110,12 +112,13 @@ def _parts(signals: Signals) -> Array:
         known = gravity.known @ scene.value[scene.model.place(term)]
         result = np.zeros((scene.robot.n, 4 + len(gravity.entering_axes), motion.samples))
         for axis in range(2):
-            columns = gravity_columns(scene.robot, axis, motion.q)
-            result[:, axis] = np.einsum("jkn,k->jn", columns, known)
-            result[:, 2 + axis] = np.einsum("jkn,k->jn", columns, gravity.nominal)
-            for place, of in enumerate(gravity.entering_axes):
-                if of == axis:
-                    result[:, 4 + place] = np.einsum("jkn,k->jn", columns, gravity.entering[:, place])
+            entering = [place for place, of in enumerate(gravity.entering_axes) if of == axis]
+            moments = np.vstack([known, gravity.nominal, gravity.entering[:, entering].T])
+            places = [axis, 2 + axis, *(4 + place for place in entering)]
+            # In parts: the columns of all first moments at once would be the largest array of a diagnosis.
+            for start in range(0, motion.samples, AT_ONCE):
+                part = slice(start, start + AT_ONCE)
+                result[:, places, part] = moments @ gravity_columns(scene.robot, axis, motion.q[:, part])
         return result
 
     return shared(signals, "tilt", make)

@@ -94,9 +94,15 @@ def least_squares(
 
 def weighted_value(observations: Observations) -> Array:
     """Return the parameters of `wls` alone, shape (p,), without the work of their covariance."""
+    return value_and_weights(observations)[0]
+
+
+def value_and_weights(observations: Observations) -> tuple[Array, Array]:
+    """Return parameters (p,) and joints' weights (n,) of `wls`, without the work of a covariance."""
     with one_blas_thread():
         joints = _joints(observations)
-        return weighted(joints, 1.0 / joint_noise(joints)).solve().value
+        weights = 1.0 / joint_noise(joints)
+        return weighted(joints, weights).solve().value, weights
 
 
 def _joints(observations: Observations) -> tuple[Information, ...]:

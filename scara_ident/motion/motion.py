@@ -16,6 +16,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.motion.spline import cubic_spline
 from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.recording import Recording
 
@@ -163,12 +164,10 @@ def _uniform(recording: Recording, start: int, stop: int, median: float) -> Stre
     count = len(time)
     ideal = time[0] + (time[-1] - time[0]) / (count - 1) * np.arange(count)
     if np.max(np.abs(time - ideal)) > UNIFORM_TOLERANCE * median:
-        from scipy.interpolate import CubicSpline
-
         # The median of jittered steps is off by up to a per cent; the number of steps is not.
         steps = int(np.sum(np.maximum(np.rint(np.diff(time) / median), 1.0)))
         ideal = np.linspace(time[0], time[-1], steps + 1)
-        position = CubicSpline(time, position, axis=1)(ideal)
+        position = cubic_spline(time, position, ideal)
     rate = (len(ideal) - 1) / (ideal[-1] - ideal[0])
     torque = _torque_at(recording, source, ideal, median)
     return Stretch(recording.name, recording.trajectory, ideal, position, torque, float(rate), source)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.motion.motion import (
     HIGHEST_CUT,
+    ROWS_AT_ONCE,
     Motion,
     Stretch,
     low_pass,
@@ -27,6 +29,7 @@ from scara_ident.motion.motion import (
     with_effort_of,
 )
 from scara_ident.recording.recording import Recording
+from scara_ident.threads import side_by_side
 
 Bands = Sequence[float | None]
 
@@ -160,6 +163,25 @@ class PreparedStretch:
         step, band = self.steps[joint], self.bands[joint]
         low = low_pass_every(self.fade[joint] * signals, self.rate, band, step)
         return np.asarray(np.sqrt(step) * low[:, self.kept[joint] // step])
+
+    def rows_of(self, signals: Sequence[tuple[int, Array]]) -> list[Array]:
+        """Return what `rows` does of single signals (N,), each given with its joint, that pass the filter together."""
+        keys = [(self.steps[joint], self.bands[joint]) for joint, _ in signals]
+        alike = [[place for place, key in enumerate(keys) if key == one] for one in dict.fromkeys(keys)]
+        parts = [part[k : k + ROWS_AT_ONCE] for part in alike for k in range(0, len(part), ROWS_AT_ONCE)]
+        # Made once, and not in two threads.
+        fade, kept = self.fade, self.kept
+
+        def passed(places: list[int]) -> list[Array]:
+            joints = [signals[place][0] for place in places]
+            step, band = keys[places[0]]
+            faded = fade[joints] * np.array([signals[place][1] for place in places])
+            low = low_pass_every(faded, self.rate, band, step)
+            return [np.sqrt(step) * row[kept[joint] // step] for joint, row in zip(joints, low, strict=True)]
+
+        made = side_by_side(passed, parts) if len(parts) > 1 else [passed(places) for places in parts]
+        found = dict(zip(chain.from_iterable(parts), chain.from_iterable(made), strict=True))
+        return [found[place] for place in range(len(signals))]
 
     def smooth(self, joint: int, signal: Array) -> Array:
         """Return a signal of a joint's equation, shape (..., N), faded out towards rest and within the joint's band."""

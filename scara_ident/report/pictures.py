@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from scara_ident.excitation.design import Design
+from scara_ident.excitation.parallel import map_in_order
 from scara_ident.excitation.tool import tool_motion, tool_of
 from scara_ident.report.drawing import draw
 from scara_ident.report.html.diagnosis import DiagnosisContext
@@ -75,19 +76,27 @@ def diagnosis_pictures(folder: Path, context: DiagnosisContext) -> tuple[tuple[s
     """
     robot, remainder = context.diagnosis.robot, context.diagnosis.unexplained
     found: list[tuple[str, str]] = []
+    figures: list[list[Sequence[Figure]]] = []
     with one_blas_thread():
         for effect, chapter in context.chapters:
             title = effect.effect if effect.joint is None else f"{effect.effect} on {effect.joint}"
             found.append((title, f"effect_{chapter.number}.png"))
-            draw(
-                folder / found[-1][1],
-                title,
-                [chapter_group(robot, chapter).figures, moment_group(robot, chapter).figures],
-            )
+            figures.append([chapter_group(robot, chapter).figures, moment_group(robot, chapter).figures])
         group = None if remainder is None else remainder_group(robot, remainder, context.sets["training"])
         if remainder is not None and group is not None:
             found.append((f"what no effect accounts for on {remainder.joint}", "unexplained.png"))
-            draw(folder / "unexplained.png", found[-1][0], [group.figures])
+            figures.append([group.figures])
+    if len(found) > 1:
+        # Loaded once, for all processes.
+        import matplotlib.figure  # noqa: F401
+
+    def draw_one(k: int) -> None:
+        title, name = found[k]
+        draw(folder / name, title, figures[k])
+
+    # Matplotlib holds the interpreter's lock, so that threads would not help.
+    for _ in map_in_order(draw_one, range(len(found))):
+        pass
     return tuple(found)
 
 

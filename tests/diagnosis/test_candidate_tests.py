@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 from scipy.stats import f
 
-from scara_ident.diagnosis.candidate_tests import Examination, examine
+from scara_ident.diagnosis.candidate_tests import Examination, examine, held_out_gains
 from scara_ident.diagnosis.candidates import Rows
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitted_model import FittedModel
@@ -314,3 +314,10 @@ def test_candidates_are_examined_alike_alone_and_in_company():
         assert company[place].p_value == pytest.approx(alone.p_value, rel=1e-9)
         assert company[place].held_out == pytest.approx(alone.held_out, rel=1e-9)
     assert examine(model, []) == []
+
+
+def test_gains_alone_are_those_of_the_whole_examination():
+    model, candidates = uneven_blocks(1)
+    found = examine(model, candidates)
+    assert_allclose(held_out_gains(model, candidates), [item.held_out for item in found], rtol=1e-12, atol=1e-15)
+    assert held_out_gains(model, []) == []

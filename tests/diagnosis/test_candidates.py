@@ -99,9 +99,9 @@ def test_columns_are_made_once_and_again_only_where_they_follow_the_estimate(mon
     other = replace(scene, value=1.1 * scene.value)
     made = []
     for effect in (Stribeck, TransmissionLoss):
-        whole = effect.regressor
+        whole = effect.by_joint
         monkeypatch.setattr(
-            effect, "regressor", lambda *given, name=effect.name, whole=whole: made.append(name) or whole(*given)
+            effect, "by_joint", lambda *given, name=effect.name, whole=whole: made.append(name) or whole(*given)
         )
     columns = CandidateColumns(seen)
     candidates = [Candidate(Stribeck(), Member(1, (0.1,))), Candidate(TransmissionLoss(), Member(1, (0.1,)))]

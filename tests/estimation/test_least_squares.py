@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from scara_ident.errors import EstimationError
 from scara_ident.estimation import ols, wls
 from scara_ident.estimation.information import joint_noise
-from scara_ident.estimation.least_squares import weighted_value
+from scara_ident.estimation.least_squares import value_and_weights, weighted_value
 from scara_ident.estimation.observations import observe
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.prepared import prepare
@@ -124,6 +124,7 @@ def test_the_value_alone_is_that_of_wls(model: TorqueModel):
     w, u, _ = made(model)
     given = linear(model, "a_1", w, u, 100)
     np.testing.assert_array_equal(weighted_value(given), wls(given).value)
+    np.testing.assert_array_equal(value_and_weights(given)[1], wls(given).weights)
 
 
 def test_nothing_to_estimate_from_is_an_error(model: TorqueModel):

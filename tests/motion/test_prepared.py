@@ -243,3 +243,14 @@ def test_an_identification_makes_stretches_once_and_motion_and_columns_once_per_
     assert max(counted.values()) == 1
     cuts = {key[1] for key in counted if isinstance(key, tuple)}
     assert set(position_cuts(RATE, result.bands)) <= cuts
+
+
+def test_signals_of_several_joints_pass_the_filter_together_as_alone(run: Recording):
+    part = only(run, (6.0, 9.0))
+    rng = np.random.default_rng(3)
+    joints = [0, 1, 1, 0, *([1] * 12)]
+    signals = rng.standard_normal((len(joints), part.samples))
+    found = part.rows_of(list(zip(joints, signals, strict=True)))
+    for joint, signal, rows in zip(joints, signals, found, strict=True):
+        assert_allclose(rows, part.rows(joint, signal[None])[0], rtol=0, atol=1e-13)
+    assert part.rows_of([]) == []
