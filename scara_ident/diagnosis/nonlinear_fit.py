@@ -1,8 +1,9 @@
 """Fitting the nonlinear parameters of all effects in a model together, by Gauss and Newton.
 
 Armatures are among them: where the base model cannot tell a rotor from its link, the load that a gear transmits follows
-from the nominal rotor inertia only, which a data sheet gives without shaft, brake and wave generator. It enters with
-that uncertainty as a prior.
+from the nominal rotor inertia only, which a data sheet gives without shaft, brake and wave generator, and which is
+guessed where nobody states it (`scara_ident.robot.rotors`). It enters with that uncertainty as a prior: its logarithm is
+a parameter with a normal distribution, and what that costs stands in the standard deviations of the effects' parameters.
 """
 
 from __future__ import annotations
@@ -16,22 +17,26 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
 from scara_ident.effects import Scene
+from scara_ident.effects.links import largest_armature
 from scara_ident.estimation.information import Information, weighted
 from scara_ident.estimation.observations import JointRows
+from scara_ident.robot.rotors import GUESS_FACTOR
 from scara_ident.threads import one_blas_thread
 
 # Step for the derivative by a nonlinear parameter, as a share of it: small beside its curvature, large beside rounding.
 DERIVATIVE_STEP = 1e-3
-# A longer one for an armature: the flights in a clearance begin and end at samples, which a short step does not move.
+# A longer one for an armature's logarithm: the flights in a clearance begin and end at samples, which a short step does not move.
 ARMATURE_STEP = 2e-2
 # Steps of Gauss and Newton; most fits settle in three, and a search has further ones.
 ROUNDS = 6
 # Standard deviations by which the last step may still move something: less is of no account.
 SETTLED = 0.1
-# A step moves a parameter by no more than this share of it: the linear model holds no further.
+# A step moves a parameter by no more than this share of it, and an armature's logarithm by this: the linear model holds no further.
 LONGEST_STEP = 0.5
 # A rise of the squared error by more than this share turns a step back; loads that settle may raise it by less.
 RISE = 1e-5
+# An armature stays within so many standard deviations of its prior.
+WIDEST = 4.0
 # Directions whose singular value, columns scaled to unit length, is below this share of the largest take no step.
 STEPLESS = 1e-9
 
@@ -43,7 +48,7 @@ class Unknown:
     Attributes
     ----------
     owner : int or None
-        Place of the effect whose it is; None for an armature.
+        Place of the effect whose it is; None for the logarithm of an armature.
     place : int
         Which of the effect's, or the joint.
     value : float
@@ -63,8 +68,14 @@ class Unknown:
     @property
     def step(self) -> float:
         """For a derivative."""
-        share = ARMATURE_STEP if self.owner is None else DERIVATIVE_STEP
-        return share * (abs(self.value) if self.value else self.upper - self.lower)
+        if self.owner is None:
+            return ARMATURE_STEP
+        return DERIVATIVE_STEP * (abs(self.value) if self.value else self.upper - self.lower)
+
+    def moved(self, change: float) -> float:
+        """Return its value after a step, within its bounds and not too far at once."""
+        reach = LONGEST_STEP if self.owner is None else LONGEST_STEP * abs(self.value) if self.value else np.inf
+        return float(np.clip(self.value + np.clip(change, -reach, reach), self.lower, self.upper))
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +167,7 @@ def linearise(
     weights : ndarray, shape (n,)
     chosen : sequence of Candidate
     rotor_inertia_std : float
-        Standard deviation of a nominal rotor inertia, as a share of it.
+        Standard deviation of a stated rotor inertia, as a share of it.
     """
     observations = columns.observations
     unknowns = _unknowns(scene, chosen, rotor_inertia_std)
@@ -194,7 +205,7 @@ def _change(
         for sign in (1.0, -1.0):
             at = item.value + sign * item.step
             if item.owner is None:
-                sides += columns.rows(_with_armature(scene, item.place, at), [chosen[owner]])
+                sides += columns.rows(_with_armature(scene, item.place, float(np.exp(at))), [chosen[owner]])
             else:
                 sides += columns.rows(scene, [_moved_candidate(chosen[owner], item.place, at)])
         for joint in sides[0]:
@@ -262,9 +273,21 @@ def _unknowns(scene: Scene, chosen: Sequence[Candidate], rotor_inertia_std: floa
     for joint in dict.fromkeys(joint for joint in joints if joint is not None):
         nominal = scene.nominal_armature(joint)
         if scene.told_armature(joint) is None and nominal > 0.0:
-            held, spread = scene.armature(joint), rotor_inertia_std * nominal
-            found.append(Unknown(None, joint, held, 0.1 * nominal, 3.0 * nominal, nominal, spread))
+            found.append(_armature(scene, joint, nominal, rotor_inertia_std))
     return tuple(found)
+
+
+def _armature(scene: Scene, joint: int, nominal: float, rotor_inertia_std: float) -> Unknown:
+    """Return the logarithm of an armature as an unknown; a guess leaves the link some inertia."""
+    stated = bool(scene.robot.rotor_stated[joint])
+    spread = rotor_inertia_std if stated else float(np.log(GUESS_FACTOR))
+    mean = float(np.log(nominal))
+    lower, upper = mean - WIDEST * spread, mean + WIDEST * spread
+    if not stated:
+        upper = min(upper, float(np.log(largest_armature(scene, joint))))
+        lower = min(lower, upper - WIDEST * spread)
+    held = min(float(np.log(scene.armature(joint))), upper)
+    return Unknown(None, joint, held, lower, upper, mean, spread)
 
 
 def _moved(state: Linearised, change: Array) -> tuple[Scene, tuple[Candidate, ...]]:
@@ -272,10 +295,9 @@ def _moved(state: Linearised, change: Array) -> tuple[Scene, tuple[Candidate, ..
     chosen = list(state.chosen)
     armatures = dict(state.scene.armatures)
     for item, step in zip(state.unknowns, change, strict=True):
-        reach = LONGEST_STEP * abs(item.value) if item.value else np.inf
-        value = float(np.clip(item.value + np.clip(step, -reach, reach), item.lower, item.upper))
+        value = item.moved(step)
         if item.owner is None:
-            armatures[item.place] = value
+            armatures[item.place] = float(np.exp(value))
         else:
             chosen[item.owner] = _moved_candidate(chosen[item.owner], item.place, value)
     size = len(state.scene.model.columns)

@@ -19,6 +19,7 @@ from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, mo
 from scara_ident.diagnosis.variation_check import variation_objection
 from scara_ident.effects import Effect, Scene
 from scara_ident.effects.catalogue import available_effects
+from scara_ident.effects.links import guessed_armatures
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.observations import Observations
@@ -233,7 +234,8 @@ def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Sc
         speed = np.maximum(speed, np.max(np.abs(part.motion.v), axis=1))
     slowest = float(min(part.rate for part in data.stretches))
     band = max((band for band in data.bands if band is not None), default=HIGHEST_CUT * slowest)
-    return Scene(model, value, longest, slowest, band, travel, speed, start, columns=columns_at_hand(observations))
+    scene = Scene(model, value, longest, slowest, band, travel, speed, start, columns=columns_at_hand(observations))
+    return replace(scene, armatures=guessed_armatures(scene))
 
 
 def corrected(data: PreparedData, candidate: Candidate, value: Array) -> PreparedData:

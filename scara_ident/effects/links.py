@@ -23,6 +23,8 @@ STANDARD_GRAVITY = 9.81
 POSITION_STEP = 1e-5
 # Step that differentiates it by velocity, as a share of the largest speed or 1; it is quadratic, so that any is exact.
 SPEED_STEP = 1e-4
+# A joint's inertia in its most folded pose is more than this share of its mean, or the estimate of it is a poor one.
+LEAST_FOLDED = 0.02
 
 _SHARED: WeakKeyDictionary[Signals | Scene | Motion, dict[Hashable, Array]] = WeakKeyDictionary()
 
@@ -189,6 +191,18 @@ def link_inertia(signals: Signals, joint: int) -> Array:
 
 def usual_link_inertia(scene: Scene, joint: int) -> float:
     """Return the mean of `link_inertia` over poses within a turn or a metre, at the joint; negative where misjudged."""
+    return float(np.mean(_moved_inertia(scene, joint))) - scene.armature(joint)
+
+
+def largest_armature(scene: Scene, joint: int) -> float:
+    """Return the armature that would leave the link no inertia in its most folded pose; infinite where misjudged."""
+    moved = _moved_inertia(scene, joint)
+    least = float(np.min(moved))
+    return least if least > LEAST_FOLDED * float(np.mean(moved)) > 0.0 else np.inf
+
+
+def _moved_inertia(scene: Scene, joint: int) -> Array:
+    """Return the inertia that a joint moves with its rotor, the others held, over 40 poses, at the joint, shape (40,)."""
     robot = scene.robot
 
     def make() -> Array:
@@ -198,6 +212,18 @@ def usual_link_inertia(scene: Scene, joint: int) -> float:
         pushed[joint] = 1.0
         motion = Motion("poses", "poses", np.arange(40.0), q, rest, rest, None, 1.0)
         change = rigid_torque(scene, motion, q, rest, pushed) - rigid_torque(scene, motion, q, rest, rest)
-        return np.array(np.mean(change[joint]) / robot.row_scale[joint] - scene.armature(joint))
+        return np.asarray(change[joint] / robot.row_scale[joint])
 
-    return float(shared(scene, ("usual link inertia", joint), make))
+    return shared(scene, ("moved inertia", joint), make)
+
+
+def guessed_armatures(scene: Scene) -> dict[int, float]:
+    """Return the armature to begin with of every joint whose rotor nobody stated and the base model cannot tell.
+
+    It is the nominal one, or half of what the estimate leaves room for.
+    """
+    return {
+        joint: min(scene.nominal_armature(joint), 0.5 * largest_armature(scene, joint))
+        for joint in range(scene.robot.n)
+        if not scene.robot.rotor_stated[joint] and scene.told_armature(joint) is None
+    }

@@ -38,7 +38,8 @@ class Scene:
     start : Mapping[str, float]
         Time of the first sample of every recording, s.
     armatures : Mapping[int, float]
-        Armature N^2 Jm of joints (by place) where the data tell it by an effect only; nominal for the others.
+        Armature N^2 Jm of joints (by place) where the base model cannot tell it: as an effect told it, or guessed within
+        what the estimate leaves room for; nominal for the others.
     columns : Mapping[Motion, tuple of ndarray]
         The base model's columns on motions where they are at hand, see `TorqueModel.joint_columns`.
     """
@@ -65,7 +66,9 @@ class Scene:
         return self.armatures.get(joint, self.nominal_armature(joint)) if told is None else told
 
     def nominal_armature(self, joint: int) -> float:
-        """Armature N^2 Jm of a joint as the robot's description has it."""
+        """Armature N^2 Jm of a joint as the robot's description has it, else guessed (`Robot.rotor_guess`)."""
+        if not self.robot.rotor_stated[joint]:
+            return float(self.robot.rotor_guess.armature[joint])
         return float(self.robot.reduction[joint] ** 2 * self.robot.rotor_inertia[joint])
 
     def told_armature(self, joint: int) -> float | None:

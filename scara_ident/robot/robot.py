@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -19,6 +20,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
 from scara_ident.robot.examples import example_urdf, is_name
+from scara_ident.robot.rotors import RotorGuess, guess_rotors
 from scara_ident.robot.signal_map import Channels, build_channels
 from scara_ident.robot.transmissions import reductions, rotor_inertias
 from scara_ident.robot.urdf_validation import urdf_fault
@@ -50,7 +52,9 @@ class Robot:
     reduction : ndarray, shape (n,)
         Motor turns per joint turn; negative where the gear reverses, never 0.
     rotor_inertia : ndarray, shape (n,)
-        Nominal inertia of the rotor on the motor side, kg m^2; 0 where nothing is known.
+        Nominal inertia of the rotor on the motor side, kg m^2; 0 where nothing is stated, see `rotor_stated`.
+    rotor_stated : ndarray of bool, shape (n,)
+        Where description or URDF state it.
     effort_side : {"motor", "joint"}
         Side of the gear on which effort is measured and the equations are written.
     effort_gain : ndarray, shape (n,)
@@ -74,6 +78,7 @@ class Robot:
     prismatic: NDArray[np.bool_]
     reduction: Array
     rotor_inertia: Array
+    rotor_stated: NDArray[np.bool_]
     effort_side: Literal["motor", "joint"]
     effort_gain: Array
     lower: Array
@@ -87,6 +92,11 @@ class Robot:
     def n(self) -> int:
         """Number of identified joints."""
         return len(self.joints)
+
+    @cached_property
+    def rotor_guess(self) -> RotorGuess:
+        """Armatures that the size of the motors suggests, stated or not."""
+        return guess_rotors(self.model, self.order, self.reduction, self.effort_limit, self.prismatic)
 
     @property
     def row_scale(self) -> Array:
@@ -173,6 +183,7 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
     position = np.array([model.joints[i].idx_q for i in ids], dtype=np.intp)
     unbounded = np.array([model.joints[i].nq != 1 for i in ids])
     reduction = reductions(names, joints, urdf, tree)
+    rotors = rotor_inertias(names, joints, urdf, tree)
     prismatic = ["P" in model.joints[i].shortname().removeprefix("JointModel") for i in ids]
     side = description.effort_side
     if side is None:
@@ -191,7 +202,8 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
         order=order,
         prismatic=np.array(prismatic),
         reduction=reduction,
-        rotor_inertia=rotor_inertias(names, joints, urdf, tree),
+        rotor_inertia=np.where(np.isnan(rotors), 0.0, rotors),
+        rotor_stated=~np.isnan(rotors),
         effort_side=side,
         effort_gain=np.array([joint.effort_gain for joint in joints]),
         lower=np.where(unbounded, -np.inf, _given(model.lowerPositionLimit[position])),

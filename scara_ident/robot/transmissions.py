@@ -28,10 +28,10 @@ def reductions(
 def rotor_inertias(
     names: Sequence[str], joints: Sequence[JointDescription], urdf: Path, tree: ElementTree.Element
 ) -> Array:
-    """Return the rotor inertia of each joint, kg m^2 at the motor, shape (n,): where none is stated, 0."""
+    """Return the rotor inertia of each joint, kg m^2 at the motor, shape (n,): NaN where none is stated."""
     from_urdf = _actuator_numbers(tree, urdf, ("rotorInertia",))
     given = [joint.rotor_inertia for joint in joints]
-    return np.array([_first(value, from_urdf.get(name), 0.0) for name, value in zip(names, given, strict=True)])
+    return np.array([_first(value, from_urdf.get(name), np.nan) for name, value in zip(names, given, strict=True)])
 
 
 def _first(*values: float | None) -> float:

@@ -7,19 +7,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.effect_parameters import physical_parameters
-from scara_ident.diagnosis.nonlinear_fit import Linearised, linearise, tune
+from scara_ident.diagnosis.nonlinear_fit import LONGEST_STEP, Linearised, linearise, tune
 from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.effects import Member
+from scara_ident.effects import Member, effects_named
 from scara_ident.effects.elasticity import Backlash
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
+from scara_ident.effects.links import largest_armature
 from scara_ident.effects.position import Spring
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import load_robot
+from scara_ident.robot.rotors import GUESS_FACTOR
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
+from tests.arms import noisy, recorded_torque, recording, rnea, sines
 from tests.diagnosis.made import NOISE, exact_runs, multisine, step_beside, with_torque
 
+UR5_BANDS = (10.0,) * 6
+UR5_LOSS = (0.1, 0.07, 0.0, 0.0, 0.0, 0.0)
 WEIGHTS = 1.0 / np.array(NOISE)
 AMPLITUDE, VELOCITY, STIFFNESS = 0.06, 0.3, 0.05
 
@@ -96,8 +104,9 @@ def test_where_data_say_nothing_the_armature_stays_nominal_and_as_unsure_as_it_w
     step = step_beside(exact_runs(), [Candidate(TransmissionLoss(), Member(0, (0.05,)))], WEIGHTS)
     scene, state = step.scene, linear(step)
     (armature,) = [item for item in state.unknowns if item.owner is None]
-    assert armature.nominal == armature.value == scene.nominal_armature(0)
-    assert armature.spread == pytest.approx(CRITERIA.rotor_inertia_std * armature.nominal)
+    assert armature.nominal == pytest.approx(np.log(scene.nominal_armature(0)))
+    assert armature.value == armature.nominal
+    assert armature.spread == CRITERIA.rotor_inertia_std
     change, std = state.solve()
     assert abs(change[-1]) < 0.5 * armature.spread
     assert 0.8 * armature.spread < std[-1] < 1.01 * armature.spread
@@ -134,7 +143,8 @@ def test_the_derivatives_are_those_of_the_predicted_torque() -> None:
     at = [0.2, 0.3, scene.nominal_armature(0)]
     for k, value in enumerate(at):
         up, down = ([x * (1.0 + sign * 1e-4 * (i == k)) for i, x in enumerate(at)] for sign in (1.0, -1.0))
-        numeric = (predicted(*up) - predicted(*down)) / (2e-4 * value)
+        # An armature's parameter is its logarithm.
+        numeric = (predicted(*up) - predicted(*down)) / (2e-4 * (1.0 if k == 2 else value))
         # The load's absolute value has kinks, at which steps of different length differ, and an armature's is long.
         bound = 5e-2 if k == 2 else 2e-3
         assert np.linalg.norm(derivatives[:, k] - numeric) < bound * np.linalg.norm(numeric)
@@ -162,3 +172,69 @@ def test_the_solution_is_that_of_all_weighted_rows_with_those_of_the_priors() ->
         scale, scale
     )
     assert std[state.linear :] == pytest.approx(np.sqrt(state.variance * np.diag(inverse))[state.linear :], rel=1e-5)
+
+
+def ur5_runs(armature: float):
+    """Four motions of a UR5 with losses in its first two gears, friction, and rotors of which its URDF says nothing."""
+    robot = load_robot("ur5")
+    rotors = np.array([armature, armature, 1.0, 0.1, 0.1, 0.1])[:, None]
+    friction = np.array([8.0, 8.0, 6.0, 2.0, 2.0, 2.0])[:, None]
+    loss = np.array(UR5_LOSS)[:, None]
+    made = []
+    for k in range(4):
+        rng = np.random.default_rng([0, k])
+        time = np.arange(2500) / 250.0
+        q, v, a = sines(rng, time, 6, lowest=0.1)
+        load = rnea(robot, q, v, a)
+        gear = np.sqrt(1.0 + loss**2) * load + loss * np.abs(load) * np.sign(v)
+        torque = gear + rotors * a + friction * (np.sign(v) + v)
+        made.append(noisy(recording(robot, f"T{k}", time, q, torque), rng, 0.012 * np.std(torque, axis=1)))
+    return robot, made
+
+
+@pytest.mark.parametrize("armature", [1.2, 4.0])
+def test_a_rotor_that_nobody_stated_is_told_by_the_loads_and_leaves_no_false_friction(armature: float) -> None:
+    """Taken as zero it made the losses 0.036 and 0.049 instead of 0.07 and 0.10, and friction over position of 0.2."""
+    robot, runs = ur5_runs(armature)
+    families = effects_named("transmission_loss", "position_dependent_friction")
+    found = diagnose(robot, "complete", runs, bands=UR5_BANDS, catalogue=families)
+    losses = {item.joint: item.parameters["loss_coefficient"] for item in found.effects}
+    assert {item.effect for item in found.effects} == {"transmission_loss"}
+    assert list(losses) == ["shoulder_lift_joint", "shoulder_pan_joint"]
+    for joint, true in zip(robot.joints, UR5_LOSS[:2], strict=False):
+        assert abs(losses[joint].value - true) < 2.0 * losses[joint].std
+        assert losses[joint].std < 0.1 * true
+    for joint in (0, 1):
+        assert found.search.scene.armature(joint) == pytest.approx(armature, rel=0.15)
+
+
+def test_a_rotor_that_nobody_stated_has_a_wide_prior_within_what_the_estimate_leaves_room_for() -> None:
+    step = step_beside(exact_runs(), [Candidate(TransmissionLoss(), Member(0, (0.05,)))], WEIGHTS)
+    (stated,) = [item for item in linear(step).unknowns if item.owner is None]
+    robot = replace(step.scene.robot, rotor_stated=np.zeros(2, dtype=bool))
+    scene = replace(step.scene, model=build_model(robot, "complete"))
+    (guessed,) = [item for item in linear(step, scene=scene).unknowns if item.owner is None]
+    assert stated.spread == CRITERIA.rotor_inertia_std
+    assert guessed.spread == np.log(GUESS_FACTOR)
+    assert guessed.nominal == np.log(robot.rotor_guess.armature[0])
+    assert guessed.upper <= np.log(largest_armature(scene, 0))
+    assert guessed.moved(100.0) == pytest.approx(guessed.value + LONGEST_STEP)
+
+
+def test_what_a_rotor_that_nobody_stated_costs_stands_in_the_standard_deviation() -> None:
+    """While the second joint hardly moves, a larger rotor before a larger loss does the same to the first."""
+    robot, loss, runs = load_robot(), 0.2, []
+    for k in range(2):
+        time = np.arange(3000) / 250.0
+        q, v, a = (part * np.array([[1.0], [0.1]]) for part in sines(np.random.default_rng([3, k]), time, 2))
+        load = rnea(robot, q, v, a)[0] * robot.row_scale[0]
+        torque = recorded_torque(robot, q, v, a, ((0.4, 0.3, 0.0, 0.0, 0.1), (0.2, 0.1, 0.0, 0.0, 0.0)))
+        torque[0] += loss * np.abs(load) * np.sign(v[0]) + (np.sqrt(1.0 + loss**2) - 1.0) * load
+        runs.append(noisy(recording(robot, f"T{k}", time, q, torque), np.random.default_rng([5, k]), NOISE))
+    step = step_beside(runs, [Candidate(TransmissionLoss(), Member(0, (loss,)))], WEIGHTS)
+    stated = replace(step.scene, armatures={0: step.scene.nominal_armature(0)})
+    not_stated = replace(robot, rotor_stated=np.zeros(2, dtype=bool))
+    guessed = replace(stated, model=build_model(not_stated, "complete"))
+    found = [physical_parameters(replace(step, scene=scene))[0]["loss_coefficient"] for scene in (stated, guessed)]
+    assert all(abs(item.value - loss) < 2.0 * item.std for item in found)
+    assert found[1].std > 1.3 * found[0].std

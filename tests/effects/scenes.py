@@ -47,6 +47,8 @@ def scene_of(
         travel=np.full(n, 2.0),
         speed=np.full(n, 2.0),
         start={"m": 0.0} if start is None else start,
+        # The arm's own, which a guess would not be where the URDF says nothing.
+        armatures=dict(enumerate((robot.reduction**2 * robot.rotor_inertia).tolist())),
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,14 +12,18 @@ from scara_ident.effects import Signals
 from scara_ident.effects.links import (
     first_moments,
     gravity_columns,
+    guessed_armatures,
     lagging,
+    largest_armature,
     link_inertia,
     point_mass,
+    rigid_torque,
     shared,
     tool_of,
     usual_link_inertia,
 )
-from scara_ident.robot.robot import load_robot
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import example_urdf, rnea
 from tests.effects.scenes import moving, scene_of
 
@@ -85,3 +91,38 @@ def test_what_members_share_is_made_once_per_stretch():
     for signals in (one, one, two):
         shared(signals, "key", make)
     assert len(made) == 2
+
+
+def unstated(robot: Robot) -> Robot:
+    return replace(robot, rotor_stated=np.zeros(robot.n, dtype=bool))
+
+
+def test_a_rotor_that_nobody_stated_begins_as_guessed_within_what_the_estimate_leaves_room_for():
+    robot = load_robot()
+    stated = scene_of(robot)
+    scene = scene_of(unstated(robot), stated.value)
+    # The second rotor is told by the base model, and needs no guess.
+    assert guessed_armatures(stated) == {}
+    assert guessed_armatures(scene) == {0: scene.nominal_armature(0)}
+    assert scene.nominal_armature(0) == robot.rotor_guess.armature[0]
+    room = largest_armature(scene, 0)
+    assert robot.rotor_guess.armature[0] < 0.5 * room
+    heavy = replace(robot, effort_limit=50.0 * robot.effort_limit)
+    assert guessed_armatures(scene_of(unstated(heavy), stated.value)) == {0: 0.5 * room}
+
+
+def test_the_largest_armature_leaves_the_link_nothing_where_it_is_folded():
+    scene = scene_of(load_robot())
+    q = np.zeros((2, 200))
+    q[1] = np.linspace(-np.pi, np.pi, 200)
+    rest, pushed = np.zeros_like(q), np.array([np.ones(200), np.zeros(200)])
+    moved = (rigid_torque(scene, item_at(q), q, rest, pushed) - rigid_torque(scene, item_at(q), q, rest, rest))[0]
+    moved /= scene.robot.row_scale[0]
+    assert moved.min() <= largest_armature(scene, 0) < moved.min() + 0.05 * (moved.max() - moved.min())
+    # A negative inertia is a poor estimate, which bounds nothing.
+    assert largest_armature(replace(scene, value=-scene.value), 0) == np.inf
+
+
+def item_at(q: np.ndarray) -> Motion:
+    rest = np.zeros_like(q)
+    return Motion("m", "m", np.arange(q.shape[1]) / 100.0, q, rest, rest, None, 100.0)

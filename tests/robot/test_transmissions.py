@@ -31,14 +31,14 @@ def test_each_joint_has_the_drive_of_its_own_transmission():
         ("j1", "<mechanical_reduction>100</mechanical_reduction>"),
     )
     np.testing.assert_array_equal(reductions(NAMES, BARE, URDF, given), [100.0, 1.0, -80.5])
-    np.testing.assert_array_equal(rotor_inertias(NAMES, BARE, URDF, given), [0.0, 0.0, 2e-4])
+    np.testing.assert_array_equal(rotor_inertias(NAMES, BARE, URDF, given), [np.nan, np.nan, 2e-4])
 
 
 def test_the_description_wins_and_a_rotor_of_zero_is_a_statement():
     given = tree(("j1", "<mechanicalReduction>100</mechanicalReduction><rotorInertia>2e-4</rotorInertia>"))
     own = (JointDescription(reduction=-50.0, rotor_inertia=0.0), *BARE[1:])
     np.testing.assert_array_equal(reductions(NAMES, own, URDF, given), [-50.0, 1.0, 1.0])
-    np.testing.assert_array_equal(rotor_inertias(NAMES, own, URDF, given), [0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(rotor_inertias(NAMES, own, URDF, given), [0.0, np.nan, np.nan])
 
 
 @pytest.mark.parametrize("text", ["", "fast", "nan", "inf"])
