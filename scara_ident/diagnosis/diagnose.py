@@ -11,8 +11,8 @@ import numpy as np
 from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.confounding import Confounder, confounders
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
-from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
+from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.model_selection import Unexplained, rms_of, select_model
 from scara_ident.diagnosis.screening import Dependence
@@ -100,6 +100,8 @@ class Diagnosis:
     dependences : tuple of Dependence
         What the remainder depends on, ranked.
     notes : tuple of str
+    rotors : tuple of RotorInertia
+        Behind the gears that found effects depend on.
     """
 
     verdict: Verdict
@@ -119,6 +121,7 @@ class Diagnosis:
     unexplained: Unexplained | None
     dependences: tuple[Dependence, ...]
     notes: tuple[str, ...]
+    rotors: tuple[RotorInertia, ...] = ()
 
     @property
     def robot(self) -> Robot:
@@ -191,7 +194,8 @@ def diagnose(
     found, after = outcome.search, outcome.after
     step = replace(found.step, weights=after.weights)
     validation_before = observe(base, held_out.at(found.bands))
-    effects = _effects(found, step)
+    parameters = physical_parameters(step) if found.chosen else PhysicalParameters((), ())
+    effects = _effects(found, step, parameters)
     notes += outcome.demoted
     if after.variation is not None:
         notes += after.variation.sentences(robot)
@@ -224,6 +228,7 @@ def diagnose(
         outcome.unexplained,
         outcome.dependences[:NAMED_DEPENDENCES],
         tuple(notes),
+        parameters.rotors,
     )
 
 
@@ -246,10 +251,9 @@ def _with_effects(found: Search, before: Observations) -> Observations:
     return observed_at_every_sample(replace(found.step, scene=scene, columns=CandidateColumns(before)))
 
 
-def _effects(found: Search, step: SelectionStep) -> list[FoundEffect]:
+def _effects(found: Search, step: SelectionStep, parameters: PhysicalParameters) -> list[FoundEffect]:
     scene = found.scene
     groups = confounders(step, found.decisions) if found.chosen else []
-    parameters = physical_parameters(step) if found.chosen else []
     labels = [item.label(scene) for item in found.chosen]
     results = []
     before = rms_of(found.start.value, found.uncorrected)
@@ -269,7 +273,7 @@ def _effects(found: Search, step: SelectionStep) -> list[FoundEffect]:
         else:
             place = labels.index(decision.label)
             candidate = found.chosen[place]
-            values, confounded = parameters[place], groups[place]
+            values, confounded = parameters.effects[place], groups[place]
         results.append(
             FoundEffect(
                 candidate.effect.name,

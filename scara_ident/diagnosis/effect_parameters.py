@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from scara_ident.arrays import Array
@@ -14,16 +16,56 @@ from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.run_variation import run_variation
 
+# A rotor is told by the data where they leave less than this share of its prior's standard deviation.
+TOLD_SHARE = 0.7
+# Logarithm that no factor of an armature exceeds: more is nothing known.
+LARGEST_LOG = 20.0
 
-def physical_parameters(step: SelectionStep) -> list[dict[str, Parameter]]:
-    """Return the physical parameters of each chosen effect.
+
+@dataclass(frozen=True)
+class RotorInertia:
+    """The rotor's inertia behind a gear that a found effect depends on.
+
+    Attributes
+    ----------
+    joint : str
+    armature : float
+        N^2 Jm at the joint, kg m^2 or kg.
+    factor : float or None
+        The armature times and over this is one standard deviation; None where the base model tells it apart.
+    stated : bool
+        Whether the robot's description or its URDF states it.
+    nominal : float
+        As stated, or guessed (`scara_ident.robot.rotors`).
+    told : bool
+        Whether these recordings make it surer than that.
+    """
+
+    joint: str
+    armature: float
+    factor: float | None
+    stated: bool
+    nominal: float
+    told: bool
+
+
+@dataclass(frozen=True)
+class PhysicalParameters:
+    """Of each chosen effect its parameters, and the rotors that these depend on."""
+
+    effects: tuple[dict[str, Parameter], ...]
+    rotors: tuple[RotorInertia, ...]
+
+
+def physical_parameters(step: SelectionStep) -> PhysicalParameters:
+    """Return the physical parameters of each chosen effect, and the rotor inertias that they depend on.
 
     Nonlinear parameters, armatures included, join the fit by the derivative of the effects' columns, so that the
     covariance is that of all parameters together.
     """
     state = linearise(step.scene, step.columns, step.weights, step.chosen, step.criteria.rotor_inertia_std)
     covariance = _covariance(step, state)
-    found = []
+    found: list[dict[str, Parameter]] = []
     for owner, (candidate, own) in enumerate(zip(step.chosen, state.places, strict=True)):
         parameters = dict(
             candidate.effect.parameters(step.scene, candidate.member, state.value[own], covariance[own, own])
@@ -39,7 +81,27 @@ def physical_parameters(step: SelectionStep) -> list[dict[str, Parameter]]:
                     unknown.value, float(np.sqrt(max(variance, 0.0))), parameter.unit
                 )
         found.append(parameters)
-    return found
+    return PhysicalParameters(tuple(found), _rotors(step, state, covariance))
+
+
+def _rotors(step: SelectionStep, state: Linearised, covariance: Array) -> tuple[RotorInertia, ...]:
+    scene = step.scene
+    spread, prior = {}, {}
+    for k, item in enumerate(state.unknowns, len(state.value)):
+        if item.owner is None:
+            spread[item.place], prior[item.place] = float(np.sqrt(max(covariance[k, k], 0.0))), item.spread
+    behind = (candidate.effect.geared_joint(candidate.member) for candidate in step.chosen)
+    return tuple(
+        RotorInertia(
+            scene.robot.joints[joint],
+            scene.armature(joint),
+            float(np.exp(min(spread[joint], LARGEST_LOG))) if joint in spread else None,
+            bool(scene.robot.rotor_stated[joint]),
+            scene.nominal_armature(joint),
+            joint not in spread or spread[joint] < TOLD_SHARE * prior[joint],
+        )
+        for joint in dict.fromkeys(joint for joint in behind if joint is not None)
+    )
 
 
 def parameters_beside(step: SelectionStep, candidate: Candidate) -> dict[str, Parameter]:

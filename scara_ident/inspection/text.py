@@ -10,6 +10,7 @@ from typing import Any
 
 from scara_ident.inspection.guess import Guess, Signal
 from scara_ident.robot.robot import Robot
+from scara_ident.robot.rotors import GUESS_FACTOR
 from scara_ident.robot.signal_map import fill
 from scara_ident.robot.units import DRIVE, table_of
 
@@ -43,6 +44,7 @@ def description_text(guess: Guess, robot: Robot, described: Mapping[str, Any], u
         "# Joints to identify, in order. reduction: motor turns per joint turn (from the URDF's transmissions, else 1);",
         "# effort_gain: torque in N m (N) = effort_gain x recorded effort.",
     ]
+    lines += _rotor_words(guess, robot)
     lines += _joints(guess, robot)
     locked = [robot.joints[k] for k in range(robot.n) if k not in guess.joints]
     if locked and guess.joints:
@@ -81,6 +83,26 @@ def _side(robot: Robot, guess: Guess) -> list[str]:
     ]
 
 
+def _rotor_words(guess: Guess, robot: Robot) -> list[str]:
+    if all(robot.rotor_stated[k] for k in guess.joints):
+        return []
+    return [
+        "# STATE rotor_inertia, kg m^2 of the rotor with shaft, brake and wave generator, on the motor's side of the gear",
+        "# (with reduction 1: seen at the joint). Gear loss, elasticity and backlash depend on it. The numbers behind # are",
+        f"# orders of magnitude from the effort limits, good to a factor of {GUESS_FACTOR:g}: not stated, they are where the search begins.",
+    ]
+
+
+def _rotor(robot: Robot, joint: int) -> str:
+    """Return the guess of a rotor's inertia that nobody stated, on the motor's side of the reduction in the file."""
+    if robot.rotor_stated[joint]:
+        return ""
+    guess = robot.rotor_guess
+    value = float(guess.armature[joint] / robot.reduction[joint] ** 2)
+    source = "effort limit" if guess.by_limit[joint] else "links' inertia"
+    return f"rotor_inertia: {value:.1e} from the {source}" if value > 0.0 else ""
+
+
 def _joints(guess: Guess, robot: Robot) -> list[str]:
     if not guess.joints:
         return ["# joints:", *(f"#   {_word(name)}: {{}}" for name in robot.joints)]
@@ -95,6 +117,9 @@ def _joints(guess: Guess, robot: Robot) -> list[str]:
             force = "N" if robot.prismatic[k] else "N m"
             what = f"{force} per {unit.removeprefix('m')}" if unit in ("A", "mA") else f"{force} per recorded unit"
             comment = f"   # STATE effort_gain, {what}"
+        rotor = _rotor(robot, k)
+        if rotor:
+            comment = f"{comment}; {rotor}" if comment else f"   # STATE {rotor}"
         lines.append(f"{entry}}}{comment}")
     return lines
 

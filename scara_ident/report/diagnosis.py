@@ -9,11 +9,13 @@ import numpy as np
 
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.diagnosis.effect_parameters import RotorInertia
 from scara_ident.diagnosis.model_selection import Unexplained, rms_of
 from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
 from scara_ident.model.terms.friction import Friction
+from scara_ident.robot.rotors import GUESS_FACTOR
 
 
 def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -60,6 +62,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for item in diagnosis.evidence
         },
+        "rotors": [_rotor(rotor, diagnosis) for rotor in diagnosis.rotors],
         "training": _before_after(diagnosis, diagnosis.training_before, diagnosis.training_after),
         "validation": _before_after(diagnosis, diagnosis.validation_before, diagnosis.validation_after),
         "recordings": {
@@ -122,6 +125,38 @@ def _candidate(decision: Decision, diagnosis: Diagnosis) -> dict[str, Any]:
             )
         },
     }
+
+
+def _rotor(rotor: RotorInertia, diagnosis: Diagnosis) -> dict[str, Any]:
+    return {
+        "joint": rotor.joint,
+        "armature": rotor.armature,
+        "factor": rotor.factor,
+        "unit": _armature_unit(rotor, diagnosis),
+        "nominal": rotor.nominal,
+        "stated": rotor.stated,
+        "told": rotor.told,
+    }
+
+
+def _armature_unit(rotor: RotorInertia, diagnosis: Diagnosis) -> str:
+    robot = diagnosis.robot
+    return "kg" if robot.prismatic[robot.joints.index(rotor.joint)] else "kg m^2"
+
+
+def _of_rotor(rotor: RotorInertia, diagnosis: Diagnosis) -> str:
+    """Say which inertia of a rotor that nobody stated the result rests on."""
+    unit = _armature_unit(rotor, diagnosis)
+    guess = f"guessed at {rotor.nominal:.2g} {unit} at the joint from the size of its motor"
+    if rotor.told and rotor.factor is not None:
+        return (
+            f"The rotor inertia of {rotor.joint} is not stated: {guess}, and found to be {rotor.armature:.3g} {unit} "
+            f"within a factor of {rotor.factor:.2g}."
+        )
+    return (
+        f"The rotor inertia of {rotor.joint} is not stated and hardly shows: {guess}, which may err by a factor of "
+        f"{GUESS_FACTOR:g}; what depends on it is as unsure as its ± says. State rotor_inertia."
+    )
 
 
 def _unexplained(diagnosis: Diagnosis) -> dict[str, Any] | None:
@@ -201,6 +236,9 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     for guess in diagnosis.tentative:
         where = f" on {guess.joint}" if guess.joint else ""
         found.append(f"Worth a look, not added: {guess.effect}{where}; {guess.why}; settled by: {guess.settled_by}.")
+    found += [
+        _of_rotor(rotor, diagnosis) for rotor in diagnosis.rotors if not rotor.stated and rotor.factor is not None
+    ]
     kind, old, new = "held-out", diagnosis.validation_before, diagnosis.validation_after
     if not old.data.recordings:
         kind, old, new = "training", diagnosis.training_before, diagnosis.training_after

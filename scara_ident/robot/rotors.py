@@ -15,7 +15,7 @@ from scara_ident.arrays import Array
 # specifications: maximum torque and inertia at the output), which it meets within a factor of two.
 COEFFICIENT, EXPONENT = 1.5e-4, 1.2
 # Factor that is one standard deviation of the guess's logarithm. The drives of Franka's FR3 (its makers' figures) and of
-# the SCARA03 (Indri et al. 2002), made otherwise, lie within factors of 2.1 and 4.1 of the rule.
+# the SCARA03 (Indri et al. 2002), made otherwise, lie within factors of 2.8 and 4.1 of the rule.
 GUESS_FACTOR = 3.0
 # Reduction of an arm's joint where none is stated: motor turns per turn, and per metre of a screw with 20 mm lead.
 USUAL_REDUCTION, USUAL_SCREW = 100.0, 314.0

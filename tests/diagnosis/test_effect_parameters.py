@@ -36,7 +36,7 @@ def test_the_deviation_of_a_nonlinear_parameter_is_its_scatter_over_noise():
     runs = stribeck_runs()
     chosen = Candidate(Stribeck(), Member(0, (VELOCITY,)))
     step = step_beside(runs, [chosen], WEIGHTS)
-    (told,) = physical_parameters(step)
+    (told,) = physical_parameters(step).effects
 
     def rows(observations: Observations, candidates: Sequence[Candidate] = ()) -> tuple[Array, Array]:
         """Weighted rows of both joints: the model's columns and the torque, and the candidates' columns."""
@@ -79,7 +79,7 @@ def test_several_effects_get_their_own_parameters():
     direction = complete().robot.drive_sign[1]
     runs = with_torque(stribeck_runs(), 1, lambda motion: direction * STIFFNESS * (motion.q[1] - REST))
     chosen = [Candidate(Spring(), Member(1)), Candidate(Stribeck(), Member(0, (VELOCITY,)))]
-    spring, stribeck = physical_parameters(step_beside(runs, chosen, WEIGHTS))
+    spring, stribeck = physical_parameters(step_beside(runs, chosen, WEIGHTS)).effects
     assert set(spring) == {"stiffness", "rest_position"}
     assert abs(spring["stiffness"].value - STIFFNESS) < 4.0 * spring["stiffness"].std
     assert set(stribeck) == {"amplitude", "velocity"}
@@ -91,7 +91,7 @@ def test_several_effects_get_their_own_parameters():
 
 def test_a_parameter_that_only_serves_the_columns_is_not_reported():
     chosen = [Candidate(TransmissionLoss(), Member(1, (0.1,)))]
-    (found,) = physical_parameters(step_beside(exact_runs(), chosen, WEIGHTS))
+    (found,) = physical_parameters(step_beside(exact_runs(), chosen, WEIGHTS)).effects
     assert set(found) == {"loss_coefficient"}
 
 
@@ -100,7 +100,7 @@ def test_beside_a_model_the_parameters_are_those_of_the_model_that_has_the_effec
     runs = stribeck_runs()
     candidate = Candidate(Stribeck(), Member(0, (VELOCITY,)))
     beside = parameters_beside(step_beside(runs, (), WEIGHTS), candidate)
-    (whole,) = physical_parameters(step_beside(runs, [candidate], WEIGHTS))
+    (whole,) = physical_parameters(step_beside(runs, [candidate], WEIGHTS)).effects
     assert beside["amplitude"].value == pytest.approx(whole["amplitude"].value, rel=1e-9)
     assert beside["amplitude"].std == pytest.approx(whole["amplitude"].std, rel=0.15)
     spring = parameters_beside(step_beside(runs, (), WEIGHTS), Candidate(Spring(), Member(1)))

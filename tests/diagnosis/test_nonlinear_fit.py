@@ -83,7 +83,7 @@ def test_it_finds_what_a_search_finds_from_either_side(start: float) -> None:
     grid = np.linspace(0.24, 0.36, 49)
     errors = [linear(step, chosen=(stribeck.at([value]), spring)).error for value in grid]
     assert stribeck.member.nonlinear[0] == pytest.approx(grid[int(np.argmin(errors))], abs=1.5 * (grid[1] - grid[0]))
-    told = physical_parameters(step)
+    told = physical_parameters(step).effects
     assert abs(told[0]["velocity"].value - VELOCITY) < 4.0 * told[0]["velocity"].std
     assert abs(told[1]["stiffness"].value - STIFFNESS) < 4.0 * told[1]["stiffness"].std
 
@@ -93,7 +93,7 @@ def test_a_large_loss_shows_the_rotor_behind_the_gear() -> None:
     step = tuned(runs, Candidate(TransmissionLoss(), Member(0, (0.2,))))
     scene = step.scene
     assert scene.armatures[0] / scene.nominal_armature(0) == pytest.approx(1.15, abs=0.02)
-    loss = physical_parameters(step)[0]["loss_coefficient"]
+    loss = physical_parameters(step).effects[0]["loss_coefficient"]
     assert loss.value == pytest.approx(0.3, abs=max(0.01, 4.0 * loss.std))
     # With the nominal rotor it would be wrong by far more than it could be.
     biased = linear(step, scene=replace(scene, armatures={})).value[-1]
@@ -120,7 +120,7 @@ def test_a_backlash_shows_the_rotor_though_its_flights_begin_and_end_at_samples(
     step = tuned(runs, Candidate(Backlash(), Member(0, (0.0012,))))
     scene = step.scene
     assert scene.armatures[0] / scene.nominal_armature(0) == pytest.approx(1.05, abs=0.01)
-    width = physical_parameters(step)[0]["width"].value
+    width = physical_parameters(step).effects[0]["width"].value
     assert width == pytest.approx(0.0011, rel=0.1)
 
 
@@ -204,8 +204,11 @@ def test_a_rotor_that_nobody_stated_is_told_by_the_loads_and_leaves_no_false_fri
     for joint, true in zip(robot.joints, UR5_LOSS[:2], strict=False):
         assert abs(losses[joint].value - true) < 2.0 * losses[joint].std
         assert losses[joint].std < 0.1 * true
-    for joint in (0, 1):
-        assert found.search.scene.armature(joint) == pytest.approx(armature, rel=0.15)
+    told = {item.joint: item for item in found.rotors}
+    for name in losses:
+        rotor = told[name]
+        assert rotor.told and not rotor.stated and rotor.factor is not None
+        assert abs(np.log(rotor.armature / armature)) < 2.0 * np.log(rotor.factor) < 0.3
 
 
 def test_a_rotor_that_nobody_stated_has_a_wide_prior_within_what_the_estimate_leaves_room_for() -> None:
@@ -235,6 +238,9 @@ def test_what_a_rotor_that_nobody_stated_costs_stands_in_the_standard_deviation(
     stated = replace(step.scene, armatures={0: step.scene.nominal_armature(0)})
     not_stated = replace(robot, rotor_stated=np.zeros(2, dtype=bool))
     guessed = replace(stated, model=build_model(not_stated, "complete"))
-    found = [physical_parameters(replace(step, scene=scene))[0]["loss_coefficient"] for scene in (stated, guessed)]
+    all_found = [physical_parameters(replace(step, scene=scene)) for scene in (stated, guessed)]
+    found = [item.effects[0]["loss_coefficient"] for item in all_found]
     assert all(abs(item.value - loss) < 2.0 * item.std for item in found)
     assert found[1].std > 1.3 * found[0].std
+    (rotor,) = all_found[1].rotors
+    assert not rotor.stated and rotor.factor is not None and 1.2 < rotor.factor < GUESS_FACTOR

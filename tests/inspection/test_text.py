@@ -42,3 +42,21 @@ def test_plotjugglers_export_maps_by_one_pattern_a_signal(tmp_path):
     assert found.mapping["velocity"] == {"column": "/joint_states/{joint}/velocity", "unit": "rad/s"}
     assert found.recording is not None
     assert_same(read_back(found, tmp_path), tmp_path)
+
+
+def test_a_rotor_that_the_urdf_does_not_state_is_asked_for_with_a_guess(tmp_path):
+    urdf = write_urdf(tmp_path / "arm.urdf", (Link(), Link()), (100.0, -50.0))
+    made = {name.replace("joint", "j"): values for name, values in MADE.items()}
+    found = inspected(save(tmp_path / "a.parquet", made), tmp_path, urdf)
+    text = found.description or ""
+    assert "# STATE rotor_inertia, kg m^2" in text
+    # Motors for 50 N m at the joint: 1.5e-4 (0.5)^1.2, and 1.5e-4 (1.0)^1.2.
+    lines = [line for line in text.splitlines() if line.startswith("  j")]
+    for line, value in zip(lines, ("6.5e-05", "1.5e-04"), strict=True):
+        assert line.endswith(f"# STATE effort_gain, N m per recorded unit; rotor_inertia: {value} from the effort limit")
+    # A guess states nothing.
+    assert all("rotor_inertia" not in joint for joint in yaml.safe_load(text)["joints"].values())
+
+
+def test_no_rotor_is_asked_for_where_the_urdf_states_all(tmp_path):
+    assert "rotor_inertia" not in (inspected(save(tmp_path / "a.parquet", MADE), tmp_path).description or "")
