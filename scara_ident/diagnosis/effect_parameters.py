@@ -77,9 +77,8 @@ def physical_parameters(step: SelectionStep) -> PhysicalParameters:
             # An underscore marks a parameter that only serves the shape of the columns.
             if not parameter.name.startswith("_"):
                 variance = covariance[len(state.value) + position, len(state.value) + position]
-                parameters[parameter.name] = Parameter(
-                    unknown.value, float(np.sqrt(max(variance, 0.0))), parameter.unit
-                )
+                unit = parameter.unit.format(**candidate.effect.words(step.scene, candidate.member))
+                parameters[parameter.name] = Parameter(unknown.value, float(np.sqrt(max(variance, 0.0))), unit)
         found.append(parameters)
     return PhysicalParameters(tuple(found), _rotors(step, state, covariance))
 

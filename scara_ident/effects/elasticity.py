@@ -64,7 +64,12 @@ class JointElasticity(BehindGear):
 
     name = "joint_elasticity"
     summary = "an elastic gear"
-    coefficients = (Coefficient("compliance", "{compliance}", "compliance of the gear of {joint}"),)
+    coefficients = (
+        Coefficient(
+            "compliance", "{compliance}", "compliance of the gear of {joint}",
+            "no elastic gear: the link would run ahead of its motor",
+        ),
+    )  # fmt: skip
     nonlinear = (
         NonlinearParameter("frequency", "Hz", LOWEST_FREQUENCY, HIGHEST_FREQUENCY),
         NonlinearParameter("_damping_ratio", "1", LOWEST_DAMPING, HIGHEST_DAMPING),
@@ -102,8 +107,9 @@ class JointElasticity(BehindGear):
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where a spring does not pull back, or would swing slower than is seen."""
-        if value[0] < -DOUBT_STDS * std[0]:
-            return "its stiffness would be negative"
+        wrong = super().inadmissible(scene, member, value, std)
+        if wrong is not None:
+            return wrong
         usual = usual_link_inertia(scene, member.place)
         least = value[0] - DOUBT_STDS * std[0]
         if usual > 0.0 and least > 0.0:
@@ -178,7 +184,7 @@ class Backlash(BehindGear):
             LARGEST_WIDTH, "a clearance of {value:.2g} {position} would rattle by hand",
         ),
     )  # fmt: skip
-    nonlinear = (NonlinearParameter("crossing_width", "rad", 1e-5, LARGEST_WIDTH),)
+    nonlinear = (NonlinearParameter("crossing_width", "{position}", 1e-5, LARGEST_WIDTH),)
     view = View("reversal", along=True, distance="width")
     experiment = "reverse under little load, and look for the angle within which no torque is needed"
 

@@ -68,7 +68,7 @@ class Stribeck(Effect):
             "amplitude", "{torque}", "further friction of {joint} near rest", "friction would fall towards rest"
         ),
     )
-    nonlinear = (NonlinearParameter("velocity", "rad/s", 1e-4, 5.0),)
+    nonlinear = (NonlinearParameter("velocity", "{position}/s", 1e-4, 5.0),)
     view = View("velocity")
     experiment = "run at eight or more constant speeds, spaced by a constant factor down to creeping"
 

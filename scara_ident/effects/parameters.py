@@ -27,6 +27,7 @@ class NonlinearParameter:
     name : str
         As in the table of effects; with an underscore before it, it shapes the columns and is not reported.
     unit : str
+        May hold the words of `Effect.words`, as ``{position}`` for rad or m.
     lower, upper : float
         What a real arm can have; refinement stays within.
     logarithmic : bool

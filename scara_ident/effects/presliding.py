@@ -43,7 +43,7 @@ class Presliding(Effect):
             "friction would be largest just after a reversal",
         ),
     )  # fmt: skip
-    nonlinear = (NonlinearParameter("presliding_distance", "rad", 1e-5, 0.3),)
+    nonlinear = (NonlinearParameter("presliding_distance", "{position}", 1e-5, 0.3),)
     view = View("reversal", along=True, distance="presliding_distance")
     experiment = "reverse often with small amplitude at two speeds: its memory is in angle, a delay's is in time"
 

@@ -148,3 +148,15 @@ def test_data_are_corrected_only_where_the_effect_says_so(effect):
             assert effect.corrected(recording, member, value) is recording
             assert effect.settled(value)
             assert effect.negligible(scene, member, value) is None
+
+
+@EVERY
+def test_what_is_an_angle_on_a_turning_joint_is_a_length_on_a_sliding_one(effect, tmp_path):
+    """Angles of the motor and phases stay angles: they have names of their own."""
+    scene = scene_of(tree(tmp_path))
+    for joint, slides in enumerate(scene.robot.prismatic):
+        for member in (item for item in effect.members(scene) if item.joint == joint and item.partner is None):
+            words = effect.words(scene, member)
+            units = [item.unit.format(**words) for item in effect.nonlinear]
+            units += [column.unit for column in effect.columns(scene, member)]
+            assert not any("rad" in unit for unit in units) or not slides, units

@@ -97,7 +97,9 @@ def test_the_width_is_recovered():
 def test_what_no_gear_can_have_is_refused():
     scene = scene_of(load_robot())
     std = np.array([1e-7])
-    assert "negative" in str(JointElasticity().inadmissible(scene, Member(0, (30.0, 0.3)), np.array([-1e-5]), std))
+    assert "ahead of its motor" in str(
+        JointElasticity().inadmissible(scene, Member(0, (30.0, 0.3)), np.array([-1e-5]), std)
+    )
     assert "Hz" in str(JointElasticity().inadmissible(scene, Member(0, (30.0, 0.3)), np.array([1e-2]), std))
     assert JointElasticity().inadmissible(scene, Member(0, (30.0, 0.3)), np.array([1.2e-5]), std) is None
     assert "negative" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([-1e-4]), std))
