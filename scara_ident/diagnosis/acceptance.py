@@ -10,6 +10,7 @@ from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.effects import Scene
+from scara_ident.effects.effect import DOUBT_STDS
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Decision:
     why : str
         In words.
     gain : float
-        Share of the squared residual of its joints that it removes on rows that it was not fitted to.
+        What it removes on rows that it was not fitted to, as a share of that and what it leaves on its joint; see `gains`.
     tentative : bool
         Not accepted, but worth a look: an arm can have it, it helps as much as is asked, and these recordings are too few
         or too alike to be sure.
@@ -45,7 +46,7 @@ class Decision:
 
 
 def decide(
-    candidate: Candidate, examination: Examination, scene: Scene, tried: int, criteria: SelectionCriteria
+    candidate: Candidate, examination: Examination, gain: float, scene: Scene, tried: int, criteria: SelectionCriteria
 ) -> Decision:
     """Decide on one candidate.
 
@@ -53,27 +54,32 @@ def decide(
     ----------
     candidate : Candidate
     examination : Examination
+    gain : float
+        See `gains`.
     scene : Scene
     tried : int
         Candidates and scan points tried, for the correction of the p-value.
     criteria : SelectionCriteria
     """
-    gain = share_of_joints(candidate, scene, examination.held_out)
     unseen = _unseen(examination, criteria)
     unphysical = unseen or _unphysical(candidate, examination, scene)
     small = unphysical or _small(candidate, examination, scene, gain, criteria)
     # The first reason that a person would give.
     why = unseen or _insignificant(examination, tried, criteria) or small or _seldom(examination, criteria)
+    if _wrong_sign(candidate, examination):
+        # The best that a real one can be is absent: nothing is removed, and nothing speaks for it.
+        examination, gain = replace(examination, p_value=1.0), min(gain, 0.0)
     words = why or f"removes {gain:.1%} of the squared residual on data that it was not fitted to"
     tentative = why is not None and small is None and examination.p_value <= criteria.family_error
     return Decision(candidate, candidate.label(scene), examination, why is None, words, gain, tentative)
 
 
-def share_of_joints(candidate: Candidate, scene: Scene, gain: float) -> float:
-    """Return a share of the squared residual of all joints as one of those that a candidate is of."""
-    joints = scene.robot.n if candidate.member.joint is None else 1
-    # The residual is weighted so that every joint holds the same share of its square.
-    return gain * scene.robot.n / joints
+def _wrong_sign(candidate: Candidate, examination: Examination) -> bool:
+    """Whether the only coefficient is, beyond doubt, on the side of zero where no real one can be."""
+    names, value = candidate.effect.coefficients, examination.value
+    if len(names) != 1 or len(value) != 1 or not names[0].positive:
+        return False
+    return bool(value[0] < -DOUBT_STDS * float(np.sqrt(max(examination.covariance[0, 0], 0.0))))
 
 
 def _unseen(examination: Examination, criteria: SelectionCriteria) -> str | None:

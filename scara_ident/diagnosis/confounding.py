@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scara_ident.diagnosis.acceptance import Decision, share_of_joints
+from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import held_out_gains
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
@@ -22,9 +22,9 @@ class Confounder:
     label, effect : str
     joint : str or None
     gain : float
-        Share of the squared residual that it removes in the place of the effect found.
+        Share of its joint's squared residual that it removes in the place of the effect found; see `gains`.
     found_gain : float
-        What the effect found removes.
+        What the effect found removes of its own joint's.
     """
 
     label: str
@@ -51,19 +51,21 @@ def confounders(step: SelectionStep, decisions: Sequence[Decision]) -> list[tupl
 def _confounders_of(step: SelectionStep, found: Candidate, pool: Sequence[Candidate]) -> tuple[Confounder, ...]:
     scene, criteria = step.scene, step.criteria
     own = step.judge([found])[0]
-    # Those that remove too little, most of them, need no test.
-    least = criteria.near_confounder * own.gain
-    gains = held_out_gains(step.model, step.columns.rows(scene, pool), criteria)
-    enough = [item for item, gain in zip(pool, gains, strict=True) if share_of_joints(item, scene, gain) > least]
+    # Of all joints together: candidates of different joints are compared. Those that remove too little, most of them, need
+    # no test.
+    saved = own.examination.held_out
+    least = criteria.near_confounder * saved
+    found_gains = held_out_gains(step.model, step.columns.rows(scene, pool), criteria)
+    enough = [item for item, gain in zip(pool, found_gains, strict=True) if gain > least]
     judged = best_of_each(step.judge(enough)).values()
-    near = [item for item in judged if item.accepted and item.gain > least]
+    near = [item for item in judged if item.accepted and item.examination.held_out > least]
     others = []
     for decision in step.refine(near):
         worse = decision.examination.left - own.examination.left
         error = float(np.sqrt(len(worse) * np.var(worse)))
         same = abs(float(np.sum(worse))) < criteria.alike * error
-        alike = decision.gain >= criteria.least_share * own.gain and same
-        if decision.accepted and (alike or decision.gain >= own.gain):
+        alike = decision.examination.held_out >= criteria.least_share * saved and same
+        if decision.accepted and (alike or decision.examination.held_out >= saved):
             candidate = decision.candidate
             name, joint = candidate.effect.name, candidate.joint(scene)
             others.append(Confounder(decision.label, name, joint, decision.gain, own.gain))

@@ -54,7 +54,7 @@ class FoundEffect:
     p_value : float
         Corrected for the candidates tried.
     gain : float
-        Share of the squared residual of its joints removed on data that it was not fitted to.
+        Share of its joint's squared residual removed on data that it was not fitted to; of all joints' where it has none.
     votes : tuple of (int, int)
         Trajectories in which it helps, of those that excite it.
     before, after : mapping of str to float or None

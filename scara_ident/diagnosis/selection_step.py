@@ -15,6 +15,7 @@ from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, columns_at_hand, with_columns
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel
+from scara_ident.diagnosis.gain import gains
 from scara_ident.effects import Scene
 from scara_ident.estimation.observations import JointRows, Observations
 from scara_ident.model.model import TorqueModel
@@ -74,9 +75,10 @@ class SelectionStep:
     def judge_rows(self, candidates: Sequence[Candidate], rows: Sequence[Rows]) -> list[Decision]:
         """Examine candidates whose columns are given, and decide on each."""
         found = examine(self.model, rows, self.criteria)
+        gained = gains(self.model, rows, [item.member.joint for item in candidates], found)
         return [
-            decide(item, result, self.scene, self.tried, self.criteria)
-            for item, result in zip(candidates, found, strict=True)
+            decide(item, result, gain, self.scene, self.tried, self.criteria)
+            for item, result, gain in zip(candidates, found, gained, strict=True)
         ]
 
     def without(self, place: int) -> SelectionStep:

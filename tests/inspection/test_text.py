@@ -53,7 +53,9 @@ def test_a_rotor_that_the_urdf_does_not_state_is_asked_for_with_a_guess(tmp_path
     # Motors for 50 N m at the joint: 1.5e-4 (0.5)^1.2, and 1.5e-4 (1.0)^1.2.
     lines = [line for line in text.splitlines() if line.startswith("  j")]
     for line, value in zip(lines, ("6.5e-05", "1.5e-04"), strict=True):
-        assert line.endswith(f"# STATE effort_gain, N m per recorded unit; rotor_inertia: {value} from the effort limit")
+        assert line.endswith(
+            f"# STATE effort_gain, N m per recorded unit; rotor_inertia: {value} from the effort limit"
+        )
     # A guess states nothing.
     assert all("rotor_inertia" not in joint for joint in yaml.safe_load(text)["joints"].values())
 

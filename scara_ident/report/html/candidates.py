@@ -18,10 +18,8 @@ def candidate_blocks(content: dict[str, Any]) -> list[Block]:
     rows: list[list[Cell | str]] = []
     for effect in content["effects"]:
         title = effect["effect"] if effect["joint"] is None else f"{effect['effect']} of {effect['joint']}"
-        # On few rows the gain can come out a little above the whole.
-        gain = min(1.0, effect["gain"])
-        why = f"removes {gain:.1%} of the squared residual at that point on data that it was not fitted to"
-        rows.append(_candidate({**effect, "label": title, "why": why, "gain": gain, "decision": "accepted"}, most))
+        why = f"removes {effect['gain']:.1%} of the squared residual at that point on data that it was not fitted to"
+        rows.append(_candidate({**effect, "label": title, "why": why, "decision": "accepted"}, most))
     rows += [_candidate(row, most) for row in content["candidates"]]
     words = (
         "First the effects found, in the order in which they came in; then what else was tried beside them, best member of every family. "

@@ -154,7 +154,7 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
     )
     p_value = chance(effect.p_value)
     words = (
-        f"{effect.description[:1].upper()}{effect.description[1:]}. It removes {min(1.0, effect.gain):.0%} of the squared residual on data that it was not "
+        f"{effect.description[:1].upper()}{effect.description[1:]}. It removes {effect.gain:.0%} of the squared residual on data that it was not "
         f"fitted to, helps in {helps} of {voting} trajectories that excite it, and would come about by chance with p {'' if p_value.startswith('<') else '= '}{p_value}. "
         f"Rms on the training recordings: {gains}."
     )
