@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scara_ident.cli import options
-from scara_ident.cli.console import check_report, progress, result_console, show_recordings, table
+from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings, table
 
 
 def compare(
@@ -24,10 +24,10 @@ def compare(
 
     check_report(output, "comparison")
     arm = load_robot(robot)
-    with progress() as step:
-        step("reading the recordings")
+    with progress() as work:
+        work("reading the recordings")
         given = read_recordings(recordings, arm)
-        result = run(arm, given, model=model, method=method, progress=step)
+        result = run(arm, given, model=model, method=method, progress=work.part(READING_SHARE, 1.0))
     content = comparison_dict(result)
     console = result_console(content, json)
     if verbose:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -18,9 +18,12 @@ from rich.table import Table
 from scara_ident.errors import PluginWarning
 
 if TYPE_CHECKING:
+    from scara_ident.progress import Work
     from scara_ident.recording.recording import Recording
     from scara_ident.report.html.section import Kind
 
+# Share of the work of a command that reading its recordings takes.
+READING_SHARE = 0.05
 # Of a pipe or a file, which have no width of their own.
 PIPE_WIDTH = 80
 
@@ -80,14 +83,18 @@ def plugin_notices() -> Iterator[None]:
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[str], None]]:
-    """Show the step that runs on a terminal, and nothing in a pipe."""
+def progress() -> Iterator[Work]:
+    """Show on a terminal which step runs, how much is done and how long the rest takes; nothing in a pipe."""
+    from scara_ident.progress import Work
+
     console = errors_console()
     if not console.is_terminal:
-        yield lambda step: None
+        yield Work()
         return
-    with console.status("starting") as status:
-        yield lambda step: status.update(step)
+    from scara_ident.cli.progress_bar import shown
+
+    with shown(console) as tell:
+        yield Work(tell)
 
 
 def check_report(output: Path | None, kind: Kind) -> None:

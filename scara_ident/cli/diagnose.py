@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from scara_ident.cli import options
-from scara_ident.cli.console import check_report, progress, result_console, show_recordings, table
+from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings, table
 
 
 def _known(names: str | None) -> str | None:
@@ -49,8 +49,8 @@ def diagnose(
 
     check_report(output, "diagnosis")
     arm = load_robot(robot)
-    with progress() as step:
-        step("reading the recordings")
+    with progress() as work:
+        work("reading the recordings")
         training = read_recordings(recordings, arm)
         held_out = read_recordings(validate, arm) if validate else ()
         result = run(
@@ -60,7 +60,7 @@ def diagnose(
             held_out,
             bands=None if band is None else [band] * arm.n,
             catalogue=None if effects is None else effects_named(*_parted(effects)),
-            progress=step,
+            progress=work.part(READING_SHARE, 1.0),
         )
     content = diagnosis_dict(result)
     console = result_console(content, json)

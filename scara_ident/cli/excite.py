@@ -10,6 +10,9 @@ import typer
 from scara_ident.cli import options
 from scara_ident.cli.console import check_report, progress, result_console, table
 
+# Share of a design that its searches take; the rest is the verification of limits.
+SEARCHES_SHARE = 0.97
+
 
 def excite(
     robot: options.Robot = None,
@@ -107,12 +110,13 @@ def excite(
     check_rate(rate, count / duration)
     nominal = None if parameters is None else read_parameters(parameters, equation)
     prior = known_information(equation, read_recordings(known, arm), PAPER_SAMPLES / duration) if known else None
-    with progress() as step:
+    with progress() as work:
 
         def told(state: Progress) -> None:
-            step(f"search {state.done} of {state.total}, best so far {-state.cost:.2f}")
+            words = f"search {state.done} of {state.total} done, best so far {-state.cost:.2f}"
+            work(words, SEARCHES_SHARE * state.done / state.total)
 
-        step("search 1")
+        work("search 1")
         design = design_excitation(
             equation,
             duration=duration,

@@ -8,7 +8,15 @@ from typing import Annotated, Literal
 import typer
 
 from scara_ident.cli import options
-from scara_ident.cli.console import check_report, number, progress, result_console, show_recordings, table
+from scara_ident.cli.console import (
+    READING_SHARE,
+    check_report,
+    number,
+    progress,
+    result_console,
+    show_recordings,
+    table,
+)
 
 
 def identify(
@@ -37,8 +45,8 @@ def identify(
 
     check_report(output, "identification")
     arm = load_robot(robot)
-    with progress() as step:
-        step("reading the recordings")
+    with progress() as work:
+        work("reading the recordings")
         training = read_recordings(recordings, arm)
         held_out = read_recordings(validate, arm) if validate else ()
         result = run(
@@ -49,7 +57,7 @@ def identify(
             validation=held_out,
             bands=None if band is None else [band] * arm.n,
             options=ConsistentOptions(friction=friction),
-            progress=step,
+            progress=work.part(READING_SHARE, 1.0),
         )
     content = identification_dict(result)
     console = result_console(content, json)

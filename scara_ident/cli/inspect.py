@@ -46,8 +46,8 @@ def inspect(
     if target is not None and target.exists():
         raise ScaraIdentError(f"{target}: exists already and is not overwritten; move it away or give another --output")
     check_output(output)
-    with progress() as step:
-        step("reading the file")
+    with progress() as work:
+        work("reading the file")
         found = inspect_file(file, urdf=urdf, robot=robot, folder=output or ".")
     if target is not None and found.description is not None:
         write_text(target, found.description)

@@ -37,11 +37,12 @@ def simulate(
     effects = [parse_effect(text) for text in effect or ()]
     motions = [named_motion(word, arm.robot) for word in trajectory]
     console = output_console()
-    with progress() as step:
-        for motion in motions:
+    with progress() as work:
+        for place, motion in enumerate(motions):
             for repetition in range(1, repetitions + 1):
-                step(f"simulating {motion.name}, run {repetition}")
+                done = (place * repetitions + repetition - 1) / (len(motions) * repetitions)
+                work(f"simulating {motion.name}, run {repetition}", done)
                 result = run(arm, motion, effects=effects, seed=seed, repetition=repetition)
-                with written_together(output) as place:
-                    path = write_simulation(result, place)
+                with written_together(output) as folder:
+                    path = write_simulation(result, folder)
                 console.written(output, path.name)

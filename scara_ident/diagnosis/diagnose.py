@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -30,6 +30,7 @@ from scara_ident.identification.channel_check import channel_faults
 from scara_ident.identification.identify import check_bands, check_held_out, data_notes
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.prepared import prepare
+from scara_ident.progress import Tell, Work, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 from scara_ident.threads import one_blas_thread
@@ -140,7 +141,7 @@ def diagnose(
     bands: Sequence[float | None] | None = None,
     catalogue: Sequence[Effect] | None = None,
     criteria: SelectionCriteria = CRITERIA,
-    progress: Callable[[str], None] = lambda step: None,
+    progress: Tell = silent,
 ) -> Diagnosis:
     """Find what a model lacks, trace it to a physical effect, add it, and report before and after.
 
@@ -160,6 +161,7 @@ def diagnose(
     criteria : SelectionCriteria, optional
         When an effect is believed.
     progress : callable, optional
+        Called with every step that begins and the share of the work done before it.
 
     Returns
     -------
@@ -180,7 +182,7 @@ def diagnose(
     notes = data_notes((*data.recordings, *held_out.recordings))
     given, known = bands is not None, None
     if bands is None:
-        progress("choosing the band")
+        progress("choosing the band", 0.0)
         choice = choose_bands(base, data)
         # A joint whose model lacks something seems to have less band than it has.
         bands, known = (max(choice.bands),) * robot.n, choice.observations
@@ -190,7 +192,9 @@ def diagnose(
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))
     families = available_effects() if catalogue is None else tuple(catalogue)
-    outcome = select_model(SearchTask(base, families, criteria, progress), observations, free=not given)
+    task = SearchTask(base, families, criteria, Work(progress).part(0.0 if given else 0.12, 0.85))
+    outcome = select_model(task, observations, free=not given)
+    progress("comparing what was found with what else it could be", 0.85)
     found, after = outcome.search, outcome.after
     step = replace(found.step, weights=after.weights)
     validation_before = observe(base, held_out.at(found.bands))

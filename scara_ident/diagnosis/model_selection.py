@@ -20,6 +20,9 @@ from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.motion.prepared import PreparedData
 
+# Share of the work that the first search takes where no other follows, and of that the search without its tests.
+FIRST_SHARE, SEARCH_SHARE = 0.8, 0.85
+
 
 @dataclass(frozen=True)
 class Unexplained:
@@ -89,10 +92,13 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
     criteria = task.criteria
     data = observations.data
     columns = CandidateColumns(observations)
-    found = _searched(task, columns, ())
+    # Further searches are rare; each has half of what is left.
+    now, left = _halves(task, FIRST_SHARE)
+    found = _searched(now, columns, ())
     for _ in range(criteria.most_widenings if free else 0):
         if not found.search.chosen:
             break
+        left.progress("choosing the band again")
         choice = choose_bands(found.search.model, found.search.data)
         wider = max(choice.bands)
         if wider < criteria.wider * _band(found):
@@ -102,15 +108,23 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
         known = choice.observations if found.search.correction is None else None
         known = None if known is None else known.leading(task.model)
         columns = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands)), known))
-        found = _searched(task, columns, ())
+        now, left = _halves(left)
+        found = _searched(now, columns, ())
     if free and (found.unexplained is not None or not _below_resonance(found, criteria)):
-        columns, found = _narrowed(task, data, columns, found)
-    return _without_proxies(task, columns, found)
+        now, left = _halves(left)
+        columns, found = _narrowed(now, data, columns, found)
+    return _without_proxies(left, columns, found)
+
+
+def _halves(task: SearchTask, share: float = 0.5) -> tuple[SearchTask, SearchTask]:
+    """Return the task with a share of the work that is left, and with the rest of it."""
+    first, rest = task.progress.part(0.0, share), task.progress.part(share, 1.0)
+    return replace(task, progress=first), replace(task, progress=rest)
 
 
 def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[str]) -> Outcome:
-    found = search(task, columns, without=without)
-    task.progress("testing what is left")
+    found = search(replace(task, progress=task.progress.part(0.0, SEARCH_SHARE)), columns, without=without)
+    task.progress("testing what is left", SEARCH_SHARE)
     training = observed_at_every_sample(found.step)
     after = wls(training)
     before, left = found.uncorrected.residuals(found.start.value), training.residuals(after.value)
@@ -168,9 +182,11 @@ def _narrowed(
         return columns, wide
     for share in task.criteria.narrower:
         narrow = CandidateColumns(observe(task.model, data.at((share * band,) * len(data.bands))))
-        if not search(replace(task, catalogue=resonant), narrow).chosen:
+        trial, task = _halves(task)
+        if not search(replace(trial, catalogue=resonant), narrow).chosen:
             continue
-        found = _searched(task, narrow, ())
+        again, task = _halves(task)
+        found = _searched(again, narrow, ())
         if found.unexplained is None and _resonances(found.search) and _below_resonance(found, task.criteria):
             return narrow, found
     return columns, wide
@@ -184,7 +200,8 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
         if not proxies:
             break
         demoted |= proxies
-        found = _searched(task, columns, tuple(demoted))
+        again, task = _halves(task)
+        found = _searched(again, columns, tuple(demoted))
     return replace(found, demoted=tuple(demoted.values()))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -27,6 +27,10 @@ from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import HIGHEST_CUT
 from scara_ident.motion.prepared import PreparedData
+from scara_ident.progress import Work
+
+# Share of a search that making all candidates' columns takes.
+COLUMNS_SHARE = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,14 +149,14 @@ class SearchTask:
     catalogue : tuple of Effect
         Families to try.
     criteria : SelectionCriteria
-    progress : callable
-        Called with the name of every step.
+    progress : Work
+        Told every step that begins.
     """
 
     model: TorqueModel
     catalogue: tuple[Effect, ...] = field(default_factory=available_effects)
     criteria: SelectionCriteria = CRITERIA
-    progress: Callable[[str], None] = lambda step: None
+    progress: Work = field(default_factory=Work)
 
 
 def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[str] = ()) -> Search:
@@ -173,14 +177,18 @@ def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[s
     everything = [Candidate(effect, member) for effect in task.catalogue for member in effect.members(scene)]
     candidates = [item for item in everything if item.label(scene) not in without]
     tried = max(1, len(candidates))
-    task.progress(f"making the columns of {len(candidates)} candidates")
+    task.progress(f"making the columns of {len(candidates)} candidates", 0.0)
     columns.rows(first, candidates)
     chosen: tuple[Candidate, ...] = ()
     steps: list[Step] = []
     correction: Correction | None = None
     weights, value = start.weights, start.value
+    rounds = 0
     while True:
-        task.progress(f"trying {len(candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else ""))
+        words = f"trying {len(candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else "")
+        # How many rounds follow is not known: each has a third of what is left.
+        task.progress(words, 1.0 - (1.0 - COLUMNS_SHARE) * (2.0 / 3.0) ** rounds)
+        rounds += 1
         columns.forget_all_but(first, scene)
         step = SelectionStep(scene, columns, chosen, weights, tried, criteria)
         decisions = step.judge(candidates, first)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from scara_ident.identification.identify import data_notes, estimate_by
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.motion.repeatability import repeatability
+from scara_ident.progress import Tell, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 
@@ -86,7 +87,7 @@ def compare(
     model: str | TorqueModel = "complete",
     method: str = "ols",
     bands: Sequence[float | None] | None = None,
-    progress: Callable[[str], None] = lambda step: None,
+    progress: Tell = silent,
 ) -> Comparison:
     """Estimate from each trajectory alone and predict all of them.
 
@@ -118,15 +119,15 @@ def compare(
     notes = data_notes(data.recordings)
     known = None
     if bands is None:
-        progress("choosing the bands")
+        progress("choosing the bands", 0.0)
         choice = choose_bands(equation, data)
         bands, notes, known = choice.bands, [*notes, *choice.notes], choice.observations
-    progress("absorbing the recordings")
+    progress("absorbing the recordings", 0.4)
     observations = observe(equation, data.at(bands), known)
     noise = repeatability(data)
     summaries, rows = [], []
-    for name in names:
-        progress(f"estimating from {name}")
+    for k, name in enumerate(names):
+        progress(f"estimating from {name}", 0.5 + 0.4 * k / len(names))
         own = observations.of([k for k, item in enumerate(data.recordings) if item.trajectory == name])
         rows.append(own.by_joint)
         summaries.append(_summary(name, own, method, noise.get(name)))

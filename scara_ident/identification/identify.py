@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -25,6 +25,7 @@ from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.prepared import PreparedRecording, prepare
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.motion.velocity_audit import audit_velocity
+from scara_ident.progress import Tell, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 
@@ -88,7 +89,7 @@ def identify(
     validation: Sequence[Recording] = (),
     bands: Sequence[float | None] | None = None,
     options: ConsistentOptions | None = None,
-    progress: Callable[[str], None] = lambda step: None,
+    progress: Tell = silent,
 ) -> Identification:
     """Identify a robot from recordings of its motion.
 
@@ -109,7 +110,7 @@ def identify(
     options : ConsistentOptions, optional
         Of the method ``consistent``: friction's shape, masses, centres of mass, priors.
     progress : callable, optional
-        Called with the name of every step.
+        Called with every step that begins and the share of the work done before it.
 
     Returns
     -------
@@ -134,15 +135,15 @@ def identify(
     notes = data_notes((*data.recordings, *held_out.recordings))
     known = None
     if bands is None:
-        progress("choosing the bands")
+        progress("choosing the bands", 0.0)
         choice = choose_bands(equation, data)
         bands, known = choice.bands, choice.observations
         notes += choice.notes
-    progress("absorbing the recordings")
+    progress("absorbing the recordings", 0.5)
     training = observe(equation, data.at(bands), known)
     validated = observe(equation, held_out.at(bands))
     notes += [str(fault) for fault in channel_faults(training)]
-    progress("estimating")
+    progress("estimating", 0.7)
     noise = repeatability(data)
     estimate, history = estimate_by(method, training, _joint_noise(noise), options)
     if isinstance(estimate, ConsistentEstimate):

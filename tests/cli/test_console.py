@@ -112,6 +112,7 @@ def test_names_are_printed_as_they_are_and_numbers_stand_below_each_other(capsys
 
 
 def test_nothing_of_the_progress_reaches_a_pipe(capfd: pytest.CaptureFixture[str]):
-    with progress() as tell:
-        tell("reading")
+    with progress() as work:
+        work("reading")
+        work.part(0.5, 1.0)("estimating", 0.5)
     assert capfd.readouterr() == ("", "")

@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.model_selection import rms_of
-from scara_ident.effects import CATALOGUE, Coefficient, Effect
+from scara_ident.effects import CATALOGUE, Coefficient, Effect, effects_named
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.periodic import TorqueRipple
@@ -154,8 +154,30 @@ def test_a_longer_delay_is_an_effect_and_is_corrected_in_what_is_held_out():
 
 
 def test_a_model_can_be_given_and_progress_is_told():
-    steps: list[str] = []
-    result = diagnose(ROBOT, complete(), exact_runs(), bands=BANDS, catalogue=(), progress=steps.append)
+    told: list[tuple[str, float]] = []
+    result = diagnose(
+        ROBOT, complete(), exact_runs(), bands=BANDS, catalogue=(), progress=lambda *step: told.append(step)
+    )
     assert result.before.model.name == "complete"
-    assert steps[-1] == "testing what is left"
-    assert all(steps)
+    assert [step for step, _ in told[-2:]] == [
+        "testing what is left", "comparing what was found with what else it could be",
+    ]  # fmt: skip
+    shares = [done for _, done in told]
+    assert shares == sorted(shares)
+    assert 0.0 <= shares[0] < shares[-1] < 1.0
+
+
+def test_no_share_of_the_work_is_smaller_than_one_before_where_a_search_is_repeated():
+    """Bands move, effects come in, and another band is chosen with them."""
+    told: list[tuple[str, float]] = []
+    diagnose(
+        ROBOT,
+        "complete",
+        virtual_runs("torque_ripple:joint1:order=2,amplitude=0.15"),
+        catalogue=effects_named("torque_ripple", "spring"),
+        progress=lambda *step: told.append(step),
+    )
+    shares = [done for _, done in told]
+    assert shares == sorted(shares)
+    assert shares[-1] <= 1.0
+    assert sum(step.startswith("trying") for step, _ in told) > 1

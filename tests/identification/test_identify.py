@@ -228,9 +228,10 @@ def test_what_the_audits_found_is_noted(robot: Robot, clean: Recording):
 
 
 def test_progress_names_the_steps(robot: Robot, clean: Recording):
-    steps: list[str] = []
-    identify(robot, [clean], progress=steps.append)
-    assert steps == ["choosing the bands", "absorbing the recordings", "estimating"]
+    told: list[tuple[str, float]] = []
+    identify(robot, [clean], progress=lambda step, done: told.append((step, done)))
+    assert [step for step, _ in told] == ["choosing the bands", "absorbing the recordings", "estimating"]
+    assert 0.0 == told[0][1] < told[1][1] < told[2][1] < 1.0
 
 
 def test_a_recording_cannot_be_fitted_and_held_out(robot: Robot, clean: Recording, tmp_path: Path):
