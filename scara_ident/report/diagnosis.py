@@ -17,6 +17,9 @@ from scara_ident.estimation.observations import Observations
 from scara_ident.model.terms.friction import Friction
 from scara_ident.robot.rotors import GUESS_FACTOR
 
+# An uncertainty below this factor is told as a standard deviation.
+NEAR = 1.3
+
 
 def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the content of ``diagnosis.json``."""
@@ -149,10 +152,10 @@ def _of_rotor(rotor: RotorInertia, diagnosis: Diagnosis) -> str:
     unit = _armature_unit(rotor, diagnosis)
     guess = f"guessed at {rotor.nominal:.2g} {unit} at the joint from the size of its motor"
     if rotor.told and rotor.factor is not None:
-        return (
-            f"The rotor inertia of {rotor.joint} is not stated: {guess}, and found to be {rotor.armature:.3g} {unit} "
-            f"within a factor of {rotor.factor:.2g}."
-        )
+        near = f"{rotor.armature:.3g} ± {rotor.armature * np.log(rotor.factor):.1g} {unit}"
+        far = f"{rotor.armature:.2g} {unit} within a factor of {rotor.factor:.2g}"
+        found = near if rotor.factor < NEAR else far
+        return f"The rotor inertia of {rotor.joint} is not stated: {guess}, and found to be {found}."
     return (
         f"The rotor inertia of {rotor.joint} is not stated and hardly shows: {guess}, which may err by a factor of "
         f"{GUESS_FACTOR:g}; what depends on it is as unsure as its ± says. State rotor_inertia."

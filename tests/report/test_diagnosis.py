@@ -144,19 +144,22 @@ def test_a_straight_friction_law_that_leaves_a_curve_is_told_what_to_try():
 
 
 def test_the_rotor_that_a_result_rests_on_is_told_where_nobody_stated_it(result):
-    told = RotorInertia("joint1", 4.1, 1.2, False, 2.4, True)
+    told = RotorInertia("joint1", 4.1, 1.02, False, 2.4, True)
+    roughly = RotorInertia("joint1", 4.1, 1.5, False, 2.4, True)
     guessed = RotorInertia("joint2", 2.0, 2.9, False, 2.4, False)
     stated = RotorInertia("joint2", 4.0, 1.2, True, 4.0, False)
     by_model = RotorInertia("joint2", 4.0, None, False, 2.4, True)
-    words = sentences(replace(result, rotors=(told, guessed, stated, by_model)))
+    words = sentences(replace(result, rotors=(told, roughly, guessed, stated, by_model)))
     assert [item for item in words if "rotor" in item] == [
         "The rotor inertia of joint1 is not stated: guessed at 2.4 kg m^2 at the joint from the size of its motor, and "
-        "found to be 4.1 kg m^2 within a factor of 1.2.",
+        "found to be 4.1 ± 0.08 kg m^2.",
+        "The rotor inertia of joint1 is not stated: guessed at 2.4 kg m^2 at the joint from the size of its motor, and "
+        "found to be 4.1 kg m^2 within a factor of 1.5.",
         "The rotor inertia of joint2 is not stated and hardly shows: guessed at 2.4 kg m^2 at the joint from the size of "
         "its motor, which may err by a factor of 3; what depends on it is as unsure as its ± says. State rotor_inertia.",
     ]
     (entry,) = diagnosis_dict(replace(result, rotors=(told,)))["rotors"]
     assert entry == {
-        "joint": "joint1", "armature": 4.1, "factor": 1.2, "unit": "kg m^2", "nominal": 2.4, "stated": False, "told": True,
+        "joint": "joint1", "armature": 4.1, "factor": 1.02, "unit": "kg m^2", "nominal": 2.4, "stated": False, "told": True,
     }  # fmt: skip
     assert diagnosis_dict(result)["rotors"] == []
