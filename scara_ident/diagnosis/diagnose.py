@@ -19,6 +19,7 @@ from scara_ident.diagnosis.screening import Dependence
 from scara_ident.diagnosis.search import Search, SearchTask, corrected
 from scara_ident.diagnosis.selection_step import SelectionStep, observed_at_every_sample
 from scara_ident.diagnosis.tentative import TentativeEffect, tentative_effects
+from scara_ident.diagnosis.work import searching
 from scara_ident.effects import Effect, Parameter
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.catalogue import available_effects
@@ -174,6 +175,7 @@ def diagnose(
     RecordingError
         If a recording cannot be used, or its channels are not what the mapping says (see `channel_faults`).
     """
+    work = Work(progress)
     check_held_out(recordings, validation)
     if bands is not None:
         check_bands(robot, bands, (*recordings, *validation))
@@ -182,7 +184,7 @@ def diagnose(
     notes = data_notes((*data.recordings, *held_out.recordings))
     given, known = bands is not None, None
     if bands is None:
-        progress("choosing the band", 0.0)
+        work("choosing the band")
         choice = choose_bands(base, data)
         # A joint whose model lacks something seems to have less band than it has.
         bands, known = (max(choice.bands),) * robot.n, choice.observations
@@ -192,9 +194,9 @@ def diagnose(
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))
     families = available_effects() if catalogue is None else tuple(catalogue)
-    task = SearchTask(base, families, criteria, Work(progress).part(0.0 if given else 0.12, 0.85))
+    task = SearchTask(base, families, criteria, searching(work, band_given=given))
     outcome = select_model(task, observations, free=not given)
-    progress("comparing what was found with what else it could be", 0.85)
+    work("comparing what was found with what else it could be", task.progress.stop)
     found, after = outcome.search, outcome.after
     step = replace(found.step, weights=after.weights)
     validation_before = observe(base, held_out.at(found.bands))

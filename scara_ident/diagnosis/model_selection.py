@@ -14,14 +14,12 @@ from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
 from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, SearchTask, search
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
+from scara_ident.diagnosis.work import first, next_of, tested
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.motion.prepared import PreparedData
-
-# Share of the work that the first search takes where no other follows, and of that the search without its tests.
-FIRST_SHARE, SEARCH_SHARE = 0.8, 0.85
 
 
 @dataclass(frozen=True)
@@ -92,13 +90,12 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
     criteria = task.criteria
     data = observations.data
     columns = CandidateColumns(observations)
-    # Further searches are rare; each has half of what is left.
-    now, left = _halves(task, FIRST_SHARE)
-    found = _searched(now, columns, ())
+    now, left = first(task.progress)
+    found = _searched(replace(task, progress=now), columns, ())
     for _ in range(criteria.most_widenings if free else 0):
         if not found.search.chosen:
             break
-        left.progress("choosing the band again")
+        left("choosing the band again")
         choice = choose_bands(found.search.model, found.search.data)
         wider = max(choice.bands)
         if wider < criteria.wider * _band(found):
@@ -108,23 +105,18 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
         known = choice.observations if found.search.correction is None else None
         known = None if known is None else known.leading(task.model)
         columns = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands)), known))
-        now, left = _halves(left)
-        found = _searched(now, columns, ())
+        now, left = next_of(left)
+        found = _searched(replace(task, progress=now), columns, ())
     if free and (found.unexplained is not None or not _below_resonance(found, criteria)):
-        now, left = _halves(left)
-        columns, found = _narrowed(now, data, columns, found)
-    return _without_proxies(left, columns, found)
-
-
-def _halves(task: SearchTask, share: float = 0.5) -> tuple[SearchTask, SearchTask]:
-    """Return the task with a share of the work that is left, and with the rest of it."""
-    first, rest = task.progress.part(0.0, share), task.progress.part(share, 1.0)
-    return replace(task, progress=first), replace(task, progress=rest)
+        now, left = next_of(left)
+        columns, found = _narrowed(replace(task, progress=now), data, columns, found)
+    return _without_proxies(replace(task, progress=left), columns, found)
 
 
 def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[str]) -> Outcome:
-    found = search(replace(task, progress=task.progress.part(0.0, SEARCH_SHARE)), columns, without=without)
-    task.progress("testing what is left", SEARCH_SHARE)
+    now, tests = tested(task.progress)
+    found = search(replace(task, progress=now), columns, without=without)
+    tests("testing what is left")
     training = observed_at_every_sample(found.step)
     after = wls(training)
     before, left = found.uncorrected.residuals(found.start.value), training.residuals(after.value)
@@ -180,13 +172,14 @@ def _narrowed(
     band = _band(wide)
     if not resonant or not np.isfinite(band):
         return columns, wide
+    left = task.progress
     for share in task.criteria.narrower:
         narrow = CandidateColumns(observe(task.model, data.at((share * band,) * len(data.bands))))
-        trial, task = _halves(task)
-        if not search(replace(trial, catalogue=resonant), narrow).chosen:
+        now, left = next_of(left)
+        if not search(replace(task, catalogue=resonant, progress=now), narrow).chosen:
             continue
-        again, task = _halves(task)
-        found = _searched(again, narrow, ())
+        now, left = next_of(left)
+        found = _searched(replace(task, progress=now), narrow, ())
         if found.unexplained is None and _resonances(found.search) and _below_resonance(found, task.criteria):
             return narrow, found
     return columns, wide
@@ -195,13 +188,14 @@ def _narrowed(
 def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome) -> Outcome:
     """Search again without effects that stand for one that is not in the catalogue."""
     demoted: dict[str, str] = {}
+    left = task.progress
     for _ in range(task.criteria.most_demotions):
         proxies = _proxies(found, task.criteria)
         if not proxies:
             break
         demoted |= proxies
-        again, task = _halves(task)
-        found = _searched(again, columns, tuple(demoted))
+        now, left = next_of(left)
+        found = _searched(replace(task, progress=now), columns, tuple(demoted))
     return replace(found, demoted=tuple(demoted.values()))
 
 

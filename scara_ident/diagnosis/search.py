@@ -17,6 +17,7 @@ from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, model_with, observed
 from scara_ident.diagnosis.variation_check import variation_objection
+from scara_ident.diagnosis.work import after_rounds
 from scara_ident.effects import Effect, Scene
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.effects.links import guessed_armatures
@@ -28,9 +29,6 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import HIGHEST_CUT
 from scara_ident.motion.prepared import PreparedData
 from scara_ident.progress import Work
-
-# Share of a search that making all candidates' columns takes.
-COLUMNS_SHARE = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,8 +184,7 @@ def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[s
     rounds = 0
     while True:
         words = f"trying {len(candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else "")
-        # How many rounds follow is not known: each has a third of what is left.
-        task.progress(words, 1.0 - (1.0 - COLUMNS_SHARE) * (2.0 / 3.0) ** rounds)
+        task.progress(words, after_rounds(rounds))
         rounds += 1
         columns.forget_all_but(first, scene)
         step = SelectionStep(scene, columns, chosen, weights, tried, criteria)
