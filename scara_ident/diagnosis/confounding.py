@@ -22,9 +22,9 @@ class Confounder:
     label, effect : str
     joint : str or None
     gain : float
-        Share of its joint's squared residual that it removes in the place of the effect found; see `gains`.
+        Of it in the place of the effect found; see `gains`.
     found_gain : float
-        What the effect found removes of its own joint's.
+        Of the effect found.
     """
 
     label: str

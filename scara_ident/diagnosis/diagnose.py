@@ -56,7 +56,7 @@ class FoundEffect:
     p_value : float
         Corrected for the candidates tried.
     gain : float
-        Share of its joint's squared residual removed on data that it was not fitted to; of all joints' where it has none.
+        What it removes on data that it was not fitted to, as a share of that and what it leaves on its joint.
     votes : tuple of (int, int)
         Trajectories in which it helps, of those that excite it.
     before, after : mapping of str to float or None

@@ -14,7 +14,7 @@ from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
 from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, SearchTask, search
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
-from scara_ident.diagnosis.work import first, next_of, tested
+from scara_ident.diagnosis.work import first, next_of, search_and_rest
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.observations import Observations, observe
@@ -114,7 +114,7 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
 
 
 def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[str]) -> Outcome:
-    now, tests = tested(task.progress)
+    now, tests = search_and_rest(task.progress)
     found = search(replace(task, progress=now), columns, without=without)
     tests("testing what is left")
     training = observed_at_every_sample(found.step)

@@ -31,7 +31,7 @@ def next_of(work: Work) -> tuple[Work, Work]:
     return work.part(0.0, 0.5), work.part(0.5, 1.0)
 
 
-def tested(work: Work) -> tuple[Work, Work]:
+def search_and_rest(work: Work) -> tuple[Work, Work]:
     """Return the part of a search, and that of the tests of what it leaves."""
     return work.part(0.0, _SEARCH), work.part(_SEARCH, 1.0)
 
