@@ -73,7 +73,13 @@ def measured(data: Path) -> dict[str, tuple[list[str], list[str]]]:
 def cases(folder: Path) -> dict[str, list[str]]:
     """Return the arguments of every folder that has recordings to fit and to hold out."""
     found = sorted(path for path in folder.iterdir() if (path / "train").is_dir())
-    return {path.name: [str(path / "train"), *held_out([path / "test"])] for path in found}
+    return {path.name: [str(path / "train"), *held_out([path / "test"]), *_description(path)] for path in found}
+
+
+def _description(folder: Path) -> list[str]:
+    """Return the option that names the robot, where the folder describes one."""
+    path = folder / "robot.yaml"
+    return ["--robot", str(path)] if path.exists() else []
 
 
 def _but(folder: Path, names: Sequence[str]) -> list[list[Path]]:

@@ -148,9 +148,12 @@ def points(robot: Robot, limits, speed: Array, acceleration: Array, duration: fl
         lasts.append(needed)
         at += needed + rng.uniform(0.0, 0.5)
 
+    # Slower by as much as the last stroke leaves of the time.
+    slower = 1.0 if not begins else max(1.0, duration / (begins[-1] + lasts[-1]))
+
     def motion(t: Array) -> Signals:
         q, v, a = np.repeat(poses[0][:, None], len(t), axis=1), np.zeros((robot.n, len(t))), np.zeros((robot.n, len(t)))
-        for k, (begin, last) in enumerate(zip(begins, lasts, strict=True)):
+        for k, (begin, last) in enumerate((slower * x, slower * y) for x, y in zip(begins, lasts, strict=True)):
             way = (poses[k + 1] - poses[k])[:, None]
             s, ds, dds = _rise((t - begin) / last)
             q, v, a = q + way * s, v + way * ds / last, a + way * dds / last**2

@@ -80,6 +80,11 @@ class ReferenceMotion:
         acceleration = (2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / (h * h)
         return replace(self, time=time, position=position, velocity=velocity, acceleration=acceleration)
 
+    def every(self, ticks: int) -> ReferenceMotion:
+        """Return each ``ticks``-th sample, from the first."""
+        signals = (np.ascontiguousarray(x[:, ::ticks]) for x in (self.position, self.velocity, self.acceleration))
+        return ReferenceMotion(self.name, self.joints, self.time[::ticks].copy(), *signals)
+
     def held(self, before: float, after: float, rate: float = 1000.0) -> ReferenceMotion:
         """Return the motion with the arm at its first position before it and at its last after it, s."""
         lead, tail = round(before * rate), round(after * rate)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import TypeVar
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -56,6 +55,10 @@ class TrueMotion:
     effort: Array
     load: Array
     direction: Array
+
+    def every(self, ticks: int) -> TrueMotion:
+        """Return each ``ticks``-th sample, from the first."""
+        return TrueMotion(*(np.ascontiguousarray(getattr(self, field.name)[:, ::ticks]) for field in fields(self)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +182,7 @@ def simulate(
     effort = _recorded_effort(arm, draft, true, 1.0 / control, ticks if averaged else 1)[:, ::ticks]
     effort = effort + arm.torque_noise[:, None] * noise.draw(random, effort.shape, rate)
     if ticks > 1:
-        wanted, true = (_every(item, ticks) for item in (wanted, true))
+        wanted, true = wanted.every(ticks), true.every(ticks)
     recording = Recording(
         name=f"{motion.name}_{repetition}",
         trajectory=motion.name,
@@ -247,15 +250,6 @@ def _draft(arm: VirtualArm, effects: Sequence[Effect]) -> PlantDraft:
     for effect in effects:
         effect.apply(arm, draft)
     return draft
-
-
-T = TypeVar("T", ReferenceMotion, TrueMotion)
-
-
-def _every(motion: T, ticks: int) -> T:
-    """Return each ``ticks``-th sample of all signals."""
-    signals = [field.name for field in fields(motion) if field.name not in ("name", "joints")]
-    return replace(motion, **{name: np.ascontiguousarray(getattr(motion, name)[..., ::ticks]) for name in signals})
 
 
 def _at_rate(arm: VirtualArm, motion: ReferenceMotion, rate: float) -> ReferenceMotion:

@@ -1,0 +1,94 @@
+"""Random sets of recordings: the same for the same seed, within limits, and under the conditions that are asked for."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from scara_ident.recording.recording import read_recordings
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import virtual_arm
+
+BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
+
+
+@pytest.fixture
+def sets(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    return pytest.importorskip("virtual_sets", reason="benchmarks are not part of an installed package")
+
+
+def small(sets: ModuleType, **asked: object) -> object:
+    return sets.Asked(**{"rate": 250.0, "recordings": 2, "motions": 1, "duration": (5.0, 5.5), **asked})
+
+
+@pytest.mark.parametrize("kind", ["fourier", "points", "sweep"])
+@pytest.mark.parametrize("name", ["ur5", "panda", "scara03"])
+def test_motions_keep_all_limits_and_are_their_own_derivatives(sets: ModuleType, kind: str, name: str) -> None:
+    import virtual_motions
+
+    arm = virtual_arm(None if name == "scara03" else load_robot(name))
+    robot = arm.robot
+    motion = virtual_motions.random_motion("M", arm, kind, 8.0, np.random.default_rng(4))
+    assert np.all(motion.position >= robot.lower[:, None])
+    assert np.all(motion.position <= robot.upper[:, None])
+    assert np.all(np.abs(motion.velocity) <= robot.velocity_limit[:, None])
+    assert np.all(np.ptp(motion.position, axis=1) > 0.03 * np.minimum(robot.upper - robot.lower, 3.0))
+    for ends in (motion.velocity[:, [0, -1]], motion.acceleration[:, [0, -1]]):
+        np.testing.assert_allclose(ends, 0.0, atol=1e-9)
+    # Trapezoidal sums: their error is h^2 / 12 times the range of what comes next.
+    for value, slope in ((motion.position, motion.velocity), (motion.velocity, motion.acceleration)):
+        step = np.diff(motion.time) * 0.5 * (slope[:, 1:] + slope[:, :-1])
+        np.testing.assert_allclose(value[:, 1:] - value[:, :1], np.cumsum(step, axis=1), atol=2e-4)
+
+
+def test_a_set_is_the_same_for_the_same_seed_and_is_read_as_it_was_made(sets: ModuleType, tmp_path: Path) -> None:
+    asked = small(sets, varied=True)
+    one, same = (sets.simulate_set("pair", 17, "ur5", tmp_path / name, asked) for name in ("one", "same"))
+    other = sets.simulate_set("pair", 18, "ur5", tmp_path / "other", asked)
+    assert one.truth() == same.truth()
+    np.testing.assert_array_equal(one.training[0].effort, same.training[0].effort)
+    assert one.truth()["effects"] != other.truth()["effects"]
+    sets.write_set(one, tmp_path / "one")
+    described = tmp_path / "one" / "robot.yaml"
+    robot = load_robot(described)
+    read = read_recordings([tmp_path / "one" / "train"], robot)
+    assert [item.name for item in read] == sorted(item.name for item in one.training)
+    np.testing.assert_allclose(read[0].effort, one.training[0].effort, atol=1e-9)
+    told = json.loads((tmp_path / "one" / "truth.json").read_text(encoding="utf-8"))
+    assert [run["recording"] for run in told["runs"]] == [item.name for item in (*one.training, *one.held_out)]
+
+
+def test_what_is_asked_for_leaves_the_other_draws_as_they_are(sets: ModuleType, tmp_path: Path) -> None:
+    drawn = sets.simulate_set("none", 5, "scara03", tmp_path, small(sets, bits=20))
+    coarse = sets.simulate_set("none", 5, "scara03", tmp_path, small(sets, bits=17))
+    for name in ("bodies", "rotor_inertia", "friction"):
+        np.testing.assert_array_equal(getattr(drawn.arm, name), getattr(coarse.arm, name))
+    assert replace(drawn.conditions, bits=17) == coarse.conditions
+    np.testing.assert_allclose(drawn.arm.encoder_resolution, 2 * np.pi / 2**20)
+    np.testing.assert_allclose(coarse.arm.encoder_resolution, 2 * np.pi / 2**17)
+
+
+def test_a_stated_rotor_is_the_arms_and_one_that_is_not_is_unknown(sets: ModuleType, tmp_path: Path) -> None:
+    stated = sets.simulate_set("none", 5, "panda", tmp_path / "a", small(sets, stated=True, recordings=1))
+    silent = sets.simulate_set("none", 5, "panda", tmp_path / "b", small(sets, stated=False, recordings=1))
+    np.testing.assert_array_equal(stated.robot.rotor_inertia, stated.arm.rotor_inertia)
+    assert np.all(silent.robot.rotor_inertia == 0.0)
+    assert stated.robot.joints == silent.robot.joints == tuple(f"panda_joint{k}" for k in range(1, 8))
+    np.testing.assert_array_equal(silent.robot.reduction, 1.0)
+
+
+def test_runs_differ_only_where_they_are_said_to(sets: ModuleType, tmp_path: Path) -> None:
+    varied = sets.simulate_set("none", 5, "scara03", tmp_path, small(sets, varied=True)).truth()
+    steady = sets.simulate_set("none", 5, "scara03", tmp_path, small(sets, varied=False)).truth()
+    assert all(run["friction"] == [1.0, 1.0] and run["delay"] == 0.0 for run in steady["runs"])
+    size = varied["conditions"]["variation"]
+    for run in varied["runs"]:
+        assert np.all(np.abs(np.array(run["friction"]) - 1.0) <= size["friction"])
+        assert np.all(np.abs(np.array(run["torque_scale"]) - 1.0) <= size["scale"])
+        assert 0.0 <= run["delay"] <= size["delay"]
