@@ -84,7 +84,7 @@ def compare(
     recordings: Sequence[Recording],
     *,
     model: str | TorqueModel = "complete",
-    method: str = "ols",
+    method: str = "wls",
     bands: Sequence[float | None] | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Comparison:
