@@ -38,7 +38,7 @@ def one_set(task: tuple[str, int]) -> dict:
     made = simulate_set(kind, seed)
     robot, effects, training, held_out = made.arm.robot, made.effects, made.training, made.held_out
     began = time.perf_counter()
-    result = diagnose(robot, "complete", training, held_out)
+    result = diagnose(robot, training, validation=held_out)
     seconds = time.perf_counter() - began
     before = [error.rms for error in joint_errors(result.before.value, result.validation_before)]
     after = [error.rms for error in joint_errors(result.after.value, result.validation_after)]

@@ -127,10 +127,10 @@ class Diagnosis:
 
 def diagnose(
     robot: Robot,
-    model: str | TorqueModel,
     recordings: Sequence[Recording],
-    validation: Sequence[Recording] = (),
     *,
+    model: str | TorqueModel = "complete",
+    validation: Sequence[Recording] = (),
     bands: Sequence[float | None] | None = None,
     catalogue: Sequence[Effect] | None = None,
     criteria: SelectionCriteria = CRITERIA,
@@ -141,10 +141,10 @@ def diagnose(
     Parameters
     ----------
     robot : Robot
-    model : str or TorqueModel
-        The base model.
     recordings : sequence of Recording
         Every choice is made on these.
+    model : str or TorqueModel, optional
+        The base model, as in `identify`.
     validation : sequence of Recording, optional
         Recordings that no choice sees; they are only predicted, before and after.
     bands : sequence of float or None, one per joint, optional

@@ -91,7 +91,7 @@ def test_diagnose_refuses_and_identify_says_it(recordings: tuple[Recording, ...]
     wrong = [turned(item, effort=(1,)) for item in recordings]
     robot = virtual_arm().robot
     with pytest.raises(RecordingError, match=r"negate effort_gain of joint2 in robot\.yaml") as caught:
-        diagnose(robot, "complete", wrong)
+        diagnose(robot, wrong)
     assert "\n" not in str(caught.value)
     notes = identify(robot, wrong).notes
     assert any("opposite sign" in note for note in notes)
