@@ -15,7 +15,8 @@ with the q independent rows of A (Perlman 1969, "One-sided testing problems in m
 1986, "Wald criteria for jointly testing equality and inequality restrictions"). T_q is Hotelling's statistic, as V is
 itself estimated, with as many degrees of freedom as blocks that share in these parameters: the inverse sum of squares of
 their shares, less one (as in Carter, Schnepel, Steigerwald 2017, "Asymptotic behavior of a t-test robust to cluster
-heterogeneity").
+heterogeneity"). Runs of one trajectory repeat what the model lacks, so that blocks at the same place of such runs count as
+one, and the covariance grows where what they leave adds up.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.consistent.friction import LUBRICATED
@@ -118,8 +120,9 @@ def lubricated_p_value(polynomial: BrakingPolynomial, observations: Observations
     statistic = distance_to_cone(rows, value, covariance)
     if statistic == 0.0:
         return 1.0
+    shares = block_shares(observations, plain, columns)
+    statistic, blocks = statistic / shares.repetition, shares.effective
     count = int(np.linalg.matrix_rank(rows))
-    blocks = effective_blocks(observations, plain, columns)
     p_value = 0.0
     for size in (count - 1, count):
         freedom = blocks - size
@@ -158,17 +161,52 @@ def distance_to_cone(rows: Array, value: Array, covariance: Array) -> float:
     return float(np.sum((half @ multipliers) ** 2))
 
 
-def effective_blocks(observations: Observations, plain: Estimate, columns: Sequence[int]) -> float:
-    """Return how many blocks of time share in what is known of some parameters: the inverse sum of their squared shares."""
+@dataclass(frozen=True, eq=False)
+class BlockShares:
+    """What each block of time has to do with some parameters, those at the same place of a trajectory's runs together.
+
+    Attributes
+    ----------
+    effective : float
+        How many of them share in what is known: the inverse sum of their squared shares.
+    repetition : float
+        By how much the covariance grows where runs of one trajectory repeat what they leave, as they do where the model
+        lacks something: scatter of the scores with repetitions added up over that without, at least 1.
+    """
+
+    effective: float
+    repetition: float
+
+
+def block_shares(observations: Observations, plain: Estimate, columns: Sequence[int]) -> BlockShares:
+    """Return what the blocks of time have to do with some parameters of an estimate."""
     places = list(columns)
     inverse = plain.information.inverse()[places]
     size = np.sqrt(np.diag(inverse[:, places]))
     inverse = inverse / np.where(size > 0.0, size, 1.0)[:, None]
     shares = np.zeros((observations.blocks, len(places), len(places)))
+    scores = np.zeros((observations.blocks, len(places)))
     for rows, weight in zip(observations.joints, plain.weights, strict=True):
         influence = weight * (inverse[:, rows.columns] @ rows.table[:-1])
+        residual = weight * (rows.table[-1] - plain.value[rows.columns] @ rows.table[:-1])
         for b, (start, stop) in enumerate(pairwise(rows.starts)):
             shares[b] += influence[:, start:stop] @ influence[:, start:stop].T
-    part = np.einsum("ij,bji->b", np.linalg.pinv(np.sum(shares, axis=0), hermitian=True), shares)
+            scores[b] += influence[:, start:stop] @ residual[start:stop]
+    metric = np.linalg.pinv(np.sum(shares, axis=0), hermitian=True)
+    group = _same_place(observations)
+    part = np.bincount(group, np.einsum("ij,bji->b", metric, shares))
+    together = np.zeros((len(part), len(places)))
+    np.add.at(together, group, scores)
+    one, added = (float(np.einsum("bi,ij,bj->", each, metric, each)) for each in (scores, together))
     total = float(np.sum(part))
-    return total**2 / float(np.sum(part**2)) if total > 0.0 else 0.0
+    effective = total**2 / float(np.sum(part**2)) if total > 0.0 else 0.0
+    return BlockShares(effective, max(1.0, added / one) if one > 0.0 else 1.0)
+
+
+def _same_place(observations: Observations) -> NDArray[np.intp]:
+    """Return a number for each block, the same for blocks at the same place of runs of one trajectory."""
+    owner = observations.owner
+    place = np.arange(len(owner)) - np.searchsorted(owner, owner)
+    names = [item.trajectory for item in observations.data.recordings]
+    run = np.array([names.index(name) for name in names] or range(len(owner)), dtype=np.intp)[owner]
+    return np.unique(np.column_stack([run, place]), axis=0, return_inverse=True)[1].ravel()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,12 +13,12 @@ from scara_ident.estimation.consistent.problem import declared
 from scara_ident.estimation.consistent.shape import (
     LEVEL,
     ShapeChoice,
+    block_shares,
     choose_shapes,
     distance_to_cone,
-    effective_blocks,
     lubricated_p_value,
 )
-from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.observations import JointRows, Observations
 from tests.arms import motion
 from tests.estimation.consistent.arms import moving, observed, scara, stroke, truth
 
@@ -56,11 +57,38 @@ def test_what_is_not_known_contradicts_nothing():
 def test_blocks_count_by_their_share():
     item = observed(MODEL, moving(MODEL.robot, count=4000), truth(MODEL), 0.05)
     plain = wls(item)
-    whole = effective_blocks(item, plain, FIRST.columns)
+    whole = block_shares(item, plain, FIRST.columns).effective
     assert 4.0 < whole < item.blocks == 20
     # A block that moves ten times as fast as the others decides alone.
     single = replace(item, joints=tuple(rows.faded(np.append(1e4, np.ones(19))) for rows in item.joints))
-    assert effective_blocks(single, wls(single), FIRST.columns) < 2.0 < whole
+    assert block_shares(single, wls(single), FIRST.columns).effective < 2.0 < whole
+
+
+def runs(*items: Observations, names: tuple[str, ...]) -> Observations:
+    """Runs of some trajectories as if observed together."""
+    joints = []
+    for rows in zip(*(item.joints for item in items), strict=True):
+        ends = np.cumsum([0, *(part.starts[-1] for part in rows)])
+        starts = [part.starts[:-1] + end for part, end in zip(rows, ends[:-1], strict=True)]
+        table = np.concatenate([part.table for part in rows], axis=1)
+        counts = np.concatenate([part.counts for part in rows])
+        joints.append(JointRows(rows[0].columns, table, np.concatenate([*starts, ends[-1:]]), counts))
+    owner = np.repeat(np.arange(len(items)), items[0].blocks)
+    data = SimpleNamespace(recordings=[SimpleNamespace(trajectory=name) for name in names])
+    return replace(items[0], joints=tuple(joints), owner=owner, data=data)
+
+
+def test_runs_that_repeat_what_they_leave_count_once():
+    moved = moving(MODEL.robot)
+    again = runs(*[observed(MODEL, moved, truth(MODEL), 0.05, seed=1)] * 4, names=("A",) * 4)
+    noisy = runs(*(observed(MODEL, moved, truth(MODEL), 0.05, seed) for seed in range(4)), names=("A",) * 4)
+    other = replace(again, data=runs(*[again] * 4, names=("A", "B", "C", "D")).data)
+    same, fresh, apart = (block_shares(item, wls(item), FIRST.columns) for item in (again, noisy, other))
+    # Four runs with the same residuals know no more than one.
+    assert same.repetition == pytest.approx(4.0)
+    assert fresh.repetition < 2.0
+    assert apart.repetition == 1.0
+    assert apart.effective == pytest.approx(4.0 * same.effective)
 
 
 def test_true_shapes_are_seldom_contradicted():
