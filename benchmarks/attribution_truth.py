@@ -87,7 +87,7 @@ def _diagnosed(made: VirtualSet, limit: int) -> tuple[Diagnosis | None, str, str
     signal.signal(signal.SIGALRM, give_up)
     signal.alarm(limit)
     try:
-        result = diagnose(made.robot, "complete", made.training, made.held_out)
+        result = diagnose(made.robot, made.training, validation=made.held_out)
         return result, result.verdict, ""
     except OutOfTimeError:
         return None, "out of time", f"more than {limit} s"

@@ -1,8 +1,8 @@
 """Physical consistency: how often estimates are impossible, and what it costs and buys to keep them possible.
 
 Random arms that can exist, excited richly, less and less, and at last by a single slow stroke, with noise from none
-to 30 % of each joint's torque. Ordinary least squares and the consistent estimate see the same rows; both predict the
-torque of another, rich trajectory. Then the same problem is given with all rows instead of their triangular factor.
+to 30 % of each joint's torque. Ordinary least squares and the consistent estimate (joints weighted by their residual,
+friction that takes energy out) see the same rows; both predict the torque of another, rich trajectory. Then the same problem is given with all rows instead of their triangular factor.
 Prints tables and writes JSON.
 
     python benchmarks/consistency.py --draws 50 --output benchmarks/results/consistency.json
@@ -172,7 +172,7 @@ def draw(name: str, excitation: str, noise: float, seed: int) -> Draw:
     shares = [smallest_eigenvalue_share(body) for body in standard[: 10 * u.n].reshape(u.n, 10)]
     braking = not any(friction_faults(p, estimate[list(p.columns)]) for p in u.polynomials)
     possible = least_squares_arm(solver, information) is not None
-    determined = ols.null.shape[1] == 0
+    determined, weighted = ols.null.shape[1] == 0, used.solve().value
     size = np.linalg.norm(u.to_parameters, axis=1)
     return Draw(
         ols_impossible=not possible,
@@ -182,7 +182,7 @@ def draw(name: str, excitation: str, noise: float, seed: int) -> Draw:
         consistent_parameters=rms((estimate - value)[u.place] / size[u.place]),
         ols_torque=torque_error(held_out, ols.value, clean),
         consistent_torque=torque_error(held_out, estimate, clean),
-        difference=largest_share(estimate - ols.value, ols.value) if possible and determined else None,
+        difference=largest_share(estimate - weighted, weighted) if found.was_possible and determined else None,
         ols_ms=1e3 * (middle - start),
         consistent_ms=1e3 * (end - middle),
         fill_ms=1e3 * (filled - end),
@@ -224,7 +224,7 @@ def summary(name: str, excitation: str, noise: float, draws: list[Draw]) -> dict
         "parameter_error": {"ols": median("ols_parameters"), "consistent": median("consistent_parameters")},
         "torque_error": {"ols": median("ols_torque"), "consistent": median("consistent_torque")},
         "torque_error_ratio": float(np.median(ratios)) if ratios else None,
-        "difference_where_ols_is_possible": max(differences, default=None),
+        "difference_where_wls_is_possible": max(differences, default=None),
         "milliseconds": {"ols": median("ols_ms"), "consistent": median("consistent_ms"), "fill": median("fill_ms")},
     }
 

@@ -90,7 +90,7 @@ def one_diagnosis(job: tuple[Path, tuple[str, int], str, float]) -> Item:
     criteria = NotedCriteria() if name == AS_IT_IS else replace(CRITERIA, **{name: scaled(name, factor)})
     NotedCriteria.read.clear()
     began = time.perf_counter()
-    result = diagnose(load_robot(), "complete", recordings, criteria=criteria)
+    result = diagnose(load_robot(), recordings, criteria=criteria)
     seconds = time.perf_counter() - began
     found = [
         {"effect": e.effect, "joint": e.joint, "group": [other.effect for other in e.confounded_with]}

@@ -8,7 +8,7 @@ The public names, loaded when they are used::
     recordings = read_recordings(["logs/*.parquet"], robot)
     result = identify(robot, recordings, method="consistent")
     export_urdf(result, "identified.urdf")
-    print(diagnose(robot, "complete", recordings).verdict)
+    print(diagnose(robot, recordings).verdict)
 """
 
 from __future__ import annotations

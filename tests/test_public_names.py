@@ -72,7 +72,7 @@ def test_the_whole_job_is_done_with_public_names(tmp_path: Path):
     assert len(found.estimate.value) == find_base_parameters(robot).count + 2 * 4 + 2
     table = compare(robot, recordings, bands=found.bands)
     assert isinstance(table, Comparison)
-    result = diagnose(robot, "complete", recordings, bands=[20.0, 20.0], catalogue=effects_named("spring"))
+    result = diagnose(robot, recordings, bands=[20.0, 20.0], catalogue=effects_named("spring"))
     assert isinstance(result, Diagnosis)
     design = design_excitation(found.model, duration=5.0, harmonics=3, effort=Effort(starts=1, rounds=1))
     assert isinstance(design, Design)

@@ -10,7 +10,7 @@ def compare(
     recordings: options.Recordings,
     robot: options.Robot = None,
     model: options.Model = "complete",
-    method: options.Method = "ols",
+    method: options.Method = "wls",
     output: options.Output = None,
     json: options.Json = False,
     verbose: options.Verbose = False,

@@ -55,9 +55,9 @@ def diagnose(
         held_out = read_recordings(validate, arm) if validate else ()
         result = run(
             arm,
-            model,
             training,
-            held_out,
+            model=model,
+            validation=held_out,
             bands=None if band is None else [band] * arm.n,
             catalogue=None if effects is None else effects_named(*_parted(effects)),
             progress=work.part(READING_SHARE, 1.0),

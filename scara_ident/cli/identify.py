@@ -23,11 +23,14 @@ def identify(
     recordings: options.Recordings,
     robot: options.Robot = None,
     model: options.Model = "complete",
-    method: options.Method = "ols",
+    method: options.Method = "wls",
     friction: Annotated[
-        Literal["dissipative", "lubricated", "free"],
-        typer.Option(help="Friction of the method consistent: takes energy out; also grows and flattens; anything."),
-    ] = "dissipative",
+        Literal["auto", "lubricated", "dissipative", "free"],
+        typer.Option(
+            help="Friction of the method consistent. lubricated: takes energy out, grows and flattens; dissipative: takes "
+            "energy out; free: anything; auto: lubricated where the data do not contradict it, else dissipative."
+        ),
+    ] = "auto",
     validate: options.Validate = None,
     band: options.Band = None,
     output: options.Output = None,

@@ -43,7 +43,8 @@ Method = Annotated[
         metavar="NAME",
         callback=ESTIMATORS.check,
         autocompletion=ESTIMATORS.names,
-        help="Estimator: {methods}; consistent: an arm that can exist.",
+        help="Estimator: {methods}. wls weighs each joint by its residual, ols not at all; consistent: an arm that can "
+        "exist, weighted.",
     ),
 ]
 Band = Annotated[

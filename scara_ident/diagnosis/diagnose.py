@@ -11,8 +11,8 @@ import numpy as np
 from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.confounding import Confounder, confounders
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
-from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
+from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.model_selection import Unexplained, rms_of, select_model
 from scara_ident.diagnosis.screening import Dependence
@@ -135,10 +135,10 @@ class Diagnosis:
 @one_blas_thread()
 def diagnose(
     robot: Robot,
-    model: str | TorqueModel,
     recordings: Sequence[Recording],
-    validation: Sequence[Recording] = (),
     *,
+    model: str | TorqueModel = "complete",
+    validation: Sequence[Recording] = (),
     bands: Sequence[float | None] | None = None,
     catalogue: Sequence[Effect] | None = None,
     criteria: SelectionCriteria = CRITERIA,
@@ -149,10 +149,10 @@ def diagnose(
     Parameters
     ----------
     robot : Robot
-    model : str or TorqueModel
-        The base model.
     recordings : sequence of Recording
         Every choice is made on these.
+    model : str or TorqueModel, optional
+        The base model, as in `identify`.
     validation : sequence of Recording, optional
         Recordings that no choice sees; they are only predicted, before and after.
     bands : sequence of float or None, one per joint, optional

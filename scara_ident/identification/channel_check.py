@@ -18,8 +18,14 @@ from scara_ident.motion.prepared import PreparedData, PreparedStretch
 
 Signal = Literal["effort", "position", "effort and position"]
 
-# Another mapping must leave at most this share of the error, geometric mean over the joints.
+# Another mapping must leave at most this share of the error on blocks that it was not fitted to, geometric mean over the
+# joints, and be better block by block at this level of significance.
 MENDED = 0.5
+LEVEL = 0.001
+# Rows per parameter of each joint below which a fit comes near interpolation, whatever the channels are.
+ENOUGH_ROWS = 3.0
+# Pieces of each recording, one of which is held out in turns.
+PIECES = 4
 # Joints whose error is above this share of their torque may be exchanged with another.
 POOR = 0.05
 # An axis turned round leaves more than this of some joint's torque.
@@ -29,6 +35,8 @@ BAD = 0.3
 # Friction that feeds in this share of a joint's power, and this many standard deviations, points to a sign.
 PUSHING = 0.02
 PUSHING_STD = 4.0
+# Residual that counts as none, as a share of the torque.
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -42,7 +50,8 @@ class ChannelFault:
         Those whose sign is opposite, or the two that are exchanged.
     exchanged : bool
     error, mended : float
-        Rms of what is left as a share of the torque, geometric mean over the joints, as mapped and as it should be.
+        Rms of what is left as a share of the torque, geometric mean over the joints, on blocks of time that the
+        parameters were not fitted to, as mapped and as it should be.
     """
 
     signal: Signal
@@ -78,7 +87,9 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     """Find efforts and positions of opposite sign, and those of two joints that are exchanged.
 
     A sign is suspected where friction would feed energy in, an exchange where two joints are hardly explained; only
-    then are other readings tried. One counts if it leaves at most half of the error and the friction brakes.
+    then are other readings tried. One counts if it leaves at most half of the error, on blocks of time that it was not
+    fitted to and significantly more often than not, and the friction brakes. Where rows are not several times as many
+    as parameters nothing is said: an interpolating fit is good or bad by chance.
 
     Parameters
     ----------
@@ -95,16 +106,21 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     held = observations.of(sorted(first.values()))
     model = observations.model
     joints = model.robot.joints
+    if any(0 < rows.table.shape[1] < ENOUGH_ROWS * len(rows.columns) for rows in held.joints):
+        return ()
     faults: list[ChannelFault] = []
     for _ in range(2 * len(joints)):
         fitted = weighted_value(held)
-        errors, score = _relative(fitted, held), _score(fitted, held)
-        pushing = _pushing(fitted, held)
+        errors, pushing = _relative(fitted, held), _pushing(fitted, held)
+        suspects = _suspects(errors, pushing)
+        if not suspects:
+            break
+        left, score = _held_out(held)
         best: tuple[ChannelFault, Observations] | None = None
-        for signal, chosen, exchanged in _suspects(errors, pushing):
+        for signal, chosen, exchanged in suspects:
             other = observe(model, _read_as(held.data, signal, chosen, exchanged))
-            mended = _score(weighted_value(other), other)
-            if mended >= (MENDED * score if best is None else best[0].mended):
+            then, mended = _held_out(other)
+            if mended >= (MENDED * score if best is None else best[0].mended) or not _better(left, then):
                 continue
             # A turned sign must take the push away; signs that an exchange brings to light are the next round's.
             allowed = np.count_nonzero(pushing) - (signal != "effort and position")
@@ -170,8 +186,49 @@ def _relative(value: Array, observations: Observations) -> Array:
     return np.array([part.rms(value) / max(part.torque_rms, tiny) for part in observations.by_joint])
 
 
-def _score(value: Array, observations: Observations) -> float:
-    return float(np.exp(np.mean(np.log(np.maximum(_relative(value, observations), 1e-12)))))
+def _held_out(observations: Observations) -> tuple[Array, float]:
+    """Predict each piece of the recordings from the others.
+
+    Returns
+    -------
+    left : ndarray, shape (blocks, n)
+        Rms residual of each block as a share of the joint's torque; NaN where a joint has no rows.
+    score : float
+        The same over all blocks, geometric mean over the joints.
+    """
+    owner = observations.owner
+    place = np.arange(len(owner)) - np.searchsorted(owner, owner)
+    piece = place * PIECES // np.bincount(owner)[owner]
+    squares = np.zeros((len(owner), len(observations.joints)))
+    for which in range(PIECES):
+        fitted = np.flatnonzero(piece != which)
+        parts = tuple(rows.part(fitted) for rows in observations.joints)
+        value = weighted_value(replace(observations, joints=parts, owner=owner[fitted]))
+        for j, rows in enumerate(observations.joints):
+            residual = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
+            total = np.concatenate([[0.0], np.cumsum(residual**2)])
+            squares[piece == which, j] = np.diff(total[rows.starts])[piece == which]
+    counts = np.array([rows.counts for rows in observations.joints]).T
+    torque = np.array([max(part.torque_rms, np.finfo(float).tiny) for part in observations.by_joint])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        left = np.sqrt(np.maximum(squares, 0.0) / counts) / torque
+        relative = np.sqrt(np.sum(squares, axis=0) / np.sum(counts, axis=0)) / torque
+    known = relative[np.isfinite(relative)]
+    return left, float(np.exp(np.mean(np.log(np.maximum(known, ROUNDING)))))
+
+
+def _better(left: Array, other: Array) -> bool:
+    """Whether other residuals are smaller block by block, by a t test of the logarithms of their ratios."""
+    from scipy.stats import t as t_distribution
+
+    both = np.isfinite(left) & np.isfinite(other)
+    ratios = np.where(both, np.log(np.maximum(other, ROUNDING)) - np.log(np.maximum(left, ROUNDING)), 0.0)
+    shared = np.sum(both, axis=1)
+    mean = np.sum(ratios, axis=1)[shared > 0] / shared[shared > 0]
+    if len(mean) < 2:
+        return False
+    spread = float(np.std(mean, ddof=1)) / np.sqrt(len(mean))
+    return bool(np.mean(mean) + t_distribution.ppf(1.0 - LEVEL, len(mean) - 1) * spread < 0.0)
 
 
 def _pushing(value: Array, observations: Observations) -> NDArray[np.bool_]:

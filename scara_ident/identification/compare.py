@@ -85,7 +85,7 @@ def compare(
     recordings: Sequence[Recording],
     *,
     model: str | TorqueModel = "complete",
-    method: str = "ols",
+    method: str = "wls",
     bands: Sequence[float | None] | None = None,
     progress: Tell = silent,
 ) -> Comparison:

@@ -13,7 +13,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.estimation import Estimate, History, JointError
 from scara_ident.estimation.bands import choose_bands
-from scara_ident.estimation.consistent.estimator import ConsistentEstimate, consistent, physical_consistency
+from scara_ident.estimation.consistent.estimator import ConsistentEstimate, physical_consistency, possible_arm
 from scara_ident.estimation.consistent.feasibility import PhysicalConsistency
 from scara_ident.estimation.consistent.options import ConsistentOptions
 from scara_ident.estimation.estimate import paper_criteria
@@ -85,7 +85,7 @@ def identify(
     recordings: Sequence[Recording],
     *,
     model: str | TorqueModel = "complete",
-    method: str = "ols",
+    method: str = "wls",
     validation: Sequence[Recording] = (),
     bands: Sequence[float | None] | None = None,
     options: ConsistentOptions | None = None,
@@ -101,8 +101,8 @@ def identify(
     model : str or TorqueModel, optional
         A name of `scara_ident.model.MODELS`: ``complete``, ``reduced``, ``basic`` or an installed package's.
     method : str, optional
-        A name of `scara_ident.identification.ESTIMATORS`: ``ols``, ``wls``, ``rls``, ``consistent`` or an installed
-        package's.
+        A name of `scara_ident.identification.ESTIMATORS`: ``wls`` (each joint weighted by its residual), ``ols`` (every
+        row counts the same, as in Indri et al. 2002), ``rls``, ``consistent`` or an installed package's.
     validation : sequence of Recording, optional
         Recordings that take no part in the fit nor in any choice.
     bands : sequence of float or None, one per joint, optional
@@ -145,7 +145,7 @@ def identify(
     notes += [str(fault) for fault in channel_faults(training)]
     progress("estimating", 0.7)
     noise = repeatability(data)
-    estimate, history = estimate_by(method, training, _joint_noise(noise), options)
+    estimate, history = estimate_by(method, training, options)
     if isinstance(estimate, ConsistentEstimate):
         notes += estimate.notes
     log_det, condition = paper_criteria(training)
@@ -155,14 +155,14 @@ def identify(
 def identified_arm(identification: Identification) -> ConsistentEstimate | None:
     """Return the estimate with all standard parameters of the links, None where no such arm is known to exist.
 
-    Where plain least squares belongs to an arm that can exist, that arm has its base parameters.
+    Where least squares belongs to an arm that can exist, that arm has its parameters.
     """
     estimate = identification.estimate
     if isinstance(estimate, ConsistentEstimate):
         return estimate
     if not identification.physical_consistency.possible:
         return None
-    return consistent(identification.training)
+    return possible_arm(identification.training, estimate)
 
 
 def known_information(model: TorqueModel, recordings: Sequence[Recording], rate: float) -> Information:
@@ -206,21 +206,13 @@ def check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequenc
 
 
 def estimate_by(
-    method: str, observations: Observations, noise: Array | None = None, options: ConsistentOptions | None = None
+    method: str, observations: Observations, options: ConsistentOptions | None = None
 ) -> tuple[Estimate, History | None]:
-    """Estimate by a method given by name; ``noise`` is each joint's, where repetitions tell it."""
+    """Estimate by a method given by name; the options are those of ``consistent``."""
     estimator = ESTIMATORS.get(method)
-    more: dict[str, dict[str, Any]] = {"consistent": {"options": options}, "wls": {"noise": noise}}
-    found = estimator(observations, **more.get(method, {}))
+    more: dict[str, Any] = {"options": options} if method == "consistent" else {}
+    found = estimator(observations, **more)
     return found if isinstance(found, tuple) else (found, None)
-
-
-def _joint_noise(noise: Mapping[str, Array]) -> Array | None:
-    """Pool the repeatability of all trajectories; None without repetitions."""
-    if not noise:
-        return None
-    sigma = np.sqrt(np.mean([value**2 for value in noise.values()], axis=0))
-    return sigma if np.all(sigma > 0.0) else None
 
 
 def check_held_out(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:

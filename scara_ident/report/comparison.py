@@ -117,4 +117,7 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, ...]:
         )
     else:
         found.append("No error exceeds twice what noise in the parameters explains.")
+    equal = all(np.ptp(summary.estimate.weights) == 0.0 for summary in comparison.trajectories)
+    weights = "every row of every joint counts the same" if equal else "each joint is weighted by its residual"
+    found.append(f"Estimated by {comparison.method}: {weights}.")
     return tuple(found)

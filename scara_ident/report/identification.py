@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from scara_ident.estimation import JointError
+import numpy as np
+
+from scara_ident.estimation import Estimate, JointError
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, links
+from scara_ident.estimation.consistent.shape import ShapeChoice
 from scara_ident.estimation.estimate import PAPER_SAMPLES
 from scara_ident.estimation.observations import Observations
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
 from scara_ident.robot.robot import Robot
+
+# What each shape of friction means.
+SHAPES = {
+    "lubricated": "takes energy out, and grows ever less with speed",
+    "dissipative": "takes energy out",
+    "free": "anything",
+}
 
 
 def identification_dict(identification: Identification) -> dict[str, Any]:
@@ -28,6 +38,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
             | {"undetermined": bool(estimate.undetermined[k])}
             for k, column in enumerate(identification.model.columns)
         ],
+        "weights": dict(zip(robot.joints, estimate.weights, strict=True)),
         "std_from": estimate.std_kind,
         "log_det": identification.log_det,
         "condition": identification.condition,
@@ -57,6 +68,10 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         ]
         content["armature"] = dict(zip(robot.joints, estimate.standard[10 * robot.n :], strict=True))
         content["held_by"] = list(estimate.active)
+        content["friction_shape"] = {
+            choice.joint: {"shape": choice.shape, "p_value": choice.p_value, "why": choice.why}
+            for choice in estimate.shapes
+        }
     return content
 
 
@@ -115,7 +130,33 @@ def sentences(identification: Identification) -> tuple[str, ...]:
     small = not_told_from_zero(identification)
     if small:
         found.append(f"Within two standard deviations of zero: {_listed(small)}.")
+    found.append(weights_said(identification.estimate))
+    if isinstance(identification.estimate, ConsistentEstimate):
+        found += _shapes_said(identification.estimate.shapes)
     return tuple(found)
+
+
+def weights_said(estimate: Estimate) -> str:
+    """Say how much each joint counts."""
+    robot = estimate.model.robot
+    if np.all(estimate.weights == estimate.weights[0]):
+        return f"Every row of every joint counts the same ({estimate.method})."
+    noise = [
+        f"{1.0 / weight:.3g} {robot.torque_unit(j)} ({joint})"
+        for j, (joint, weight) in enumerate(zip(robot.joints, estimate.weights, strict=True))
+    ]
+    return f"Each joint is weighted by its residual ({estimate.method}): {', '.join(noise)}."
+
+
+def _shapes_said(choices: Sequence[ShapeChoice]) -> list[str]:
+    """Say what friction was held to on which joints, and why."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for choice in choices:
+        tested = "" if choice.p_value is None else f" (p = {choice.p_value:.2g})"
+        groups.setdefault((choice.shape, choice.why), []).append(f"{choice.joint}{tested}")
+    return [
+        f"Friction is {shape} ({SHAPES[shape]}) on {_listed(joints)}: {why}." for (shape, why), joints in groups.items()
+    ]
 
 
 def _listed(names: list[str], most: int = 12) -> str:

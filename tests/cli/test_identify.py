@@ -31,7 +31,7 @@ def test_it_writes_what_the_contract_says(command, folder: Path, tmp_path: Path)
     assert (content["robot"], content["model"], content["method"], content["samples"]) == (
         "scara03",
         "complete",
-        "ols",
+        "wls",
         6000,
     )
     assert set(content["errors"]["training"]) == {"OJD_1", "OJD_2"}

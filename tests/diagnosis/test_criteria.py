@@ -67,13 +67,13 @@ def test_what_they_stand_behind_keeps_its_order():
 def test_a_diagnosis_obeys_the_criteria_that_it_is_given(change: dict, verdict: str, found: list[str]):
     runs = with_torque(exact_runs(), 1, lambda motion: 0.05 * motion.q[1])
     criteria = replace(CRITERIA, **change)
-    result = diagnose(load_robot(), "complete", runs, bands=BANDS, catalogue=(Spring(),), criteria=criteria)
+    result = diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),), criteria=criteria)
     assert (result.verdict, [effect.effect for effect in result.effects]) == (verdict, found)
 
 
 def spring_diagnosed(criteria: SelectionCriteria):
     runs = with_torque(exact_runs(), 1, lambda motion: 0.05 * motion.q[1])
-    return diagnose(load_robot(), "complete", runs, bands=BANDS, catalogue=(Spring(),), criteria=criteria)
+    return diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),), criteria=criteria)
 
 
 def test_a_limit_doubled_or_halved_lets_an_effect_out_or_in():

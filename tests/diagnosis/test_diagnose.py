@@ -36,25 +36,25 @@ class Lobes(Effect):
 
 
 def test_a_clean_set_is_complete():
-    result = diagnose(ROBOT, "complete", virtual_runs())
+    result = diagnose(ROBOT, virtual_runs())
     assert (result.verdict, result.effects, result.unexplained) == ("complete", (), None)
     assert result.after.value == pytest.approx(result.before.value)
     assert [fit.joint for fit in result.fit_after] == ["joint1", "joint2"]
 
 
 def test_a_clean_formula_is_complete():
-    result = diagnose(ROBOT, "complete", exact_runs())
+    result = diagnose(ROBOT, exact_runs())
     assert (result.verdict, result.effects, result.unexplained) == ("complete", (), None)
 
 
 def test_reversals_of_a_clean_arm_are_not_taken_for_ripple():
     runs = virtual_runs(seconds=(6.0, 7.0))
-    assert diagnose(ROBOT, "complete", runs, bands=BANDS, catalogue=(TorqueRipple(),)).verdict == "complete"
+    assert diagnose(ROBOT, runs, bands=BANDS, catalogue=(TorqueRipple(),)).verdict == "complete"
 
 
 @pytest.fixture(scope="module")
 def spring():
-    return diagnose(ROBOT, "complete", virtual_runs("spring:joint1"), [held_out_run("spring:joint1")], bands=BANDS)
+    return diagnose(ROBOT, virtual_runs("spring:joint1"), validation=[held_out_run("spring:joint1")], bands=BANDS)
 
 
 def test_a_spring_is_found_with_its_stiffness_and_lowers_the_error_held_out(spring):
@@ -79,7 +79,7 @@ def test_lack_of_fit_is_there_before_and_gone_after(spring):
 def test_recordings_held_out_take_no_part(spring):
     other = held_out_run("spring:joint1")
     wild = replace(other, name="W_1", trajectory="W", effort=3.0 * other.effort + 1.0)
-    result = diagnose(ROBOT, "complete", virtual_runs("spring:joint1"), [wild], bands=BANDS)
+    result = diagnose(ROBOT, virtual_runs("spring:joint1"), validation=[wild], bands=BANDS)
     assert_array_equal(result.after.value, spring.after.value)
     assert [effect.parameters for effect in result.effects] == [effect.parameters for effect in spring.effects]
     assert result.search.bands == spring.search.bands
@@ -92,19 +92,19 @@ def test_recordings_held_out_take_no_part(spring):
 def test_the_band_is_not_chosen_on_recordings_held_out():
     train = virtual_runs()
     wild = replace(train[0], name="W_1", trajectory="W", effort=train[0].effort[:, ::-1].copy())
-    alone = diagnose(ROBOT, "complete", train, catalogue=())
-    beside = diagnose(ROBOT, "complete", train, [wild], catalogue=())
+    alone = diagnose(ROBOT, train, catalogue=())
+    beside = diagnose(ROBOT, train, validation=[wild], catalogue=())
     assert alone.search.bands == beside.search.bands
 
 
 def test_a_recording_cannot_be_fitted_and_held_out():
     with pytest.raises(UsageError, match="held out"):
-        diagnose(ROBOT, "complete", exact_runs(), exact_runs()[:1], bands=BANDS)
+        diagnose(ROBOT, exact_runs(), validation=exact_runs()[:1], bands=BANDS)
 
 
 def test_a_users_own_effect_is_found_beside_the_catalogue():
     runs = with_torque(exact_runs(), 1, lambda motion: 0.03 * np.sin(2.0 * motion.q[1]))
-    result = diagnose(ROBOT, "complete", runs, bands=BANDS, catalogue=(*CATALOGUE, Lobes()))
+    result = diagnose(ROBOT, runs, bands=BANDS, catalogue=(*CATALOGUE, Lobes()))
     (effect,) = result.effects
     assert (effect.effect, effect.joint, effect.description) == ("lobes", "joint2", "two lobes per turn")
     size = effect.parameters["size"]
@@ -114,7 +114,7 @@ def test_a_users_own_effect_is_found_beside_the_catalogue():
 
 def test_what_no_effect_of_the_catalogue_explains_is_said_with_joint_signals_and_size():
     runs = with_torque(exact_runs(), 1, lambda motion: 0.03 * np.sin(5.0 * motion.q[1]))
-    result = diagnose(ROBOT, "complete", runs, bands=BANDS, catalogue=())
+    result = diagnose(ROBOT, runs, bands=BANDS, catalogue=())
     assert (result.verdict, result.effects) == ("unexplained", ())
     assert result.unexplained.joint == "joint2"
     assert result.unexplained.signals == ("position of joint2",)
@@ -129,14 +129,14 @@ def test_a_remainder_is_seen_by_repetition_where_no_signal_shows_it():
         replace(run, effort=run.effort + np.array([[1.0], [0.0]]) * hidden[run.trajectory][: run.effort.shape[1]])
         for run in exact_runs()
     ]
-    result = diagnose(ROBOT, "complete", runs, bands=BANDS, catalogue=())
+    result = diagnose(ROBOT, runs, bands=BANDS, catalogue=())
     assert result.verdict == "unexplained"
     assert result.unexplained.joint == "joint1"
 
 
 def test_less_than_a_sample_of_delay_is_a_note_and_not_an_effect():
     late = [shifted(run, -0.4 / RATE) for run in exact_runs()]
-    result = diagnose(ROBOT, "complete", late, bands=BANDS, catalogue=DELAYS)
+    result = diagnose(ROBOT, late, bands=BANDS, catalogue=DELAYS)
     assert result.effects == ()
     assert result.verdict == "complete"
     assert any("less than one sample" in note for note in result.notes)
@@ -145,7 +145,7 @@ def test_less_than_a_sample_of_delay_is_a_note_and_not_an_effect():
 
 def test_a_longer_delay_is_an_effect_and_is_corrected_in_what_is_held_out():
     late = "time_delay:delay=0.005"
-    result = diagnose(ROBOT, "complete", virtual_runs(late), [held_out_run(late)], bands=BANDS, catalogue=DELAYS)
+    result = diagnose(ROBOT, virtual_runs(late), validation=[held_out_run(late)], bands=BANDS, catalogue=DELAYS)
     (effect,) = result.effects
     assert (effect.effect, effect.joint) == ("time_delay", None)
     assert effect.parameters["delay"].value == pytest.approx(0.005, abs=1e-3)
@@ -156,7 +156,7 @@ def test_a_longer_delay_is_an_effect_and_is_corrected_in_what_is_held_out():
 def test_a_model_can_be_given_and_progress_is_told():
     told: list[tuple[str, float]] = []
     result = diagnose(
-        ROBOT, complete(), exact_runs(), bands=BANDS, catalogue=(), progress=lambda *step: told.append(step)
+        ROBOT, exact_runs(), model=complete(), bands=BANDS, catalogue=(), progress=lambda *step: told.append(step)
     )
     assert result.before.model.name == "complete"
     assert [step for step, _ in told[-2:]] == [
@@ -172,7 +172,6 @@ def test_no_share_of_the_work_is_smaller_than_one_before_where_a_search_is_repea
     told: list[tuple[str, float]] = []
     diagnose(
         ROBOT,
-        "complete",
         virtual_runs("torque_ripple:joint1:order=2,amplitude=0.15"),
         catalogue=effects_named("torque_ripple", "spring"),
         progress=lambda *step: told.append(step),

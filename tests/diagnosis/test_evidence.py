@@ -40,7 +40,7 @@ def test_units_of_torque_change_nothing():
 
 @pytest.fixture(scope="module")
 def nothing_missing():
-    return diagnose(load_robot(), "complete", virtual_runs(), bands=BANDS)
+    return diagnose(load_robot(), virtual_runs(), bands=BANDS)
 
 
 def test_complete_is_earned_by_repetition(nothing_missing):
@@ -55,7 +55,7 @@ def test_one_short_run_cannot_tell():
     short = replace(
         first, time=first.time[:500], position=first.position[:, :500], effort=first.effort[:, :500], velocity=None
     )
-    result = diagnose(load_robot(), "complete", [short], bands=BANDS)
+    result = diagnose(load_robot(), [short], bands=BANDS)
     assert result.verdict == "undecided"
     assert not result.effects
     assert any("would not have been significant" in item.why for item in result.evidence)

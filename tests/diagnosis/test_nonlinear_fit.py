@@ -197,7 +197,7 @@ def test_a_rotor_that_nobody_stated_is_told_by_the_loads_and_leaves_no_false_fri
     """Taken as zero it made the losses 0.036 and 0.049 instead of 0.07 and 0.10, and friction over position of 0.2."""
     robot, runs = ur5_runs(armature)
     families = effects_named("transmission_loss", "position_dependent_friction")
-    found = diagnose(robot, "complete", runs, bands=UR5_BANDS, catalogue=families)
+    found = diagnose(robot, runs, bands=UR5_BANDS, catalogue=families)
     losses = {item.joint: item.parameters["loss_coefficient"] for item in found.effects}
     assert {item.effect for item in found.effects} == {"transmission_loss"}
     assert list(losses) == ["shoulder_lift_joint", "shoulder_pan_joint"]

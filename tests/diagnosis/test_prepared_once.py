@@ -60,7 +60,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Counts, Diagnosis]:
         counted(patch, TorqueModel, "joint_columns", "models", columns_of)
         counted(patch, RigidBody, "fill", "rigid", lambda term, motion, rows: states(motion))
         counted(patch, Effect, "regressor", "candidates", candidate)
-        found = diagnose(load_robot(), "complete", runs, [held_out])
+        found = diagnose(load_robot(), runs, validation=[held_out])
         context = DiagnosisContext(found)
         diagnosis_pictures(folder, context)
         diagnosis_report(folder / "report.html", context)

@@ -20,7 +20,7 @@ def doubtful():
     """A spring that would have to help in more trajectories than there are."""
     runs = with_torque(exact_runs(), 1, lambda motion: 0.05 * motion.q[1])
     criteria = replace(CRITERIA, least_votes=1.01)
-    return diagnose(load_robot(), "complete", runs, bands=BANDS, catalogue=(Spring(),), criteria=criteria)
+    return diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),), criteria=criteria)
 
 
 def test_what_is_not_settled_is_listed_and_not_added(doubtful):

@@ -111,7 +111,7 @@ def test_weighing_what_differs_as_noise_leaves_white_rows():
 
 
 def test_no_effect_is_believed_that_stands_for_runs_that_differ():
-    result = diagnose(ROBOT, "complete", runs(np.random.default_rng(1002)))
+    result = diagnose(ROBOT, runs(np.random.default_rng(1002)))
     assert not result.effects
     assert result.verdict in ("undecided", "complete")
     assert any("differs from run to run" in note and "friction by" in note for note in result.notes)

@@ -10,7 +10,7 @@ import pytest
 from scara_ident.diagnosis import diagnose
 from scara_ident.errors import RecordingError
 from scara_ident.estimation.observations import observe
-from scara_ident.identification.channel_check import ChannelFault, channel_faults
+from scara_ident.identification.channel_check import ChannelFault, _better, channel_faults
 from scara_ident.identification.identify import identify
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
@@ -91,10 +91,56 @@ def test_diagnose_refuses_and_identify_says_it(recordings: tuple[Recording, ...]
     wrong = [turned(item, effort=(1,)) for item in recordings]
     robot = virtual_arm().robot
     with pytest.raises(RecordingError, match=r"negate effort_gain of joint2 in robot\.yaml") as caught:
-        diagnose(robot, "complete", wrong)
+        diagnose(robot, wrong)
     assert "\n" not in str(caught.value)
     notes = identify(robot, wrong).notes
     assert any("opposite sign" in note for note in notes)
+
+
+def wandering(recording: Recording, share: float, seed: int) -> Recording:
+    """Six seconds with efforts that wander by a share of their scatter within a second or so."""
+    assert recording.effort is not None
+    kept = 3000
+    steps = np.random.default_rng(seed).standard_normal(recording.effort.shape)
+    effort = (
+        recording.effort + share * np.std(recording.effort, axis=1, keepdims=True) * np.cumsum(steps, axis=1) / 30.0
+    )
+    return replace(
+        recording,
+        time=recording.time[:kept],
+        position=recording.position[:, :kept],
+        effort=effort[:, :kept],
+        velocity=None,
+        acceleration=None,
+    )
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_fits_that_interpolate_are_not_compared(recordings: tuple[Recording, ...], share: float) -> None:
+    """Ten rows a joint for nine parameters of its own: one reading or another always fits far better, by chance."""
+    model = build_model(virtual_arm().robot, "complete")
+    for seed in range(6):
+        item = wandering(recordings[seed % 2], share, seed)
+        seen = observe(model, prepare([item], (1.0, 1.0)))
+        assert seen.joints[0].table.shape[1] < 12
+        assert channel_faults(seen) == ()
+
+
+def test_a_better_reading_has_to_be_better_block_by_block() -> None:
+    rng = np.random.default_rng(0)
+    left = np.exp(0.3 * rng.standard_normal((20, 2)))
+    assert _better(left, 0.5 * left)
+    assert not _better(left, left)
+    # One block that is far better, and none of the others: the mean falls, and nothing is shown.
+    once = left * np.where(np.arange(20) == 3, 1e-9, 1.0)[:, None]
+    assert not _better(left, once)
+    assert not _better(left[:1], 0.1 * left[:1])
+
+
+def test_an_exchange_shows_in_a_short_recording_of_enough_rows(recordings: tuple[Recording, ...]) -> None:
+    short = wandering(exchanged(recordings[1], "effort"), 0.0, 0)
+    faults = channel_faults(observe(build_model(virtual_arm().robot, "complete"), prepare([short], (6.0, 6.0))))
+    assert [(fault.signal, fault.exchanged) for fault in faults] == [("effort", True)]
 
 
 def test_the_share_left_is_what_it_says(recordings: tuple[Recording, ...]) -> None:

@@ -24,13 +24,18 @@ from scara_ident.paper import OJD, table5_parameters
 from scara_ident.recording.audit import Finding
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
-from tests.arms import noisy, recorded_torque, recording, sines
+from tests.arms import example_urdf, noisy, recorded_torque, recording, sines
 
 RATE = 500.0
 SIGMA = (0.020, 0.008)
 # Table 5, column OJD: P_d1..P_d5, a01..a31, a02..a32, p_o1, p_o2.
 # The paper's offsets are 0 there; others would not show.
 TRUTH = np.array([*table5_parameters("OJD")[:13], 0.010, -0.004])
+# Coulomb and viscous friction as large as on the real arm.
+UR5_FRICTION = tuple(
+    (coulomb, viscous, 0.0, 0.0, 0.0)
+    for coulomb, viscous in ((8.0, 5.0), (8.0, 5.0), (4.0, 3.0), (1.2, 0.8), (1.1, 0.7), (0.9, 0.6))
+)
 FRICTION = tuple((*TRUTH[5 + 4 * j : 9 + 4 * j], TRUTH[13 + j]) for j in range(2))
 
 
@@ -200,21 +205,58 @@ def test_a_motion_of_one_joint_leaves_the_other_undetermined(robot: Robot, clean
     assert not set(not_told_from_zero(result)) & lost
 
 
-def test_repetitions_tell_the_noise_and_weigh_the_joints(robot: Robot, clean: Recording):
+def test_repetitions_tell_the_noise_and_residuals_weigh_the_joints(robot: Robot, clean: Recording):
     rng = np.random.default_rng(0)
     runs = [replace(noisy(clean, rng, SIGMA), name=f"OJD_{k}", repetition=k) for k in (1, 2, 3)]
-    result = identify(robot, runs, method="wls", bands=[20.0, 20.0])
+    result = identify(robot, runs, bands=[20.0, 20.0])
+    assert result.estimate.method == "wls"
     assert_allclose(result.noise["OJD"], SIGMA, rtol=0.05)
-    assert_allclose(result.estimate.weights, 1.0 / result.noise["OJD"])
+    residual = [information.rms(result.estimate.value) for information in result.training.by_joint]
+    assert_allclose(result.estimate.weights, 1.0 / np.array(residual), rtol=1e-3)
     assert np.all(np.abs(result.estimate.value - TRUTH) < 4.0 * result.estimate.std)
 
 
 def test_rls_is_ols_and_has_a_history(robot: Robot, clean: Recording, fitted: Identification):
     result = identify(robot, [clean], method="rls", bands=fitted.bands)
-    assert_allclose(result.estimate.value, fitted.estimate.value, rtol=1e-9, atol=1e-12)
+    plain = identify(robot, [clean], method="ols", bands=fitted.bands)
+    assert_allclose(result.estimate.value, plain.estimate.value, rtol=1e-9, atol=1e-12)
     assert result.history is not None
     assert fitted.history is None
     assert_allclose(result.history.value[-1], result.estimate.value, rtol=1e-9, atol=1e-12)
+
+
+def ur5_run(robot: Robot, seed: int, share: float, bits: int) -> Recording:
+    """Eight seconds of a rigid UR5, torque noise as a share of each joint's torque, encoders of so many bits a turn."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(2000) / 250.0
+    q, v, a = sines(rng, time, 6, size=0.8)
+    torque = recorded_torque(robot, q, v, a, UR5_FRICTION)
+    step = 2.0 * np.pi / 2**bits
+    made = recording(robot, f"run{seed}_1", time, np.round(q / step) * step, torque)
+    return noisy(made, rng, share * np.sqrt(np.mean(torque**2, axis=1)))
+
+
+@pytest.mark.slow
+def test_the_shoulders_noise_does_not_spoil_the_wrist_of_a_ur5():
+    """The torques of shoulder and elbow and their noise are many times the wrist's; with equal weights the wrist pays for them."""
+    robot = load_robot(example_urdf("ur5_robot.urdf"))
+    training = [ur5_run(robot, seed, 0.012, 14) for seed in (0, 1)]
+    held_out = ur5_run(robot, 9, 0.0, 20)
+    bands = [10.0] * 6
+
+    def wrist(**method: str) -> tuple[float, float, float]:
+        result = identify(robot, training, validation=[held_out], bands=bands, **method)
+        (error,) = [errors[3] for errors in result.validation_errors().values()]
+        assert error is not None
+        assert error.relative is not None
+        place = result.model.names.index("a04")
+        return error.relative, result.estimate.value[place], result.estimate.std[place]
+
+    plain = wrist(method="ols")
+    for error, coulomb, std in (wrist(), wrist(method="consistent")):
+        assert error < 0.3 * plain[0]
+        assert std < 0.5 * plain[2]
+        assert abs(coulomb - UR5_FRICTION[3][0]) < 3.0 * std
 
 
 def test_what_the_audits_found_is_noted(robot: Robot, clean: Recording):

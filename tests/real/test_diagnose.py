@@ -29,7 +29,7 @@ CASES = (
 def run(case: str) -> Diagnosis:
     robot = load_robot()
     training = read_recordings([shared_path("cases", case, "train")], robot)
-    return diagnose(robot, "complete", training, read_recordings([shared_path("cases", case, "test")], robot))
+    return diagnose(robot, training, validation=read_recordings([shared_path("cases", case, "test")], robot))
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -56,9 +56,9 @@ def test_emps_friction_differs_by_direction():
     robot = load_robot(shared_path("data", "emps", "robot.yaml"))
     result = diagnose(
         robot,
-        "basic",
         read_recordings([shared_path("data", "emps", "identification.parquet")], robot),
-        read_recordings([shared_path("data", "emps", "validation_pulses.parquet")], robot),
+        model="basic",
+        validation=read_recordings([shared_path("data", "emps", "validation_pulses.parquet")], robot),
     )
 
     def relative(estimate, observations) -> float:

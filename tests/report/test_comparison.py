@@ -21,6 +21,13 @@ def test_without_bias_none_is_told(clean):
     assert comparison_sentences(clean)[1] == "No error exceeds twice what noise in the parameters explains."
 
 
+def test_the_weights_are_said(clean):
+    assert clean.method == "wls"
+    assert comparison_sentences(clean)[2] == "Estimated by wls: each joint is weighted by its residual."
+    plain = comparison_sentences(compare(ROBOT, exact_runs(3), method="ols", bands=BANDS))[2]
+    assert plain == "Estimated by ols: every row of every joint counts the same."
+
+
 def test_bias_in_one_trajectory_is_told_from_noise():
     runs = exact_runs(3)
     spoilt = with_torque(runs[:2], 1, lambda motion: 0.1 * motion.q[1])

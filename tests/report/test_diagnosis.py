@@ -30,7 +30,7 @@ def result():
     runs = exact_runs(3)
     held_out = with_torque(runs[4:5], 1, spring)
     return diagnose(
-        load_robot(), "complete", with_torque(runs[:4], 1, spring), held_out, bands=BANDS, catalogue=CATALOGUE
+        load_robot(), with_torque(runs[:4], 1, spring), validation=held_out, bands=BANDS, catalogue=CATALOGUE
     )
 
 
@@ -116,7 +116,7 @@ def test_the_story_has_every_candidate_and_both_tables(result, content):
 
 
 def test_without_repetitions_the_noise_floor_is_unknown_and_said_so():
-    result = diagnose(load_robot(), "complete", exact_runs()[::2], bands=BANDS, catalogue=())
+    result = diagnose(load_robot(), exact_runs()[::2], bands=BANDS, catalogue=())
     content = diagnosis_dict(result)
     assert content["noise_floor"] == {"joint1": None, "joint2": None}
     assert content["validation"] == {"before": {}, "after": {}}
@@ -126,7 +126,7 @@ def test_without_repetitions_the_noise_floor_is_unknown_and_said_so():
 
 def test_a_remainder_is_told_with_joint_signal_and_size():
     runs = with_torque(exact_runs(), 1, lambda motion: 0.03 * np.sin(5.0 * motion.q[1]))
-    content = diagnosis_dict(diagnose(load_robot(), "complete", runs, bands=BANDS, catalogue=()))
+    content = diagnosis_dict(diagnose(load_robot(), runs, bands=BANDS, catalogue=()))
     assert content["verdict"] == "unexplained"
     assert set(content["unexplained"]) == {"joint", "signals", "rms", "explained_share"}
     assert "depends on position of joint2" in content["summary"][-1]
@@ -134,12 +134,12 @@ def test_a_remainder_is_told_with_joint_signal_and_size():
 
 def test_a_straight_friction_law_that_leaves_a_curve_is_told_what_to_try():
     runs = with_torque(exact_runs(), 0, lambda motion: 0.05 * motion.v[0] ** 3)
-    found = diagnose(load_robot(), "basic", runs, bands=BANDS, catalogue=())
+    found = diagnose(load_robot(), runs, model="basic", bands=BANDS, catalogue=())
     words = " ".join(sentences(found))
     assert found.unexplained is not None
     assert found.unexplained.signals == (f"velocity of {found.unexplained.joint}",)
     assert "straight in speed: try --model complete" in words
-    cubic = " ".join(sentences(diagnose(load_robot(), "complete", runs, bands=BANDS, catalogue=())))
+    cubic = " ".join(sentences(diagnose(load_robot(), runs, bands=BANDS, catalogue=())))
     assert "try --model" not in cubic
 
 

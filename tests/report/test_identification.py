@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scara_ident.estimation import ConsistentOptions
 from scara_ident.files import plain
 from scara_ident.report.identification import identification_dict, sentences
 from tests.report.simulated import made, run
@@ -109,6 +110,30 @@ def test_what_is_not_told_from_zero_is_named(result):
     assert len(small) == 1
     assert "P_d3" in small[0] or "a31" in small[0] or "p_o1" in small[0]
     assert "P_d1" not in small[0]
+
+
+def test_the_weights_are_said(result, content):
+    first, second = result.estimate.weights
+    assert content["weights"] == {"joint1": first, "joint2": second}
+    said = f"Each joint is weighted by its residual (wls): {1 / first:.3g} N m (joint1), {1 / second:.3g} N m (joint2)."
+    assert said in content["summary"]
+    plain_ = identification_dict(made([run("OJD_1", 1)], method="ols"))
+    assert plain_["weights"] == {"joint1": 1.0, "joint2": 1.0}
+    assert "Every row of every joint counts the same (ols)." in plain_["summary"]
+
+
+def test_the_shape_of_friction_and_why_are_said():
+    found = made([run("OJD_1", 1)], method="consistent")
+    content = identification_dict(found)
+    first, second = found.estimate.shapes
+    assert content["friction_shape"]["joint1"] == {"shape": first.shape, "p_value": first.p_value, "why": first.why}
+    assert content["summary"][-1] == (
+        f"Friction is lubricated (takes energy out, and grows ever less with speed) on joint1 (p = {first.p_value:.2g}), "
+        f"joint2 (p = {second.p_value:.2g}): the data do not contradict it."
+    )
+    asked = made([run("OJD_1", 1)], method="consistent", options=ConsistentOptions(friction={"joint1": "free"}))
+    said = [text for text in sentences(asked) if text.startswith("Friction is ")]
+    assert said[0] == "Friction is free (anything) on joint1: as asked for."
 
 
 def test_notes_are_handed_on(result):

@@ -31,13 +31,13 @@ from tests.report.simulated import made, run
 @pytest.fixture(scope="module")
 def with_spring():
     runs = with_torque(exact_runs(3)[:4], 1, lambda motion: 0.05 * motion.q[1])
-    return runs, diagnose(load_robot(), "complete", runs, bands=BANDS, catalogue=(Spring(),))
+    return runs, diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),))
 
 
 @pytest.fixture(scope="module")
 def with_remainder():
     runs = with_torque(exact_runs(), 1, lambda motion: 0.03 * np.sin(5.0 * motion.q[1]))
-    return runs, diagnose(load_robot(), "complete", runs, bands=BANDS, catalogue=())
+    return runs, diagnose(load_robot(), runs, bands=BANDS, catalogue=())
 
 
 def test_an_effect_is_drawn_before_and_after_and_stands_in_the_story(with_spring, tmp_path):

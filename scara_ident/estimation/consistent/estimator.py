@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,16 +12,32 @@ from scara_ident.estimation.consistent.bodies import LinkInertia, link_inertia
 from scara_ident.estimation.consistent.constraints import active_set
 from scara_ident.estimation.consistent.feasibility import PhysicalConsistency, check_consistency
 from scara_ident.estimation.consistent.options import ConsistentOptions
-from scara_ident.estimation.consistent.problem import DEPENDENT, MARGIN, Point, Problem, Unknowns
-from scara_ident.estimation.consistent.solution import StandardPrior, nearest_arm, solve_joints
+from scara_ident.estimation.consistent.problem import (
+    DEPENDENT,
+    MARGIN,
+    Point,
+    Problem,
+    Unknowns,
+    declared,
+)
+from scara_ident.estimation.consistent.shape import ShapeChoice, choose_shapes
+from scara_ident.estimation.consistent.solution import (
+    ConsistentSolution,
+    StandardPrior,
+    joint_weights,
+    least_squares_arm,
+    nearest_arm,
+    solve_joints,
+)
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import UNDETERMINED, Information
+from scara_ident.estimation.least_squares import least_squares
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_variation import run_variation
 from scara_ident.threads import one_blas_thread
 
-__all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "physical_consistency"]
-
+__all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "physical_consistency", "possible_arm"]
 
 # Directions that active constraints allow by less than this are what the solver's digits leave of forbidden ones.
 DIGITS = 1e-6
@@ -31,7 +47,7 @@ DIGITS = 1e-6
 class ConsistentEstimate(Estimate):
     """An estimate that belongs to an arm that can exist, and that arm.
 
-    Where plain least squares already belongs to one it is the estimate, and ``std`` is its standard deviation.
+    Where weighted least squares already belongs to one it is the estimate, and ``std`` is its standard deviation.
     Where constraints hold the estimate, ``std`` is that of the directions in which it can still move: a parameter
     fixed by active constraints has a standard deviation of 0, which says that the constraint and not the data
     determines it. The curvature of the constraints is left out, which makes ``std`` rather too large than too small.
@@ -44,7 +60,9 @@ class ConsistentEstimate(Estimate):
     active : tuple of str
         Active constraints, such as ``inertia of link2`` or ``friction of joint1``.
     was_possible : bool
-        Whether plain least squares was possible and is the estimate.
+        Whether least squares without constraints was possible and is the estimate.
+    shapes : tuple of ShapeChoice
+        What the friction of each joint was held to, and why.
     notes : tuple of str
         What a person should know, such as nominal bodies that the URDF lacks.
     """
@@ -52,27 +70,25 @@ class ConsistentEstimate(Estimate):
     standard: Array
     active: tuple[str, ...]
     was_possible: bool
+    shapes: tuple[ShapeChoice, ...]
     notes: tuple[str, ...]
 
 
 @one_blas_thread()
-def consistent(
-    observations: Observations, *, options: ConsistentOptions | None = None, problem: Problem | None = None
-) -> ConsistentEstimate:
+def consistent(observations: Observations, *, options: ConsistentOptions | None = None) -> ConsistentEstimate:
     """Estimate by least squares among all arms that can exist.
 
     Every body has a positive semidefinite pseudo-inertia (Wensing, Kim, Slotine 2018) and every rotor a positive
-    inertia; friction takes energy out and can be overcome by the motor; each further term keeps what it declares.
-    Where plain least squares is possible it is the result; else a prior on the nominal bodies acts on directions that
-    the data hardly determine, see ``prior_weight`` of `ConsistentOptions`. The standard parameters are those nearest to
+    inertia; friction takes energy out, can be overcome by the motor, and grows ever less with speed where the data do
+    not contradict that (see `choose_shapes`); each further term keeps what it declares. Every joint's rows are divided
+    by its residual, as in `wls`. Where `wls` is possible it is the result; else a prior on the nominal bodies acts on
+    directions that the data hardly determine, see ``prior_weight`` of `ConsistentOptions`. The standard parameters are those nearest to
     the nominal bodies among all that have the estimated base parameters (see `nearest_to_nominal`).
 
     Parameters
     ----------
     observations : Observations
     options : ConsistentOptions, optional
-    problem : Problem, optional
-        Compiled with the same model and options, to spare compiling it again; then its options count.
 
     Returns
     -------
@@ -86,26 +102,62 @@ def consistent(
         If an option names what the robot or the model does not have.
     """
     model = observations.model
-    problem = problem or Problem(model, options)
-    options = problem.options
+    options = options or ConsistentOptions()
     if not observations.blocks:
         raise EstimationError("no recording to estimate from")
+    plain = least_squares(observations, joint_weights(observations.by_joint, options), "wls")
+    shapes = choose_shapes(declared(model, options)[1], options, observations, plain)
+    problem = Problem(model, replace(options, friction={choice.joint: choice.shape for choice in shapes}))
     u = problem.unknowns
     parameter_prior, standard_prior = _priors(u, options)
     found, information, weights = solve_joints(
         problem, observations.by_joint, parameter_prior=parameter_prior, standard_prior=standard_prior
     )
     x = nearest_arm(problem, information, found.x, standard_prior=standard_prior)
+    return _estimate(problem, observations, information, weights, "consistent", found, x, shapes)
+
+
+@one_blas_thread()
+def possible_arm(observations: Observations, estimate: Estimate) -> ConsistentEstimate | None:
+    """Return an estimate by least squares with an arm that has its parameters, None where none is found.
+
+    Parameters
+    ----------
+    observations : Observations
+        The rows that it came from.
+    estimate : Estimate
+        The standard parameters are those nearest to the nominal bodies among all that have its base parameters.
+    """
+    problem = Problem(observations.model, ConsistentOptions(friction="dissipative"))
+    found = least_squares_arm(problem, estimate.information)
+    if found is None:
+        return None
+    x = nearest_arm(problem, estimate.information, found.x)
+    return _estimate(problem, observations, estimate.information, estimate.weights, estimate.method, found, x, ())
+
+
+def _estimate(
+    problem: Problem,
+    observations: Observations,
+    information: Information,
+    weights: Array,
+    method: str,
+    found: ConsistentSolution,
+    x: Array,
+    shapes: tuple[ShapeChoice, ...],
+) -> ConsistentEstimate:
+    u = problem.unknowns
     value = u.parameters(x)
     free, labels = _free_directions(u, found.point)
     inverse = _inverse_along(information, free, u.sizes(value))
     spread = block_covariance(inverse, value, observations.joints, observations.owner, weights)
     undetermined = information.solve().undetermined
-    covariance = spread.matrix.copy()
+    variation = run_variation(observations, observations.joints, value)
+    covariance = spread.matrix + variation.covariance(inverse, observations.joints, weights)
     covariance[np.diag_indices_from(covariance)] = np.where(undetermined, np.inf, np.diag(covariance))
     return ConsistentEstimate(
-        model=model,
-        method="consistent",
+        model=observations.model,
+        method=method,
         value=value,
         covariance=covariance,
         undetermined=undetermined,
@@ -115,7 +167,9 @@ def consistent(
         standard=u.standard(x),
         active=labels,
         was_possible=found.was_possible,
-        notes=_notes(u, options, labels, value, covariance),
+        shapes=shapes,
+        notes=_notes(u, labels, value, covariance),
+        variation=variation,
     )
 
 
@@ -188,17 +242,15 @@ def _inverse_along(information: Information, directions: Array, size: Array) -> 
     return np.asarray(half @ half.T)
 
 
-def _notes(
-    u: Unknowns, options: ConsistentOptions, active: tuple[str, ...], value: Array, covariance: Array
-) -> tuple[str, ...]:
+def _notes(u: Unknowns, active: tuple[str, ...], value: Array, covariance: Array) -> tuple[str, ...]:
     notes = list(u.nominal.notes)
-    if options.friction != "free":
-        slow = [p.joint for p in u.polynomials if not np.isfinite(p.speed)]
-        if slow:
-            notes.append(
-                f"{', '.join(slow)}: no velocity limit is known; friction takes energy out at every speed, and the "
-                "motor's limit is not used"
-            )
+    held = [p for p, shape in zip(u.polynomials, u.shapes, strict=True) if shape != "free"]
+    slow = [p.joint for p in held if not np.isfinite(p.speed)]
+    if slow:
+        notes.append(
+            f"{', '.join(slow)}: no velocity limit is known; friction takes energy out at every speed, and the "
+            "motor's limit is not used"
+        )
     if active:
         notes.append(f"held by what an arm can have: {', '.join(active)}")
     moved = MARGIN * u.sizes(value)

@@ -301,7 +301,7 @@ def check_consistency(
 
 def _distance_std(model: TorqueModel, value: Array, information: Information) -> float | None:
     """Distance of the nearest possible arm in the data's own metric, None where the solver does not find it."""
-    problem = Problem(model)
+    problem = Problem(model, ConsistentOptions(friction="dissipative"))
     u = problem.unknowns
     factor = information.regressor_factor / (information.rms() or 1.0)
     try:

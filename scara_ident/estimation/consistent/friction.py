@@ -84,8 +84,8 @@ def certificate(polynomial: BrakingPolynomial, shape: Shape, margin: float = MAR
                 "none; give one (option speed) or use 'dissipative'"
             )
         (low, start), *high = sides
-        matrix = np.vstack([_LUBRICATED @ low, *(side.sum(axis=0) for side, _ in high)])
-        offset = np.concatenate([_LUBRICATED @ start, *([end.sum()] for _, end in high)])
+        matrix = np.vstack([LUBRICATED @ low, *(side.sum(axis=0) for side, _ in high)])
+        offset = np.concatenate([LUBRICATED @ start, *([end.sum()] for _, end in high)])
         return Certificate((_linear(matrix, offset, label),), 0, unit)
     degree = int(powers.max())
     if degree < 2:
@@ -126,7 +126,7 @@ _ON_HALF_LINE = {
 }
 # At least 0 at rest, concave, and not falling at the limit: the second derivative is linear, so its ends decide, and
 # then the slope falls, so its end decides.
-_LUBRICATED = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -2.0, 0.0], [0.0, 0.0, -2.0, -6.0], [0.0, 1.0, 2.0, 3.0]])
+LUBRICATED = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -2.0, 0.0], [0.0, 0.0, -2.0, -6.0], [0.0, 1.0, 2.0, 3.0]])
 
 
 def _linear(matrix: Array, offset: Array, label: str) -> Cone:

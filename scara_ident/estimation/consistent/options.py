@@ -10,7 +10,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 
 FrictionShape = Literal["free", "dissipative", "lubricated"]
-Weighting = Literal["auto", "equal", "noise"]
+FrictionOption = Literal["auto", "free", "dissipative", "lubricated"]
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,11 @@ class ConsistentOptions:
 
     Attributes
     ----------
-    friction : {"dissipative", "lubricated", "free"}
-        What the friction of every joint fulfils: it takes energy out and the motor can overcome it up to the
-        velocity limit; that, and it is non-decreasing and concave in speed; or nothing.
+    friction : {"auto", "lubricated", "dissipative", "free"} or mapping of str to one of them
+        What the friction of every joint fulfils. ``dissipative``: it takes energy out and the motor can overcome it
+        up to the velocity limit; ``lubricated``: that, and it is non-decreasing and concave in speed; ``free``:
+        nothing. By default ``auto``: lubricated unless the data contradict it, then dissipative, joint by joint, see
+        `scara_ident.estimation.consistent.shape`. A mapping gives it by joint; the others are ``auto``.
     speed : mapping of str to float
         Velocity limits to use instead of the URDF's, by joint, rad/s or m/s.
     total_mass : (float, float), optional
@@ -50,11 +52,8 @@ class ConsistentOptions:
     priors : mapping of str to (float, float)
         Mean and standard deviation of parameters, by the name of the model's parameter or of a standard
         parameter such as ``m2``.
-    weighting : {"auto", "equal", "noise"}
-        Every joint's rows count the same, as in ordinary least squares, or are divided by the joint's noise. By
-        default ordinary least squares is the answer where it is possible, and else rows are divided by the noise.
     noise : ndarray, shape (n,), optional
-        Standard deviation of each joint's torque; by default its residual in ordinary least squares.
+        Standard deviation of each joint's torque, by which its rows are divided; by default its residual in `wls`.
     prior_weight : float
         Weight of the nominal bodies against the data where plain least squares is impossible: a change of a body by
         its own size against one standard deviation of the noise. The default of 0.01 moves no direction that the
@@ -62,21 +61,20 @@ class ConsistentOptions:
         `scara_ident.estimation.consistent.prior`.
     """
 
-    friction: FrictionShape = "dissipative"
+    friction: FrictionOption | Mapping[str, FrictionOption] = "auto"
     speed: Mapping[str, float] = field(default_factory=dict)
     total_mass: tuple[float, float] | None = None
     link_mass: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     com: Literal["free", "visual"] | Mapping[str, Ellipsoid] = "free"
     priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    weighting: Weighting = "auto"
     noise: Array | None = None
     prior_weight: float = 0.01
 
     def __post_init__(self) -> None:
-        if self.friction not in get_args(FrictionShape):
-            raise UsageError(f"friction {self.friction!r}: expected one of {', '.join(get_args(FrictionShape))}")
-        if self.weighting not in get_args(Weighting):
-            raise UsageError(f"weighting {self.weighting!r}: expected one of {', '.join(get_args(Weighting))}")
+        given = (self.friction,) if isinstance(self.friction, str) else tuple(self.friction.values())
+        for shape in given:
+            if shape not in get_args(FrictionOption):
+                raise UsageError(f"friction {shape!r}: expected one of {', '.join(get_args(FrictionOption))}")
         if isinstance(self.com, str) and self.com not in ("free", "visual"):
             raise UsageError(f"com {self.com!r}: expected free, visual or ellipsoids by link")
         if not self.prior_weight > 0.0:
@@ -93,3 +91,7 @@ class ConsistentOptions:
         for name, (_, std) in self.priors.items():
             if not std > 0.0:
                 raise UsageError(f"prior of {name}: standard deviation {std:g}; it must be above 0")
+
+    def friction_of(self, joint: str) -> FrictionOption:
+        """Return what the friction of a joint is asked to fulfil."""
+        return self.friction if isinstance(self.friction, str) else self.friction.get(joint, "auto")

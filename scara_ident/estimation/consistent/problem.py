@@ -26,7 +26,7 @@ from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation.consistent.constraints import Cone, Statement, body_limits
 from scara_ident.estimation.consistent.friction import certificate
 from scara_ident.estimation.consistent.nominal import Nominal, nominal
-from scara_ident.estimation.consistent.options import ConsistentOptions
+from scara_ident.estimation.consistent.options import ConsistentOptions, FrictionShape
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.constraints import BrakingPolynomial, Nonnegative, constraints_of
 
@@ -80,6 +80,8 @@ class Unknowns:
         Friction and signs of the other columns; on [x; aux].
     polynomials : tuple of BrakingPolynomial
         Friction of the joints, with columns counted in the model.
+    shapes : tuple of {"lubricated", "dissipative", "free"}
+        What each of them fulfils.
     nonnegative : ndarray of int
         Columns of the model that other terms declare nonnegative.
     auxiliary : int
@@ -95,6 +97,7 @@ class Unknowns:
     arm: tuple[Cone, ...]
     others: tuple[Cone, ...]
     polynomials: tuple[BrakingPolynomial, ...]
+    shapes: tuple[FrictionShape, ...]
     nonnegative: NDArray[np.intp]
     auxiliary: int
     place: slice
@@ -148,6 +151,8 @@ class Unknowns:
 def build_unknowns(model: TorqueModel, options: ConsistentOptions) -> Unknowns:
     """Collect the unknowns and the constraints that the model's terms and the options declare.
 
+    Friction whose shape is left to the data keeps what the friction of every arm does: it is dissipative.
+
     Raises
     ------
     UsageError
@@ -161,13 +166,15 @@ def build_unknowns(model: TorqueModel, options: ConsistentOptions) -> Unknowns:
     size = rigid + len(others)
     where = {column: rigid + i for i, column in enumerate(others)}
 
-    positive, polynomials = _declared(model, options)
-    friction = [] if options.friction == "free" else [certificate(p, options.friction) for p in polynomials]
-    auxiliary = sum(piece.auxiliary for piece in friction)
+    positive, polynomials = declared(model, options)
+    asked = [options.friction_of(p.joint) for p in polynomials]
+    shapes: tuple[FrictionShape, ...] = tuple("dissipative" if shape == "auto" else shape for shape in asked)
+    friction = [(p, certificate(p, shape)) for p, shape in zip(polynomials, shapes, strict=True) if shape != "free"]
+    auxiliary = sum(piece.auxiliary for _, piece in friction)
     total = size + auxiliary
     cones = [Cone("nonnegative", np.eye(total)[[where[c]]], np.array([-MARGIN]), model.names[c]) for c in positive]
     unit, start = np.ones(p), size
-    for polynomial, piece in zip(polynomials, friction, strict=bool(friction)):
+    for polynomial, piece in friction:
         unit[list(polynomial.columns)] = piece.unit
         places = [*(where[c] for c in polynomial.columns), *range(start, start + piece.auxiliary)]
         # Matrices have a margin of their own, see `certificate`.
@@ -192,6 +199,7 @@ def build_unknowns(model: TorqueModel, options: ConsistentOptions) -> Unknowns:
         arm=(*_bodies(model), *(cone.through(arm.to_standard) for cone in body_limits(robot, options))),
         others=tuple(cones),
         polynomials=tuple(polynomials),
+        shapes=shapes,
         nonnegative=np.array(positive, dtype=np.intp),
         auxiliary=auxiliary,
         place=place,
@@ -207,12 +215,15 @@ def _bodies(model: TorqueModel) -> Iterator[Cone]:
         yield Cone("nonnegative", unit[[10 * robot.n + i]], np.zeros(1), f"rotor inertia of {joint}")
 
 
-def _declared(model: TorqueModel, options: ConsistentOptions) -> tuple[list[int], list[BrakingPolynomial]]:
+def declared(model: TorqueModel, options: ConsistentOptions) -> tuple[list[int], list[BrakingPolynomial]]:
     """Columns that cannot be negative, and friction, as the terms declare them; columns are counted in the model."""
     joints = model.robot.joints
     for name in options.speed:
         if name not in joints:
             raise UsageError(f"speed: {name!r} is no identified joint; the joints are {', '.join(joints)}")
+    for name in () if isinstance(options.friction, str) else options.friction:
+        if name not in joints:
+            raise UsageError(f"friction: {name!r} is no identified joint; the joints are {', '.join(joints)}")
     positive: list[int] = []
     polynomials: list[BrakingPolynomial] = []
     for term in model.terms:

@@ -1,8 +1,8 @@
 """From a triangular factor to the possible arm that explains it best, in two steps.
 
-First the parameters. Where plain least squares belongs to an arm that can exist, it is the solution and no prior acts
-on it. Else the estimation problem is solved, with a weak prior so that directions which the data hardly determine do
-not follow the noise to the edge of what is possible.
+First the parameters. Where least squares, each joint weighted by its residual, belongs to an arm that can exist, it is
+the solution and no prior acts on it. Else the estimation problem is solved, with a weak prior so that directions which
+the data hardly determine do not follow the noise to the edge of what is possible.
 
 Then the bodies: among those that have these parameters, the nearest to the nominal ones.
 """
@@ -18,7 +18,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation.consistent.feasibility import ROUNDING, fixed, fixed_columns, furthest_inside
 from scara_ident.estimation.consistent.friction import friction_faults, shape_faults
-from scara_ident.estimation.consistent.options import FrictionShape
+from scara_ident.estimation.consistent.options import ConsistentOptions
 from scara_ident.estimation.consistent.prior import nearest_to_nominal, prior_rows
 from scara_ident.estimation.consistent.problem import DEPENDENT, MARGIN, Point, Problem, Unknowns
 from scara_ident.estimation.information import (
@@ -83,7 +83,7 @@ def solve_joints(
     parameter_prior: Information | None = None,
     standard_prior: StandardPrior | None = None,
 ) -> tuple[ConsistentSolution, Information, Array]:
-    """Find the best possible parameters for the rows of all joints, weighted as the options say.
+    """Find the best possible parameters for the rows of all joints, each divided by its joint's noise.
 
     Parameters
     ----------
@@ -109,17 +109,7 @@ def solve_joints(
     UsageError
         If the noise in the options does not fit the joints.
     """
-    options = problem.options
-    weights = np.ones(len(joints))
-    if options.weighting != "noise":
-        information = _weighted(joints, weights, parameter_prior)
-        if options.weighting == "equal":
-            found = solve_consistent(problem, information, standard_prior=standard_prior)
-            return found, information, weights
-        possible = None if standard_prior is not None else least_squares_arm(problem, information)
-        if possible is not None:
-            return possible, information, weights
-    weights = 1.0 / _joint_noise(joints, options.noise)
+    weights = joint_weights(joints, problem.options)
     information = _weighted(joints, weights, parameter_prior)
     return solve_consistent(problem, information, standard_prior=standard_prior), information, weights
 
@@ -131,13 +121,20 @@ def _weighted(joints: Sequence[Information], weights: Array, prior: Information 
     return merge([information, prior.scaled(noise_of(information, information.solve()))])
 
 
-def _joint_noise(joints: Sequence[Information], given: Array | None) -> Array:
-    if given is not None:
-        noise = np.asarray(given, dtype=float)
-        if noise.shape != (len(joints),) or not np.all(noise > 0.0):
-            raise UsageError(f"noise: expected {len(joints)} numbers above 0, one per joint")
-        return noise
-    return joint_noise(joints)
+def joint_weights(joints: Sequence[Information], options: ConsistentOptions) -> Array:
+    """Return the weight of each joint's rows, shape (n,): by the noise that is given, or by what is left as in `wls`.
+
+    Raises
+    ------
+    UsageError
+        If the noise that is given does not fit the joints.
+    """
+    if options.noise is None:
+        return 1.0 / joint_noise(joints)
+    noise = np.asarray(options.noise, dtype=float)
+    if noise.shape != (len(joints),) or not np.all(noise > 0.0):
+        raise UsageError(f"noise: expected {len(joints)} numbers above 0, one per joint")
+    return 1.0 / noise
 
 
 @one_blas_thread()
@@ -258,7 +255,7 @@ def noise_of(information: Information, solution: Solution) -> float:
 def _determined(problem: Problem, value: Array) -> Array | None:
     """Return an arm that has these parameters, None where none is found."""
     u = problem.unknowns
-    if not _is_allowed(u, value, problem.options.friction):
+    if not _is_allowed(u, value):
         return None
     given = fixed_columns(u, np.arange(u.place.start, u.place.stop), u.sizes(np.zeros(len(value))))
     # The arm nearest to the nominal one may do already.
@@ -277,16 +274,17 @@ def _determined(problem: Problem, value: Array) -> Array | None:
     return _inside(u, x, margin)
 
 
-def _is_allowed(u: Unknowns, value: Array, friction: FrictionShape) -> bool:
+def _is_allowed(u: Unknowns, value: Array) -> bool:
     """Whether friction and the signs of parameters are possible; says nothing of bodies."""
     if np.any(value[u.nonnegative] < 0.0):
         return False
-    if friction == "free":
-        return True
-    parts = [(p, value[list(p.columns)]) for p in u.polynomials]
-    if any(friction_faults(p, part) for p, part in parts):
-        return False
-    return friction != "lubricated" or not any(shape_faults(p, part) for p, part in parts)
+    for polynomial, shape in zip(u.polynomials, u.shapes, strict=True):
+        part = value[list(polynomial.columns)]
+        if shape != "free" and friction_faults(polynomial, part):
+            return False
+        if shape == "lubricated" and shape_faults(polynomial, part):
+            return False
+    return True
 
 
 def _partly_determined(problem: Problem, least_squares: Solution, point: Point) -> Array | None:
@@ -297,14 +295,14 @@ def _partly_determined(problem: Problem, least_squares: Solution, point: Point) 
     """
     from scipy.linalg import null_space
 
-    u, friction = problem.unknowns, problem.options.friction
+    u = problem.unknowns
     size = u.sizes(least_squares.value)
     given = fixed(u, null_space((least_squares.null / size[:, None]).T, rcond=DEPENDENT).T / size)
     x = given.corrected(point.x, least_squares.value)
-    if u.margin(x) > MARGIN and _is_allowed(u, u.parameters(x), friction):
+    if u.margin(x) > MARGIN and _is_allowed(u, u.parameters(x)):
         return x
     found = furthest_inside(u, least_squares.value, given)
-    if not found.possible or not _is_allowed(u, u.parameters(found.x), friction):
+    if not found.possible or not _is_allowed(u, u.parameters(found.x)):
         return None
     return _inside(u, found.x, found.margin)
 

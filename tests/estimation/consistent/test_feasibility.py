@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import EstimationError, UsageError
-from scara_ident.estimation.consistent import feasibility
+from scara_ident.estimation.consistent import feasibility, problem
 from scara_ident.estimation.consistent.feasibility import check_consistency
 from scara_ident.estimation.consistent.options import ConsistentOptions, Ellipsoid
 from scara_ident.estimation.consistent.problem import Problem, build_unknowns
@@ -131,6 +131,23 @@ def test_a_finished_estimate_is_kept_when_the_nearest_arm_is_not_found(model, mo
     monkeypatch.setattr(Problem, "solve", fails)
     value = impossible(model)
     found = check_consistency(model, value, information=rows_about(model, value))
+    assert found.possible is False
+    assert found.distance_std is None
+
+
+@pytest.mark.parametrize("limit", [{"max_iter": 1}, {"tol_gap_abs": 0.0, "tol_gap_rel": 0.0, "tol_feas": 0.0}])
+def test_a_solver_that_stops_short_of_the_nearest_arm_loses_no_estimate(model, monkeypatch, limit):
+    """Clarabel itself, out of iterations or of digits: what it leaves is not accepted, and no error."""
+    for settings in ("_SETTINGS", "_CAREFUL"):
+        monkeypatch.setattr(problem, settings, {**getattr(problem, settings), **limit})
+    for bound in ("ACCEPTED_GAP", "ACCEPTED_RELATIVE_GAP", "ACCEPTED_RESIDUAL"):
+        monkeypatch.setattr(problem, bound, 0.0)
+    value = impossible(model)
+    rows = rows_about(model, value)
+    with pytest.raises(EstimationError, match="was not solved"):
+        u = Problem(model).unknowns
+        Problem(model).solve(rows.regressor_factor @ u.to_parameters, rows.projected_torque, 1e-2 * np.eye(u.size))
+    found = check_consistency(model, value, information=rows)
     assert found.possible is False
     assert found.distance_std is None
 

@@ -10,7 +10,7 @@ from scara_ident.estimation.consistent.options import ConsistentOptions
     "options",
     [
         {"friction": "slippery"},
-        {"weighting": "heavy"},
+        {"friction": {"joint1": "slippery"}},
         {"com": "inside"},
         {"prior_weight": 0.0},
         {"total_mass": (3.0, 0.0)},

@@ -39,3 +39,5 @@ def test_the_problem_is_a_parametrised_one_of_one_size_and_repeats():
 def test_a_velocity_limit_of_no_joint_is_refused():
     with pytest.raises(UsageError, match="no identified joint"):
         build_unknowns(scara(), ConsistentOptions(speed={"nose": 1.0}))
+    with pytest.raises(UsageError, match="friction: 'nose' is no identified joint"):
+        build_unknowns(scara(), ConsistentOptions(friction={"nose": "free"}))

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from scara_ident.errors import UsageError
-from scara_ident.estimation import ConsistentOptions, consistent, links, ols, physical_consistency, wls
+from scara_ident.estimation import ConsistentOptions, consistent, links, physical_consistency, wls
 from scara_ident.estimation.consistent.bodies import smallest_eigenvalue_share
 from scara_ident.estimation.consistent.prior import prior_rows
 from scara_ident.estimation.consistent.problem import Problem
@@ -31,6 +33,7 @@ from tests.estimation.consistent.arms import (
 )
 
 Array = NDArray[np.float64]
+DISSIPATIVE = ConsistentOptions(friction="dissipative")
 
 
 def test_the_prior_does_not_bias_determined_directions():
@@ -63,7 +66,7 @@ def test_where_least_squares_is_possible_it_is_the_estimate_whatever_the_urdf_sa
     for factor in (1.0, 5.0, 0.1):
         model = build_model(heavier(load_robot(), factor), "complete")
         item = observed(model, moving(model.robot), truth(scara()), 0.05)
-        plain, found = ols(item), consistent(item)
+        plain, found = wls(item), consistent(item, options=DISSIPATIVE)
         assert found.was_possible
         assert found.active == ()
         np.testing.assert_allclose(found.value, plain.value, rtol=1e-6)
@@ -72,16 +75,16 @@ def test_where_least_squares_is_possible_it_is_the_estimate_whatever_the_urdf_sa
         assert smallest(found) > 0.0
 
 
-def test_weighted_least_squares_is_the_estimate_where_it_is_possible_and_asked_for():
+def test_joints_are_weighted_by_their_residual_or_by_the_noise_given():
     model = scara()
     item = observed(model, moving(model.robot), truth(model), 0.05)
-    found = consistent(item, options=ConsistentOptions(weighting="noise"))
-    np.testing.assert_allclose(found.value, wls(item).value, rtol=1e-6)
-    given = ConsistentOptions(weighting="noise", noise=np.array([0.02, 0.008]))
+    found = consistent(item, options=DISSIPATIVE)
+    np.testing.assert_allclose(found.weights, wls(item).weights, rtol=1e-12)
+    given = replace(DISSIPATIVE, noise=np.array([0.02, 0.008]))
     plain = wls(item, np.array([0.02, 0.008]))
     np.testing.assert_allclose(consistent(item, options=given).value, plain.value, rtol=1e-6)
     with pytest.raises(UsageError, match="noise: expected 2 numbers"):
-        consistent(item, options=ConsistentOptions(weighting="noise", noise=np.ones(3)))
+        consistent(item, options=ConsistentOptions(noise=np.ones(3)))
 
 
 def test_what_torque_does_not_determine_is_nearest_to_nominal():
@@ -96,14 +99,14 @@ def test_a_joint_that_never_moves_keeps_its_nominal_body():
     item = moving(model.robot)
     still = motion(item.q * [[1.0], [0.0]], item.v * [[1.0], [0.0]], item.a * [[1.0], [0.0]], rate=200.0)
     seen = observed(model, still, truth(model), 0.02)
-    found = consistent(seen)
+    found = consistent(seen, options=DISSIPATIVE)
     assert np.any(found.undetermined)
     assert np.isinf(found.std[found.undetermined]).all()
     rotor = model.names.index("P_d5")
     nominal = truth(model)
     assert found.value[rotor] == pytest.approx(nominal[rotor], rel=1e-3)
     # What the first joint does tell, the sum of inertias at this angle, is least squares'.
-    plain = ols(seen)
+    plain = wls(seen)
     np.testing.assert_allclose(found.predict(still)[0], plain.predict(still)[0], atol=1e-6)
     assert smallest(found) > 0.0
 
@@ -120,7 +123,7 @@ def test_a_velocity_limit_can_be_given():
     model = scara()
     item = observed(model, stroke(model.robot), truth(model), 0.05, seed=3)
     # Up to the speed that was seen plain least squares is possible.
-    slow = ConsistentOptions(speed={"joint1": 0.6, "joint2": 0.6})
+    slow = ConsistentOptions(friction="dissipative", speed={"joint1": 0.6, "joint2": 0.6})
     found = consistent(item, options=slow)
     assert not any("friction" in text for text in found.active)
 

@@ -58,7 +58,7 @@ def diagnosed(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("diagnosed") / "report.html"
     fit = [_with_spring(f"{name}_{k}", motion, 10 * motion + k) for motion, name in enumerate("ABC") for k in (1, 2)]
     held_out = [_with_spring("D_1", 7, 77)]
-    found = diagnose(load_robot(), "complete", fit, held_out, bands=[15.0, 15.0], catalogue=(Spring(),))
+    found = diagnose(load_robot(), fit, validation=held_out, bands=[15.0, 15.0], catalogue=(Spring(),))
     assert [(effect.effect, effect.joint) for effect in found.effects] == [("spring", "joint1")]
     diagnosis_report(path, DiagnosisContext(found))
     return path

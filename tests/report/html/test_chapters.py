@@ -44,7 +44,7 @@ def test_what_was_corrected_in_the_data_adds_nothing_to_the_prediction():
 def test_each_chapter_begins_with_what_the_one_before_left():
     runs = with_torque(exact_runs(3)[:4], 1, lambda motion: 0.05 * motion.q[1])
     runs = with_torque(runs, 0, lambda motion: 0.05 * motion.q[0])
-    found = chapters(diagnose(load_robot(), "complete", runs, bands=BANDS, catalogue=(Spring(), Stribeck())))
+    found = chapters(diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(), Stribeck())))
     assert [(effect.effect, effect.joint, made.joint) for effect, made in found] in (
         [("spring", "joint1", 0), ("spring", "joint2", 1)],
         [("spring", "joint2", 1), ("spring", "joint1", 0)],

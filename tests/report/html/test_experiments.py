@@ -20,7 +20,7 @@ HOLD_OUT = "give it with --validate."
 @pytest.fixture(scope="module")
 def lean():
     """A model that lacks nothing, on runs without repetition or validation."""
-    return diagnose(load_robot(), "complete", exact_runs()[::2], bands=BANDS, catalogue=())
+    return diagnose(load_robot(), exact_runs()[::2], bands=BANDS, catalogue=())
 
 
 def test_what_the_recordings_lack_is_asked_for(lean):
@@ -31,7 +31,7 @@ def test_what_the_recordings_lack_is_asked_for(lean):
 
 def test_a_remainder_that_depends_on_a_signal_asks_for_that_signal_and_another_for_half_the_speed():
     runs = with_torque(exact_runs(), 1, lambda motion: 0.03 * np.sin(5.0 * motion.q[1]))
-    found = diagnose(load_robot(), "complete", runs, bands=BANDS, catalogue=())
+    found = diagnose(load_robot(), runs, bands=BANDS, catalogue=())
     first, *others = next_experiments(found)
     assert first.startswith("To learn what is left on joint2: move slowly over the whole range of position of joint2,")
     assert REPEAT not in others
@@ -41,5 +41,5 @@ def test_a_remainder_that_depends_on_a_signal_asks_for_that_signal_and_another_f
 
 def test_an_effect_that_was_found_asks_for_the_experiment_that_shows_it():
     runs = with_torque(exact_runs(3)[:4], 1, lambda motion: 0.05 * motion.q[1])
-    found = diagnose(load_robot(), "complete", runs, bands=BANDS, catalogue=(Spring(),))
+    found = diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),))
     assert f"To confirm spring of joint2: {Spring().experiment}." in next_experiments(found)
