@@ -18,6 +18,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict
 from pathlib import Path
 
@@ -99,9 +100,14 @@ def main() -> None:
     wanted = tasks(options.sets, options.seed, options.only or KINDS)
     done = sum(_place(folder, *task).exists() for task in wanted)
     print(f"{folder}: {done} of {len(wanted)} sets are there", file=sys.stderr, flush=True)
-    for item in run(folder, wanted, options.robot, asked, options.jobs, options.limit):
-        done += 1
-        print(f"{done:4d} {describe(item)}", flush=True)
+    try:
+        for item in run(folder, wanted, options.robot, asked, options.jobs, options.limit):
+            done += 1
+            print(f"{done:4d} {describe(item)}", flush=True)
+    except BrokenProcessPool:
+        raise SystemExit(
+            f"{folder}: a process ended before its set was done (out of memory?); run again to go on"
+        ) from None
     seeds = {seed for _, seed in wanted}
     found = [item for item in results(folder) if item["seed"] in seeds]
     report(found)

@@ -36,11 +36,7 @@ FRICTION = ("a0", "a1", "a2", "a3")
 OTHER_NAMES = {"_lost_share": "loss_coefficient", "crossing_width": "width"}
 # Effects whose columns share something with the base model, so that its parameters mean something else beside them: the
 # spring's rest is an offset, and a gain is one of all torques of its joint.
-SHARING = {
-    "transmission_loss": ("inertial",),
-    "spring": ("offset",),
-    "torque_gain_mismatch": ("inertial", "friction", "offset"),
-}
+SHARING = {"spring": ("offset",), "torque_gain_mismatch": ("inertial", "friction", "offset")}
 
 
 class OutOfTimeError(Exception):

@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
+from scipy.stats import beta
 
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.fitted_model import FittedModel
@@ -119,9 +120,11 @@ def report(found: Sequence[dict[str, float]]) -> bool:
     right = True
     for item in found:
         rate, draws = item["at_1_percent"], item["draws"]
-        # Two standard errors of the rate itself.
-        slack = 2.0 * np.sqrt(rate * (1.0 - rate) / draws)
-        good = item["not_testable"] > 0.5 or low - slack <= rate <= high + slack
+        # Clopper and Pearson's interval of 95 %: what so few draws leave open does not speak against a rate.
+        hits = round(rate * draws)
+        least = beta.ppf(0.025, hits, draws - hits + 1) if hits else 0.0
+        most = beta.ppf(0.975, hits + 1, draws - hits) if hits < draws else 1.0
+        good = item["not_testable"] > 0.5 or (least <= high and most >= low)
         right &= good
         print(
             f"{item['blocks']:6} {item['memory']:7.1f} {item['width']:8} "
