@@ -176,7 +176,7 @@ class Observations:
     @property
     def trajectory(self) -> str:
         """Trajectory of the recording, or of the first of several."""
-        return self.data.recordings[0].trajectory
+        return self.data.labels[0]
 
     @property
     def samples(self) -> int:
