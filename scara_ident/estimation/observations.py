@@ -285,6 +285,11 @@ def observe(model: TorqueModel, data: PreparedData, known: Observations | None =
     return Observations(model, data, tuple(joints), whole, tuple(raw for raw, _ in parts))
 
 
+def kept_rows(item: PreparedRecording) -> int:
+    """Return how many rows of all joints a recording has in its bands."""
+    return sum(len(kept) for part in item.stretches if part.usable for kept in part.kept)
+
+
 def _observed(model: TorqueModel, item: PreparedRecording) -> tuple[tuple[Raw, ...], Sequence[JointRows]]:
     """Return the columns of a recording at every sample, and its rows."""
     raw = tuple(model.joint_columns(part.motion) for part in item.stretches)

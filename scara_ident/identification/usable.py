@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from scara_ident.errors import RecordingError
-from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.observations import Observations, kept_rows
 from scara_ident.motion.motion import torque_of
 from scara_ident.motion.prepared import PreparedData, prepare
 from scara_ident.recording.recording import Recording
@@ -54,7 +54,7 @@ def with_rows(data: PreparedData, *, needed: bool) -> tuple[PreparedData, list[s
     needed : bool
         Whether at least one has to be left; if all have too few, all are.
     """
-    rows = [item.rows for item in data.recordings]
+    rows = [kept_rows(item) for item in data.recordings]
     kept = [k for k, count in enumerate(rows) if count >= LEAST_ROWS]
     if len(kept) == len(rows) or (needed and not kept):
         return data, []

@@ -223,11 +223,6 @@ class PreparedRecording:
         """Its longest stretch."""
         return max(self.stretches, key=lambda part: part.samples)
 
-    @property
-    def rows(self) -> int:
-        """Number of kept rows of all joints."""
-        return sum(len(kept) for part in self.stretches if part.usable for kept in part.kept)
-
     def at(self, bands: Bands) -> PreparedRecording:
         """Return it in other bands; what does not depend on them is shared."""
         if tuple(bands) == self.bands:
@@ -260,8 +255,7 @@ class PreparedData:
     @property
     def motions(self) -> Trajectories:
         """Which recordings have the same motion, found once for all bands."""
-        if not self._motions:
-            self._motions.append(trajectories_of([item.longest.stretch for item in self.recordings]))
+        self._motions[:] = self._motions or [trajectories_of([item.longest.stretch for item in self.recordings])]
         return self._motions[0]
 
     @property

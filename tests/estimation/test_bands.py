@@ -18,6 +18,7 @@ from scara_ident.estimation.bands import (
     narrowest_bands,
     needed_rows,
 )
+from scara_ident.estimation.observations import kept_rows
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
@@ -221,7 +222,7 @@ def test_the_band_leaves_more_rows_than_parameters(model: TorqueModel, seconds: 
     for noise in (0.01, 3.0):
         data = prepare([pendulum(model, seconds, noise)])
         bands = choose_bands(model, data).bands
-        rows = data.at(bands).recordings[0].rows
+        rows = kept_rows(data.at(bands).recordings[0])
         assert rows >= ROWS_PER_PARAMETER * len(model.columns) or max(bands) >= HIGHEST_BAND * RATE
 
 
