@@ -42,7 +42,7 @@ def identify(
     from scara_ident.files import write_json, written_together
     from scara_ident.identification.identify import identified_arm
     from scara_ident.identification.identify import identify as run
-    from scara_ident.recording.recording import read_recordings
+    from scara_ident.recording.recording import read_usable
     from scara_ident.report.identification import identification_dict, sentences
     from scara_ident.robot.robot import load_robot
 
@@ -50,8 +50,8 @@ def identify(
     arm = load_robot(robot)
     with progress() as work:
         work("reading the recordings")
-        training = read_recordings(recordings, arm)
-        held_out = read_recordings(validate, arm) if validate else ()
+        training, useless = read_usable(recordings, arm)
+        held_out, more = read_usable(validate or (), arm, needed=False)
         result = run(
             arm,
             training,
@@ -66,7 +66,7 @@ def identify(
     console = result_console(content, json)
     if verbose:
         show_recordings(console, (*training, *held_out))
-    console.note(result.notes)
+    console.note([*useless, *more, *result.notes])
     parameters = table(
         f"{arm.name}: {model} model by {method}", "name", "value", "std", "unit", "meaning", right=("value", "std")
     )

@@ -181,15 +181,15 @@ def diagnose(
         check_bands(robot, bands, (*recordings, *validation))
     base = build_model(robot, model) if isinstance(model, str) else model
     data, held_out = prepare(recordings), prepare(validation)
-    notes = data_notes((*data.recordings, *held_out.recordings))
-    given, known = bands is not None, None
+    notes = data_notes(data, held_out)
+    given = bands is not None
     if bands is None:
         work("choosing the band")
         choice = choose_bands(base, data)
         # A joint whose model lacks something seems to have less band than it has.
-        bands, known = (max(choice.bands),) * robot.n, choice.observations
+        bands = (max(choice.bands),) * robot.n
         notes += choice.notes
-    observations = observe(base, data.at(bands), known)
+    observations = observe(base, data.at(bands))
     faults = channel_faults(observations)
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))

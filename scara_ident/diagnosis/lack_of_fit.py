@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.motion.prepared import PreparedStretch
-from scara_ident.motion.repeatability import LARGEST_SHIFT, SAME_RATE, alignment
+from scara_ident.motion.trajectories import LARGEST_SHIFT, SAME_RATE, alignment
 
 # Residual of every joint, where it was used, and samples per second.
 Aligned = tuple[Array, NDArray[np.bool_], float]
@@ -61,9 +61,9 @@ def lack_of_fit(residuals: Residuals) -> tuple[LackOfFit, ...]:
     """
     groups: dict[str, list[tuple[PreparedStretch, Array]]] = {}
     banded = iter(residuals.banded)
-    for item in residuals.data.recordings:
+    for label, item in zip(residuals.data.labels, residuals.data.recordings, strict=True):
         parts = [(part, next(banded)) for part in item.stretches]
-        groups.setdefault(item.trajectory, []).append(max(parts, key=lambda pair: pair[0].samples))
+        groups.setdefault(label, []).append(max(parts, key=lambda pair: pair[0].samples))
     aligned = {name: _aligned(group) for name, group in groups.items() if len(group) > 1}
     repeated = {name: group for name, group in aligned.items() if len(group) > 1}
     joints = residuals.data.recordings[0].recording.joints if repeated else ()

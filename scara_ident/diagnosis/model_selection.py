@@ -96,15 +96,11 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
         if not found.search.chosen:
             break
         left("choosing the band again")
-        choice = choose_bands(found.search.model, found.search.data)
-        wider = max(choice.bands)
+        wider = max(choose_bands(found.search.model, found.search.data).bands)
         if wider < criteria.wider * _band(found):
             break
         # What was missing had hidden how far up the motion explains the torque, and other effects with it.
-        # Where the data were corrected, what the band was chosen with holds another torque.
-        known = choice.observations if found.search.correction is None else None
-        known = None if known is None else known.leading(task.model)
-        columns = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands)), known))
+        columns = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands))))
         now, left = next_of(left)
         found = _searched(replace(task, progress=now), columns, ())
     if free and (found.unexplained is not None or not _below_resonance(found, criteria)):

@@ -77,7 +77,7 @@ def _samples(
     trajectories = data.trajectories
     error, signals, fold = [], [], []
     parts = zip(residuals.banded, residuals.predicted, strict=True)
-    for item in data.recordings:
+    for label, item in zip(data.labels, data.recordings, strict=True):
         begin = float(item.recording.time[0])
         for part in item.stretches:
             banded, predicted = next(parts)
@@ -85,7 +85,7 @@ def _samples(
             places = places[~part.rest[j][places]]
             error.append(banded[j][places])
             signals.append(_signals(robot, part.motion, predicted[j], j, begin, places))
-            fold.append(np.full(len(places), trajectories.index(item.trajectory)))
+            fold.append(np.full(len(places), trajectories.index(label)))
     merged = {name: np.concatenate([part[name] for part in signals]) for name in signals[0]}
     residual = np.concatenate(error)
     groups = np.concatenate(fold)

@@ -151,7 +151,7 @@ def folds_of(data: PreparedData, owner: NDArray[np.intp], parts: int) -> NDArray
     names = data.trajectories
     if len(names) == 1:
         return np.minimum(np.arange(len(owner)) * parts // max(1, len(owner)), parts - 1)
-    place = np.array([names.index(item.trajectory) for item in data.recordings], dtype=np.intp)
+    place = np.array([names.index(label) for label in data.labels], dtype=np.intp)
     return np.asarray(place[owner], dtype=np.intp)
 
 

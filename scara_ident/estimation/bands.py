@@ -5,6 +5,11 @@ regressor is noise. Where that is, the torque tells: with parameters fitted at l
 hardly filtered motion predicts is compared with the recorded one, frequency by frequency. Where the prediction
 leaves more than half of the torque's power, motion and torque no longer speak of the same thing, be it for noise
 in the position or in the torque, and the band ends.
+
+The first fit is in a narrow band, where noise has grown least, and the band is widened as far as that fit explains. What
+a fit in the wider band says then brackets it from both sides, so that the search ends and cannot swing. A band of B Hz
+needs few samples a second, so it is chosen on recordings of a low rate, and of higher ones only where the band asks for
+them.
 """
 
 from __future__ import annotations
@@ -15,33 +20,41 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.estimation.information import merge
-from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.least_squares import weighted_value
+from scara_ident.estimation.observations import kept_rows, observe
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Stretch, motion_of, torque_of
-from scara_ident.motion.prepared import PreparedData
+from scara_ident.motion.prepared import END_PERIODS, PreparedData, PreparedStretch
+from scara_ident.motion.thinning import thinned
 from scara_ident.threads import side_by_side
 
-# The first fit uses the band that holds this share of the torque's power.
-FIRST_POWER = 0.95
-# It is not narrower than this many periods in the longest recording.
-FIRST_PERIODS = 10.0
-# Nor than this, Hz: in a narrower one too much about turning points would be left out to fit the rest.
+# Independent rows per parameter, at the least: what noise does to the estimate then adds a fifth to the noise variance of
+# a prediction, p / N of it (Seber and Lee, Linear Regression Analysis, 2003, section 12.2).
+ROWS_PER_PARAMETER = 5.0
+# A joint that hardly moves is not given more than so many times the band that all joints together need.
+MOST_ALONE = 2.0
+# Independent values a second of a signal low-passed at 1 Hz (Nyquist).
+ROWS_PER_HERTZ = 2.0
+# The first fit is not in a narrower band, Hz: too much about turning points would be left out to fit the rest.
 FIRST_BAND = 2.0
-# The fit and the choice of its band are repeated until they agree, at the most so often.
-MOST_ROUNDS = 3
-MOST_HALVINGS = 4
 # Share of the torque's power that the motion must explain at the band's edge.
 EXPLAINED = 0.5
 # Highest band as a share of the sample rate, and of the position filter that shows where the noise begins.
 HIGHEST_BAND = 0.2
 WIDE_FILTER = 0.4
+# The lowest sample rate that is looked at lets the first band widen so much; so much higher is the next.
+FIRST_WIDENING = 8.0
+NEXT_RATE = 16.0
+# Parameters fitted in a band tell as well how far the motion explains the torque up to so many times that band.
+NEAR_FIT = 4.0
+# A band above this share of the highest that a sample rate allows asks for the next.
+NEAR_HIGHEST = 0.5
 # Frequencies are pooled into this many bins per octave.
 BINS_PER_OCTAVE = 3
 # Segments of the spectra, s.
 SEGMENT_SECONDS = 4.0
-# Samples that the choice looks at, at the most.
-ENOUGH_SAMPLES = 60_000
+# Samples that the choice looks at, at the most, at each rate.
+ENOUGH_SAMPLES = 20_000
 
 
 @dataclass(frozen=True)
@@ -53,17 +66,14 @@ class BandChoice:
     bands : tuple of float
         Cut-off per joint, Hz.
     explained : tuple of float
-        Share of the torque's power within the band that the first fit explains, per joint.
+        Share of the torque's power within the band that the fit explains, per joint.
     notes : tuple of str
         What a person should know, such as a joint whose torque the motion does not explain.
-    observations : Observations or None
-        Of the recordings that were looked at, in the bands of the last fit.
     """
 
     bands: tuple[float, ...]
     explained: tuple[float, ...]
     notes: tuple[str, ...]
-    observations: Observations | None = None
 
 
 def choose_bands(model: TorqueModel, data: PreparedData) -> BandChoice:
@@ -75,91 +85,185 @@ def choose_bands(model: TorqueModel, data: PreparedData) -> BandChoice:
     data : PreparedData
         With effort; in any bands. The first repetition of each trajectory is looked at first.
     """
-    chosen = _sample(data)
-    parts = [part.stretch for part in chosen.stretches]
-    edges = _edges(parts)
-    highest = HIGHEST_BAND * min(part.rate for part in parts)
-    start = _first_bands(parts, edges, model.robot.n)
-    spectra = _Spectra(model, parts, edges)
-    choice = _refined(chosen, spectra, start, highest)
-    # Where the first band holds so much noise that nothing is explained, a narrower one may show what is.
-    for _ in range(MOST_HALVINGS):
-        if any(share > 0.0 for share in choice.explained):
-            break
-        start = [0.5 * band for band in start]
-        choice = _refined(chosen, spectra, start, highest)
-    return choice
+    _ = data.labels  # from the recordings as they are, before they are thinned
+    edges = _edges([part.stretch for part in data.stretches])
+    highest = HIGHEST_BAND * min(part.rate for part in data.stretches)
+    moving = _moving(data)
+    floor = np.minimum(narrowest_bands(model, len(data.stretches), moving), highest)
+    bands = np.minimum(np.maximum(floor, FIRST_BAND), highest)
+    rate = float(np.max(bands)) * FIRST_WIDENING / HIGHEST_BAND
+    fit = None
+    while True:
+        level = _sample(_thinned(data, rate))
+        allowed = HIGHEST_BAND * min(part.rate for part in level.stretches)
+        bands, fit = _widened(_Spectra(model, level, edges), bands, floor, allowed, fit)
+        if allowed >= highest or np.max(bands) < NEAR_HIGHEST * allowed:
+            return _told(model, bands, fit, edges, floor, moving)
+        rate *= NEXT_RATE
 
 
-def _refined(data: PreparedData, spectra: _Spectra, start: Sequence[float], highest: float) -> BandChoice:
-    """Repeat fit and choice of bands from a first band on until they agree."""
-    n = spectra.model.robot.n
-    choice = BandChoice((max(start),) * n, (0.0,) * n, ())
-    for _ in range(MOST_ROUNDS):
-        before = choice.bands
-        observations = observe(spectra.model, data.at(before))
-        value = merge(observations.by_joint).solve().value
-        choice = replace(_explained_bands(spectra, value, start, highest), observations=observations)
-        if choice.bands == before:
-            break
-    return choice
+def _widened(spectra: _Spectra, bands: Array, floor: Array, highest: float, known: _Fit | None) -> tuple[Array, _Fit]:
+    """Widen bands as far as a fit in them explains the torque, until they stay, and return them with the last fit.
+
+    Each fit leaves a joint's band between the widest that explained beyond itself and the narrowest that did not, which is
+    not tried again: the bracket shrinks from bin to bin, so that this ends, whatever a fit says.
+    """
+    lower, upper = floor.copy(), np.full(len(bands), np.inf)
+    bands = np.clip(bands, floor, highest)
+    fit = spectra.fit(bands) if known is None else spectra.judged(known.bands, known.value)
+    while True:
+        # Where a band holds so much noise that nothing is explained, a narrower one may show what is.
+        wanted = np.where(fit.explains > 0.0, np.minimum(fit.explains, highest), 0.5 * bands)
+        wider = wanted >= bands
+        lower, upper = np.where(wider, bands, lower), np.where(wider, upper, bands)
+        bands = np.where(wider & (wanted >= upper), bands, np.maximum(wanted, lower))
+        if np.all((bands >= fit.bands) & (bands <= NEAR_FIT * fit.bands)):
+            return bands, fit
+        fit = spectra.fit(bands)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """What parameters fitted in some bands explain.
+
+    Attributes
+    ----------
+    bands : ndarray, shape (n,)
+        Of the fit, Hz.
+    value : ndarray, shape (p,)
+        Its parameters.
+    explains : ndarray, shape (n,)
+        Frequency up to which they explain each joint's torque, Hz; 0 where they explain nothing.
+    shares : ndarray, shape (n, m)
+        Share of the torque's power that they explain, from 0 to the end of each bin of frequency.
+    """
+
+    bands: Array
+    value: Array
+    explains: Array
+    shares: Array
 
 
 class _Spectra:
-    """Power of the torque, and of the columns of a hardly filtered motion, in bins of frequency."""
+    """Power of the torque, and of what fits leave of it along a hardly filtered motion, in bins of frequency."""
 
-    def __init__(self, model: TorqueModel, parts: Sequence[Stretch], edges: Array) -> None:
-        self.model, self.parts, self.edges = model, parts, edges
-        self.torque = np.sum([binned_power(torque_of(part), part.rate, edges) for part in parts], axis=0)
+    def __init__(self, model: TorqueModel, data: PreparedData, edges: Array) -> None:
+        self.model, self.data, self.edges = model, data, edges
+        self.parts = [part.stretch for part in data.stretches]
+        self.torque = np.sum([binned_power(torque_of(part), part.rate, edges) for part in self.parts], axis=0)
 
         def wide(part: Stretch) -> tuple[Array, ...]:
             return model.joint_columns(motion_of(part, [WIDE_FILTER * part.rate] * model.robot.n))
 
-        self.columns = side_by_side(wide, parts)
+        self.columns = side_by_side(wide, self.parts)
 
-    def error(self, value: Array) -> Array:
-        """Return the power that parameters leave of the torque, shape (n, bins)."""
+    def fit(self, bands: Array) -> _Fit:
+        """Fit parameters in bands, and say how far up they explain each joint's torque."""
+        data = self.data.at(tuple(bands.tolist()))
+        # One that is too short for these bands, or at rest, has nothing to say.
+        kept = [k for k, item in enumerate(data.recordings) if kept_rows(item)]
+        return self.judged(bands, weighted_value(observe(self.model, data.of(kept) if kept else data)))
 
-        def of_part(part: Stretch, columns: tuple[Array, ...]) -> Array:
+    def judged(self, bands: Array, value: Array) -> _Fit:
+        """Say how far up parameters that were fitted in some bands explain each joint's torque."""
+
+        def left(part: Stretch, columns: tuple[Array, ...]) -> Array:
             predicted = [value[own] @ rows for own, rows in zip(self.model.active, columns, strict=True)]
             return binned_power(torque_of(part) - np.array(predicted), part.rate, self.edges)
 
-        return np.asarray(np.sum(side_by_side(of_part, self.parts, self.columns), axis=0))
+        error = np.sum(side_by_side(left, self.parts, self.columns), axis=0)
+        gain = np.cumsum(self.torque * (1.0 - EXPLAINED) - error, axis=1)
+        best = np.argmax(gain, axis=1)
+        some = gain[np.arange(len(best)), best] > 0.0
+        whole = np.maximum(np.cumsum(self.torque, axis=1), np.finfo(float).tiny)
+        return _Fit(bands, value, np.where(some, self.edges[best + 1], 0.0), 1.0 - np.cumsum(error, axis=1) / whole)
 
 
-def _explained_bands(spectra: _Spectra, value: Array, start: Sequence[float], highest: float) -> BandChoice:
-    """Return the bands up to which parameters explain the torque."""
-    model, edges = spectra.model, spectra.edges
-    torque, error = spectra.torque, spectra.error(value)
-    bands, explained, notes = [], [], []
-    for j, joint in enumerate(model.robot.joints):
-        gain = np.cumsum(torque[j] * (1.0 - EXPLAINED) - error[j])
-        best = int(np.argmax(gain))
-        if gain[best] <= 0.0:
-            bands.append(min(start[j], highest))
-            explained.append(0.0)
+def _told(model: TorqueModel, bands: Array, fit: _Fit, edges: Array, floor: Array, moving: Array) -> BandChoice:
+    """Return the choice with what a person should know of it."""
+    place = np.clip(np.searchsorted(edges, bands * (1.0 - 1e-9)) - 1, 0, fit.shares.shape[1] - 1)
+    some = fit.explains > 0.0
+    explained = np.where(some, fit.shares[np.arange(len(place)), place], 0.0)
+    notes = []
+    for j, (joint, need) in enumerate(zip(model.robot.joints, needed_rows(model), strict=True)):
+        band, rows = bands[j], ROWS_PER_HERTZ * bands[j] * moving[j]
+        if not some[j]:
             notes.append(
-                f"{joint}: its motion explains under half of its torque at every frequency; "
-                f"the band of {bands[-1]:.3g} Hz holds {FIRST_POWER:.0%} of the torque"
+                f"{joint}: its motion explains under half of its torque at every frequency; the band is left at {band:.3g} Hz"
             )
-            continue
-        bands.append(float(min(edges[best + 1], highest)))
-        explained.append(float(1.0 - np.sum(error[j, : best + 1]) / np.sum(torque[j, : best + 1])))
-    return BandChoice(tuple(bands), tuple(explained), tuple(notes))
+        elif fit.explains[j] < band and band <= floor[j]:
+            notes.append(
+                f"{joint}: its motion explains its torque up to {fit.explains[j]:.2g} Hz, but a band below {band:.3g} Hz would "
+                f"leave fewer than {ROWS_PER_PARAMETER:g} independent rows per parameter; record longer"
+            )
+        if moving[j] > 0.0 and rows < need:
+            notes.append(
+                f"{joint}: moves for {moving[j]:.2g} s in all, too little to tell its own parameters; record it moving"
+            )
+    return BandChoice(tuple(bands.tolist()), tuple(explained.tolist()), tuple(notes))
+
+
+def needed_rows(model: TorqueModel) -> Array:
+    """Return how many parameters the rows of each joint have to tell, shape (n,).
+
+    A parameter that acts on several joints is shared equally by them. With at least so many rows on every joint, no
+    set of joints has fewer rows than there are parameters that act on no other joint (Hall's condition), and all
+    together have as many as the model has parameters.
+    """
+    pattern = model.pattern
+    share = 1.0 / np.maximum(np.sum(pattern, axis=0), 1)
+    return np.asarray(pattern @ share, dtype=float)
+
+
+def narrowest_bands(model: TorqueModel, stretches: int, moving: Array) -> Array:
+    """Return the bands below which there are too few independent rows for the parameters, Hz, shape (n,).
+
+    A signal low-passed at B Hz has 2 B independent values a second, less those of a period at both ends of every stretch.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    stretches : int
+        Their number.
+    moving : ndarray, shape (n,)
+        Time in which each joint moves, s.
+    """
+    if not np.any(moving > 0.0):
+        return np.zeros(len(moving))
+    need = ROWS_PER_PARAMETER * needed_rows(model) / ROWS_PER_HERTZ + 2.0 * END_PERIODS * stretches
+    together = float(np.sum(need) / np.sum(moving))
+    alone = np.divide(need, moving, out=np.full(len(need), np.inf), where=moving > 0.0)
+    return np.asarray(np.clip(alone, together, MOST_ALONE * together))
+
+
+def _moving(data: PreparedData) -> Array:
+    """Return the time in which each joint moves, s, shape (n,)."""
+    slow = _thinned(data.at((FIRST_BAND,) * len(data.bands)), FIRST_BAND * FIRST_WIDENING / HIGHEST_BAND)
+    times = [np.count_nonzero(~part.rest, axis=1) / part.rate for part in slow.stretches]
+    return np.asarray(np.sum(times, axis=0))
+
+
+def _thinned(data: PreparedData, rate: float) -> PreparedData:
+    """Return recordings at the lowest rate that is not below a given one and a whole part of their own."""
+    made = []
+    for item in data.recordings:
+        parts = (thinned(part.stretch, max(1, int(part.rate / rate))) for part in item.stretches)
+        made.append(replace(item, stretches=tuple(PreparedStretch(part, data.bands) for part in parts)))
+    return replace(data, recordings=tuple(made))
 
 
 def _sample(data: PreparedData) -> PreparedData:
     """Take one repetition of each trajectory, then more, until there is enough to look at."""
     seen: dict[str, int] = {}
     ranked = []
-    for place, item in enumerate(data.recordings):
-        turn = seen.get(item.trajectory, 0)
-        seen[item.trajectory] = turn + 1
+    for place, label in enumerate(data.labels):
+        turn = seen.get(label, 0)
+        seen[label] = turn + 1
         ranked.append((turn, place))
     chosen: list[int] = []
     total = 0
     for _, place in sorted(ranked):
-        count = len(data.recordings[place].recording.time)
+        count = sum(part.samples for part in data.recordings[place].stretches)
         if chosen and total + count > ENOUGH_SAMPLES:
             continue
         chosen.append(place)
@@ -173,18 +277,6 @@ def _edges(parts: Sequence[Stretch]) -> Array:
     highest = 0.5 * max(part.rate for part in parts)
     count = max(2, int(np.ceil(BINS_PER_OCTAVE * np.log2(highest / lowest))))
     return np.concatenate([[0.0], np.geomspace(1.5 * lowest, highest, count)])
-
-
-def _first_bands(parts: Sequence[Stretch], edges: Array, n: int) -> list[float]:
-    power = np.zeros((n, len(edges) - 1))
-    for part in parts:
-        power += binned_power(torque_of(part), part.rate, edges)
-    longest = max(len(part.time) / part.rate for part in parts)
-    slowest = max(FIRST_BAND, FIRST_PERIODS / longest)
-    fastest = max(slowest, HIGHEST_BAND * min(part.rate for part in parts))
-    share = np.cumsum(power, axis=1) / np.maximum(np.sum(power, axis=1, keepdims=True), np.finfo(float).tiny)
-    first = [float(edges[int(np.argmax(row >= FIRST_POWER)) + 1]) for row in share]
-    return [float(np.clip(band, slowest, fastest)) for band in first]
 
 
 def binned_power(signals: Array, rate: float, edges: Array) -> Array:

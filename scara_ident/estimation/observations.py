@@ -176,7 +176,7 @@ class Observations:
     @property
     def trajectory(self) -> str:
         """Trajectory of the recording, or of the first of several."""
-        return self.data.recordings[0].trajectory
+        return self.data.labels[0]
 
     @property
     def samples(self) -> int:
@@ -283,6 +283,11 @@ def observe(model: TorqueModel, data: PreparedData, known: Observations | None =
         )
     whole = np.concatenate([np.zeros(0), *owner]).astype(np.intp)
     return Observations(model, data, tuple(joints), whole, tuple(raw for raw, _ in parts))
+
+
+def kept_rows(item: PreparedRecording) -> int:
+    """Return how many rows of all joints a recording has in its bands."""
+    return sum(len(kept) for part in item.stretches if part.usable for kept in part.kept)
 
 
 def _observed(model: TorqueModel, item: PreparedRecording) -> tuple[tuple[Raw, ...], Sequence[JointRows]]:

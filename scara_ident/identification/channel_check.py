@@ -101,8 +101,7 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     tuple of ChannelFault
         To be mended together; empty where nothing else fits better.
     """
-    recordings = observations.data.recordings
-    first = {item.trajectory: place for place, item in reversed(list(enumerate(recordings)))}
+    first = {label: place for place, label in reversed(list(enumerate(observations.data.labels)))}
     held = observations.of(sorted(first.values()))
     model = observations.model
     joints = model.robot.joints
@@ -170,7 +169,9 @@ def _read_as(data: PreparedData, signal: Signal, joints: Sequence[int], exchange
     def read(part: PreparedStretch) -> PreparedStretch:
         position = turned(part.stretch.position, "position" in signal)
         torque = turned(part.torque, "effort" in signal)
-        return PreparedStretch(replace(part.stretch, position=position, torque=torque, _filtered={}), part.bands)
+        return PreparedStretch(
+            replace(part.stretch, position=position, torque=torque, _filtered={}, _thinned={}), part.bands
+        )
 
     recordings = [replace(item, stretches=tuple(map(read, item.stretches))) for item in data.recordings]
     return replace(data, recordings=tuple(recordings))

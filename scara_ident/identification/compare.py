@@ -113,22 +113,21 @@ def compare(
     if len(names) < 2:
         raise UsageError(
             f"compare needs recordings of at least two trajectories, found {len(names)}; "
-            "a trajectory's name is the file's stem without its last _<number>"
+            "recordings of the same motion are repetitions of one trajectory, whatever they are named"
         )
     equation = build_model(robot, model) if isinstance(model, str) else model
-    notes = data_notes(data.recordings)
-    known = None
+    notes = data_notes(data)
     if bands is None:
         progress("choosing the bands", 0.0)
         choice = choose_bands(equation, data)
-        bands, notes, known = choice.bands, [*notes, *choice.notes], choice.observations
+        bands, notes = choice.bands, [*notes, *choice.notes]
     progress("absorbing the recordings", 0.4)
-    observations = observe(equation, data.at(bands), known)
+    observations = observe(equation, data.at(bands))
     noise = repeatability(data)
     summaries, rows = [], []
     for k, name in enumerate(names):
         progress(f"estimating from {name}", 0.5 + 0.4 * k / len(names))
-        own = observations.of([k for k, item in enumerate(data.recordings) if item.trajectory == name])
+        own = observations.of([place for place, label in enumerate(data.labels) if label == name])
         rows.append(own.by_joint)
         summaries.append(_summary(name, own, method, noise.get(name)))
     errors = np.zeros((len(names), len(names), robot.n))

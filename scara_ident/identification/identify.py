@@ -21,8 +21,9 @@ from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.channel_check import channel_faults
+from scara_ident.identification.usable import check_rows, usable_data, with_rows
 from scara_ident.model.model import TorqueModel, build_model
-from scara_ident.motion.prepared import PreparedRecording, prepare
+from scara_ident.motion.prepared import PreparedData, prepare
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.motion.velocity_audit import audit_velocity
 from scara_ident.progress import Tell, silent
@@ -122,7 +123,8 @@ def identify(
         If there are no recordings, the model or the method is unknown, a recording is both fitted and held out, or a band is no
         frequency that the slowest recording carries.
     RecordingError
-        If a recording cannot be used.
+        If none of the recordings to fit can be used, or they have fewer rows than the model has parameters. One of several
+        that cannot be used, or one that is held out, is left out with a note.
     """
     if not recordings:
         raise UsageError("no recordings to identify from")
@@ -131,17 +133,20 @@ def identify(
     equation = build_model(robot, model) if isinstance(model, str) else model
     if bands is not None:
         check_bands(robot, bands, (*recordings, *validation))
-    data, held_out = prepare(recordings), prepare(validation)
-    notes = data_notes((*data.recordings, *held_out.recordings))
-    known = None
+    data, useless = usable_data(recordings, needed=True)
+    held_out, more = usable_data(validation, needed=False)
+    notes = [*useless, *more, *data_notes(data, held_out)]
     if bands is None:
         progress("choosing the bands", 0.0)
         choice = choose_bands(equation, data)
-        bands, known = choice.bands, choice.observations
+        bands = choice.bands
         notes += choice.notes
     progress("absorbing the recordings", 0.5)
-    training = observe(equation, data.at(bands), known)
-    validated = observe(equation, held_out.at(bands))
+    data, useless = with_rows(data.at(bands), needed=True)
+    held_out, more = with_rows(held_out.at(bands), needed=False)
+    training, validated = observe(equation, data), observe(equation, held_out)
+    check_rows(training)
+    notes += [*useless, *more]
     notes += [str(fault) for fault in channel_faults(training)]
     progress("estimating", 0.7)
     noise = repeatability(data)
@@ -176,8 +181,7 @@ def known_information(model: TorqueModel, recordings: Sequence[Recording], rate:
         Samples per second that the design they are to be joined with counts.
     """
     data = prepare(recordings)
-    choice = choose_bands(model, data)
-    observations = observe(model, data.at(choice.bands), choice.observations)
+    observations = observe(model, data.at(choose_bands(model, data).bands))
     return merge(
         information.scaled(float(np.sqrt(rate / recording.rate)))
         for item, recording in zip(observations.each, recordings, strict=True)
@@ -231,10 +235,10 @@ def check_held_out(recordings: Sequence[Recording], validation: Sequence[Recordi
             )
 
 
-def data_notes(recordings: Sequence[PreparedRecording]) -> list[str]:
-    """Return what the audits found, the same remark on many recordings in one line."""
+def data_notes(*data: PreparedData) -> list[str]:
+    """Return what the audits found, the same remark on many recordings in one line, and where names contradict motions."""
     found: dict[str, list[str]] = {}
-    for item in recordings:
+    for item in (item for part in data for item in part.recordings):
         remarks = [finding.message for finding in item.recording.findings]
         longest = item.longest.stretch
         verdicts: dict[str, list[str]] = {}
@@ -247,7 +251,8 @@ def data_notes(recordings: Sequence[PreparedRecording]) -> list[str]:
         ]
         for remark in remarks:
             found.setdefault(remark, []).append(item.name)
-    return [f"{_listed(names)}: {remark}" for remark, names in found.items()]
+    notes = [f"{_listed(names)}: {remark}" for remark, names in found.items()]
+    return [*notes, *(note for part in data for note in part.motions.notes)]
 
 
 def _listed(names: Sequence[str], most: int = 3) -> str:

@@ -107,6 +107,7 @@ class Stretch:
     rate: float
     source: slice
     _filtered: dict[tuple[int, float | None], tuple[Array, Array, Array]] = field(default_factory=dict, repr=False)
+    _thinned: dict[int, Stretch] = field(default_factory=dict, repr=False)
 
     def filtered(self, joint: int, cut: float | None) -> tuple[Array, Array, Array]:
         """Return position, velocity and acceleration of a joint, low-passed at ``cut`` Hz, made once."""

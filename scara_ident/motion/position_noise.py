@@ -100,4 +100,4 @@ def _noisier(part: PreparedStretch, steps: list[float | None], rng: np.random.Ge
         else:
             smooth = part.motion.q[joint] + step * rng.choice((UNLIKE, 1.0 - UNLIKE))
             position[joint] += step * np.round(smooth / step) - smooth
-    return replace(stretch, position=position, _filtered={})
+    return replace(stretch, position=position, _filtered={}, _thinned={})

@@ -8,7 +8,7 @@ time, long against the filter's memory.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
 
@@ -28,6 +28,7 @@ from scara_ident.motion.motion import (
     torque_of,
     with_effort_of,
 )
+from scara_ident.motion.trajectories import Trajectories, trajectories_of
 from scara_ident.recording.recording import Recording
 from scara_ident.threads import side_by_side
 
@@ -213,11 +214,6 @@ class PreparedRecording:
         return self.recording.name
 
     @property
-    def trajectory(self) -> str:
-        """Trajectory of which it is a repetition."""
-        return self.recording.trajectory
-
-    @property
     def bands(self) -> tuple[float | None, ...]:
         """Low-pass of each joint, Hz."""
         return self.stretches[0].bands
@@ -253,11 +249,27 @@ class PreparedData:
 
     recordings: tuple[PreparedRecording, ...]
     bands: tuple[float | None, ...]
+    _motions: list[Trajectories] = field(default_factory=list, repr=False)
+    _part_of: tuple[PreparedData, tuple[int, ...]] | None = field(default=None, repr=False)
+
+    @property
+    def motions(self) -> Trajectories:
+        """Which recordings have the same motion, found once for all bands."""
+        self._motions[:] = self._motions or [trajectories_of([item.longest.stretch for item in self.recordings])]
+        return self._motions[0]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Trajectory of each recording: the same for repetitions of one motion; of a part, as in the whole."""
+        if self._part_of is None:
+            return self.motions.labels
+        labels = self._part_of[0].labels
+        return tuple(labels[k] for k in self._part_of[1])
 
     @property
     def trajectories(self) -> tuple[str, ...]:
         """Trajectories in the order in which they come."""
-        return tuple(dict.fromkeys(item.trajectory for item in self.recordings))
+        return tuple(dict.fromkeys(self.labels))
 
     @property
     def sources(self) -> tuple[Recording, ...]:
@@ -271,11 +283,11 @@ class PreparedData:
 
     def at(self, bands: Bands) -> PreparedData:
         """Return the recordings in other bands; what does not depend on them is shared."""
-        return PreparedData(tuple(item.at(bands) for item in self.recordings), tuple(bands))
+        return replace(self, recordings=tuple(item.at(bands) for item in self.recordings), bands=tuple(bands))
 
     def of(self, places: Sequence[int]) -> PreparedData:
         """Return some of the recordings."""
-        return PreparedData(tuple(self.recordings[k] for k in places), self.bands)
+        return PreparedData(tuple(self.recordings[k] for k in places), self.bands, _part_of=(self, tuple(places)))
 
 
 def prepare(recordings: Sequence[Recording], bands: Bands = ()) -> PreparedData:
@@ -362,10 +374,11 @@ def _velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | 
 
     White position noise of density s/rate integrates to ``s (2 pi)^2 f^3 / 3`` in velocity up to f.
     """
-    cut = position_cuts(stretch.rate, [band])[0] or HIGHEST_CUT * stretch.rate
-    if band is None:
-        # Nothing was filtered; the noise is what a wide filter would take out.
+    cut = reach = position_cuts(stretch.rate, [band])[0]
+    if cut is None or reach is None:
+        # Nothing was filtered; the noise is what a wide filter would take out. Within a wide band all of it is there.
         cut = 0.2 * stretch.rate
+        reach = cut if band is None else 0.5 * stretch.rate
         smooth = stretch.filtered(joint, cut)[0]
     else:
         smooth = motion.q[joint]
@@ -374,7 +387,7 @@ def _velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | 
     scatter = float(np.median(np.abs(rest))) / 0.6745
     nyquist = 0.5 * stretch.rate
     removed = max(nyquist - cut, 0.1 * nyquist)
-    return float(scatter / np.sqrt(removed) * 2.0 * np.pi * np.sqrt(cut**3 / 3.0))
+    return float(scatter / np.sqrt(removed) * 2.0 * np.pi * np.sqrt(reach**3 / 3.0))
 
 
 def _runs_longer_than(mask: NDArray[np.bool_], length: int, widen: int) -> NDArray[np.bool_]:

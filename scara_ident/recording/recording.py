@@ -209,6 +209,28 @@ def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: b
     return tuple(read_recording(path, robot, need_effort=need_effort) for path in recording_paths(words))
 
 
+def read_usable(
+    words: Sequence[Path | str], robot: Robot, *, needed: bool = True
+) -> tuple[tuple[Recording, ...], list[str]]:
+    """Read recordings with effort, without those that cannot be used, and say which; at least one if it is needed.
+
+    Raises
+    ------
+    UsageError, RecordingError
+        As `read_recordings`; that of the first recording if none can be used.
+    """
+    found, notes, errors = [], [], []
+    for path in recording_paths(words):
+        try:
+            found.append(read_recording(path, robot))
+        except RecordingError as error:
+            errors.append(error)
+            notes.append(f"{error}; left out")
+    if needed and errors and not found:
+        raise errors[0]
+    return tuple(found), notes
+
+
 def recording_paths(words: Sequence[Path | str]) -> tuple[Path, ...]:
     """List the files that words on a command line stand for; see `read_recordings`."""
     found: dict[Path, Path] = {}

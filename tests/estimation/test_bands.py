@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from scara_ident.estimation.bands import binned_power, choose_bands
+from scara_ident.estimation.bands import (
+    HIGHEST_BAND,
+    ROWS_PER_PARAMETER,
+    _Fit,
+    _widened,
+    binned_power,
+    choose_bands,
+    narrowest_bands,
+    needed_rows,
+)
+from scara_ident.estimation.observations import kept_rows
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
@@ -163,3 +173,88 @@ def test_binned_power_is_the_mean_square_whatever_the_bins():
     tone = np.sin(2 * np.pi * 30.0 * np.arange(count) / RATE)[None]
     assert binned_power(tone, RATE, edges)[0, 1] > 0.999 * binned_power(tone, RATE, edges).sum()
     np.testing.assert_allclose(binned_power(tone + 7.0, RATE, edges), binned_power(tone, RATE, edges), atol=1e-6)
+
+
+def pendulum(model: TorqueModel, seconds: float, torque_noise: float, seed: int = 0) -> Recording:
+    """A slow swing at 500 Hz with half a milliradian of noise, and torque that is mostly noise if so wanted."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(seconds * RATE)) / RATE
+    q, v, a = (np.zeros((2, len(time))) for _ in range(3))
+    for j in range(2):
+        for frequency in (0.3, 0.7, 1.1, 1.6):
+            w, size, phase = 2 * np.pi * frequency, 0.5 / (1 + frequency**2), rng.uniform(0, 2 * np.pi)
+            q[j] += size * np.sin(w * time + phase)
+            v[j] += size * w * np.cos(w * time + phase)
+            a[j] -= size * w**2 * np.sin(w * time + phase)
+    torque = recorded_torque(model.robot, q, v, a, FRICTION)
+    scale = torque_noise * np.std(torque, axis=1, keepdims=True)
+    noisy = torque + scale * rng.standard_normal(torque.shape)
+    return recording(model.robot, "swing_1", time, q + 5e-4 * rng.standard_normal(q.shape), noisy)
+
+
+@pytest.mark.parametrize("torque_noise", [0.5, 2.0, 5.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_noisy_torque_does_not_swing_the_band(model: TorqueModel, torque_noise: float, seed: int):
+    """White noise as large as the torque has most of its power above what moves; the band stays where the motion is."""
+    found = choose_bands(model, prepare([pendulum(model, 12.0, torque_noise, seed)]))
+    assert min(found.bands) > 1.0
+    assert max(found.bands) < 12.0
+
+
+def test_the_search_for_bands_ends_where_fits_contradict_each_other():
+    """Fits in a wide band that explain a narrow one only, and the other way round."""
+
+    class Contrary:
+        def fit(self, bands: np.ndarray) -> _Fit:
+            self.fits = getattr(self, "fits", 0) + 1
+            return _Fit(bands, bands, np.where(bands > 5.0, 1.0, 90.0), np.zeros((2, 1)))
+
+    spectra = Contrary()
+    bands, fit = _widened(spectra, np.full(2, 2.0), np.full(2, 0.5), 100.0, None)  # type: ignore[arg-type]
+    assert spectra.fits < 10
+    assert np.all(bands <= 5.0)
+    np.testing.assert_array_equal(fit.bands, bands)
+
+
+@pytest.mark.parametrize("seconds", [2.0, 4.0, 8.0, 30.0])
+def test_the_band_leaves_more_rows_than_parameters(model: TorqueModel, seconds: float):
+    """Held to the highest band where the recording is too short even for that."""
+    for noise in (0.01, 3.0):
+        data = prepare([pendulum(model, seconds, noise)])
+        bands = choose_bands(model, data).bands
+        rows = kept_rows(data.at(bands).recordings[0])
+        assert rows >= ROWS_PER_PARAMETER * len(model.columns) or max(bands) >= HIGHEST_BAND * RATE
+
+
+def test_rows_are_needed_where_parameters_act(model: TorqueModel):
+    need = needed_rows(model)
+    assert np.sum(need) == pytest.approx(len(model.columns))
+    # Hall: no fewer than the parameters that act on that joint alone.
+    alone = np.sum(model.pattern & (np.sum(model.pattern, axis=0) == 1), axis=1)
+    assert np.all(need >= alone)
+
+
+def test_the_narrowest_band_follows_from_time_and_parameters(model: TorqueModel):
+    narrow = narrowest_bands(model, 1, np.array([20.0, 20.0]))
+    rows = 2.0 * narrow * 20.0 - 4.0
+    assert np.all(rows >= ROWS_PER_PARAMETER * needed_rows(model) - 1e-9)
+    # One that hardly moves is not forced far up into noise; none that moves, none is asked for.
+    odd = narrowest_bands(model, 1, np.array([20.0, 0.1]))
+    assert odd[1] <= 2.0 * odd[0] * 1.0001
+    assert np.all(narrowest_bands(model, 1, np.zeros(2)) == 0.0)
+
+
+def test_the_rate_of_the_samples_does_not_move_the_band(model: TorqueModel):
+    """Noise of the same density, at 500 and at 250 samples a second."""
+    whole = pendulum(model, 20.0, 0.5)
+    assert whole.effort is not None
+    count = len(whole.time) // 2
+    half = replace(
+        whole,
+        time=whole.time[: 2 * count].reshape(-1, 2).mean(axis=1),
+        position=whole.position[:, : 2 * count].reshape(2, -1, 2).mean(axis=2),
+        effort=whole.effort[:, : 2 * count].reshape(2, -1, 2).mean(axis=2),
+    )
+    one, other = (choose_bands(model, prepare([item])).bands for item in (whole, half))
+    # Bins are a third of an octave.
+    assert np.all(np.abs(np.log2(np.array(one) / other)) < 0.7)

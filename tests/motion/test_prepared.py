@@ -169,9 +169,12 @@ def test_a_gap_makes_two_stretches_of_one_recording(run: Recording):
 
 
 def test_recordings_are_prepared_in_their_order_and_known_by_their_trajectory(robot: Robot):
-    runs = [swing(robot, name, seconds=4.0) for name in ("b_1", "a_1", "b_2")]
+    runs = [swing(robot, name, seed, seconds=4.0) for name, seed in (("b_1", 1), ("a_1", 2), ("b_2", 1))]
     data = prepare(runs, BANDS)
     assert data.trajectories == ("b", "a")
+    assert data.labels == ("b", "a", "b")
+    assert data.of([2, 1]).labels == data.of([0, 2, 1]).of([1, 2]).labels == ("b", "a")
+    assert data.at((6.0, 6.0)).motions is data.motions
     assert data.sources == tuple(runs)
     assert [item.name for item in data.of([2, 0]).recordings] == ["b_2", "b_1"]
     assert data.bands == BANDS

@@ -77,8 +77,9 @@ def test_an_odd_first_run_does_not_hide_the_repetitions(robot: Robot):
 
 
 def test_trajectories_are_judged_apart(robot: Robot):
-    runs = [run(robot, name, k) for k, name in enumerate(("a_1", "a_2", "b_1", "b_2", "c_1"))]
-    runs[2] = replace(runs[2], effort=3 * runs[2].effort - 2 * run(robot, "b_1", 77).effort)
+    paces = {"a_1": 1.0, "a_2": 1.0, "b_1": 1.2, "b_2": 1.2, "c_1": 0.8}
+    runs = [run(robot, name, k, pace=pace) for k, (name, pace) in enumerate(paces.items())]
+    runs[2] = replace(runs[2], effort=3 * runs[2].effort - 2 * run(robot, "b_1", 77, pace=1.2).effort)
     found = repeats(runs)
     assert set(found) == {"a", "b"}
     assert np.all(found["b"] > 2.0 * found["a"])

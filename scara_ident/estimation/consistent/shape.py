@@ -207,6 +207,6 @@ def _same_place(observations: Observations) -> NDArray[np.intp]:
     """Return a number for each block, the same for blocks at the same place of runs of one trajectory."""
     owner = observations.owner
     place = np.arange(len(owner)) - np.searchsorted(owner, owner)
-    names = [item.trajectory for item in observations.data.recordings]
+    names = list(observations.data.labels)
     run = np.array([names.index(name) for name in names] or range(len(owner)), dtype=np.intp)[owner]
     return np.unique(np.column_stack([run, place]), axis=0, return_inverse=True)[1].ravel()

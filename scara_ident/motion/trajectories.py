@@ -1,0 +1,178 @@
+"""Which recordings are repetitions of one trajectory: those of the same motion, whatever they are named.
+
+Positions are laid on each other, moved in time by up to a second. A name says what a trajectory is called, and where names
+and motions contradict each other a note says so.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.motion.motion import Stretch
+
+# Repetitions start within this many seconds of each other after alignment; more is another motion.
+LARGEST_SHIFT = 1.0
+# Aligned positions that differ by more than this share of their range are not the same motion.
+SAME_MOTION = 0.01
+# Sample rates that differ by more than this share are not compared sample by sample.
+SAME_RATE = 1e-3
+# A joint's range counts as at least this share of the widest joint's: one that stands still has only noise for a range.
+LEAST_RANGE = 0.01
+# A run shorter than this share of another says too little of whether it is its motion.
+LEAST_LENGTH = 0.5
+# Motions are told apart at this many samples per second, and most of them at fewer already, where a shift is known to half
+# a sample only and so much of their range is no difference yet.
+FINE_RATE, COARSE_RATE = 100.0, 10.0
+COARSELY_SAME = 0.1
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """Trajectories of recordings.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        Of each recording; the same for repetitions of one motion.
+    notes : tuple of str
+        Where names and motions contradict each other.
+    """
+
+    labels: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def trajectories_of(stretches: Sequence[Stretch]) -> Trajectories:
+    """Group recordings by their motion.
+
+    Motions that are the same as a third are one trajectory. It is called by the name that most of its recordings have; of
+    several that claim a name the one with most recordings has it, and each of the others is called by its first recording
+    in the order of their names.
+
+    Parameters
+    ----------
+    stretches : sequence of Stretch
+        The longest of each recording.
+    """
+    groups = _groups(stretches)
+    wanted = [_common(stretches[k].trajectory for k in group) for group in groups]
+    labels = [""] * len(stretches)
+    notes = []
+    taken: set[str] = set()
+    # A name goes to the largest group that wants it; none has it where two are as large.
+    order = sorted(range(len(groups)), key=lambda g: (-len(groups[g]), min(stretches[k].name for k in groups[g])))
+    for g in order:
+        names = sorted(stretches[k].name for k in groups[g])
+        rivals = [other for other in order if other != g and wanted[other] == wanted[g]]
+        own = all(len(groups[other]) < len(groups[g]) for other in rivals)
+        label = wanted[g] if own else names[0]
+        while label in taken:
+            label += "'"
+        taken.add(label)
+        for k in groups[g]:
+            labels[k] = label
+        called = sorted({stretches[k].trajectory for k in groups[g]})
+        if len(called) > 1:
+            notes.append(
+                f"{_listed(names)} have the same motion under the names {_listed(called)}: taken as repetitions"
+            )
+    for name in sorted({stretch.trajectory for stretch in stretches}):
+        place = [k for k, stretch in enumerate(stretches) if stretch.trajectory == name]
+        motions = len({labels[k] for k in place})
+        if motions > 1:
+            runs = _listed(sorted(stretches[k].name for k in place))
+            notes.append(f"{runs} are {motions} different motions, so not all of them repetitions of {name}")
+    return Trajectories(tuple(labels), tuple(notes))
+
+
+def _common(names: Iterable[str]) -> str:
+    """Return the most frequent name, the first of the alphabet among equals."""
+    count = Counter(names)
+    return min(count, key=lambda name: (-count[name], name))
+
+
+def _listed(names: Sequence[str], most: int = 4) -> str:
+    return ", ".join(names) if len(names) <= most else f"{names[0]}, {names[1]} ... {names[-1]}"
+
+
+def _groups(stretches: Sequence[Stretch]) -> list[list[int]]:
+    """Return the places of the recordings of each motion."""
+    coarse = [_at_rate(stretch, COARSE_RATE) for stretch in stretches]
+    fine: dict[int, Array] = {}
+    group = list(range(len(stretches)))
+    for k in range(1, len(stretches)):
+        for i in range(k):
+            if group[i] == group[k] or not _alike(coarse[i], coarse[k]):
+                continue
+            for place in (i, k):
+                if place not in fine:
+                    fine[place] = _at_rate(stretches[place], FINE_RATE)
+            if alignment(fine[i], fine[k], round(LARGEST_SHIFT * FINE_RATE)) is not None:
+                old = group[k]
+                group = [group[i] if own == old else own for own in group]
+    return [[k for k, own in enumerate(group) if own == head] for head in dict.fromkeys(group)]
+
+
+def _at_rate(stretch: Stretch, rate: float) -> Array:
+    """Return positions at a common rate, shape (n, N), whatever they were sampled at."""
+    time = np.arange(stretch.time[0], stretch.time[-1], 1.0 / rate)
+    return np.array([np.interp(time, stretch.time, row) for row in stretch.position])
+
+
+def _alike(one: Array, other: Array) -> bool:
+    """Tell whether positions at the coarse rate may be of one motion."""
+    if min(one.shape[1], other.shape[1]) < LEAST_LENGTH * max(one.shape[1], other.shape[1]):
+        return False
+    distance, _ = _distances(one, other, round(LARGEST_SHIFT * COARSE_RATE))
+    return len(distance) > 0 and bool(np.min(distance) < COARSELY_SAME**2)
+
+
+def alignment(reference: Array, other: Array, largest: int) -> int | None:
+    """Return the samples by which ``other`` must move to lie on ``reference``, None if it is another motion.
+
+    Parameters
+    ----------
+    reference, other : ndarray, shape (n, N) and (n, M)
+        Positions at the same rate.
+    largest : int
+        Samples by which it may move either way.
+    """
+    distance, largest = _distances(reference, other, largest)
+    if not len(distance):
+        return None
+    best = int(np.argmin(distance))
+    least = float(distance[best])
+    if 0 < best < len(distance) - 1:
+        # Between samples the motion may lie nearer still: the squared distance is a parabola of the shift.
+        before, after = distance[best - 1], distance[best + 1]
+        bend = before + after - 2.0 * least
+        least -= (before - after) ** 2 / (8.0 * bend) if bend > 0.0 else 0.0
+    return largest - best if least < SAME_MOTION**2 else None
+
+
+def _distances(reference: Array, other: Array, largest: int) -> tuple[Array, int]:
+    """Return the mean squared distance in shares of the range for every shift, and the largest shift."""
+    length = min(reference.shape[1], other.shape[1])
+    if length < 4:
+        return np.zeros(0), 0
+    largest = min(largest, length // 4)
+    spread = np.maximum(np.ptp(reference[:, :length], axis=1), np.ptp(other[:, :length], axis=1))
+    scale = np.maximum(spread, max(LEAST_RANGE * float(np.max(spread)), 1e-12))[:, None]
+    x = reference[:, largest : length - largest] / scale
+    y = other[:, :length] / scale
+    # By FFT: |x|^2 + |y|^2 - 2 x.y. About a common centre, so that the difference keeps its digits.
+    centre = x.mean(axis=1, keepdims=True)
+    x, y = x - centre, y - centre
+    size = x.shape[1]
+    starts = np.arange(2 * largest + 1)
+    padded = 1 << (length + size).bit_length()
+    spectrum = np.fft.rfft(y, padded, axis=1) * np.conj(np.fft.rfft(x, padded, axis=1))
+    product = np.fft.irfft(np.sum(spectrum, axis=0), padded)[starts]
+    square = np.concatenate([[0.0], np.cumsum(np.sum(y**2, axis=0))])
+    total = np.sum(x**2) + square[starts + size] - square[starts] - 2.0 * product
+    return np.maximum(total, 0.0) / x.size, largest

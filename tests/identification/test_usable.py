@@ -1,0 +1,116 @@
+"""One useless recording is left out and named; without any that is of use there is an error."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.errors import RecordingError
+from scara_ident.estimation.observations import kept_rows, observe
+from scara_ident.identification.identify import identify
+from scara_ident.identification.usable import check_rows, usable_data, with_rows
+from scara_ident.model.model import build_model
+from scara_ident.motion.prepared import prepare
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import Robot, load_robot
+from tests.arms import recorded_torque, recording, sines
+
+FRICTION = ((2.0, 1.0, 0.0, 0.0, 0.1), (1.0, 0.5, 0.0, 0.0, -0.1))
+RATE = 200.0
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot()
+
+
+def moving(robot: Robot, name: str, seed: int, seconds: float = 12.0) -> Recording:
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(seconds * RATE)) / RATE
+    q, v, a = sines(rng, time, robot.n)
+    torque = recorded_torque(robot, q, v, a, FRICTION)
+    return recording(robot, name, time, q, torque + 0.01 * rng.standard_normal(torque.shape))
+
+
+def useless(robot: Robot) -> dict[str, Recording]:
+    whole = moving(robot, "bad_1", 5)
+    still = np.tile(np.array([[0.3], [-0.2]]), (1, len(whole.time)))
+    noise = 1e-5 * np.random.default_rng(0).standard_normal(still.shape)
+    part = slice(0, 60)
+    return {
+        "no effort was recorded": replace(whole, effort=None),
+        "no four samples in a row": cut(whole, slice(0, 3)),
+        "0 independent rows are left": replace(whole, position=still + noise),
+        "independent rows are left once the ends": cut(whole, part),
+    }
+
+
+def cut(whole: Recording, part: slice) -> Recording:
+    assert whole.effort is not None
+    return replace(whole, time=whole.time[part], position=whole.position[:, part], effort=whole.effort[:, part])
+
+
+KINDS = (
+    "no effort was recorded",
+    "no four samples in a row",
+    "0 independent rows are left",
+    "independent rows are left once the ends",
+)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_useless_recording_is_left_out_with_a_note(robot: Robot, kind: str):
+    good, bad = [moving(robot, "a_1", 1), moving(robot, "b_1", 2)], useless(robot)[kind]
+    expected = identify(robot, good, model="basic", bands=(4.0, 4.0), validation=[moving(robot, "c_1", 3)])
+    found = identify(robot, [bad, *good], model="basic", bands=(4.0, 4.0), validation=[moving(robot, "c_1", 3)])
+    np.testing.assert_allclose(found.estimate.value, expected.estimate.value, rtol=1e-9)
+    assert [item.name for item in found.training.each] == ["a_1", "b_1"]
+    (note,) = [note for note in found.notes if kind in note]
+    assert note.startswith("bad_1: ")
+    assert note.endswith("left out")
+
+    held = identify(robot, good, model="basic", bands=(4.0, 4.0), validation=[bad, moving(robot, "c_1", 3)])
+    assert list(held.validation_errors()) == ["c_1"]
+    assert any(kind in note for note in held.notes)
+    alone = identify(robot, good, model="basic", bands=(4.0, 4.0), validation=[bad])
+    assert alone.validation_errors() == {}
+
+
+@pytest.mark.parametrize("kind", KINDS[:3])
+def test_bands_are_chosen_beside_a_useless_recording(robot: Robot, kind: str):
+    found = identify(robot, [useless(robot)[kind], moving(robot, "a_1", 1)], model="basic")
+    assert [item.name for item in found.training.each] == ["a_1"]
+    assert max(error.relative for error in found.training_errors()["a_1"] if error and error.relative) < 0.1
+
+
+def test_one_at_rest_is_seen_in_a_band_so_wide_that_positions_are_not_filtered(robot: Robot):
+    still = prepare([useless(robot)["0 independent rows are left"]], (40.0, 40.0))
+    assert kept_rows(still.recordings[0]) == 0
+
+
+def test_without_any_of_use_there_is_an_error(robot: Robot):
+    for kind in KINDS[:2]:
+        with pytest.raises(RecordingError, match=kind):
+            identify(robot, [useless(robot)[kind]], model="basic")
+    with pytest.raises(RecordingError, match="nothing is left of"):
+        identify(robot, [useless(robot)[KINDS[2]]], model="basic")
+
+
+def test_fewer_rows_than_parameters_are_refused(robot: Robot):
+    """A band of 0.3 Hz over 12 s: they would be met exactly."""
+    with pytest.raises(RecordingError, match="independent rows within the bands for 11 parameters; record longer"):
+        identify(robot, [moving(robot, "a_1", 1)], model="basic", bands=(0.3, 0.3))
+
+
+def test_the_parts(robot: Robot):
+    bad, good = useless(robot)["no effort was recorded"], moving(robot, "a_1", 1)
+    data, notes = usable_data([bad, good], needed=True)
+    assert (len(data.recordings), len(notes)) == (1, 1)
+    assert usable_data([bad], needed=False)[0].recordings == ()
+    assert with_rows(data, needed=True)[0] is data
+    short = prepare([cut(good, slice(0, 60))], (2.0, 2.0))
+    assert with_rows(short, needed=True)[0] is short
+    assert with_rows(short, needed=False)[0].recordings == ()
+    check_rows(observe(build_model(robot, "basic"), prepare([good], (4.0, 4.0))))
