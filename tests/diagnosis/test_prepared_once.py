@@ -59,7 +59,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Counts, Diagnosis]:
         counted(patch, motion_module, "differentiate", "filters", lambda row, rate, cut: (row.tobytes(), rate, cut))
         counted(patch, TorqueModel, "joint_columns", "models", columns_of)
         counted(patch, RigidBody, "fill", "rigid", lambda term, motion, rows: states(motion))
-        counted(patch, Effect, "regressor", "candidates", candidate)
+        counted(patch, Effect, "by_joint", "candidates", candidate)
         found = diagnose(load_robot(), runs, validation=[held_out])
         context = DiagnosisContext(found)
         diagnosis_pictures(folder, context)
