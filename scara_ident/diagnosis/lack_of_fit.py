@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.residuals import Residuals
-from scara_ident.motion.prepared import PreparedStretch
+from scara_ident.motion.prepared import BLOCK_PERIODS, BLOCK_SECONDS, PreparedStretch
 from scara_ident.motion.trajectories import LARGEST_SHIFT, SAME_RATE, alignment
 
 # Residual of every joint, where it was used, and samples per second.
@@ -34,7 +34,8 @@ class LackOfFit:
     most_missing : float
         What may repeat at the most, with 95 % confidence.
     p_value : float
-        That nothing repeats; F test with the band's degrees of freedom.
+        That nothing repeats: the larger of an F test with the band's degrees of freedom and of Student's t test that
+        it repeats in blocks of time, which a single moment does not pass.
     by_trajectory : tuple of (str, float)
         The missing rms trajectory by trajectory.
     """
@@ -76,6 +77,7 @@ def _of_joint(j: int, joint: str, groups: dict[str, list[Aligned]], band: float 
 
     repeating = scatter = freedom = noise_freedom = samples = excess = 0.0
     by_trajectory = []
+    excesses: list[Array] = []
     for trajectory, aligned in groups.items():
         used = np.all([mask[j] for _, mask, _ in aligned], axis=0)
         if not np.any(used):
@@ -93,6 +95,10 @@ def _of_joint(j: int, joint: str, groups: dict[str, list[Aligned]], band: float 
         noise_freedom += independent * (count - 1)
         samples += size
         excess += missing * size
+        length = block_length(aligned[0][2], band)
+        each = np.arange(size) // length
+        part = np.bincount(each, mean**2 - np.var(residual, axis=0, ddof=1) / count)
+        excesses.append(part[np.bincount(each) > length // 2])
     if not samples or scatter == 0.0:
         return None
     ratio = (repeating / freedom) / (scatter / noise_freedom)
@@ -104,9 +110,28 @@ def _of_joint(j: int, joint: str, groups: dict[str, list[Aligned]], band: float 
         float(np.sqrt(scatter / noise_freedom)),
         float(np.sqrt(max(excess / samples, 0.0))),
         float(np.sqrt(max(most, 0.0) * scatter / noise_freedom)),
-        float(fdtrc(freedom, noise_freedom, ratio)),
+        max(float(fdtrc(freedom, noise_freedom, ratio)), above_zero(np.concatenate(excesses))),
         tuple(by_trajectory),
     )
+
+
+def block_length(rate: float, band: float | None) -> int:
+    """Return the samples of a block of time that is long against the memory of a band."""
+    periods = 0.0 if band is None else BLOCK_PERIODS / band
+    return max(1, int(rate * max(BLOCK_SECONDS, periods)))
+
+
+def above_zero(values: Array) -> float:
+    """Return the p-value of Student's t test that the mean of independent values, shape (N,), is above zero."""
+    from scipy.special import stdtr
+
+    if len(values) < 2:
+        return 1.0
+    error = float(np.std(values, ddof=1)) / np.sqrt(len(values))
+    mean = float(np.mean(values))
+    if error == 0.0:
+        return 0.0 if mean > 0.0 else 1.0
+    return float(stdtr(len(values) - 1, -mean / error))
 
 
 def _aligned(group: Sequence[tuple[PreparedStretch, Array]]) -> list[Aligned]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,7 +55,7 @@ class Outcome:
     training : Observations
         Of the training recordings, as corrected, with the effects found.
     residuals : Residuals
-        What is left of them.
+        What is left of them, without what runs differ by.
     fit_before, fit_after : tuple of LackOfFit
         Per joint; empty without repetitions.
     dependences : tuple of Dependence
@@ -116,18 +116,30 @@ def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[s
     training = observed_at_every_sample(found.step)
     after = wls(training)
     before, left = found.uncorrected.residuals(found.start.value), training.residuals(after.value)
+    # What a run differs by from the others is no remainder of the model.
+    of_runs = dict.fromkeys(task.model.robot.joints, 0.0)
+    if after.variation:
+        deviations = after.variation.deviations(training, after.value)
+        left = Residuals(left.data, tuple(a + b for a, b in zip(left.predicted, deviations, strict=True)))
+        rms = np.sqrt(np.mean(np.concatenate(deviations, axis=1) ** 2, axis=1))
+        of_runs = dict(zip(task.model.robot.joints, rms.tolist(), strict=True))
     fit_after, dependences = lack_of_fit(left), screen(task.model, left, task.criteria)
-    unexplained = _unexplained(fit_after, dependences, task.criteria)
+    unexplained = _unexplained(fit_after, dependences, of_runs, task.criteria)
     return Outcome(found, after, training, left, lack_of_fit(before), fit_after, dependences, unexplained)
 
 
 def _unexplained(
-    fit: Sequence[LackOfFit], dependences: Sequence[Dependence], criteria: SelectionCriteria
+    fit: Sequence[LackOfFit],
+    dependences: Sequence[Dependence],
+    of_runs: Mapping[str, float],
+    criteria: SelectionCriteria,
 ) -> Unexplained | None:
-    if dependences and dependences[0].explained > criteria.remainder:
-        top = dependences[0]
+    """Return the remainder on the joint that shows it most, if any is larger than what runs differ by (rms by joint)."""
+    shown = [item for item in dependences if item.p_value < criteria.significant and item.rms > of_runs[item.joint]]
+    if shown and shown[0].explained > criteria.remainder:
+        top = shown[0]
         # A pair must say clearly more than its better half.
-        for other in dependences[1:]:
+        for other in shown[1:]:
             if (
                 other.joint == top.joint
                 and len(other.signals) == 1
@@ -137,7 +149,7 @@ def _unexplained(
                 break
         return Unexplained(top.joint, top.signals, top.rms, top.explained)
     for joint in fit:
-        if _left_over(joint, criteria):
+        if _left_over(joint, criteria) and joint.missing > of_runs[joint.joint]:
             return Unexplained(joint.joint, (), joint.missing, 0.0)
     return None
 

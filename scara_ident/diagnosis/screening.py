@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
+from scara_ident.diagnosis.lack_of_fit import above_zero, block_length
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
@@ -29,12 +30,15 @@ class Dependence:
         Share of the squared residual that they explain on trajectories held out.
     rms : float
         The same as an rms torque, N m or N.
+    p_value : float
+        That they explain nothing, over all that was tried: Student's t test over blocks of time.
     """
 
     joint: str
     signals: tuple[str, ...]
     explained: float
     rms: float
+    p_value: float
 
 
 def screen(model: TorqueModel, residuals: Residuals, criteria: SelectionCriteria = CRITERIA) -> tuple[Dependence, ...]:
@@ -55,7 +59,7 @@ def screen(model: TorqueModel, residuals: Residuals, criteria: SelectionCriteria
     found: list[Dependence] = []
     pair_bins = criteria.pair_bins
     for j, joint in enumerate(model.robot.joints):
-        residual, signals, fold = _samples(model.robot, residuals, j, criteria.parts)
+        residual, signals, fold, block = _samples(model.robot, residuals, j, criteria.parts)
         if len(residual) < criteria.least_per_bin * pair_bins**2 or not np.any(residual):
             continue
         total = float(np.mean(residual**2))
@@ -64,18 +68,20 @@ def screen(model: TorqueModel, residuals: Residuals, criteria: SelectionCriteria
         sets: list[tuple[tuple[str, ...], NDArray[np.intp]]] = [((name,), bins) for name, bins in singles.items()]
         sets += [((one, other), coarse[one] * pair_bins + coarse[other]) for one, other in combinations(signals, 2)]
         for names, bins in sets:
-            share = _held_out(residual, bins, fold, criteria.shrinkage)
-            found.append(Dependence(joint, names, share, float(np.sqrt(max(share, 0.0) * total))))
+            saved = _saved(residual, bins, fold, criteria.shrinkage)
+            share = float(np.mean(saved)) / total
+            p_value = min(1.0, above_zero(np.bincount(block, saved)) * len(sets) * model.robot.n)
+            found.append(Dependence(joint, names, share, float(np.sqrt(max(share, 0.0) * total)), p_value))
     return tuple(sorted(found, key=lambda item: -item.explained))
 
 
 def _samples(
     robot: Robot, residuals: Residuals, j: int, only_parts: int
-) -> tuple[Array, dict[str, Array], NDArray[np.intp]]:
-    """Residual of a joint within its band at independent times, the signals then, and the fold of each."""
+) -> tuple[Array, dict[str, Array], NDArray[np.intp], NDArray[np.intp]]:
+    """Residual of a joint within its band at independent times, the signals then, and fold and block of each."""
     data = residuals.data
     trajectories = data.trajectories
-    error, signals, fold = [], [], []
+    error, signals, fold, blocks = [], [], [], []
     parts = zip(residuals.banded, residuals.predicted, strict=True)
     for label, item in zip(data.labels, data.recordings, strict=True):
         begin = float(item.recording.time[0])
@@ -84,6 +90,8 @@ def _samples(
             places = np.arange(part.trim, part.samples - part.trim, part.steps[j])
             places = places[~part.rest[j][places]]
             error.append(banded[j][places])
+            length = block_length(part.rate, data.bands[j])
+            blocks.append((places - part.trim) // length + (blocks[-1][-1] + 1 if blocks and len(blocks[-1]) else 0))
             signals.append(_signals(robot, part.motion, predicted[j], j, begin, places))
             fold.append(np.full(len(places), trajectories.index(label)))
     merged = {name: np.concatenate([part[name] for part in signals]) for name in signals[0]}
@@ -91,7 +99,9 @@ def _samples(
     groups = np.concatenate(fold)
     if len(trajectories) == 1:
         groups = np.arange(len(residual)) * only_parts // max(1, len(residual))
-    return residual, merged, groups
+    # Blocks without a sample are none.
+    numbers = np.unique(np.concatenate(blocks), return_inverse=True)[1]
+    return residual, merged, groups, np.asarray(numbers, dtype=np.intp)
 
 
 def _signals(
@@ -114,13 +124,12 @@ def _bins(values: Array, count: int) -> NDArray[np.intp]:
     return np.asarray(np.searchsorted(edges, values), dtype=np.intp)
 
 
-def _held_out(residual: Array, bins: NDArray[np.intp], fold: NDArray[np.intp], shrinkage: float) -> float:
-    """Share of the squared residual that the bins' means of the other folds explain."""
+def _saved(residual: Array, bins: NDArray[np.intp], fold: NDArray[np.intp], shrinkage: float) -> Array:
+    """Fall of the squared residual of every sample by the bins' means of the other folds, shape (N,)."""
     size = int(bins.max()) + 1
     folds = int(fold.max()) + 1
     place = fold * size + bins
     count = np.bincount(place, minlength=folds * size).reshape(folds, size)
     total = np.bincount(place, residual, folds * size).reshape(folds, size)
     mean = (total.sum(axis=0) - total) / (count.sum(axis=0) - count + shrinkage)
-    left = residual - mean[fold, bins]
-    return 1.0 - float(np.sum(left**2) / np.sum(residual**2))
+    return np.asarray(residual**2 - (residual - mean[fold, bins]) ** 2)

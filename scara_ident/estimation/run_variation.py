@@ -125,6 +125,29 @@ class RunVariation:
         item = self.joints[joint]
         return signals if item is None else item.whitened(signals)
 
+    def deviations(self, observations: Observations, value: Array) -> tuple[Array, ...]:
+        """Return by how much the torque of each run lies off that of the mean run, on every stretch, shape (n, N) each.
+
+        Parameters
+        ----------
+        observations : Observations
+            With all columns that the differences were estimated beside.
+        value : ndarray, shape (p,)
+            Their parameters.
+        """
+        found = []
+        for run, (recording, raws) in enumerate(zip(observations.data.recordings, observations.raw, strict=True)):
+            for part, raw in zip(recording.stretches, raws, strict=True):
+                off = np.zeros((len(self.joints), part.samples))
+                for joint, item in enumerate(self.joints):
+                    if item is not None:
+                        columns = observations.joints[joint].columns
+                        torque = value[columns] @ raw[joint]
+                        rate = -np.gradient(torque, 1.0 / part.rate)
+                        off[joint] = item.of_run[run] @ _of_columns(observations, columns, value, raw[joint], rate)
+                found.append(off)
+        return tuple(found)
+
     def covariance(self, inverse: Array, joints: Sequence[JointRows], weights: Array) -> Array:
         """Return what the differences add to the covariance of a least-squares estimate, shape (p, p).
 
@@ -178,18 +201,6 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
 
 def _directions(observations: Observations, joint: int, rows: JointRows, value: Array) -> Array:
     """Return what one unit of each kind does on the rows of a joint, shape (kinds, N); zero where it does nothing."""
-    model = observations.model
-    predicted = value[rows.columns] * rows.table[:-1].T
-    friction, offset = np.zeros(len(rows.columns), dtype=bool), np.zeros(len(rows.columns), dtype=bool)
-    for term in model.terms:
-        place = model.place(term)
-        own = (rows.columns >= place.start) & (rows.columns < place.stop)
-        friction |= own & isinstance(term, Friction)
-        offset |= own & isinstance(term, Offset)
-    found = np.zeros((len(KINDS), rows.table.shape[1]))
-    found[0] = np.sum(predicted[:, friction], axis=1)
-    found[1] = np.sum(predicted, axis=1)
-    found[2] = np.sum(rows.table[:-1][offset], axis=0)
     # A torque that comes late lacks so much of its rate.
     base = value[: observations.parameters]
     parts = []
@@ -198,8 +209,24 @@ def _directions(observations: Observations, joint: int, rows: JointRows, value: 
         if part.usable:
             torque = base[observations.joints[joint].columns] @ raw[joint]
             parts.append(part.rows(joint, -np.gradient(torque, 1.0 / part.rate)[None])[0])
-    found[3] = np.concatenate(parts)
-    return found
+    return _of_columns(observations, rows.columns, value, rows.table[:-1], np.concatenate(parts))
+
+
+def _of_columns(
+    observations: Observations, columns: NDArray[np.intp], value: Array, signals: Array, rate: Array
+) -> Array:
+    """Return what one unit of each kind does, of the columns (k, N) of a joint and what one second of delay does."""
+    model = observations.model
+    friction, offset = np.zeros(len(columns), dtype=bool), np.zeros(len(columns), dtype=bool)
+    for term in model.terms:
+        place = model.place(term)
+        own = (columns >= place.start) & (columns < place.stop)
+        friction |= own & isinstance(term, Friction)
+        offset |= own & isinstance(term, Offset)
+    own_value = value[columns]
+    return np.array(
+        [own_value[friction] @ signals[friction], own_value @ signals, np.sum(signals[offset], axis=0), rate]
+    )
 
 
 def _estimated(
