@@ -98,7 +98,7 @@ def _of_joint(j: int, joint: str, groups: dict[str, list[Aligned]], band: float 
         length = block_length(aligned[0][2], band)
         each = np.arange(size) // length
         part = np.bincount(each, mean**2 - np.var(residual, axis=0, ddof=1) / count)
-        excesses.append(part[np.bincount(each) > length // 2])
+        excesses.append(np.asarray(part[np.bincount(each) > length // 2], dtype=float))
     if not samples or scatter == 0.0:
         return None
     ratio = (repeating / freedom) / (scatter / noise_freedom)

@@ -70,7 +70,9 @@ def screen(model: TorqueModel, residuals: Residuals, criteria: SelectionCriteria
         for names, bins in sets:
             saved = _saved(residual, bins, fold, criteria.shrinkage)
             share = float(np.mean(saved)) / total
-            p_value = min(1.0, above_zero(np.bincount(block, saved)) * len(sets) * model.robot.n)
+            p_value = min(
+                1.0, above_zero(np.asarray(np.bincount(block, saved), dtype=float)) * len(sets) * model.robot.n
+            )
             found.append(Dependence(joint, names, share, float(np.sqrt(max(share, 0.0) * total)), p_value))
     return tuple(sorted(found, key=lambda item: -item.explained))
 
@@ -81,7 +83,8 @@ def _samples(
     """Residual of a joint within its band at independent times, the signals then, and fold and block of each."""
     data = residuals.data
     trajectories = data.trajectories
-    error, signals, fold, blocks = [], [], [], []
+    error, signals, fold = [], [], []
+    blocks: list[NDArray[np.intp]] = []
     parts = zip(residuals.banded, residuals.predicted, strict=True)
     for label, item in zip(data.labels, data.recordings, strict=True):
         begin = float(item.recording.time[0])
