@@ -89,6 +89,12 @@ class SelectionCriteria:
         "that signals explain on other trajectories to be called a remainder",
         "docs/diagnosis.md",
     )
+    remainder_of_runs: float = _criterion(
+        0.2,
+        "share of squared residual",
+        "the same where runs differ: what is of second order in their differences depends on signals too",
+        "docs/diagnosis.md",
+    )
     remainder_to_noise: float = _criterion(
         1.0, "of the noise", "a repeatable remainder larger than the noise is one whatever it depends on"
     )

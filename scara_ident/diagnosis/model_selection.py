@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import SelectionCriteria
+from scara_ident.diagnosis.evidence import coloured_shares
 from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
 from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, SearchTask, search
@@ -17,6 +18,7 @@ from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.diagnosis.work import first, next_of, search_and_rest
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.bands import choose_bands
+from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.motion.prepared import PreparedData
@@ -116,30 +118,38 @@ def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[s
     training = observed_at_every_sample(found.step)
     after = wls(training)
     before, left = found.uncorrected.residuals(found.start.value), training.residuals(after.value)
-    # What a run differs by from the others is no remainder of the model.
-    of_runs = dict.fromkeys(task.model.robot.joints, 0.0)
+    joints, criteria = task.model.robot.joints, task.criteria
+    least = dict.fromkeys(joints, criteria.remainder)
     if after.variation:
+        # What a run differs by from the others is no remainder of the model; of second order something of it is left.
         deviations = after.variation.deviations(training, after.value)
         left = Residuals(left.data, tuple(a + b for a, b in zip(left.predicted, deviations, strict=True)))
-        rms = np.sqrt(np.mean(np.concatenate(deviations, axis=1) ** 2, axis=1))
-        of_runs = dict(zip(task.model.robot.joints, rms.tolist(), strict=True))
-    fit_after, dependences = lack_of_fit(left), screen(task.model, left, task.criteria)
-    unexplained = _unexplained(fit_after, dependences, of_runs, task.criteria)
+        least |= dict.fromkeys(after.variation.sizes(task.model.robot), criteria.remainder_of_runs)
+    fit_after, dependences = lack_of_fit(left), screen(task.model, left, criteria)
+    # What is spread evenly over frequency is no motion's doing even where it repeats: an encoder's steps do, and what a
+    # controller makes of them.
+    coloured = dict(zip(joints, coloured_shares(left) > criteria.least_colour, strict=True))
+    repeating = [fit for fit in fit_after if coloured[fit.joint] and _left_over(fit, criteria)]
+    depending = [
+        item for item in dependences if item.p_value < criteria.significant and item.explained > least[item.joint]
+    ]
+    if repeating or depending:
+        # So does what their noise does to the columns.
+        noise = dict(zip(joints, noise_torque(training, after.value).tolist(), strict=True))
+        repeating = [fit for fit in repeating if fit.missing > noise[fit.joint]]
+        depending = [item for item in depending if item.rms > noise[item.joint]]
+    unexplained = _unexplained(repeating, depending, criteria)
     return Outcome(found, after, training, left, lack_of_fit(before), fit_after, dependences, unexplained)
 
 
 def _unexplained(
-    fit: Sequence[LackOfFit],
-    dependences: Sequence[Dependence],
-    of_runs: Mapping[str, float],
-    criteria: SelectionCriteria,
+    repeating: Sequence[LackOfFit], depending: Sequence[Dependence], criteria: SelectionCriteria
 ) -> Unexplained | None:
-    """Return the remainder on the joint that shows it most, if any is larger than what runs differ by (rms by joint)."""
-    shown = [item for item in dependences if item.p_value < criteria.significant and item.rms > of_runs[item.joint]]
-    if shown and shown[0].explained > criteria.remainder:
-        top = shown[0]
+    """Return the remainder on the joint that shows it most."""
+    if depending:
+        top = depending[0]
         # A pair must say clearly more than its better half.
-        for other in shown[1:]:
+        for other in depending[1:]:
             if (
                 other.joint == top.joint
                 and len(other.signals) == 1
@@ -148,9 +158,8 @@ def _unexplained(
                 top = other
                 break
         return Unexplained(top.joint, top.signals, top.rms, top.explained)
-    for joint in fit:
-        if _left_over(joint, criteria) and joint.missing > of_runs[joint.joint]:
-            return Unexplained(joint.joint, (), joint.missing, 0.0)
+    if repeating:
+        return Unexplained(repeating[0].joint, (), repeating[0].missing, 0.0)
     return None
 
 

@@ -141,7 +141,9 @@ def observed_at_every_sample(step: SelectionStep) -> Observations:
             own = [[item[j] for item in more if j in item] for j in range(len(raw))]
             # What no effect acts on is shared, as it is large.
             found.append(
-                tuple(np.concatenate([rows, *beside]) if beside else rows for rows, beside in zip(raw, own, strict=True))
+                tuple(
+                    np.concatenate([rows, *beside]) if beside else rows for rows, beside in zip(raw, own, strict=True)
+                )
             )
             place += 1
         raws.append(tuple(found))

@@ -61,6 +61,9 @@ class Estimate:
         How the covariance was found, see `scara_ident.estimation.covariance`.
     variation : RunVariation or None
         How runs differ, which is part of the covariance; None where it was not looked for.
+    noise_bias : ndarray, shape (p,), or None
+        By how much the noise of positions moves the parameters, which is part of the covariance; None where negligible
+        or not looked for.
     """
 
     model: TorqueModel
@@ -72,6 +75,7 @@ class Estimate:
     weights: Array
     std_kind: str
     variation: RunVariation | None = field(default=None, kw_only=True)
+    noise_bias: Array | None = field(default=None, kw_only=True)
 
     @property
     def std(self) -> Array:

@@ -9,6 +9,7 @@ from scara_ident.errors import EstimationError
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, merge, weighted
+from scara_ident.estimation.noise_bias import noise_bias
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import run_variation
 from scara_ident.threads import one_blas_thread
@@ -74,6 +75,9 @@ def least_squares(
         spread = block_covariance(inverse, solution.value, observations.joints, observations.owner, weights)
     variation = run_variation(observations, observations.joints, solution.value)
     covariance = spread.matrix + variation.covariance(inverse, observations.joints, weights)
+    bias = noise_bias(observations, weights, solution.value) if prior is None else None
+    if bias is not None:
+        covariance += np.outer(bias, bias)
     if prior is not None:
         # The prior's own error, which no residual shows.
         precision = prior.regressor_factor.T @ prior.regressor_factor
@@ -89,6 +93,7 @@ def least_squares(
         weights,
         spread.kind,
         variation=variation,
+        noise_bias=bias,
     )
 
 

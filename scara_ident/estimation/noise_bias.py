@@ -1,0 +1,96 @@
+"""What the noise of positions does to estimated parameters.
+
+Velocities and accelerations stand in the regressor with their noise, which makes least squares err to one side however
+much is recorded. With the noise twice the estimate moves by as much again (Cook and Stefanski 1994); that this is more
+than chance is what Durbin, Wu and Hausman test. The estimate is left as it is, and the bias stands in its covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.estimation.information import weighted
+from scara_ident.estimation.observations import Observations, observe
+from scara_ident.motion.position_noise import encoder_step, noise_level, noisier
+from scara_ident.motion.prepared import PreparedData
+
+# Share of an acceleration's square that is noise within the band: less biases an inertia by less than a hundredth of a percent.
+NEGLIGIBLE = 1e-4
+# Standard deviations by which the noise moves a parameter before that is said.
+SPOKEN_OF = 1.0
+
+
+def noise_bias(observations: Observations, weights: Array, value: Array) -> Array | None:
+    """Return by how much the noise of positions moves parameters, shape (p,); None where it is negligible.
+
+    Parameters
+    ----------
+    observations : Observations
+    weights : ndarray, shape (n,)
+        Of each joint's rows.
+    value : ndarray, shape (p,)
+        Estimated with them.
+    """
+    if max(noise_shares(observations.data), default=0.0) < NEGLIGIBLE:
+        return None
+    again = observe(observations.model, noisier(observations.data))
+    return np.asarray(weighted(again.by_joint, weights).solve().value - value)
+
+
+def noise_torque(observations: Observations, value: Array) -> Array:
+    """Return the rms that the noise of positions makes in the torque that parameters predict, within the bands, shape (n,).
+
+    Parameters
+    ----------
+    observations : Observations
+    value : ndarray, shape (p,)
+    """
+    again = observe(observations.model, noisier(observations.data)).predicted(value)
+    square, count = np.zeros(len(observations.joints)), np.zeros(len(observations.joints))
+    parts = zip(observations.data.stretches, observations.predicted(value), again, strict=True)
+    for part, once, twice in parts:
+        for joint, (before, after) in enumerate(zip(once, twice, strict=True)):
+            made = part.smooth(joint, after - before)[part.used[joint]]
+            square[joint] += float(made @ made)
+            count[joint] += len(made)
+    return np.sqrt(square / np.maximum(count, 1.0))
+
+
+def noise_shares(data: PreparedData) -> list[float]:
+    """Return for every moving joint of every recording the share of its acceleration's square that is noise.
+
+    White position noise of variance s^2 at a rate r has the acceleration ``2 s^2 / r (2 pi)^4 f^5 / 5`` up to f.
+    """
+    found = []
+    for item in data.recordings:
+        part = item.longest
+        for joint, band in enumerate(data.bands):
+            if band is None or not np.any(part.used[joint]):
+                continue
+            step = encoder_step(item.recording.position[joint])
+            noise = noise_level(part, joint) if step is None else step / np.sqrt(12.0)
+            power = 2.0 * noise**2 / part.rate * (2.0 * np.pi) ** 4 * band**5 / 5.0
+            whole = float(np.mean(part.motion.a[joint][part.used[joint]] ** 2))
+            found.append(power / whole if whole > 0.0 else 0.0)
+    return found
+
+
+def bias_sentence(names: Sequence[str], bias: Array, std: Array) -> str | None:
+    """Say which parameters the noise of positions moves by more than their uncertainty without it; None where none.
+
+    Parameters
+    ----------
+    names : sequence of str, of length p
+    bias, std : ndarray, shape (p,)
+        The standard deviations hold the bias.
+    """
+    chance = np.sqrt(np.clip(std**2 - bias**2, np.finfo(float).tiny, None))
+    moved = [k for k in np.argsort(-np.abs(bias) / chance) if abs(bias[k]) > SPOKEN_OF * chance[k]]
+    if not moved:
+        return None
+    some = ", ".join(f"{names[k]} by about {bias[k]:.2g}" for k in moved[:6])
+    more = f" and {len(moved) - 6} more" if len(moved) > 6 else ""
+    return f"the noise of the positions biases {some}{more}; their standard deviations hold that"
