@@ -202,7 +202,7 @@ def diagnose(
     validation_before = observe(base, held_out.at(found.bands))
     parameters = physical_parameters(step) if found.chosen else PhysicalParameters((), ())
     effects = _effects(found, step, parameters)
-    notes += outcome.demoted
+    notes += [f"{item.label} is not counted: {item.why}" for item in outcome.demoted]
     if after.variation is not None:
         notes += after.variation.sentences(robot)
     negligible = _negligible(found)
@@ -228,7 +228,7 @@ def diagnose(
         outcome.fit_before,
         outcome.fit_after,
         tuple(effects),
-        tentative_effects(found, {(item.effect, item.joint) for item in effects}),
+        tentative_effects(found, outcome.demoted, {(item.effect, item.joint) for item in effects}),
         shown,
         aliases(base),
         outcome.unexplained,

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.audit import unsettled
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.evidence import coloured_shares
@@ -63,8 +65,8 @@ class Outcome:
     dependences : tuple of Dependence
         What the remainder depends on, ranked.
     unexplained : Unexplained or None
-    demoted : tuple of str
-        Effects that were found and not counted, and why.
+    demoted : tuple of Decision
+        On effects that were found and are not believed, with why.
     """
 
     search: Search
@@ -75,7 +77,7 @@ class Outcome:
     fit_after: tuple[LackOfFit, ...]
     dependences: tuple[Dependence, ...]
     unexplained: Unexplained | None
-    demoted: tuple[str, ...] = ()
+    demoted: tuple[Decision, ...] = ()
 
 
 def select_model(task: SearchTask, observations: Observations, *, free: bool) -> Outcome:
@@ -203,27 +205,27 @@ def _narrowed(
 
 
 def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome) -> Outcome:
-    """Search again without effects that stand for one that is not in the catalogue."""
-    demoted: dict[str, str] = {}
+    """Search again without effects that stand for another, or for none."""
+    demoted: dict[str, Decision] = {}
     left = task.progress
     for _ in range(task.criteria.most_demotions):
-        proxies = _proxies(found, task.criteria)
+        proxies = [*_proxies(found, task.criteria), *unsettled(found.search, found.after.weights)]
         if not proxies:
             break
-        demoted |= proxies
+        demoted |= {item.label: item for item in reversed(proxies)}
         now, left = next_of(left)
         found = _searched(replace(task, progress=now), columns, tuple(demoted))
     return replace(found, demoted=tuple(demoted.values()))
 
 
-def _proxies(found: Outcome, criteria: SelectionCriteria) -> dict[str, str]:
-    """Return the effects that remove little of a remainder most of which stays, and the words for it."""
+def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
+    """Return the decisions on effects that remove little of a remainder most of which stays, with why."""
     if found.unexplained is None or not found.fit_after:
-        return {}
+        return []
     joints = found.search.base.robot.joints
     noise = {fit.joint: fit.noise for fit in found.fit_after}
     left = {fit.joint for fit in found.fit_after if _left_over(fit, criteria)} | {found.unexplained.joint}
-    proxies = {}
+    proxies = []
     before = rms_of(found.search.start.value, found.search.uncorrected)
     for step in found.search.steps:
         after = step.rms
@@ -236,10 +238,8 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> dict[str, str]:
         before = after
         if (owner is None or owner in left) and removed < criteria.least_of_repeatable * repeats:
             share = max(0.0, removed / repeats)
-            proxies[step.decision.label] = (
-                f"{step.decision.label} is not counted: it would remove {share:.0%} of what repeats, and most of the "
-                "rest stays unexplained"
-            )
+            why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"
+            proxies.append(step.decision.refused(why))
     return proxies
 
 

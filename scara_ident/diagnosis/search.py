@@ -256,19 +256,18 @@ def _choose(step: SelectionStep, decisions: Sequence[Decision]) -> tuple[Decisio
     accepted = [item for item in best_of_each(decisions).values() if item.accepted]
     accepted.sort(key=lambda item: -item.examination.held_out)
     refused: dict[str, Decision] = {}
-    if not accepted:
-        return None, refused
-    enough = criteria.near_best * accepted[0].examination.held_out
-    leaders = [item for item in accepted if item.examination.held_out >= enough][: criteria.most_refined]
-    sound = sorted(
-        (item for item in step.refine(leaders) if item.accepted), key=lambda item: -item.examination.held_out
-    )
-    for decision in sound:
-        why = _insignificant(step, decision.candidate) or noise_objection(step, decision)
-        why = why or variation_objection(step, decision)
-        if why is None:
-            return decision, refused
-        refused[decision.label] = decision.refused(why)
+    # Where the best are refused, the next best may still be sound.
+    while accepted:
+        enough = criteria.near_best * accepted[0].examination.held_out
+        leaders = [item for item in accepted if item.examination.held_out >= enough][: criteria.most_refined]
+        refined = (item for item in step.refine(leaders) if item.accepted)
+        for decision in sorted(refined, key=lambda item: -item.examination.held_out):
+            why = _insignificant(step, decision.candidate) or noise_objection(step, decision)
+            why = why or variation_objection(step, decision)
+            if why is None:
+                return decision, refused
+            refused[decision.label] = decision.refused(why)
+        accepted = accepted[len(leaders) :]
     return None, refused
 
 

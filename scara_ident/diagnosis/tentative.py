@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
+from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import best_of_each
 
@@ -37,18 +38,24 @@ class TentativeEffect:
     p_value: float
 
 
-def tentative_effects(found: Search, believed: Collection[tuple[str, str | None]]) -> tuple[TentativeEffect, ...]:
+def tentative_effects(
+    found: Search, demoted: Sequence[Decision], believed: Collection[tuple[str, str | None]]
+) -> tuple[TentativeEffect, ...]:
     """Return the effects that an arm could have and that these recordings do not settle, the most gaining first.
 
     Parameters
     ----------
     found : Search
+    demoted : sequence of Decision
+        On effects that were let in and did not stay.
     believed : collection of (str, str or None)
         Name and joint of the effects in the model, which are not listed again.
     """
     scene = found.scene
     # Scan points of an effect that was refined and refused must not bring it back.
-    best = [item for item in best_of_each(found.decisions).values() if item.tentative]
+    tried = {item.label: item for item in demoted}
+    best = [item for item in best_of_each(found.decisions).values() if item.tentative and item.label not in tried]
+    best += tried.values()
     result = []
     for decision in sorted(best, key=lambda item: -item.gain):
         candidate = decision.candidate

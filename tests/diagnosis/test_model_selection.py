@@ -68,8 +68,9 @@ def test_an_effect_that_stands_for_one_outside_the_catalogue_is_not_counted() ->
     # Something did help, and is named with the share that it would have removed.
     first = searched(runs, *CATALOGUE, bands=bands)
     (proxy,) = {item.label(first.scene) for item in first.chosen}
-    (words,) = outcome.demoted
-    assert words.startswith(f"{proxy} is not counted: it would remove ")
+    (refused,) = outcome.demoted
+    assert (refused.label, refused.accepted, refused.tentative) == (proxy, False, True)
+    assert refused.why.startswith("it would remove ")
     before, after = rms_of(first.start.value, first.uncorrected)[1], first.steps[-1].rms[1]
     assert before is not None
     assert after is not None

@@ -41,4 +41,4 @@ def test_it_stands_in_the_results_as_the_contract_says(doubtful):
 
 
 def test_what_is_believed_is_not_listed_again(doubtful):
-    assert tentative_effects(doubtful.search, {("spring", "joint2")}) == ()
+    assert tentative_effects(doubtful.search, (), {("spring", "joint2")}) == ()
