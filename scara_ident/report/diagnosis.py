@@ -14,6 +14,7 @@ from scara_ident.diagnosis.model_selection import Unexplained, rms_of
 from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_variation import unit_of_kind
 from scara_ident.model.terms.friction import Friction
 from scara_ident.robot.rotors import GUESS_FACTOR
 
@@ -223,7 +224,8 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     if diagnosis.verdict == "complete":
         found.append("The model lacks nothing that these recordings can show.")
     if diagnosis.verdict == "undecided":
-        found.append("These recordings cannot tell whether something is missing.")
+        more = "something more is missing than was found" if diagnosis.effects else "something is missing"
+        found.append(f"Undecided: these recordings cannot tell whether {more}.")
         by_why: dict[str, list[str]] = {}
         for item in diagnosis.evidence:
             if not item.shown:
@@ -310,6 +312,7 @@ def diagnosis_markdown(diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]]
         lines += [
             f"| {m['name']} | {m['before']:.4g} | {m['after']:.4g} | {m['in_std']:+.1f} |" for m in content["moved"]
         ]
+    lines += _certainty(content, diagnosis)
     lines += ["", "## Candidates", "", "| candidate | gain held out | p | decision | why |", "|---|---|---|---|---|"]
     for row in content["candidates"]:
         lines.append(
@@ -322,6 +325,37 @@ def diagnosis_markdown(diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]]
             for row in content["not_identifiable"]
         ]
     return "\n".join(lines) + "\n"
+
+
+def _certainty(content: dict[str, Any], diagnosis: Diagnosis) -> list[str]:
+    """Return what is worth a look, whether what is left is noise, and how runs differ, as Markdown."""
+    lines = []
+    if content["tentative"]:
+        lines += ["", "## Worth a look, not added", "", "| effect | joint | gain | p | why not | settled by |"]
+        lines += ["|---|---|---|---|---|---|"]
+        lines += [
+            f"| {row['effect']} | {row['joint'] or '-'} | {row['gain']:.2%} | {row['p_value']:.1e} | {row['why']} | {row['settled_by']} |"
+            for row in content["tentative"]
+        ]
+    lines += [
+        "",
+        "## Is what is left noise?",
+        "",
+        "| joint | shown | by | detection limit | why |",
+        "|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {joint} | {'yes' if row['noise'] else 'no'} | {row['by'] or '-'} | {_cell(row['detection_limit'], share=True)} | {row['why']} |"
+        for joint, row in content["evidence"].items()
+    ]
+    if content["run_variation"]:
+        lines += ["", "## How runs differ", "", "| joint | what | std between runs | unit |", "|---|---|---|---|"]
+        lines += [
+            f"| {joint} | {kind} | {std:.3g} | {unit_of_kind(diagnosis.robot, joint, kind)} |"
+            for joint, kinds in content["run_variation"].items()
+            for kind, std in kinds.items()
+        ]
+    return lines
 
 
 def _cell(value: float | None, share: bool) -> str:

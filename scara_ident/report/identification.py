@@ -40,6 +40,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         ],
         "weights": dict(zip(robot.joints, estimate.weights, strict=True)),
         "std_from": estimate.std_kind,
+        "run_variation": estimate.variation.sizes(robot) if estimate.variation else {},
         "log_det": identification.log_det,
         "condition": identification.condition,
         "criteria_samples": PAPER_SAMPLES,
@@ -131,6 +132,8 @@ def sentences(identification: Identification) -> tuple[str, ...]:
     if small:
         found.append(f"Within two standard deviations of zero: {_listed(small)}.")
     found.append(weights_said(identification.estimate))
+    if identification.estimate.variation:
+        found += [f"{said}." for said in identification.estimate.variation.sentences(identification.model.robot)]
     if isinstance(identification.estimate, ConsistentEstimate):
         found += _shapes_said(identification.estimate.shapes)
     return tuple(found)
