@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.effect_parameters import RotorInertia
+from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.model_selection import Unexplained, rms_of
 from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
@@ -218,6 +219,22 @@ def _curved(diagnosis: Diagnosis, remainder: Unexplained) -> str:
     return ""
 
 
+def _not_shown(evidence: Sequence[Evidence]) -> list[str]:
+    """Say why what is left was not shown to be noise, joints with the same reason together."""
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for item in evidence:
+        if not item.shown:
+            share, percent, reason = item.why.partition("% ")
+            alike = percent and share.isdigit()
+            groups.setdefault(reason if alike else item.why, []).append((item.joint, share if alike else ""))
+    found = []
+    for why, members in groups.items():
+        shares = sorted({int(share) for _, share in members if share})
+        size = " to ".join(f"{share}%" for share in dict.fromkeys((shares[0], shares[-1]))) + " " if shares else ""
+        found.append(f"On {', '.join(joint for joint, _ in members)}: {size}{why}.")
+    return found
+
+
 def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Return the result in words."""
     found = []
@@ -226,11 +243,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     if diagnosis.verdict == "undecided":
         more = "something more is missing than was found" if diagnosis.effects else "something is missing"
         found.append(f"Undecided: these recordings cannot tell whether {more}.")
-        by_why: dict[str, list[str]] = {}
-        for item in diagnosis.evidence:
-            if not item.shown:
-                by_why.setdefault(item.why, []).append(item.joint)
-        found += [f"On {', '.join(joints)}: {why}." for why, joints in by_why.items()]
+        found += _not_shown(diagnosis.evidence)
     for effect in diagnosis.effects:
         where = f" on {effect.joint}" if effect.joint else ""
         values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())

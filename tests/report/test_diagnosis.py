@@ -123,6 +123,12 @@ def test_where_it_cannot_be_told_the_first_sentence_says_so(result):
     first, second, *_ = sentences(undecided)
     assert first == "Undecided: these recordings cannot tell whether something is missing."
     assert second == "On joint1: it is not white."
+    both = (
+        replace(unsure, why="76% of it is not white"),
+        replace(unsure, joint="joint2", why="26% of it is not white"),
+    )
+    assert sentences(replace(undecided, evidence=both))[1] == "On joint1, joint2: 26% to 76% of it is not white."
+    assert sentences(replace(undecided, evidence=both[:1]))[1] == "On joint1: 76% of it is not white."
     found, *_ = sentences(replace(undecided, effects=result.effects))
     assert found == "Undecided: these recordings cannot tell whether something more is missing than was found."
 
