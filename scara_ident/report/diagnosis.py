@@ -17,6 +17,7 @@ from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import unit_of_kind
 from scara_ident.model.terms.friction import Friction
+from scara_ident.report.identification import bias_of, bias_said
 from scara_ident.robot.rotors import GUESS_FACTOR
 
 # An uncertainty below this factor is told as a standard deviation.
@@ -89,6 +90,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
             for k, column in enumerate(diagnosis.after.model.columns)
         ],
         "run_variation": diagnosis.after.variation.sizes(diagnosis.robot) if diagnosis.after.variation else {},
+        "noise_bias": bias_of(diagnosis.after),
         "not_identifiable": [
             {"effect": alias.effect, "absorbed_by": list(alias.absorbed_by), "opened_by": alias.opened_by}
             for alias in diagnosis.aliases
@@ -274,6 +276,9 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
             if a is not None and b is not None
         ]
         found.append(f"Rms error on the {kind} recordings: {'; '.join(changes)}.")
+    biased = bias_said(diagnosis.after)
+    if biased is not None:
+        found.append(biased)
     if not diagnosis.fit_after:
         found.append(
             "No trajectory was repeated, so the noise floor is not known: record each trajectory twice or more."

@@ -134,6 +134,24 @@ def test_how_runs_differ_is_said(result):
     assert identification_dict(alone)["run_variation"] == {}
 
 
+def test_what_the_noise_of_positions_biases_is_said(result):
+    bias = np.zeros(len(result.estimate.value))
+    bias[0] = 0.5
+    free = np.diag(result.estimate.covariance)[0]
+    covariance = result.estimate.covariance + np.outer(bias, bias)
+    assert free < bias[0] ** 2
+    found = identification_dict(
+        replace(result, estimate=replace(result.estimate, covariance=covariance, noise_bias=bias))
+    )
+    assert found["noise_bias"]["P_d1"] == 0.5
+    assert (
+        "The noise of the positions biases P_d1 by about 0.5; their standard deviations hold that." in found["summary"]
+    )
+    alone = identification_dict(replace(result, estimate=replace(result.estimate, noise_bias=None)))
+    assert alone["noise_bias"] == {}
+    assert not any("noise of the positions" in said for said in alone["summary"])
+
+
 def test_the_shape_of_friction_and_why_are_said():
     found = made([run("OJD_1", 1)], method="consistent")
     content = identification_dict(found)
