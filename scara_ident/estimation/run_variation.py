@@ -174,6 +174,12 @@ class RunVariation:
         return total
 
 
+def unit_of_kind(robot: Robot, joint: str, kind: str) -> str:
+    """Return the unit in which runs differ by a kind on a joint; 1 for a share of what the model predicts."""
+    units = ("1", "1", robot.torque_unit(robot.joints.index(joint)), "s")
+    return units[KINDS.index(kind)]
+
+
 def run_variation(observations: Observations, joints: Sequence[JointRows], value: Array) -> RunVariation:
     """Estimate how runs differ.
 

@@ -10,11 +10,14 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.effect_parameters import RotorInertia
+from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.model_selection import Unexplained, rms_of
 from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_variation import unit_of_kind
 from scara_ident.model.terms.friction import Friction
+from scara_ident.report.identification import bias_of, bias_said
 from scara_ident.robot.rotors import GUESS_FACTOR
 
 # An uncertainty below this factor is told as a standard deviation.
@@ -87,6 +90,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
             for k, column in enumerate(diagnosis.after.model.columns)
         ],
         "run_variation": diagnosis.after.variation.sizes(diagnosis.robot) if diagnosis.after.variation else {},
+        "noise_bias": bias_of(diagnosis.after),
         "not_identifiable": [
             {"effect": alias.effect, "absorbed_by": list(alias.absorbed_by), "opened_by": alias.opened_by}
             for alias in diagnosis.aliases
@@ -217,18 +221,31 @@ def _curved(diagnosis: Diagnosis, remainder: Unexplained) -> str:
     return ""
 
 
+def _not_shown(evidence: Sequence[Evidence]) -> list[str]:
+    """Say why what is left was not shown to be noise, joints with the same reason together."""
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for item in evidence:
+        if not item.shown:
+            share, percent, reason = item.why.partition("% ")
+            alike = percent and share.isdigit()
+            groups.setdefault(reason if alike else item.why, []).append((item.joint, share if alike else ""))
+    found = []
+    for why, members in groups.items():
+        shares = sorted({int(share) for _, share in members if share})
+        size = " to ".join(f"{share}%" for share in dict.fromkeys((shares[0], shares[-1]))) + " " if shares else ""
+        found.append(f"On {', '.join(joint for joint, _ in members)}: {size}{why}.")
+    return found
+
+
 def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Return the result in words."""
     found = []
     if diagnosis.verdict == "complete":
         found.append("The model lacks nothing that these recordings can show.")
     if diagnosis.verdict == "undecided":
-        found.append("These recordings cannot tell whether something is missing.")
-        by_why: dict[str, list[str]] = {}
-        for item in diagnosis.evidence:
-            if not item.shown:
-                by_why.setdefault(item.why, []).append(item.joint)
-        found += [f"On {', '.join(joints)}: {why}." for why, joints in by_why.items()]
+        more = "something more is missing than was found" if diagnosis.effects else "something is missing"
+        found.append(f"Undecided: these recordings cannot tell whether {more}.")
+        found += _not_shown(diagnosis.evidence)
     for effect in diagnosis.effects:
         where = f" on {effect.joint}" if effect.joint else ""
         values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())
@@ -259,6 +276,9 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
             if a is not None and b is not None
         ]
         found.append(f"Rms error on the {kind} recordings: {'; '.join(changes)}.")
+    biased = bias_said(diagnosis.after)
+    if biased is not None:
+        found.append(biased)
     if not diagnosis.fit_after:
         found.append(
             "No trajectory was repeated, so the noise floor is not known: record each trajectory twice or more."
@@ -310,6 +330,7 @@ def diagnosis_markdown(diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]]
         lines += [
             f"| {m['name']} | {m['before']:.4g} | {m['after']:.4g} | {m['in_std']:+.1f} |" for m in content["moved"]
         ]
+    lines += _certainty(content, diagnosis)
     lines += ["", "## Candidates", "", "| candidate | gain held out | p | decision | why |", "|---|---|---|---|---|"]
     for row in content["candidates"]:
         lines.append(
@@ -322,6 +343,37 @@ def diagnosis_markdown(diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]]
             for row in content["not_identifiable"]
         ]
     return "\n".join(lines) + "\n"
+
+
+def _certainty(content: dict[str, Any], diagnosis: Diagnosis) -> list[str]:
+    """Return what is worth a look, whether what is left is noise, and how runs differ, as Markdown."""
+    lines = []
+    if content["tentative"]:
+        lines += ["", "## Worth a look, not added", "", "| effect | joint | gain | p | why not | settled by |"]
+        lines += ["|---|---|---|---|---|---|"]
+        lines += [
+            f"| {row['effect']} | {row['joint'] or '-'} | {row['gain']:.2%} | {row['p_value']:.1e} | {row['why']} | {row['settled_by']} |"
+            for row in content["tentative"]
+        ]
+    lines += [
+        "",
+        "## Is what is left noise?",
+        "",
+        "| joint | shown | by | detection limit | why |",
+        "|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {joint} | {'yes' if row['noise'] else 'no'} | {row['by'] or '-'} | {_cell(row['detection_limit'], share=True)} | {row['why']} |"
+        for joint, row in content["evidence"].items()
+    ]
+    if content["run_variation"]:
+        lines += ["", "## How runs differ", "", "| joint | what | std between runs | unit |", "|---|---|---|---|"]
+        lines += [
+            f"| {joint} | {kind} | {std:.3g} | {unit_of_kind(diagnosis.robot, joint, kind)} |"
+            for joint, kinds in content["run_variation"].items()
+            for kind, std in kinds.items()
+        ]
+    return lines
 
 
 def _cell(value: float | None, share: bool) -> str:

@@ -11,6 +11,7 @@ from scara_ident.estimation import Estimate, JointError
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, links
 from scara_ident.estimation.consistent.shape import ShapeChoice
 from scara_ident.estimation.estimate import PAPER_SAMPLES
+from scara_ident.estimation.noise_bias import bias_sentence
 from scara_ident.estimation.observations import Observations
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
 from scara_ident.robot.robot import Robot
@@ -40,6 +41,8 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         ],
         "weights": dict(zip(robot.joints, estimate.weights, strict=True)),
         "std_from": estimate.std_kind,
+        "run_variation": estimate.variation.sizes(robot) if estimate.variation else {},
+        "noise_bias": bias_of(estimate),
         "log_det": identification.log_det,
         "condition": identification.condition,
         "criteria_samples": PAPER_SAMPLES,
@@ -131,6 +134,11 @@ def sentences(identification: Identification) -> tuple[str, ...]:
     if small:
         found.append(f"Within two standard deviations of zero: {_listed(small)}.")
     found.append(weights_said(identification.estimate))
+    if identification.estimate.variation:
+        found += [f"{said}." for said in identification.estimate.variation.sentences(identification.model.robot)]
+    biased = bias_said(identification.estimate)
+    if biased is not None:
+        found.append(biased)
     if isinstance(identification.estimate, ConsistentEstimate):
         found += _shapes_said(identification.estimate.shapes)
     return tuple(found)
@@ -146,6 +154,20 @@ def weights_said(estimate: Estimate) -> str:
         for j, (joint, weight) in enumerate(zip(robot.joints, estimate.weights, strict=True))
     ]
     return f"Each joint is weighted by its residual ({estimate.method}): {', '.join(noise)}."
+
+
+def bias_of(estimate: Estimate) -> dict[str, float]:
+    """Return by how much the noise of positions moves each parameter; nothing where it is negligible."""
+    names, bias = estimate.model.names, estimate.noise_bias
+    return {} if bias is None else dict(zip(names, bias.tolist(), strict=True))
+
+
+def bias_said(estimate: Estimate) -> str | None:
+    """Say which parameters the noise of positions biases by more than their other uncertainty; None where none."""
+    if estimate.noise_bias is None:
+        return None
+    said = bias_sentence(estimate.model.names, estimate.noise_bias, estimate.std)
+    return said and f"{said[0].upper()}{said[1:]}."
 
 
 def _shapes_said(choices: Sequence[ShapeChoice]) -> list[str]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from types import ModuleType
 
 import pytest
 
 from scara_ident import load_robot, read_recordings
 from scara_ident.diagnosis import Diagnosis, diagnose
-from tests.shared import shared_path
+from tests.shared import ROOT, shared_path
 
 pytestmark = pytest.mark.slow
 
@@ -30,6 +31,12 @@ def run(case: str) -> Diagnosis:
     robot = load_robot()
     training = read_recordings([shared_path("cases", case, "train")], robot)
     return diagnose(robot, training, validation=read_recordings([shared_path("cases", case, "test")], robot))
+
+
+@pytest.fixture
+def measured(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
+    return pytest.importorskip("measured", reason="benchmarks are not part of an installed package")
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -70,3 +77,17 @@ def test_emps_friction_differs_by_direction():
     training = relative(result.after, result.training_after) / relative(result.before, result.training_before)
     assert training <= 0.82
     assert relative(result.after, result.validation_after) < relative(result.before, result.validation_before)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_what_is_found_on_half_of_the_ur10e_holds_on_recordings_that_nothing_saw(measured: ModuleType, swapped: bool):
+    """Gear loss of shoulder and elbow, and presliding in the wrist; none of them was published with the data."""
+    arm = shared_path("data", "ur10e")
+    one, other = measured.halves(read_recordings([arm], load_robot(arm / "robot.yaml")))
+    found = measured.direction(arm, "basic", *((other, one) if swapped else (one, other)))
+    ratios = {(item["effect"], item["joint"]): item["ratio"] for item in found["effects"]}
+    assert {(name, joint) for name, joint in ratios if name == "transmission_loss"} == {
+        ("transmission_loss", "shoulder_lift_joint"),
+        ("transmission_loss", "elbow_joint"),
+    }
+    assert all(ratio < measured.HOLDS for ratio in ratios.values()), ratios

@@ -10,8 +10,10 @@ import pytest
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.effect_parameters import RotorInertia
+from scara_ident.diagnosis.tentative import TentativeEffect
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.position import Spring
+from scara_ident.estimation.run_variation import JointVariation, RunVariation
 from scara_ident.files import plain
 from scara_ident.report.diagnosis import best_by_label, diagnosis_dict, diagnosis_markdown, sentences
 from scara_ident.robot.robot import load_robot
@@ -113,6 +115,36 @@ def test_the_story_has_every_candidate_and_both_tables(result, content):
     assert "## Error on the validation recordings" in text
     for row in content["candidates"]:
         assert row["label"] in text
+
+
+def test_where_it_cannot_be_told_the_first_sentence_says_so(result):
+    unsure = replace(result.evidence[0], shown=False, by="", why="it is not white")
+    undecided = replace(result, verdict="undecided", evidence=(unsure, result.evidence[1]), effects=())
+    first, second, *_ = sentences(undecided)
+    assert first == "Undecided: these recordings cannot tell whether something is missing."
+    assert second == "On joint1: it is not white."
+    both = (
+        replace(unsure, why="76% of it is not white"),
+        replace(unsure, joint="joint2", why="26% of it is not white"),
+    )
+    assert sentences(replace(undecided, evidence=both))[1] == "On joint1, joint2: 26% to 76% of it is not white."
+    assert sentences(replace(undecided, evidence=both[:1]))[1] == "On joint1: 76% of it is not white."
+    found, *_ = sentences(replace(undecided, effects=result.effects))
+    assert found == "Undecided: these recordings cannot tell whether something more is missing than was found."
+
+
+def test_what_is_tentative_what_is_noise_and_how_runs_differ_stand_in_the_story(result):
+    guess = TentativeEffect("stribeck", "joint1", "d", "helps in only 1 of 2", "slow motion", 0.0712, 3e-4)
+    variation = RunVariation((JointVariation(np.ones((4, 4)), np.array([0.06, 0.0, 0.0, 0.003]), np.zeros((2, 4)), 0.01, np.array([0, 2, 4])), None))  # fmt: skip
+    changed = replace(result, tentative=(guess,), after=replace(result.after, variation=variation))
+    content, text = diagnosis_dict(changed), diagnosis_markdown(changed)
+    assert content["run_variation"] == {"joint1": {"friction": 0.06, "delay": 0.003}}
+    assert "| stribeck | joint1 | 7.12% | 3.0e-04 | helps in only 1 of 2 | slow motion |" in text
+    assert "| joint1 | friction | 0.06 | 1 |\n| joint1 | delay | 0.003 | s |" in text
+    for joint, row in content["evidence"].items():
+        shown = "yes" if row["noise"] else "no"
+        assert f"| {joint} | {shown} | {row['by'] or '-'} | {row['detection_limit']:.1%} | {row['why']} |" in text
+    assert "How runs differ" not in diagnosis_markdown(replace(changed, after=replace(result.after, variation=None)))
 
 
 def test_without_repetitions_the_noise_floor_is_unknown_and_said_so():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from scara_ident.estimation import ConsistentOptions
+from scara_ident.estimation.run_variation import JointVariation, RunVariation
 from scara_ident.files import plain
 from scara_ident.report.identification import identification_dict, sentences
 from tests.report.simulated import made, run
@@ -120,6 +121,35 @@ def test_the_weights_are_said(result, content):
     plain_ = identification_dict(made([run("OJD_1", 1)], method="ols"))
     assert plain_["weights"] == {"joint1": 1.0, "joint2": 1.0}
     assert "Every row of every joint counts the same (ols)." in plain_["summary"]
+
+
+def test_how_runs_differ_is_said(result):
+    std = np.array([0.06, 0.0, 0.0, 0.0])
+    item = JointVariation(np.ones((4, 6)), std, np.zeros((3, 4)), 0.01, np.array([0, 2, 4, 6]))
+    estimate = replace(result.estimate, variation=RunVariation((item, None)))
+    found = identification_dict(replace(result, estimate=estimate))
+    assert found["run_variation"] == {"joint1": {"friction": 0.06}}
+    assert "joint1 differs from run to run (standard deviation): its friction by 6 %." in found["summary"]
+    alone = replace(result, estimate=replace(result.estimate, variation=None))
+    assert identification_dict(alone)["run_variation"] == {}
+
+
+def test_what_the_noise_of_positions_biases_is_said(result):
+    bias = np.zeros(len(result.estimate.value))
+    bias[0] = 0.5
+    free = np.diag(result.estimate.covariance)[0]
+    covariance = result.estimate.covariance + np.outer(bias, bias)
+    assert free < bias[0] ** 2
+    found = identification_dict(
+        replace(result, estimate=replace(result.estimate, covariance=covariance, noise_bias=bias))
+    )
+    assert found["noise_bias"]["P_d1"] == 0.5
+    assert (
+        "The noise of the positions biases P_d1 by about 0.5; their standard deviations hold that." in found["summary"]
+    )
+    alone = identification_dict(replace(result, estimate=replace(result.estimate, noise_bias=None)))
+    assert alone["noise_bias"] == {}
+    assert not any("noise of the positions" in said for said in alone["summary"])
 
 
 def test_the_shape_of_friction_and_why_are_said():

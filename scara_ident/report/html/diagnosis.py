@@ -29,6 +29,7 @@ from scara_ident.report.html.blocks import (
     superscripts,
 )
 from scara_ident.report.html.candidates import candidate_blocks
+from scara_ident.report.html.certainty import evidence_blocks, tentative_blocks
 from scara_ident.report.html.chapters import Chapter, chapters
 from scara_ident.report.html.experiments import next_experiments
 from scara_ident.report.html.page import Page, parts
@@ -38,6 +39,7 @@ from scara_ident.report.html.residual import residual_blocks
 from scara_ident.report.html.section import NamedSection, Section, notes_section
 from scara_ident.report.html.story import chapter_group, moment_group
 from scara_ident.report.html.torque import torque_group
+from scara_ident.report.html.variation import variation_blocks
 from scara_ident.report.traces import FittedContext, Trace, traces
 from scara_ident.threads import one_blas_thread
 
@@ -177,6 +179,23 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
     return blocks
 
 
+def _tentative(context: DiagnosisContext) -> Sequence[Block]:
+    """What is worth a look and not believed."""
+    return tentative_blocks(context.content)
+
+
+def _evidence(context: DiagnosisContext) -> Sequence[Block]:
+    """Whether what is left was shown to be noise."""
+    return evidence_blocks(context.content)
+
+
+def _variation(context: DiagnosisContext) -> Sequence[Block]:
+    """How runs differ."""
+    found = context.diagnosis
+    runs = [item.name for item in found.training_after.data.recordings]
+    return variation_blocks(found.robot, found.after.variation, runs)
+
+
 def _next(context: DiagnosisContext) -> list[Block]:
     """What to record next."""
     found = next_experiments(context.diagnosis)
@@ -272,8 +291,11 @@ def _unknowable(context: DiagnosisContext) -> list[Block]:
 SECTIONS: tuple[Section, ...] = (
     NamedSection("gain", "Before and after", _gain),
     NamedSection("story", "The story", _story),
+    NamedSection("tentative", "Worth a look", _tentative),
     NamedSection("next", "What to do next", _next),
     NamedSection("left", "What is left", _left),
+    NamedSection("evidence", "Is it noise?", _evidence),
+    NamedSection("variation", "How runs differ", _variation),
     NamedSection("torque-section", "Torque", _torque),
     NamedSection("candidates", "Candidates", _candidates),
     NamedSection("limits", "What cannot be known", _unknowable),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +23,7 @@ from scara_ident.report.html.parameters import (
 from scara_ident.report.html.residual import residual_blocks
 from scara_ident.report.html.section import NamedSection, Section, notes_section
 from scara_ident.report.html.torque import error_table, torque_group
+from scara_ident.report.html.variation import variation_blocks
 from scara_ident.report.identification import sentences
 from scara_ident.report.traces import FittedContext, Trace, traces
 from scara_ident.threads import one_blas_thread
@@ -89,6 +91,13 @@ def _parameters(context: IdentificationContext) -> list[Block]:
     return blocks
 
 
+def _variation(context: IdentificationContext) -> Sequence[Block]:
+    """How runs differ."""
+    found = context.identification
+    runs = [item.name for item in found.training.data.recordings]
+    return variation_blocks(found.model.robot, found.estimate.variation, runs)
+
+
 def _friction_curves(context: IdentificationContext) -> list[Block]:
     """Friction over velocity; nothing where the model has none."""
     group = friction_group(context.identification.estimate, context.sets["fitted"])
@@ -114,6 +123,7 @@ def _convergence(context: IdentificationContext) -> list[Block]:
 SECTIONS: tuple[Section, ...] = (
     NamedSection("prediction", "Prediction", _prediction),
     NamedSection("parameters", "Parameters", _parameters),
+    NamedSection("variation", "How runs differ", _variation),
     NamedSection("friction", "Friction", _friction_curves),
     NamedSection("residual", "Residual", _residual),
     NamedSection("convergence", "Convergence", _convergence),
