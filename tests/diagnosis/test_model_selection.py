@@ -77,7 +77,7 @@ def test_an_effect_that_stands_for_one_outside_the_catalogue_is_not_counted() ->
     noise = outcome.fit_after[1].noise
     share = (before**2 - after**2) / (before**2 - noise**2)
     assert share < CRITERIA.least_of_repeatable
-    assert abs(float(words.split("remove ")[1].split("%")[0]) - 100.0 * share) < 2.0
+    assert abs(float(refused.why.split("remove ")[1].split("%")[0]) - 100.0 * share) < 2.0
 
 
 def test_nothing_is_demoted_where_the_rest_is_noise() -> None:
