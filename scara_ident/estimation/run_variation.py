@@ -20,6 +20,7 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.observations import JointRows, Observations
 from scara_ident.model.terms.friction import Friction, Offset
 from scara_ident.robot.robot import Robot
+from scara_ident.threads import side_by_side
 
 KINDS = ("friction", "torque scale", "offset", "delay")
 
@@ -190,13 +191,14 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
     if runs < LEAST_RUNS:
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
-    found = []
-    for joint, rows in enumerate(joints):
+
+    def of_joint(joint: int, rows: JointRows) -> JointVariation | None:
         bounds = rows.starts[firsts]
         directions = _directions(observations, joint, rows, value)
         left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
-        found.append(_estimated(directions, left, rows.starts, firsts, bounds))
-    return RunVariation(tuple(found))
+        return _estimated(directions, left, rows.starts, firsts, bounds)
+
+    return RunVariation(tuple(side_by_side(of_joint, range(len(joints)), joints)))
 
 
 def _directions(observations: Observations, joint: int, rows: JointRows, value: Array) -> Array:

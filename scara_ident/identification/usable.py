@@ -15,6 +15,7 @@ from scara_ident.motion.motion import torque_of
 from scara_ident.motion.prepared import PreparedData, prepare
 from scara_ident.motion.velocity_audit import audit_velocity
 from scara_ident.recording.recording import Recording
+from scara_ident.threads import side_by_side
 
 # An rms of so many independent values is known to 1 / sqrt(2 N), here 22 % (the standard error of a standard deviation).
 LEAST_ROWS = 10
@@ -121,7 +122,7 @@ def with_rows(data: PreparedData, *, needed: bool) -> tuple[PreparedData, list[s
     needed : bool
         Whether at least one has to be left; if all have too few, all are.
     """
-    rows = [kept_rows(item) for item in data.recordings]
+    rows = side_by_side(kept_rows, data.recordings)
     kept = [k for k, count in enumerate(rows) if count >= LEAST_ROWS]
     if len(kept) == len(rows) or (needed and not kept):
         return data, []
