@@ -18,7 +18,7 @@ def compare(
     """Set every trajectory's parameters against every trajectory."""
     from scara_ident.files import write_json, written_together
     from scara_ident.identification.compare import compare as run
-    from scara_ident.recording.recording import read_recordings
+    from scara_ident.recording.recording import read_usable
     from scara_ident.report.comparison import comparison_dict
     from scara_ident.robot.robot import load_robot
 
@@ -26,13 +26,13 @@ def compare(
     arm = load_robot(robot)
     with progress() as work:
         work("reading the recordings")
-        given = read_recordings(recordings, arm)
+        given, useless = read_usable(recordings, arm)
         result = run(arm, given, model=model, method=method, progress=work.part(READING_SHARE, 1.0))
     content = comparison_dict(result)
     console = result_console(content, json)
     if verbose:
         show_recordings(console, given)
-    console.note(result.notes)
+    console.note([*useless, *result.notes])
     names = content["trajectories"]
     what = table("trajectories", "trajectory", "J_d", "J_k", "runs", right=("J_d", "J_k", "runs"))
     for name in names:

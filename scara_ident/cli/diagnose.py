@@ -43,7 +43,7 @@ def diagnose(
     from scara_ident.diagnosis import diagnose as run
     from scara_ident.effects import effects_named
     from scara_ident.files import write_json, write_text, written_together
-    from scara_ident.recording.recording import read_recordings
+    from scara_ident.recording.recording import read_usable
     from scara_ident.report.diagnosis import diagnosis_dict, diagnosis_markdown
     from scara_ident.robot.robot import load_robot
 
@@ -51,8 +51,8 @@ def diagnose(
     arm = load_robot(robot)
     with progress() as work:
         work("reading the recordings")
-        training = read_recordings(recordings, arm)
-        held_out = read_recordings(validate, arm) if validate else ()
+        training, useless = read_usable(recordings, arm)
+        held_out, more = read_usable(validate or (), arm, needed=False)
         result = run(
             arm,
             training,
@@ -66,7 +66,7 @@ def diagnose(
     console = result_console(content, json)
     if verbose:
         show_recordings(console, (*training, *held_out))
-    console.note(result.notes)
+    console.note([*useless, *more, *result.notes])
     console.print(f"{arm.name}: {result.verdict}", style="bold")
     console.say(content["summary"])
     errors = table("rms error within the band", "recordings", "joint", "before", "after", right=("before", "after"))

@@ -84,7 +84,7 @@ def excite(
     from scara_ident.files import write_json, written_together
     from scara_ident.identification.identify import known_information
     from scara_ident.model.model import build_model
-    from scara_ident.recording.recording import read_recordings
+    from scara_ident.recording.recording import read_usable
     from scara_ident.report.html import excitation_report
     from scara_ident.report.pictures import design_picture
     from scara_ident.robot.robot import load_robot
@@ -109,7 +109,8 @@ def excite(
     check_size(count, arm.n, trajectories, SAMPLES)
     check_rate(rate, count / duration)
     nominal = None if parameters is None else read_parameters(parameters, equation)
-    prior = known_information(equation, read_recordings(known, arm), PAPER_SAMPLES / duration) if known else None
+    recorded, useless = read_usable(known or (), arm)
+    prior = known_information(equation, recorded, PAPER_SAMPLES / duration) if recorded else None
     with progress() as work:
 
         def told(state: Progress) -> None:
@@ -138,7 +139,7 @@ def excite(
     for each in design.reached:
         reached.add_row(each.name, f"{each.bound:.4g} {each.unit}", f"{each.reached:.4g} {each.unit}")
     console.print(reached)
-    console.note(content["notes"])
+    console.note([*useless, *content["notes"]])
     with written_together(output) as folder:
         for trajectory, csv, yaml in zip(
             design.trajectories, file_names(design, ".csv"), file_names(design, ".yaml"), strict=True

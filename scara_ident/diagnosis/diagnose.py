@@ -25,12 +25,11 @@ from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.errors import RecordingError
 from scara_ident.estimation import Estimate
-from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.channel_check import channel_faults
-from scara_ident.identification.identify import check_bands, check_held_out, data_notes
+from scara_ident.identification.identify import check_bands, check_held_out
+from scara_ident.identification.usable import check_rows, usable_in_bands, with_rows
 from scara_ident.model.model import TorqueModel, build_model
-from scara_ident.motion.prepared import prepare
 from scara_ident.progress import Tell, Work, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
@@ -173,23 +172,20 @@ def diagnose(
     UsageError
         If a recording is both fitted and held out, or a band is no frequency that the slowest recording carries.
     RecordingError
-        If a recording cannot be used, or its channels are not what the mapping says (see `channel_faults`).
+        If none of the recordings can be used, or they have fewer rows than the model has parameters (one of several that
+        cannot be used is left out with a note), or channels are not what the mapping says (see `channel_faults`).
     """
     work = Work(progress)
     check_held_out(recordings, validation)
     if bands is not None:
         check_bands(robot, bands, (*recordings, *validation))
     base = build_model(robot, model) if isinstance(model, str) else model
-    data, held_out = prepare(recordings), prepare(validation)
-    notes = data_notes(data, held_out)
     given = bands is not None
-    if bands is None:
+    if not given:
         work("choosing the band")
-        choice = choose_bands(base, data)
-        # A joint whose model lacks something seems to have less band than it has.
-        bands = (max(choice.bands),) * robot.n
-        notes += choice.notes
-    observations = observe(base, data.at(bands))
+    data, held_out, notes = usable_in_bands(base, recordings, validation, bands, alike=True)
+    observations = observe(base, data)
+    check_rows(observations)
     faults = channel_faults(observations)
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))
@@ -199,7 +195,9 @@ def diagnose(
     work("comparing what was found with what else it could be", task.progress.stop)
     found, after = outcome.search, outcome.after
     step = replace(found.step, weights=after.weights)
-    validation_before = observe(base, held_out.at(found.bands))
+    held_out, useless = with_rows(held_out.at(found.bands), needed=False)
+    notes += [note for note in useless if note not in notes]
+    validation_before = observe(base, held_out)
     parameters = physical_parameters(step) if found.chosen else PhysicalParameters((), ())
     effects = _effects(found, step, parameters)
     notes += [f"{item.label} is not counted: {item.why}" for item in outcome.demoted]

@@ -23,6 +23,7 @@ from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
+from scara_ident.identification.usable import with_rows
 from scara_ident.motion.prepared import PreparedData
 
 
@@ -193,7 +194,9 @@ def _narrowed(
         return columns, wide
     left = task.progress
     for share in task.criteria.narrower:
-        narrow = CandidateColumns(observe(task.model, data.at((share * band,) * len(data.bands))))
+        # Runs that are too short for so narrow a band are left out of this search.
+        short, _ = with_rows(data.at((share * band,) * len(data.bands)), needed=True)
+        narrow = CandidateColumns(observe(task.model, short))
         now, left = next_of(left)
         if not search(replace(task, catalogue=resonant, progress=now), narrow).chosen:
             continue

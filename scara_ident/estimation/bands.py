@@ -161,7 +161,7 @@ class _Spectra:
         """Fit parameters in bands, and say how far up they explain each joint's torque."""
         data = self.data.at(tuple(bands.tolist()))
         # One that is too short for these bands, or at rest, has nothing to say.
-        kept = [k for k, item in enumerate(data.recordings) if kept_rows(item)]
+        kept = np.flatnonzero(side_by_side(kept_rows, data.recordings)).tolist()
         return self.judged(bands, weighted_value(observe(self.model, data.of(kept) if kept else data)))
 
     def judged(self, bands: Array, value: Array) -> _Fit:

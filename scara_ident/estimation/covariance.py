@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.observations import JointRows
+from scara_ident.threads import side_by_side
 
 # With fewer blocks than this many per parameter the matrix of scores is too noisy to stand for itself.
 BLOCKS_PER_PARAMETER = 2.5
@@ -66,7 +67,7 @@ def block_covariance(
         Weight of each joint's rows in the estimate.
     """
     root = _square_root(inverse)
-    scores = [_scores(rows, weight, root, value) for rows, weight in zip(joints, weights, strict=True)]
+    scores = side_by_side(lambda rows, weight: _scores(rows, weight, root, value), joints, weights)
     meat = _scattered(scores, owner) if len(owner) >= BLOCKS_PER_PARAMETER * root.shape[1] else None
     if meat is None:
         return Covariance(_pooled(scores, root), "pooled block", len(owner))

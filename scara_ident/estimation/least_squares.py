@@ -12,6 +12,7 @@ from scara_ident.estimation.information import Information, joint_noise, merge, 
 from scara_ident.estimation.noise_bias import noise_bias
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import run_variation
+from scara_ident.estimation.working_range import told_directions
 from scara_ident.threads import one_blas_thread
 
 
@@ -62,33 +63,45 @@ def wls(observations: Observations, noise: Array | None = None) -> Estimate:
     return least_squares(observations, 1.0 / noise, "wls")
 
 
+@one_blas_thread()
 def least_squares(
     observations: Observations, weights: Array, method: str, prior: Information | None = None
 ) -> Estimate:
-    """Least squares with a weight per joint and, if given, rows of a prior."""
+    """Least squares with a weight per joint and, if given, rows of a prior.
+
+    Without a prior, what data leave open of the torque within the arm's limits is left at zero, see `told_directions`.
+    """
     information = weighted(_joints(observations), weights)
     if prior is not None:
         information = merge([information, prior])
     solution = information.solve()
-    inverse = information.inverse()
-    with one_blas_thread():
-        spread = block_covariance(inverse, solution.value, observations.joints, observations.owner, weights)
-    variation = run_variation(observations, observations.joints, solution.value)
+    value, undetermined, inverse = solution.value, solution.undetermined, information.inverse()
+    told = told_directions(observations, value) if prior is None else None
+    if told is not None:
+        within = told.within(information)
+        value, undetermined = told.kept @ within.solve().value, told.undetermined
+        inverse = told.kept @ within.inverse() @ told.kept.T
+    spread = block_covariance(inverse, value, observations.joints, observations.owner, weights)
+    variation = run_variation(observations, observations.joints, value)
     covariance = spread.matrix + variation.covariance(inverse, observations.joints, weights)
-    bias = noise_bias(observations, weights, solution.value) if prior is None else None
+    bias = None
+    if told is not None:
+        covariance += told.prior
+    elif prior is None:
+        bias = noise_bias(observations, weights, value)
     if bias is not None:
         covariance += np.outer(bias, bias)
     if prior is not None:
         # The prior's own error, which no residual shows.
         precision = prior.regressor_factor.T @ prior.regressor_factor
         covariance += inverse @ precision @ inverse
-    covariance[np.diag_indices_from(covariance)] = np.where(solution.undetermined, np.inf, np.diag(covariance))
+    covariance[np.diag_indices_from(covariance)] = np.where(undetermined, np.inf, np.diag(covariance))
     return Estimate(
         observations.model,
         method,
-        solution.value,
+        value,
         covariance,
-        solution.undetermined,
+        undetermined,
         information,
         weights,
         spread.kind,

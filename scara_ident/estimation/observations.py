@@ -56,6 +56,16 @@ class JointRows:
         own = Information.empty(len(self.columns)).absorb_columns(self.table[:, starts[0] : stop])
         return Information(own.factor, float(np.sum(counts))).embed(self.columns, parameters)
 
+    @property
+    def samples(self) -> float:
+        """Samples that all rows stand for."""
+        return float(np.sum(self.counts))
+
+    def rms(self, value: Array) -> float:
+        """Return the rms of what parameters leave of the torque, as the triangular factor has it; 0 without rows."""
+        left = self.table[-1] - value[self.columns] @ self.table[:-1]
+        return float(np.sqrt(left @ left / self.samples)) if self.samples else 0.0
+
     def part(self, blocks: NDArray[np.intp]) -> JointRows:
         """Return some of the blocks, in their order."""
         if np.array_equal(blocks, np.arange(len(self.counts))):

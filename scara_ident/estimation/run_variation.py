@@ -20,6 +20,7 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.observations import JointRows, Observations
 from scara_ident.model.terms.friction import Friction, Offset
 from scara_ident.robot.robot import Robot
+from scara_ident.threads import side_by_side
 
 KINDS = ("friction", "torque scale", "offset", "delay")
 
@@ -196,13 +197,14 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
     if runs < LEAST_RUNS:
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
-    found = []
-    for joint, rows in enumerate(joints):
+
+    def of_joint(joint: int, rows: JointRows) -> JointVariation | None:
         bounds = rows.starts[firsts]
         directions = _directions(observations, joint, rows, value)
         left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
-        found.append(_estimated(directions, left, rows.starts, firsts, bounds))
-    return RunVariation(tuple(found))
+        return _estimated(directions, left, rows.starts, firsts, bounds)
+
+    return RunVariation(tuple(side_by_side(of_joint, range(len(joints)), joints)))
 
 
 def _directions(observations: Observations, joint: int, rows: JointRows, value: Array) -> Array:
@@ -251,17 +253,18 @@ def _estimated(
     scale = 1.0 / np.sqrt(spread)
     products = products * np.outer(scale, scale)
     aims = aims * scale / noise
-    active = list(range(int(np.count_nonzero(shown))))
-    variance, best = _most_likely(products, aims, active)
-    while active:
-        without = [_most_likely(products, aims, [k for k in active if k != out]) for out in active]
-        losses = [2.0 * (best - likelihood) for _, likelihood in without]
-        weakest = int(np.argmin(losses))
-        if losses[weakest] > CHANCE:
+    active = np.ones((1, np.count_nonzero(shown)), dtype=bool)
+    variances, likelihoods = _most_likely(products, aims, active)
+    while np.any(active):
+        # All that lack one more kind, in one go.
+        kept, variance, best = active[0], variances[0], likelihoods[0]
+        active = kept & ~np.eye(len(kept), dtype=bool)[kept]
+        variances, likelihoods = _most_likely(products, aims, active)
+        weakest = int(np.argmax(likelihoods))
+        if 2.0 * (best - likelihoods[weakest]) > CHANCE:
             break
-        variance, best = without[weakest]
-        active.pop(weakest)
-    if not active:
+        active, variances, likelihoods = active[[weakest]], variances[[weakest]], likelihoods[[weakest]]
+    else:
         return None
     std, of_run = np.zeros(kinds), np.zeros((runs, kinds))
     # Parameters are fitted to all runs, so that these lie about their own mean.
@@ -296,31 +299,50 @@ def _of_runs(
 
 
 def _expected(products: Array, aims: Array, variance: Array) -> tuple[Array, Array]:
-    """Return how far each run lies off along each direction, and the variance of that."""
-    root = np.sqrt(variance)
-    inner = np.eye(len(variance)) + products * np.outer(root, root)
-    inverse = np.linalg.inv(inner)
-    spread = root[:, None] * inverse * root
-    return np.einsum("rij,rj->ri", spread, aims), np.diagonal(spread, axis1=1, axis2=2)
+    """Return how far each run lies off along each direction, and the variance of that.
+
+    Parameters
+    ----------
+    products : ndarray, shape (runs, k, k)
+    aims : ndarray, shape (runs, k)
+    variance : ndarray, shape (..., k)
+        Of sets of directions; zero leaves a direction out.
+
+    Returns
+    -------
+    tuple of ndarray, each of shape (..., runs, k)
+    """
+    root = np.sqrt(variance)[..., None, :]
+    inner = products * (root[..., :, None] * root[..., None, :])
+    place = np.arange(inner.shape[-1])
+    inner[..., place, place] += 1.0
+    spread = root[..., :, None] * np.linalg.inv(inner) * root[..., None, :]
+    return (spread @ aims[..., None])[..., 0], spread[..., place, place]
 
 
-def _most_likely(products: Array, aims: Array, active: Sequence[int]) -> tuple[Array, float]:
-    """Return the variances of the active kinds that are most likely, and the logarithm of their likelihood."""
-    kinds = products.shape[1]
-    variance = np.zeros(kinds)
-    if not len(active):
-        return variance, 0.0
-    own = list(active)
-    inner, aim = products[np.ix_(range(len(products)), own, own)], aims[:, own]
-    alone = np.diagonal(inner, axis1=1, axis2=2)
+def _most_likely(products: Array, aims: Array, active: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Return the variances that are most likely, and the logarithm of their likelihood, for sets of active kinds.
+
+    Parameters
+    ----------
+    products : ndarray, shape (runs, k, k)
+    aims : ndarray, shape (runs, k)
+    active : ndarray of bool, shape (sets, k)
+        The variances of the others are zero.
+
+    Returns
+    -------
+    tuple of ndarray, shapes (sets, k) and (sets,)
+    """
+    alone = np.diagonal(products, axis1=1, axis2=2)
     # The first guess leaves nothing to chance.
-    some = np.mean((aim / np.maximum(alone, np.finfo(float).tiny)) ** 2, axis=0)
+    guess = np.mean((aims / np.maximum(alone, np.finfo(float).tiny)) ** 2, axis=0)
+    variance = np.where(active, guess, 0.0)
     for _ in range(STEPS):
-        mean, spread = _expected(inner, aim, some)
-        some = np.mean(mean**2 + spread, axis=0)
-    root = np.sqrt(some)
-    grown = np.eye(len(own)) + inner * np.outer(root, root)
-    mean, _ = _expected(inner, aim, some)
-    likelihood = 0.5 * float(np.sum(mean * aim)) - 0.5 * float(np.sum(np.linalg.slogdet(grown)[1]))
-    variance[own] = some
+        mean, spread = _expected(products, aims, variance)
+        variance = np.mean(mean**2 + spread, axis=-2)
+    root = np.sqrt(variance)[:, None, :]
+    grown = np.eye(len(guess)) + products * (root[..., :, None] * root[..., None, :])
+    mean, _ = _expected(products, aims, variance)
+    likelihood = 0.5 * np.sum(mean * aims, axis=(-2, -1)) - 0.5 * np.sum(np.linalg.slogdet(grown)[1], axis=-1)
     return variance, likelihood

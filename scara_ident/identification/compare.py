@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import UsageError
+from scara_ident.errors import RecordingError, UsageError
 from scara_ident.estimation import Estimate
-from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.estimate import paper_criteria
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.identification.identify import data_notes, estimate_by
+from scara_ident.identification.identify import check_bands, estimate_by
+from scara_ident.identification.usable import check_rows, usable_in_bands
 from scara_ident.model.model import TorqueModel, build_model
-from scara_ident.motion.prepared import prepare
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.progress import Tell, silent
 from scara_ident.recording.recording import Recording
@@ -106,29 +105,35 @@ def compare(
     Raises
     ------
     UsageError
-        If there are fewer than two trajectories.
+        If there are fewer than two trajectories, or a band is no frequency that the slowest recording carries.
+    RecordingError
+        If none of the recordings can be used; one of several that cannot, or a trajectory with fewer rows than the model has
+        parameters, is left out with a note.
     """
-    data = prepare(recordings)
-    names = data.trajectories
-    if len(names) < 2:
-        raise UsageError(
-            f"compare needs recordings of at least two trajectories, found {len(names)}; "
-            "recordings of the same motion are repetitions of one trajectory, whatever they are named"
-        )
     equation = build_model(robot, model) if isinstance(model, str) else model
-    notes = data_notes(data)
-    if bands is None:
+    if bands is not None:
+        check_bands(robot, bands, recordings)
+    else:
         progress("choosing the bands", 0.0)
-        choice = choose_bands(equation, data)
-        bands, notes = choice.bands, [*notes, *choice.notes]
+    data, _, notes = usable_in_bands(equation, recordings, bands=bands)
     progress("absorbing the recordings", 0.4)
-    observations = observe(equation, data.at(bands))
+    observations = observe(equation, data)
     noise = repeatability(data)
-    summaries, rows = [], []
-    for k, name in enumerate(names):
+    each, useless = _with_enough(observations)
+    if len(each) < 2:
+        raise UsageError(
+            "; ".join(
+                [
+                    f"compare needs recordings of at least two trajectories, found {len(each)}; "
+                    "recordings of the same motion are repetitions of one trajectory, whatever they are named",
+                    *(note for note in (*notes, *useless) if note.endswith("left out")),
+                ]
+            )
+        )
+    names, rows = list(each), [own.by_joint for own in each.values()]
+    summaries = []
+    for k, (name, own) in enumerate(each.items()):
         progress(f"estimating from {name}", 0.5 + 0.4 * k / len(names))
-        own = observations.of([place for place, label in enumerate(data.labels) if label == name])
-        rows.append(own.by_joint)
         summaries.append(_summary(name, own, method, noise.get(name)))
     errors = np.zeros((len(names), len(names), robot.n))
     expected = np.zeros_like(errors)
@@ -145,7 +150,22 @@ def compare(
                 expected[i, k, j] = np.sqrt(
                     information.rms(summaries[i].estimate.value) ** 2 + max(spread, 0.0) / information.rows
                 )
-    return Comparison(equation, method, tuple(bands), tuple(summaries), errors, expected, tuple(notes))
+    return Comparison(equation, method, data.bands, tuple(summaries), errors, expected, (*notes, *useless))
+
+
+def _with_enough(observations: Observations) -> tuple[dict[str, Observations], list[str]]:
+    """Return the observations of each trajectory, without those that cannot be estimated from alone, and say which."""
+    found, notes = {}, []
+    labels = observations.data.labels
+    for name in observations.data.trajectories:
+        own = observations.of([place for place, label in enumerate(labels) if label == name])
+        try:
+            check_rows(own)
+        except RecordingError as error:
+            notes.append(f"{error}; left out")
+        else:
+            found[name] = own
+    return found, notes
 
 
 def _summary(name: str, observations: Observations, method: str, sigma: Array | None) -> TrajectorySummary:

@@ -12,7 +12,6 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.estimation import Estimate, History, JointError
-from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, physical_consistency, possible_arm
 from scara_ident.estimation.consistent.feasibility import PhysicalConsistency
 from scara_ident.estimation.consistent.options import ConsistentOptions
@@ -21,11 +20,9 @@ from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.channel_check import channel_faults
-from scara_ident.identification.usable import check_rows, usable_data, with_rows
+from scara_ident.identification.usable import check_rows, usable_in_bands
 from scara_ident.model.model import TorqueModel, build_model
-from scara_ident.motion.prepared import PreparedData, prepare
 from scara_ident.motion.repeatability import repeatability
-from scara_ident.motion.velocity_audit import audit_velocity
 from scara_ident.progress import Tell, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
@@ -133,20 +130,12 @@ def identify(
     equation = build_model(robot, model) if isinstance(model, str) else model
     if bands is not None:
         check_bands(robot, bands, (*recordings, *validation))
-    data, useless = usable_data(recordings, needed=True)
-    held_out, more = usable_data(validation, needed=False)
-    notes = [*useless, *more, *data_notes(data, held_out)]
     if bands is None:
         progress("choosing the bands", 0.0)
-        choice = choose_bands(equation, data)
-        bands = choice.bands
-        notes += choice.notes
+    data, held_out, notes = usable_in_bands(equation, recordings, validation, bands)
     progress("absorbing the recordings", 0.5)
-    data, useless = with_rows(data.at(bands), needed=True)
-    held_out, more = with_rows(held_out.at(bands), needed=False)
     training, validated = observe(equation, data), observe(equation, held_out)
     check_rows(training)
-    notes += [*useless, *more]
     notes += [str(fault) for fault in channel_faults(training)]
     progress("estimating", 0.7)
     noise = repeatability(data)
@@ -154,7 +143,7 @@ def identify(
     if isinstance(estimate, ConsistentEstimate):
         notes += estimate.notes
     log_det, condition = paper_criteria(training)
-    return Identification(estimate, history, tuple(bands), training, validated, noise, log_det, condition, tuple(notes))
+    return Identification(estimate, history, data.bands, training, validated, noise, log_det, condition, tuple(notes))
 
 
 def identified_arm(identification: Identification) -> ConsistentEstimate | None:
@@ -180,11 +169,10 @@ def known_information(model: TorqueModel, recordings: Sequence[Recording], rate:
     rate : float
         Samples per second that the design they are to be joined with counts.
     """
-    data = prepare(recordings)
-    observations = observe(model, data.at(choose_bands(model, data).bands))
+    data, _, _ = usable_in_bands(model, recordings)
     return merge(
-        information.scaled(float(np.sqrt(rate / recording.rate)))
-        for item, recording in zip(observations.each, recordings, strict=True)
+        information.scaled(float(np.sqrt(rate / item.data.sources[0].rate)))
+        for item in observe(model, data).each
         for information in item.by_joint
     )
 
@@ -233,30 +221,6 @@ def check_held_out(recordings: Sequence[Recording], validation: Sequence[Recordi
             raise UsageError(
                 f"{recording.path or recording.name}: given to fit and to validate; a validation recording must be held out"
             )
-
-
-def data_notes(*data: PreparedData) -> list[str]:
-    """Return what the audits found, the same remark on many recordings in one line, and where names contradict motions."""
-    found: dict[str, list[str]] = {}
-    for item in (item for part in data for item in part.recordings):
-        remarks = [finding.message for finding in item.recording.findings]
-        longest = item.longest.stretch
-        verdicts: dict[str, list[str]] = {}
-        for audit in audit_velocity(item.recording, longest):
-            verdict = audit.verdict(longest.rate)
-            if verdict is not None:
-                verdicts.setdefault(verdict, []).append(audit.joint)
-        remarks += [
-            f"recorded velocity of {', '.join(joints)} is not used: {verdict}" for verdict, joints in verdicts.items()
-        ]
-        for remark in remarks:
-            found.setdefault(remark, []).append(item.name)
-    notes = [f"{_listed(names)}: {remark}" for remark, names in found.items()]
-    return [*notes, *(note for part in data for note in part.motions.notes)]
-
-
-def _listed(names: Sequence[str], most: int = 3) -> str:
-    return ", ".join(names) if len(names) <= most else f"{names[0]} and {len(names) - 1} more recordings"
 
 
 def undetermined(identification: Identification) -> list[str]:

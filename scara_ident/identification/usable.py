@@ -3,17 +3,85 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from scara_ident.errors import RecordingError
+from scara_ident.errors import RecordingError, UsageError
+from scara_ident.estimation.bands import BandChoice, choose_bands
 from scara_ident.estimation.observations import Observations, kept_rows
+from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import torque_of
 from scara_ident.motion.prepared import PreparedData, prepare
+from scara_ident.motion.velocity_audit import audit_velocity
 from scara_ident.recording.recording import Recording
+from scara_ident.threads import side_by_side
 
 # An rms of so many independent values is known to 1 / sqrt(2 N), here 22 % (the standard error of a standard deviation).
 LEAST_ROWS = 10
+
+
+def usable_in_bands(
+    model: TorqueModel,
+    recordings: Sequence[Recording],
+    validation: Sequence[Recording] = (),
+    bands: Sequence[float | None] | None = None,
+    *,
+    alike: bool = False,
+) -> tuple[PreparedData, PreparedData, list[str]]:
+    """Make recordings ready in their bands, without those that say nothing.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    recordings : sequence of Recording
+        At least one of them is left.
+    validation : sequence of Recording, optional
+        Take no part in the choice of bands; all of them may go.
+    bands : sequence of float or None, one per joint, optional
+        Hz; chosen from the recordings by default.
+    alike : bool, optional
+        Whether a choice gives all joints the widest of their bands.
+
+    Returns
+    -------
+    data, held_out : PreparedData
+    notes : list of str
+        What was found in the data, and what was left out and why.
+
+    Raises
+    ------
+    UsageError
+        If there are no recordings.
+    RecordingError
+        If none of the recordings has effort and four samples in a row.
+    """
+    if not recordings:
+        raise UsageError("no recordings to identify from")
+    data, useless = usable_data(recordings, needed=True)
+    held_out, more = usable_data(validation, needed=False)
+    notes = [*useless, *more, *data_notes(data, held_out)]
+    useless = []
+    if bands is None:
+        chosen, data, useless = _bands_of(model, data, alike=alike)
+        bands, notes = chosen.bands, [*notes, *chosen.notes]
+    data, short = with_rows(data.at(bands), needed=True)
+    held_out, more = with_rows(held_out.at(bands), needed=False)
+    return data, held_out, [*notes, *useless, *short, *more]
+
+
+def _bands_of(model: TorqueModel, data: PreparedData, *, alike: bool) -> tuple[BandChoice, PreparedData, list[str]]:
+    """Choose bands from the recordings that have rows in them, and return these, and which have none."""
+    useless: list[str] = []
+    while True:
+        choice = choose_bands(model, data)
+        if alike:
+            # A joint whose model lacks something seems to have less band than it has.
+            choice = replace(choice, bands=(max(choice.bands),) * len(choice.bands))
+        left, short = with_rows(data.at(choice.bands), needed=True)
+        if not short:
+            return choice, left, useless
+        data, useless = left, [*useless, *short]
 
 
 def usable_data(recordings: Sequence[Recording], *, needed: bool) -> tuple[PreparedData, list[str]]:
@@ -54,7 +122,7 @@ def with_rows(data: PreparedData, *, needed: bool) -> tuple[PreparedData, list[s
     needed : bool
         Whether at least one has to be left; if all have too few, all are.
     """
-    rows = [kept_rows(item) for item in data.recordings]
+    rows = side_by_side(kept_rows, data.recordings)
     kept = [k for k, count in enumerate(rows) if count >= LEAST_ROWS]
     if len(kept) == len(rows) or (needed and not kept):
         return data, []
@@ -84,3 +152,27 @@ def check_rows(observations: Observations) -> None:
             f"{first.path or first.name}: {rows} independent rows within the bands for {np.count_nonzero(told)} parameters; "
             "record longer, or give a wider band"
         )
+
+
+def data_notes(*data: PreparedData) -> list[str]:
+    """Return what the audits found, the same remark on many recordings in one line, and where names contradict motions."""
+    found: dict[str, list[str]] = {}
+    for item in (item for part in data for item in part.recordings):
+        remarks = [finding.message for finding in item.recording.findings]
+        longest = item.longest.stretch
+        verdicts: dict[str, list[str]] = {}
+        for audit in audit_velocity(item.recording, longest):
+            verdict = audit.verdict(longest.rate)
+            if verdict is not None:
+                verdicts.setdefault(verdict, []).append(audit.joint)
+        remarks += [
+            f"recorded velocity of {', '.join(joints)} is not used: {verdict}" for verdict, joints in verdicts.items()
+        ]
+        for remark in remarks:
+            found.setdefault(remark, []).append(item.name)
+    notes = [f"{_listed(names)}: {remark}" for remark, names in found.items()]
+    return [*notes, *(note for part in data for note in part.motions.notes)]
+
+
+def _listed(names: Sequence[str], most: int = 3) -> str:
+    return ", ".join(names) if len(names) <= most else f"{names[0]} and {len(names) - 1} more recordings"

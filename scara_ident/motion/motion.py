@@ -253,13 +253,15 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int) -> 
     lead = -(-reach // step) * step
     closed = _closed_length(count, reach, step)
     low = closed // step
+    half = low // 2 + 1
     frequency = np.arange(min(closed // 2, int(HIGHEST * cut * closed / rate)) + 1) * (rate / closed)
     gain = 1.0 / (1.0 + (frequency / cut) ** 8)
     # Half the rate is its own mirror image.
     gain[2 * np.arange(len(frequency)) == closed] *= 0.5
     result = np.empty((signal.shape[0], kept))
-    whole = np.arange(count + 2 * reach, dtype=float)
+    line = np.arange(count + 2 * reach, dtype=float)
     buffer = np.zeros((min(ROWS_AT_ONCE, len(signal)), closed))
+    whole = np.empty((len(buffer), closed // 2 + 1), dtype=complex)
     for begin in range(0, signal.shape[0], ROWS_AT_ONCE):
         rows = signal[begin : begin + ROWS_AT_ONCE]
         start, stop = 2.0 * rows[:, :1] - rows[:, reach : reach + 1], 2.0 * rows[:, -1:] - rows[:, -1 - reach, None]
@@ -267,25 +269,24 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int) -> 
         flat = buffer[: len(rows)]
         # The chord of the continued signal, which then closes on itself.
         chord = flat[:, lead - reach : lead + count + reach]
-        np.multiply(slope, whole, out=chord)
-        chord += start
-        np.subtract(rows, chord[:, reach : reach + count], out=chord[:, reach : reach + count])
-        np.subtract(2.0 * rows[:, :1] - rows[:, reach:0:-1], chord[:, :reach], out=chord[:, :reach])
-        tail = chord[:, reach + count :]
-        np.subtract(2.0 * rows[:, -1:] - rows[:, -2 : -reach - 2 : -1], tail, out=tail)
-        spectrum = np.fft.rfft(flat, axis=1)[:, : len(frequency)] * gain
-        folded = np.zeros((len(rows), low), dtype=complex)
+        np.multiply(slope, line, out=chord)
+        middle = chord[:, reach : reach + count]
+        np.subtract(rows, middle, out=middle)
+        middle -= start
+        head, tail = chord[:, :reach], chord[:, reach + count :]
+        np.subtract(2.0 * rows[:, :1] - start - rows[:, reach:0:-1], head, out=head)
+        np.subtract(2.0 * rows[:, -1:] - start - rows[:, -2 : -reach - 2 : -1], tail, out=tail)
+        np.fft.rfft(flat, axis=1, out=whole[: len(rows)])
+        spectrum = whole[: len(rows), : len(frequency)]
+        spectrum *= gain
+        folded = np.zeros((len(rows), half), dtype=complex)
         for first in range(0, len(frequency), low):
-            part = spectrum[:, first : first + low]
-            size = part.shape[1]
-            folded[:, :size] += part
-            # The negative frequencies mirror the positive ones; zero has no mirror image.
-            mirrored = np.conj(part)
-            if first == 0:
-                mirrored[:, 0] = 0.0
-            folded[:, 0] += mirrored[:, 0]
-            folded[:, low - size + 1 :] += mirrored[:, :0:-1]
-        smooth = np.fft.ifft(folded, axis=1).real / step
+            part = spectrum[:, first : first + half]
+            folded[:, : part.shape[1]] += part
+            # Frequencies just below a multiple of the lower rate mirror those just below zero.
+            mirrored = spectrum[:, first + low - half + 1 : first + low + 1][:, ::-1]
+            folded[:, half - mirrored.shape[1] :] += np.conj(mirrored)
+        smooth = np.fft.irfft(folded, low, axis=1) / step
         ramp = start + slope * (reach + step * np.arange(kept))
         result[begin : begin + len(rows)] = smooth[:, lead // step : lead // step + kept] + ramp
     return result

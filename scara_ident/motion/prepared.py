@@ -330,10 +330,10 @@ def row_step(rate: float, band: float | None) -> int:
 def standstill(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) -> NDArray[np.bool_]:
     """Return where each joint stands still, shape (n, N), widened by the memory of the position's filter."""
     result = np.zeros(motion.q.shape, dtype=bool)
-    for j, band in enumerate(bands):
-        v = motion.v[j]
-        threshold = max(REST_SHARE * float(np.max(np.abs(v))), REST_NOISE * _velocity_noise(stretch, motion, j, band))
-        result[j] = _runs_longer_than(np.abs(v) <= threshold, 1, widen=_widening(REST_WIDEN, stretch.rate, band))
+    for j, (band, speed) in enumerate(zip(bands, np.abs(motion.v), strict=True)):
+        least = REST_SHARE / REST_NOISE * float(np.max(speed))
+        threshold = REST_NOISE * _velocity_noise(stretch, motion, j, band, least)
+        result[j] = _runs_longer_than(speed <= threshold, 1, widen=_widening(REST_WIDEN, stretch.rate, band))
     return result
 
 
@@ -369,8 +369,8 @@ def _widening(periods: float, rate: float, band: float | None) -> int:
     return max(1, int(rate * min(periods / (POSITION_BAND * band), LONGEST_WIDENING)))
 
 
-def _velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | None) -> float:
-    """Return the standard deviation of the filtered velocity's noise, from what the filter took out of the position.
+def _velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | None, least: float) -> float:
+    """Return the standard deviation of the filtered velocity's noise, from what the filter took out, or the least given.
 
     White position noise of density s/rate integrates to ``s (2 pi)^2 f^3 / 3`` in velocity up to f.
     """
@@ -382,12 +382,12 @@ def _velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | 
         smooth = stretch.filtered(joint, cut)[0]
     else:
         smooth = motion.q[joint]
-    rest = stretch.position[joint] - smooth
+    rest = np.abs(stretch.position[joint] - smooth)
+    removed = max(0.5 * stretch.rate - cut, 0.05 * stretch.rate)
     # The median ignores the moments at which real motion is faster than the filter.
-    scatter = float(np.median(np.abs(rest))) / 0.6745
-    nyquist = 0.5 * stretch.rate
-    removed = max(nyquist - cut, 0.1 * nyquist)
-    return float(scatter / np.sqrt(removed) * 2.0 * np.pi * np.sqrt(reach**3 / 3.0))
+    gain = 2.0 * np.pi * float(np.sqrt(reach**3 / (3.0 * removed))) / 0.6745
+    small = 2 * np.count_nonzero(gain * rest <= least) > len(rest)
+    return least if small else max(least, gain * float(np.median(rest)))
 
 
 def _runs_longer_than(mask: NDArray[np.bool_], length: int, widen: int) -> NDArray[np.bool_]:

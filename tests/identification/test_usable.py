@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.errors import RecordingError
+from scara_ident.diagnosis.diagnose import diagnose
+from scara_ident.errors import RecordingError, UsageError
 from scara_ident.estimation.observations import kept_rows, observe
-from scara_ident.identification.identify import identify
+from scara_ident.identification.compare import compare
+from scara_ident.identification.identify import identify, known_information
 from scara_ident.identification.usable import check_rows, usable_data, with_rows
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
@@ -102,6 +104,49 @@ def test_fewer_rows_than_parameters_are_refused(robot: Robot):
     """A band of 0.3 Hz over 12 s: they would be met exactly."""
     with pytest.raises(RecordingError, match="independent rows within the bands for 11 parameters; record longer"):
         identify(robot, [moving(robot, "a_1", 1)], model="basic", bands=(0.3, 0.3))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_command_leaves_it_out(robot: Robot, kind: str):
+    good, bad = [moving(robot, "a_1", 1), moving(robot, "b_1", 2)], useless(robot)[kind]
+    one, bands = (moving(robot, "c_1", 3),), (4.0, 4.0)
+
+    expected = compare(robot, good, model="basic", bands=bands)
+    found = compare(robot, [bad, *good], model="basic", bands=bands)
+    assert [item.name for item in found.trajectories] == ["a", "b"]
+    np.testing.assert_allclose(found.errors, expected.errors, rtol=1e-9)
+    assert [note.endswith("left out") for note in found.notes if kind in note] == [True]
+
+    settled = diagnose(robot, good, model="basic", bands=bands, validation=one, catalogue=())
+    again = diagnose(robot, [bad, *good], model="basic", bands=bands, validation=[replace(bad), *one], catalogue=())
+    np.testing.assert_allclose(again.after.value, settled.after.value, rtol=1e-9)
+    assert [item.name for item in again.validation_after.each] == ["c_1"]
+    assert all(note.endswith("left out") for note in again.notes if kind in note)
+    assert any(kind in note for note in again.notes)
+
+    information = known_information(build_model(robot, "basic"), [bad, *good], RATE)
+    if kind != KINDS[3]:  # in the bands that are chosen, that one has rows
+        assert information.rows == known_information(build_model(robot, "basic"), good, RATE).rows
+
+
+def test_a_short_run_among_good_ones_is_left_out(robot: Robot):
+    """In the bands that the good ones ask for, nothing of it is left between its ends."""
+    good = [moving(robot, "a_1", 1), moving(robot, "b_1", 2)]
+    short = cut(moving(robot, "s_1", 3), slice(0, 150))
+    for bands in ((2.0, 2.0), (None, 2.0), None):
+        found = identify(robot, [short, *good], model="basic", bands=bands)
+        names = [item.name for item in found.training.each]
+        assert names == (["s_1", "a_1", "b_1"] if bands is None else ["a_1", "b_1"])
+
+
+def test_a_trajectory_that_is_too_short_alone_is_not_compared(robot: Robot):
+    good = [moving(robot, "a_1", 1), moving(robot, "b_1", 2)]
+    short = cut(moving(robot, "s_1", 3), slice(0, 200))
+    found = compare(robot, [*good, short], model="basic", bands=(3.0, 3.0))
+    assert [item.name for item in found.trajectories] == ["a", "b"]
+    assert found.notes[-1].startswith("s_1: ")
+    with pytest.raises(UsageError, match=r"at least two trajectories, found 1.*s_1: .* left out"):
+        compare(robot, [good[0], short], model="basic", bands=(3.0, 3.0))
 
 
 def test_the_parts(robot: Robot):

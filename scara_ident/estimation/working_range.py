@@ -1,0 +1,142 @@
+"""What data leave open of the torque that an arm can need, and what the description says of it instead.
+
+No joint needs more torque than its drive gives, wherever and however fast the arm moves within its limits. That is known
+before any data, and data say something of a direction of parameters only where they say more. Where a joint hardly
+moves, or moves so slowly that the cube of its speed is noise, they do not: least squares then finds some value, the
+torque of which grows beyond all bounds in any other motion. Such directions are left at zero, what is known of them
+without data. Directions are those of the generalised singular value decomposition of the rows and of the arm's torque
+over its range (Hansen, Rank-Deficient and Discrete Ill-Posed Problems, 1998, section 2.1.2), so that neither the
+choice of base parameters nor their units matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.estimation.information import LEAST_NOISE, UNDETERMINED, Information, triangular, weighted
+from scara_ident.estimation.observations import Observations
+from scara_ident.model.terms.friction import Friction, Offset
+from scara_ident.model.terms.rigid_body import RigidBody
+from scara_ident.motion.motion import Motion
+
+# The drive's torque is so many standard deviations of what is known without data.
+SURE = 3.0
+# Random states per parameter that stand for the range.
+STATES_PER_PARAMETER = 8
+# An open share of a parameter's variance, as it is known without data, above which the parameter is called undetermined.
+OPEN_SHARE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """Directions of parameters, scaled so that their torque over the arm's range is the drives' (rms over states).
+
+    Attributes
+    ----------
+    kept : ndarray, shape (p, k)
+        Those that data tell.
+    left_open : ndarray, shape (p, m)
+        Those that are left at zero.
+    """
+
+    kept: Array
+    left_open: Array
+
+    @property
+    def undetermined(self) -> NDArray[np.bool_]:
+        """Parameters that are mostly left open, shape (p,)."""
+        open_, told = np.sum(self.left_open**2, axis=1), np.sum(self.kept**2, axis=1)
+        return np.asarray(open_ > OPEN_SHARE * (open_ + told))
+
+    @property
+    def prior(self) -> Array:
+        """Covariance of what is left open, shape (p, p)."""
+        return np.asarray(self.left_open @ self.left_open.T) / SURE**2
+
+    def within(self, information: Information) -> Information:
+        """Return information of the coordinates along the directions kept."""
+        rows = np.column_stack([information.factor[:, :-1] @ self.kept, information.factor[:, -1]])
+        return Information(triangular(rows), information.rows)
+
+
+def told_directions(observations: Observations, value: Array) -> Told | None:
+    """Tell directions that data determine from those that they leave open.
+
+    Parameters
+    ----------
+    observations : Observations
+    value : ndarray, shape (p,)
+        Least squares, whose residuals say how large the noise is.
+
+    Returns
+    -------
+    Told or None
+        None where all is told that can be, or for a model with terms that are no function of the state.
+    """
+    range_ = _range_factor(observations)
+    if range_ is None:
+        return None
+    joints = observations.by_joint
+    rows = np.array([joint.table.shape[1] for joint in observations.joints])
+    noise = np.array([max(part.rms(value), LEAST_NOISE * part.torque_rms) or 1.0 for part in joints])
+    # A row stands for several samples, and has their noise.
+    step = np.array([part.rows for part in joints]) / np.maximum(rows, 1)
+    whole = weighted(joints, 1.0 / (noise * np.sqrt(np.maximum(step, 1.0))))
+    _, singular, right = np.linalg.svd(whole.regressor_factor @ range_)
+    some = int(np.count_nonzero(singular > UNDETERMINED * singular[0]))
+    std = np.sqrt(rows.sum() / max(int(rows.sum()) - len(value), 1)) / singular[:some]
+    known = SURE * std <= 1.0
+    # What no row shows at all is open anyway, see `Information.solve`.
+    if np.all(known):
+        return None
+    unknown = np.append(~known, np.ones(len(value) - some, dtype=bool))
+    directions = range_ @ right.T
+    return Told(directions[:, ~unknown], directions[:, unknown])
+
+
+def _range_factor(observations: Observations) -> Array | None:
+    """Return sums of columns, shape (p, p), whose torques over the arm's range are orthonormal, in drives' torques."""
+    model, robot = observations.model, observations.model.robot
+    if not all(isinstance(term, RigidBody | Friction | Offset) for term in model.terms):
+        return None
+    stretches = [part for part in observations.data.stretches if part.usable]
+    if not stretches:
+        return None
+    peak = np.max([np.max(np.abs(part.motion.v), axis=1) for part in stretches], axis=0)
+    torque = np.max([np.max(np.abs(part.torque), axis=1) for part in stretches], axis=0)
+    lowest = np.min([np.min(part.stretch.position, axis=1) for part in stretches], axis=0)
+    highest = np.max([np.max(part.stretch.position, axis=1) for part in stretches], axis=0)
+    # What a description does not state, or states too small, the recordings show.
+    speed = np.where(np.isfinite(robot.velocity_limit), np.maximum(robot.velocity_limit, peak), np.max(peak))
+    drive = np.where(np.isfinite(robot.torque_limit), np.maximum(robot.torque_limit, torque), torque)
+    lower = np.where(np.isfinite(robot.lower), np.minimum(robot.lower, lowest), lowest)
+    upper = np.where(np.isfinite(robot.upper), np.maximum(robot.upper, highest), highest)
+    half = np.where(robot.prismatic, 0.5 * (upper - lower), np.pi)
+    # No joint is faster than its drive makes it within its range, whatever is stated.
+    inertia = np.diag(pin.crba(robot.model, robot.model.createData(), pin.neutral(robot.model)))[robot.order]
+    inertia = inertia + robot.reduction**2 * robot.rotor_inertia
+    moved = inertia > 0.0
+    fastest = np.sqrt(
+        np.divide(half * drive / np.abs(robot.row_scale), inertia, out=np.full(robot.n, np.inf), where=moved)
+    )
+    speed = np.minimum(speed, np.maximum(fastest, peak))
+    if not (np.all(speed > 0.0) and np.all(drive > 0.0) and np.all(half > 0.0)):
+        return None
+    random = np.random.default_rng(0)
+    count = STATES_PER_PARAMETER * observations.parameters
+    q, v, a = random.uniform(-1.0, 1.0, (3, robot.n, count))
+    # A joint that swings through its range at its highest speed reaches this acceleration.
+    q, v, a = 0.5 * (lower + upper)[:, None] + half[:, None] * q, speed[:, None] * v, (speed**2 / half)[:, None] * a
+    motion = Motion("range", "range", np.arange(count, dtype=float), q, v, a, None, 1.0)
+    table = model.regressor(motion) / drive[:, None, None]
+    rows = table.transpose(0, 2, 1).reshape(-1, observations.parameters) / np.sqrt(robot.n * count)
+    factor = triangular(rows)
+    size = np.linalg.norm(factor, axis=0)
+    if np.any(size == 0.0) or np.linalg.cond(factor / size) > 1.0 / UNDETERMINED:
+        return None
+    return np.asarray(np.linalg.inv(factor))

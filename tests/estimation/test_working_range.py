@@ -1,0 +1,87 @@
+"""What data do not tell within the drives' torque is left open, and what they tell is not touched."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.arrays import Array
+from scara_ident.estimation.information import weighted
+from scara_ident.estimation.least_squares import ols, wls
+from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.working_range import told_directions
+from scara_ident.model.model import build_model
+from scara_ident.motion.prepared import prepare
+from scara_ident.robot.robot import Robot, load_robot
+from tests.arms import recorded_torque, recording, sines
+
+FRICTION = ((2.0, 1.0, 0.0, 0.0, 0.1), (1.0, 0.5, 0.0, 0.0, -0.1))
+BANDS = (6.0, 6.0)
+RATE = 200.0
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot()
+
+
+def observations(robot: Robot, seed: int, size: tuple[float, float], noise: float = 0.02, model: str = "complete"):
+    """Make a run whose joints move by so large a share of the whole motion; position noise as of an encoder."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(20.0 * RATE)) / RATE
+    q, v, a = (np.array(size)[:, None] * signal for signal in sines(rng, time, robot.n))
+    torque = recorded_torque(robot, q, v, a, FRICTION)
+    q = q + 2e-5 * rng.standard_normal(q.shape)
+    made = recording(robot, f"run_{seed}", time, q, torque + noise * rng.standard_normal(torque.shape))
+    return observe(build_model(robot, model), prepare([made], BANDS))
+
+
+def largest_error(value: Array, other: Observations) -> float:
+    """Worst joint's error in shares of its torque."""
+    return float(np.max(other.unfiltered_rms(value) / other.unfiltered_torque_rms))
+
+
+def test_an_arm_that_moves_leaves_nothing_open(robot: Robot):
+    found = observations(robot, 1, (1.0, 1.0))
+    plain = weighted(found.by_joint, np.ones(robot.n)).solve()
+    assert told_directions(found, plain.value) is None
+    np.testing.assert_array_equal(ols(found).value, plain.value)
+    assert not np.any(ols(found).undetermined)
+
+
+def test_a_joint_that_hardly_moves_does_not_make_absurd_predictions(robot: Robot):
+    """Least squares alone is off by many times the torque; what is left open is named."""
+    still, whole = observations(robot, 2, (0.2, 2e-4)), observations(robot, 3, (1.0, 1.0))
+    plain = weighted(still.by_joint, np.ones(robot.n)).solve()
+    assert largest_error(plain.value, whole) > 10.0
+    for estimate in (ols(still), wls(still)):
+        assert largest_error(estimate.value, whole) < 2.0
+        assert np.any(estimate.undetermined)
+        assert np.all(np.isinf(estimate.std[estimate.undetermined]))
+        assert np.all(np.isfinite(estimate.std[~estimate.undetermined]))
+
+
+def test_directions_left_open_are_at_zero(robot: Robot):
+    still = observations(robot, 2, (0.2, 2e-4))
+    estimate = wls(still)
+    told = told_directions(still, weighted(still.by_joint, estimate.weights).solve().value)
+    assert told is not None
+    both = np.column_stack([told.kept, told.left_open])
+    coordinates = np.linalg.solve(both, estimate.value)
+    np.testing.assert_allclose(coordinates[told.kept.shape[1] :], 0.0, atol=1e-9 * np.max(np.abs(coordinates)))
+    # Kept and open directions are orthogonal on the weighted rows, so that the fit along one does not move the other.
+    rows = weighted(still.by_joint, estimate.weights).regressor_factor
+    cross = (rows @ told.kept).T @ (rows @ told.left_open)
+    size = np.linalg.norm(rows @ told.kept, axis=0)[:, None] * np.linalg.norm(rows, 2) * np.linalg.norm(told.left_open)
+    assert np.max(np.abs(cross) / size) < 1e-6
+
+
+def test_a_drive_that_is_stated_far_too_weak_is_as_strong_as_it_was_seen(robot: Robot):
+    weak = replace(robot, effort_limit=np.full(robot.n, 1e-6), velocity_limit=np.full(robot.n, 1e4))
+    found = observations(weak, 1, (1.0, 1.0), model="basic")
+    assert told_directions(found, wls(found).value) is None
+    unstated = replace(robot, effort_limit=np.full(robot.n, np.inf), velocity_limit=np.full(robot.n, np.inf))
+    found = observations(unstated, 1, (1.0, 1.0))
+    assert told_directions(found, wls(found).value) is None
