@@ -20,6 +20,9 @@ WARM_UP_SHARES = (0.06, 0.16, 0.4, 1.0)
 LONGEST_WARM_UP = 4.0
 # Friction of a cold gear is not more than this many times that of a warm one, less one.
 LARGEST_WARM_UP_SHARE = 3.0
+# Friction of a warming gear loses no more than this share of itself in a second. A lubricant loses some 3.5 % of its
+# viscosity by kelvin, so that a quarter takes 7 K/s: 3 kW of friction for each kilogram of steel.
+FASTEST_WARM_UP = 0.25
 # A drift within this many standard deviations of none is an offset.
 DRIFT_STDS = 3.0
 
@@ -59,10 +62,15 @@ class WarmUp(Effect):
         return [friction_torque(signals, member.place) * np.exp(-signals.time / member.nonlinear[0])]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Say so where friction rises, or falls by too much or too late."""
-        late = member.nonlinear[0] > LONGEST_WARM_UP * scene.duration
+        """Say so where friction rises, or falls by too much, too fast or too late."""
         wrong = super().inadmissible(scene, member, value, std)
-        return wrong or ("the recordings are too short to see it end" if late else None)
+        if wrong is not None:
+            return wrong
+        least = max(float(value[0]) - DOUBT_STDS * float(std[0]), 0.0)
+        if least / (1.0 + least) > FASTEST_WARM_UP * member.nonlinear[0]:
+            return f"friction would fall faster than by {FASTEST_WARM_UP:.0%} a second, which no gear warms up by"
+        late = member.nonlinear[0] > LONGEST_WARM_UP * scene.duration
+        return "the recordings are too short to see it end" if late else None
 
 
 class OffsetDrift(Effect):

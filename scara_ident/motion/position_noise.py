@@ -58,16 +58,21 @@ def noise_level(part: PreparedStretch, joint: int) -> float:
     joint : int
     """
     stretch = part.stretch
-    cut = position_cuts(stretch.rate, part.bands)[joint]
-    if cut is None:
-        cut = WIDE * stretch.rate
-        smooth = stretch.filtered(joint, cut)[0]
-    else:
-        smooth = part.motion.q[joint]
+    smooth, cut = _smooth(part, joint)
     # The median ignores the moments at which real motion is faster than the filter.
     scatter = float(np.median(np.abs(stretch.position[joint] - smooth))) / NORMAL_MEDIAN
     nyquist = 0.5 * stretch.rate
     return float(scatter / np.sqrt(max(nyquist - cut, 0.1 * nyquist) / nyquist))
+
+
+def _smooth(part: PreparedStretch, joint: int) -> tuple[Array, float]:
+    """Return a filtered position, shape (N,), and the filter's frequency; filtered too where the bands ask for none."""
+    cut = position_cuts(part.stretch.rate, part.bands)[joint]
+    if cut is not None:
+        return part.motion.q[joint], cut
+    # An unfiltered position has the very steps that are looked for.
+    cut = WIDE * part.stretch.rate
+    return part.stretch.filtered(joint, cut)[0], cut
 
 
 def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
@@ -98,6 +103,6 @@ def _noisier(part: PreparedStretch, steps: list[float | None], rng: np.random.Ge
         if step is None:
             position[joint] += noise_level(part, joint) * rng.standard_normal(position.shape[1])
         else:
-            smooth = part.motion.q[joint] + step * rng.choice((UNLIKE, 1.0 - UNLIKE))
+            smooth = _smooth(part, joint)[0] + step * rng.choice((UNLIKE, 1.0 - UNLIKE))
             position[joint] += step * np.round(smooth / step) - smooth
     return replace(stretch, position=position, _filtered={}, _thinned={})

@@ -36,6 +36,14 @@ def test_it_writes_what_the_contract_says(command, tmp_path: Path):
     assert (out / "diagnosis.md").read_text().startswith("# Diagnosis of scara03")
 
 
+def test_a_band_can_be_asked_for(command, folder: Path, tmp_path: Path):
+    run = folder / "OJD_1.parquet"
+    assert command("diagnose", run, "--band", "6", "--output", tmp_path / "out").status == 0
+    content = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert content["band_hz"] == {"joint1": 6.0, "joint2": 6.0}
+    assert command("diagnose", run, "--band", "0").status == 2
+
+
 def test_what_cannot_be_read_or_used_is_said_in_a_line(command, folder: Path):
     run = folder / "OJD_1.parquet"
     assert command("diagnose", "nowhere.csv").status == 2

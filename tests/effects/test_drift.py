@@ -43,3 +43,14 @@ def test_warming_up_is_tried_where_there_is_friction():
     scene = scene_of(load_robot())
     bare = type(model)(model.name, model.robot, tuple(frictionless))
     assert WarmUp().members(type(scene)(bare, scene.value, 10.0, 1e3, 15.0, scene.travel, scene.speed, {})) == ()
+
+
+def test_no_gear_warms_up_in_a_second():
+    """A share of 3.3 with 0.6 s was once believed of a measured arm."""
+    scene, std = scene_of(load_robot()), np.array([0.01])
+    warm = WarmUp()
+    for share, seconds, possible in ((3.3, 0.6, False), (0.3, 0.6, False), (0.3, 8.0, True), (2.5, 8.0, True)):
+        why = warm.inadmissible(scene, Member(0, (seconds,)), np.array([share]), std)
+        assert (why is None) is possible
+    # What is within its own error of no friction at all is not too fast.
+    assert warm.inadmissible(scene, Member(0, (0.6,)), np.array([0.3]), np.array([0.2])) is None
