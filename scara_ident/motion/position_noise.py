@@ -20,6 +20,9 @@ from scara_ident.motion.prepared import PreparedData, PreparedRecording, Prepare
 WHOLE = 0.1
 # The noise of an unfiltered joint is what a filter at this share of the rate takes out.
 WIDE = 0.2
+# Where steps fall anew is that of a position that has little left of them: with much left, the same ones would come
+# again. Whether it is the motion to less than a step matters not.
+STEPLESS = 0.02
 # Steps about two zeros that lie so much of a step apart are uncorrelated: ``1 - 6 x (1 - x)`` is zero.
 UNLIKE = 0.5 - np.sqrt(1.0 / 12.0)
 # Median of a normal variable's size.
@@ -65,14 +68,12 @@ def noise_level(part: PreparedStretch, joint: int) -> float:
     return float(scatter / np.sqrt(max(nyquist - cut, 0.1 * nyquist) / nyquist))
 
 
-def _smooth(part: PreparedStretch, joint: int) -> tuple[Array, float]:
-    """Return a filtered position, shape (N,), and the filter's frequency; filtered too where the bands ask for none."""
-    cut = position_cuts(part.stretch.rate, part.bands)[joint]
-    if cut is not None:
+def _smooth(part: PreparedStretch, joint: int, widest: float = WIDE) -> tuple[Array, float]:
+    """Return a filtered position, shape (N,), and the filter's frequency, at most this share of the rate."""
+    cut, widest = position_cuts(part.stretch.rate, part.bands)[joint], widest * part.stretch.rate
+    if cut is not None and cut <= widest:
         return part.motion.q[joint], cut
-    # An unfiltered position has the very steps that are looked for.
-    cut = WIDE * part.stretch.rate
-    return part.stretch.filtered(joint, cut)[0], cut
+    return part.stretch.filtered(joint, widest)[0], widest
 
 
 def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
@@ -103,6 +104,6 @@ def _noisier(part: PreparedStretch, steps: list[float | None], rng: np.random.Ge
         if step is None:
             position[joint] += noise_level(part, joint) * rng.standard_normal(position.shape[1])
         else:
-            smooth = _smooth(part, joint)[0] + step * rng.choice((UNLIKE, 1.0 - UNLIKE))
+            smooth = _smooth(part, joint, STEPLESS)[0] + step * rng.choice((UNLIKE, 1.0 - UNLIKE))
             position[joint] += step * np.round(smooth / step) - smooth
     return replace(stretch, position=position, _filtered={}, _thinned={})

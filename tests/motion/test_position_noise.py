@@ -67,10 +67,15 @@ def test_steps_are_added_about_another_zero_and_follow_the_motion():
     assert np.array_equal(again, more.stretch.position)
 
 
-def test_steps_are_added_where_the_band_is_so_wide_that_positions_are_not_filtered():
-    """Those of the unfiltered position itself are no further noise: it was moved as a whole."""
+@pytest.mark.parametrize("band", [None, 0.13])
+def test_steps_are_added_where_the_band_is_so_wide_that_positions_keep_them(band: float | None):
+    """Those of a hardly filtered position are no further noise: it was moved as a whole."""
     step = 2.0 * np.pi / 2**12
-    data = prepared(step * np.round(SMOOTH / step)).at((None, None))
+    data = prepared(step * np.round(SMOOTH / step))
+    rate = data.stretches[0].stretch.rate
+    data = data.at((None if band is None else band * rate,) * 2)
     (part,) = data.stretches
     (more,) = noisier(data, seed=3).stretches
-    assert np.std(more.stretch.position[0] - part.stretch.position[0]) == pytest.approx(step / np.sqrt(12.0), rel=0.1)
+    added = more.stretch.position - part.stretch.position
+    assert np.std(added[0]) == pytest.approx(step / np.sqrt(12.0), rel=0.1)
+    assert abs(np.corrcoef(added[0], part.stretch.position[0] - SMOOTH[0])[0, 1]) < 0.2

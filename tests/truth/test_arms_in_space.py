@@ -43,6 +43,7 @@ def test_the_steps_of_an_encoder_are_no_elastic_joint(ur5: Robot, bits: int):
 
 @pytest.mark.slow
 def test_a_lossy_gear_behind_encoder_steps_is_found_alone(ur5: Robot):
+    """Commit a6cf3ca: loss 0.0885 +- 0.002, and two elastic joints at 10.6 and 9.9 Hz."""
     place = ur5.joints.index("shoulder_lift_joint")
 
     def loss(t: Array, q: Array, v: Array, a: Array, load: Array) -> Array:
