@@ -60,7 +60,7 @@ class Outcome:
     training : Observations
         Of the training recordings, as corrected, with the effects found.
     residuals : Residuals
-        What is left of them, without what runs differ by where repetitions tell that.
+        What is left of them, without what runs differ by.
     fit_before, fit_after : tuple of LackOfFit
         Per joint; empty without repetitions.
     dependences : tuple of Dependence
@@ -123,13 +123,10 @@ def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[s
     before, left = found.uncorrected.residuals(found.start.value), training.residuals(after.value)
     joints, criteria = task.model.robot.joints, task.criteria
     least = dict.fromkeys(joints, criteria.remainder)
-    residuals = left
     if after.variation:
         # What a run differs by from the others is no remainder of the model; of second order something of it is left.
         deviations = after.variation.deviations(training, after.value)
         left = Residuals(left.data, tuple(a + b for a, b in zip(left.predicted, deviations, strict=True)))
-        # Where no motion is repeated that may be the model's fault all the same: then nothing is shown to be noise by it.
-        residuals = left if all(item is None or item.repeated for item in after.variation.joints) else residuals
         least |= dict.fromkeys(after.variation.sizes(task.model.robot), criteria.remainder_of_runs)
     fit_after, dependences = lack_of_fit(left), screen(task.model, left, criteria)
     # What is spread evenly over frequency is no motion's doing even where it repeats: an encoder's steps do, and what a
@@ -145,7 +142,7 @@ def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[s
         repeating = [fit for fit in repeating if fit.missing > noise[fit.joint]]
         depending = [item for item in depending if item.rms > noise[item.joint]]
     unexplained = _unexplained(repeating, depending, criteria)
-    return Outcome(found, after, training, residuals, lack_of_fit(before), fit_after, dependences, unexplained)
+    return Outcome(found, after, training, left, lack_of_fit(before), fit_after, dependences, unexplained)
 
 
 def _unexplained(

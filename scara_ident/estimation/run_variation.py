@@ -52,9 +52,6 @@ class JointVariation:
         Standard deviation of one row.
     bounds : ndarray of int, shape (runs + 1,)
         Where the rows of each run begin.
-    repeated : bool
-        Whether repetitions of one motion tell it; else runs are different motions, of which the model may explain one
-        better than the other.
     """
 
     directions: Array
@@ -62,7 +59,6 @@ class JointVariation:
     of_run: Array
     noise: float
     bounds: NDArray[np.intp]
-    repeated: bool
 
     @cached_property
     def shrinking(self) -> tuple[tuple[Array, Array], ...]:
@@ -201,14 +197,12 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
     if runs < LEAST_RUNS:
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
-    labels = observations.data.labels
-    groups = [np.flatnonzero([other == label for other in labels]) for label in dict.fromkeys(labels)]
 
     def of_joint(joint: int, rows: JointRows) -> JointVariation | None:
         bounds = rows.starts[firsts]
         directions = _directions(observations, joint, rows, value)
         left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
-        return _estimated(directions, left, rows.starts, firsts, bounds, groups)
+        return _estimated(directions, left, rows.starts, firsts, bounds)
 
     return RunVariation(tuple(side_by_side(of_joint, range(len(joints)), joints)))
 
@@ -244,12 +238,7 @@ def _of_columns(
 
 
 def _estimated(
-    directions: Array,
-    left: Array,
-    starts: NDArray[np.intp],
-    firsts: NDArray[np.intp],
-    bounds: NDArray[np.intp],
-    groups: Sequence[NDArray[np.intp]],
+    directions: Array, left: Array, starts: NDArray[np.intp], firsts: NDArray[np.intp], bounds: NDArray[np.intp]
 ) -> JointVariation | None:
     runs, kinds = len(bounds) - 1, len(directions)
     size = np.sqrt(np.sum(directions**2, axis=1) / runs)
@@ -264,13 +253,6 @@ def _estimated(
     scale = 1.0 / np.sqrt(spread)
     products = products * np.outer(scale, scale)
     aims = aims * scale / noise
-    # What the model lacks is the same in all repetitions of a motion, and no difference of runs.
-    contrasts, of = _contrasts(groups, runs)
-    repeated = len(contrasts) >= LEAST_RUNS - 1
-    all_products, all_aims = products, aims
-    if repeated:
-        means = np.array([np.mean(products[group], axis=0) for group in groups])
-        products, aims = means[of], contrasts @ aims
     active = np.ones((1, np.count_nonzero(shown)), dtype=bool)
     variances, likelihoods = _most_likely(products, aims, active)
     while np.any(active):
@@ -285,23 +267,11 @@ def _estimated(
     else:
         return None
     std, of_run = np.zeros(kinds), np.zeros((runs, kinds))
+    # Parameters are fitted to all runs, so that these lie about their own mean.
     back = scale * noise / size[shown]
-    # Parameters are fitted to all runs, so that these lie about their own mean; contrasts do so already.
-    std[shown] = np.sqrt(variance * (1.0 if repeated else runs / (runs - 1.0))) * back
-    of_run[:, shown] = _expected(all_products, all_aims, variance)[0] * back
-    return JointVariation(directions, std, of_run, noise, bounds, repeated)
-
-
-def _contrasts(groups: Sequence[NDArray[np.intp]], runs: int) -> tuple[Array, list[int]]:
-    """Return orthonormal differences within groups of runs (Helmert), shape (c, runs), and the group of each."""
-    rows, of = [], []
-    for number, group in enumerate(groups):
-        for k in range(1, len(group)):
-            row = np.zeros(runs)
-            row[group[:k]], row[group[k]] = 1.0, -k
-            rows.append(row / np.sqrt(k * (k + 1.0)))
-            of.append(number)
-    return np.array(rows).reshape(-1, runs), of
+    std[shown] = np.sqrt(variance * runs / (runs - 1.0)) * back
+    of_run[:, shown] = _expected(products, aims, variance)[0] * back
+    return JointVariation(directions, std, of_run, noise, bounds)
 
 
 def _of_runs(
