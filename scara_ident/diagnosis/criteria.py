@@ -89,6 +89,12 @@ class SelectionCriteria:
         "that signals explain on other trajectories to be called a remainder",
         "docs/diagnosis.md",
     )
+    least_remainder: float = _criterion(
+        0.01,
+        "of the joint's torque",
+        "sampling, filters and friction about a reversal leave as much",
+        "docs/diagnosis.md",
+    )
     remainder_of_runs: float = _criterion(
         0.2,
         "share of squared residual",

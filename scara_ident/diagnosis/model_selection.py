@@ -60,7 +60,7 @@ class Outcome:
     training : Observations
         Of the training recordings, as corrected, with the effects found.
     residuals : Residuals
-        What is left of them, without what runs differ by.
+        What is left of them.
     fit_before, fit_after : tuple of LackOfFit
         Per joint; empty without repetitions.
     dependences : tuple of Dependence
@@ -123,6 +123,8 @@ def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[s
     before, left = found.uncorrected.residuals(found.start.value), training.residuals(after.value)
     joints, criteria = task.model.robot.joints, task.criteria
     least = dict.fromkeys(joints, criteria.remainder)
+    # Runs may seem to differ where the model explains one motion better than another: nothing is shown to be noise by that.
+    residuals = left
     if after.variation:
         # What a run differs by from the others is no remainder of the model; of second order something of it is left.
         deviations = after.variation.deviations(training, after.value)
@@ -138,11 +140,13 @@ def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[s
     ]
     if repeating or depending:
         # So does what their noise does to the columns.
-        noise = dict(zip(joints, noise_torque(training, after.value).tolist(), strict=True))
-        repeating = [fit for fit in repeating if fit.missing > noise[fit.joint]]
-        depending = [item for item in depending if item.rms > noise[item.joint]]
+        torque = [item.torque_rms if item.rows else 0.0 for item in training.by_joint]
+        known = np.maximum(noise_torque(training, after.value), criteria.least_remainder * np.array(torque))
+        large = dict(zip(joints, known.tolist(), strict=True))
+        repeating = [fit for fit in repeating if fit.missing > large[fit.joint]]
+        depending = [item for item in depending if item.rms > large[item.joint]]
     unexplained = _unexplained(repeating, depending, criteria)
-    return Outcome(found, after, training, left, lack_of_fit(before), fit_after, dependences, unexplained)
+    return Outcome(found, after, training, residuals, lack_of_fit(before), fit_after, dependences, unexplained)
 
 
 def _unexplained(

@@ -1,0 +1,72 @@
+"""What the noise of positions does to parameters: measured by adding it once more, and said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.estimation import wls
+from scara_ident.estimation.noise_bias import bias_sentence, noise_bias, noise_shares, noise_torque
+from scara_ident.motion.prepared import prepare
+from tests.diagnosis.made import exact_runs, observed
+
+# A band in which two differentiations magnify an encoder's steps.
+WIDE = (15.0, 15.0)
+
+
+def coarse(bits: int):
+    """Runs of formulas whose positions go in steps."""
+    step = 2.0 * np.pi / 2**bits
+    return [replace(run, position=step * np.round(run.position / step)) for run in exact_runs()]
+
+
+def test_fine_positions_bias_nothing():
+    seen = observed(exact_runs())
+    assert max(noise_shares(seen.data)) < 1e-6
+    assert wls(seen).noise_bias is None
+
+
+def test_what_steps_make_of_an_inertia_is_measured_and_counted():
+    exact = wls(observed(exact_runs(), WIDE)).value
+    seen = observed(coarse(13), WIDE)
+    estimate = wls(seen)
+    bias = estimate.noise_bias
+    assert bias is not None
+    # The first joint's inertia comes out too small, by as much as adding the noise again makes it smaller.
+    seen_bias = estimate.value[0] - exact[0]
+    assert seen_bias < 0.0
+    assert bias[0] == pytest.approx(seen_bias, rel=0.3)
+    assert estimate.std[0] >= abs(bias[0])
+    words = bias_sentence(estimate.model.names, bias, estimate.std)
+    assert words is not None
+    assert "biases P_d2" in words
+
+
+def test_the_share_of_noise_is_that_of_white_steps():
+    # 16 bits at 250 samples a second up to 15 Hz, over the acceleration's square.
+    data = prepare(coarse(16), WIDE)
+    (part, *_) = data.stretches
+    step = 2.0 * np.pi / 2**16
+    power = 2.0 * step**2 / 12.0 / part.rate * (2.0 * np.pi) ** 4 * WIDE[0] ** 5 / 5.0
+    expected = power / np.mean(part.motion.a[0][part.used[0]] ** 2)
+    assert noise_shares(data)[0] == pytest.approx(expected, rel=0.3)
+
+
+def test_the_torque_that_the_noise_makes_is_that_of_the_steps():
+    fine, rough = observed(exact_runs(), WIDE), observed(coarse(13), WIDE)
+    value = wls(fine).value
+    differs = [
+        np.concatenate([part.smooth(j, a[j] - b[j])[part.used[j]] for part, a, b in zip(rough.data.stretches, rough.predicted(value), fine.predicted(value), strict=True)])
+        for j in range(2)
+    ]  # fmt: skip
+    assert noise_torque(rough, value) == pytest.approx([np.sqrt(np.mean(row**2)) for row in differs], rel=0.3)
+
+
+def test_where_nothing_is_moved_nothing_is_said():
+    assert bias_sentence(("a", "b"), np.array([0.1, 0.0]), np.array([1.0, 1.0])) is None
+
+
+def test_without_a_band_nothing_can_be_said():
+    assert noise_bias(observed(exact_runs()[:2], (None, None)), np.ones(2), np.zeros(15)) is None
