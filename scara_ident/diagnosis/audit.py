@@ -28,7 +28,8 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
     step = replace(found.step, weights=weights)
     if not step.chosen:
         return []
-    parameters = physical_parameters(step).effects
+    # Whether runs that differ make it is asked of it alone, on rows that weigh them as noise.
+    parameters = physical_parameters(step, runs_differ=False).effects
     result = []
     for place, (candidate, values) in enumerate(zip(step.chosen, parameters, strict=True)):
         beside = step.without(place)
@@ -42,7 +43,7 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
 
 
 def uncertain(candidate: Candidate, values: dict[str, Parameter], least_size: float) -> str | None:
-    """Say so where no size of an effect is beyond its uncertainty with everything free and runs that differ counted in.
+    """Say so where no size of an effect is beyond its uncertainty with everything free.
 
     Parameters
     ----------

@@ -69,14 +69,16 @@ def least_squares(
 ) -> Estimate:
     """Least squares with a weight per joint and, if given, rows of a prior.
 
-    Without a prior, what data leave open of the torque within the arm's limits is left at zero, see `told_directions`.
+    With weights and without a prior, what data leave open of the torque within the arm's limits is left at zero, see
+    `told_directions`.
     """
     information = weighted(_joints(observations), weights)
     if prior is not None:
         information = merge([information, prior])
     solution = information.solve()
     value, undetermined, inverse = solution.value, solution.undetermined, information.inverse()
-    told = told_directions(observations, value) if prior is None else None
+    # Equal weights stay what they are in the literature, the paper's among it.
+    told = told_directions(observations, value) if prior is None and method == "wls" else None
     if told is not None:
         within = told.within(information)
         value, undetermined = told.kept @ within.solve().value, told.undetermined

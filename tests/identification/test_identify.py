@@ -240,7 +240,7 @@ def ur5_run(robot: Robot, seed: int, share: float, bits: int) -> Recording:
 def test_the_shoulders_noise_does_not_spoil_the_wrist_of_a_ur5():
     """The torques of shoulder and elbow and their noise are many times the wrist's; with equal weights the wrist pays for them."""
     robot = load_robot(example_urdf("ur5_robot.urdf"))
-    training = [ur5_run(robot, seed, 0.012, 14) for seed in (0, 1)]
+    training = [ur5_run(robot, seed, 0.012, 16) for seed in (0, 1)]
     held_out = ur5_run(robot, 9, 0.0, 20)
     bands = [10.0] * 6
 

@@ -75,7 +75,7 @@ def runs(*items: Observations, names: tuple[str, ...]) -> Observations:
         counts = np.concatenate([part.counts for part in rows])
         joints.append(JointRows(rows[0].columns, table, np.concatenate([*starts, ends[-1:]]), counts))
     owner = np.repeat(np.arange(len(items)), items[0].blocks)
-    data = SimpleNamespace(recordings=[SimpleNamespace(trajectory=name) for name in names])
+    data = SimpleNamespace(recordings=[SimpleNamespace(trajectory=name) for name in names], labels=names)
     return replace(items[0], joints=tuple(joints), owner=owner, data=data)
 
 
