@@ -139,7 +139,7 @@ def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[s
         item for item in dependences if item.p_value < criteria.significant and item.explained > least[item.joint]
     ]
     if repeating or depending:
-        # So does what their noise does to the columns.
+        # What the positions' noise does to the columns may repeat too; and what is small beside the torque is not called one.
         torque = [item.torque_rms if item.rows else 0.0 for item in training.by_joint]
         known = np.maximum(noise_torque(training, after.value), criteria.least_remainder * np.array(torque))
         large = dict(zip(joints, known.tolist(), strict=True))

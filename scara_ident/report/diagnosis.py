@@ -58,7 +58,6 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
             for effect in diagnosis.effects
         ],
         "tentative": [dict(vars(item)) for item in diagnosis.tentative],
-        "events": [],
         "evidence": {
             item.joint: {
                 "noise": item.shown,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -88,7 +89,7 @@ def diagnosis_pictures(folder: Path, context: DiagnosisContext) -> tuple[tuple[s
             figures.append([group.figures])
     if len(found) > 1:
         # Loaded once, for all processes.
-        import matplotlib.figure  # noqa: F401
+        import_module("matplotlib.figure")
 
     def draw_one(k: int) -> None:
         title, name = found[k]

@@ -12,6 +12,7 @@ from scara_ident.estimation.bands import (
     HIGHEST_BAND,
     ROWS_PER_PARAMETER,
     _Fit,
+    _Spectra,
     _widened,
     binned_power,
     choose_bands,
@@ -204,13 +205,16 @@ def test_noisy_torque_does_not_swing_the_band(model: TorqueModel, torque_noise: 
 def test_the_search_for_bands_ends_where_fits_contradict_each_other():
     """Fits in a wide band that explain a narrow one only, and the other way round."""
 
-    class Contrary:
+    class Contrary(_Spectra):
+        def __init__(self) -> None:
+            self.fits = 0
+
         def fit(self, bands: np.ndarray) -> _Fit:
-            self.fits = getattr(self, "fits", 0) + 1
+            self.fits += 1
             return _Fit(bands, bands, np.where(bands > 5.0, 1.0, 90.0), np.zeros((2, 1)))
 
     spectra = Contrary()
-    bands, fit = _widened(spectra, np.full(2, 2.0), np.full(2, 0.5), 100.0, None)  # type: ignore[arg-type]
+    bands, fit = _widened(spectra, np.full(2, 2.0), np.full(2, 0.5), 100.0, None)
     assert spectra.fits < 10
     assert np.all(bands <= 5.0)
     np.testing.assert_array_equal(fit.bands, bands)
