@@ -106,6 +106,7 @@ def _compared(result: Diagnosis, made: VirtualSet, was: Item) -> Item:
             {"effect": _of(effect, "effect"), "joint": _of(effect, "joint")}
             for effect in getattr(result, "tentative", ())
         ],
+        "corrected": _corrected(result),
         "unexplained": told["unexplained"] and told["unexplained"]["joint"],
         "band": list(told["band_hz"].values()),
         "noise": told["noise_floor"],
@@ -114,7 +115,7 @@ def _compared(result: Diagnosis, made: VirtualSet, was: Item) -> Item:
         "true_model": oracle,
         "to_true_model": worst_ratio(after, reference),
         "strength": strength(told["training"]["before"], oracle and oracle["training"]),
-        "coverage": coverage(told["parameters"], was["parameters"], [effect.name for effect in made.effects]),
+        "coverage": coverage(told["parameters"], true_parameters(made, was), [effect.name for effect in made.effects]),
     }
 
 
@@ -127,6 +128,12 @@ def _found(effect: Item) -> Item:
         "p_value": effect["p_value"],
         "gain": effect["gain"],
     }
+
+
+def _corrected(result: Diagnosis) -> dict[str, float]:
+    """Return what was taken out of the data, though it may be too small to be called an effect."""
+    correction = result.search.correction
+    return {} if correction is None else {correction.candidate.effect.name: float(correction.value[0])}
 
 
 def _of(effect: Any, name: str) -> Any:
@@ -144,6 +151,8 @@ def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, dict[str,
     scene, bands = result.search.scene, result.search.bands
     joints = made.robot.joints
     delays = [effect.as_dict()["parameters"]["delay"] for effect in made.effects if effect.name == "time_delay"]
+    # What the delays of the runs have in common is there, whatever else is.
+    delays.append(float(np.mean([state.delay for state in made.states[: len(made.training)]])))
     others = [_candidates(effect, made) for effect in made.effects if effect.name != "time_delay"]
     training, held_out = (
         prepare([shifted(item, sum(delays)) for item in items], bands) for items in (made.training, made.held_out)
@@ -204,6 +213,21 @@ def strength(before: dict[str, float | None], oracle: dict[str, float] | None) -
         return None
     excess = [(error / oracle[joint]) ** 2 - 1.0 for joint, error in before.items() if error and oracle.get(joint)]
     return float(np.sqrt(max(0.0, *excess))) if excess else None
+
+
+def true_parameters(made: VirtualSet, was: Item) -> list[Item]:
+    """Return the true parameters of the arm as its recordings can know them.
+
+    Where runs differ, these are their mean over all possible runs; only, recordings of one day know but that day's offsets.
+    """
+    recorded = [run.day for run in made.conditions.runs if not run.held_out]
+    if len(set(recorded)) > 1:
+        return list(was["parameters"])
+    offsets = {f"p_o{k + 1}": float(x) for k, x in enumerate(made.states[0].torque_offset)}
+    return [
+        entry | {"value": entry["value"] + offsets.get(entry["name"], 0.0)} if entry["value"] is not None else entry
+        for entry in was["parameters"]
+    ]
 
 
 def coverage(found: Sequence[Item], true: Sequence[Item], effects: Sequence[str]) -> dict[str, list[float]]:

@@ -21,6 +21,8 @@ from scara_ident.diagnosis.fitted_model import FittedModel, Products
 
 # Share of a direction that the other blocks must hold, or it cannot be tested without this one.
 _LEAST_REDUNDANCY = 1e-6
+# Fewer degrees of freedom than this after those of several coefficients, and one direction alone is asked too.
+FEW = 10.0
 # Directions of a few columns below this share of the largest are not tested.
 _RANK = 1e-9
 
@@ -81,8 +83,13 @@ def cluster_test(
     unbiased = scale @ np.einsum("gpi,gpj->gij", pairs, pairs) @ scale
     whitened = np.einsum("gij,gj->gi", back, value)
     known = np.all(strength > _LEAST_REDUNDANCY, axis=(1, 2))
-    p_value = np.where(known, _hotelling(whitened, unbiased, freedom, rank), 1.0)
-    return ClusterTest(p_value, into @ unbiased @ into.transpose(0, 2, 1), freedom)
+    # The direction of which least is known; one without any column takes no part.
+    least = np.min(freedom, axis=1)
+    least = np.where(np.isfinite(least), least, 1.0)
+    together = _hotelling(whitened, unbiased, least, rank)
+    few = (rank > 1) & (least - rank + 1.0 < FEW)
+    p_value = np.where(few, _either(together, whitened, unbiased, freedom, rank), together)
+    return ClusterTest(np.where(known, p_value, 1.0), into @ unbiased @ into.transpose(0, 2, 1), least)
 
 
 def significance(value: Array, covariance: Array, freedom: float) -> float:
@@ -102,6 +109,20 @@ def significance(value: Array, covariance: Array, freedom: float) -> float:
     scaled = covariance / np.outer(size, size)
     rank = np.atleast_1d(np.linalg.matrix_rank(scaled, rtol=_RANK, hermitian=True))
     return float(_hotelling((value / size)[None], scaled[None], np.atleast_1d(freedom), rank)[0])
+
+
+def _either(together: Array, value: Array, covariance: Array, freedom: Array, rank: NDArray[np.intp]) -> Array:
+    """Return p-values of several coefficients together or of the most significant direction alone, shape (g,).
+
+    Where blocks are few, several together leave hardly any freedom, and one alone may be beyond doubt (Bonferroni).
+    """
+    from scipy.special import fdtrc
+
+    variance = np.diagonal(covariance, axis1=1, axis2=2)
+    some = (variance > 0.0) & np.isfinite(freedom)
+    each = np.where(some, value**2 / np.where(some, variance, 1.0), 0.0)
+    alone = np.where(some, fdtrc(1.0, np.where(some, freedom, 1.0), each), 1.0)
+    return np.asarray(np.minimum(1.0, 2.0 * np.minimum(together, rank * np.min(alone, axis=1))))
 
 
 def _hotelling(value: Array, covariance: Array, freedom: Array, rank: NDArray[np.intp]) -> Array:
@@ -192,7 +213,8 @@ def _if_white(neighbours: _Neighbours, own: Array, links: Array) -> tuple[Array,
     """Return what the scatter is expected to be where residuals are white of variance one, and its freedom.
 
     The changes of blocks b and c have the covariance ``-links_b links_c'``, and that of a block with itself is
-    ``own_b``. Satterthwaite: the freedom is the squared trace of the covariance of all over its squared norm.
+    ``own_b``. Satterthwaite: the freedom of a direction is the squared trace of the covariance of all over its squared
+    norm; infinite where a candidate has no column in it.
 
     Parameters
     ----------
@@ -218,6 +240,4 @@ def _if_white(neighbours: _Neighbours, own: Array, links: Array) -> tuple[Array,
     trace = np.diagonal(expected, axis1=1, axis2=2)
     shown = (trace > 0.0) & (norm > 0.0)
     freedom = np.where(shown, trace**2 / np.where(shown, norm, 1.0), np.inf)
-    # The direction of which least is known; one without any column takes no part.
-    freedom = np.min(freedom, axis=1)
-    return expected, np.where(np.isfinite(freedom), freedom, 1.0)
+    return expected, freedom

@@ -52,6 +52,12 @@ class SelectionCriteria:
         "removed on rows that it was not fitted to; below it is the detection limit",
         "docs/diagnosis.md",
     )
+    nearly_all: float = _criterion(
+        0.9,
+        "share of squared residual",
+        "what removes as much leaves little but noise on its joint, and is tested by single rows too",
+        "diagnosis/row_test.py",
+    )
     least_votes: float = _criterion(
         0.75, "of voting trajectories", "an effect of the arm helps on most motions that excite it", "docs/diagnosis.md"
     )

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision, decide
-from scara_ident.diagnosis.candidate_tests import examine
+from scara_ident.diagnosis.candidate_tests import Examination, examine
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, columns_at_hand, with_columns
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.gain import gains
+from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.effects import Scene
 from scara_ident.estimation.observations import JointRows, Observations
 from scara_ident.model.model import TorqueModel
@@ -76,10 +77,17 @@ class SelectionStep:
         """Examine candidates whose columns are given, and decide on each."""
         found = examine(self.model, rows, self.criteria)
         gained = gains(self.model, rows, [item.member.joint for item in candidates], found)
+        for k, (result, gain) in enumerate(zip(found, gained, strict=True)):
+            if self.in_doubt(result, gain):
+                found[k] = examine_rows(self.model, rows[k], result)
         return [
             decide(item, result, gain, self.scene, self.tried, self.criteria)
             for item, result, gain in zip(candidates, found, gained, strict=True)
         ]
+
+    def in_doubt(self, found: Examination, gain: float) -> bool:
+        """Whether a candidate that removes nearly all of its joint's residual is not significant by blocks of time."""
+        return gain >= self.criteria.nearly_all and found.p_value * self.tried > self.criteria.family_error
 
     def without(self, place: int) -> SelectionStep:
         """Return the step with one of the chosen effects left out of the model."""

@@ -10,6 +10,8 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import with_columns
 from scara_ident.diagnosis.fitted_model import FittedModel
+from scara_ident.diagnosis.gain import gains
+from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.estimation.run_variation import RunVariation, run_variation
 
@@ -31,11 +33,12 @@ def variation_objection(step: SelectionStep, decision: Decision) -> str | None:
     variation = run_variation(step.observations, with_columns(step.observations, [*chosen, own]), value)
     if not variation:
         return None
-    (again,) = examine(
-        whitened(step.model, variation),
-        [{joint: variation.whitened(joint, rows) for joint, rows in own.items()}],
-        step.criteria,
-    )
+    model = whitened(step.model, variation)
+    rows = {joint: variation.whitened(joint, columns) for joint, columns in own.items()}
+    (again,) = examine(model, [rows], step.criteria)
+    (gain,) = gains(model, [rows], [decision.candidate.member.joint], [again])
+    if step.in_doubt(again, gain):
+        again = examine_rows(model, rows, again)
     # One delay for all runs is their mean, which they confirm by themselves however few they are.
     tried = 1 if decision.candidate.corrects_data else step.tried
     if again.p_value * tried <= step.criteria.family_error:
