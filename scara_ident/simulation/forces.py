@@ -4,7 +4,7 @@ Every joint has one drive coordinate (the motor, seen through the gear) and one 
 unless the joint is elastic. With the torque ``load`` that goes through the gear to the link,
 
     drive  = armature x acceleration + dry x direction + smooth + loss(load, direction) x load
-    load   = (M(q) acceleration + h(q, v)) of the link.
+    load   = (M(q) acceleration + h(q, v) - J(q)^T force from outside) of the link.
 
 Where a joint slides its direction is +1 or -1; where it stands still it sticks as long as the friction that holds it
 stays within its bounds, which makes the contact a linear complementarity problem coupled by M.
@@ -18,6 +18,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
+from scara_ident.simulation.external import push
 from scara_ident.simulation.plant import Plant
 from scara_ident.simulation.spatial import dynamics
 
@@ -53,6 +54,7 @@ class Room(NamedTuple):
     load: Array
     spring: Array
     sign: Array
+    force: Array
 
 
 def make_room(n: int) -> Room:
@@ -60,7 +62,7 @@ def make_room(n: int) -> Room:
     v = [np.zeros(n) for _ in range(8)]
     return Room(
         np.zeros((n, n)), v[0], np.empty((n, 9)), np.empty((n, 3)), np.empty((n, 15)), np.empty((n, 10)),
-        np.zeros((n, n)), v[1], v[2], v[3], v[4], v[5], v[6], v[7],
+        np.zeros((n, n)), v[1], v[2], v[3], v[4], v[5], v[6], v[7], np.zeros((n, 3)),
     )  # fmt: skip
 
 
@@ -186,6 +188,7 @@ def accelerate(
         plant.parent, plant.prismatic, plant.rotation, plant.offset, bodies, plant.gravity,
         q, v, room.mass, room.bias, room.e, room.p, room.state, room.composite,
     )  # fmt: skip
+    push(plant, t, room.e, room.p, room.force, room.bias)
     _friction(plant, room, t, x, start)
     lossy = False
     for j in range(n):

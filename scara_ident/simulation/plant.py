@@ -14,6 +14,14 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 
+# What a joint may have several of -> lengths of their values, 0 for a number. The force of a push is in the base frame, its
+# point in the turned frame of its joint, its times are begin, end and length of the edges.
+FAMILIES: dict[str, dict[str, int]] = {
+    "ripple": {"order": 0, "amplitude": 0, "phase": 0},
+    "vibration": {"frequency": 0, "amplitude": 0, "phase": 0},
+    "push": {"point": 3, "force": 3, "time": 3},
+}
+
 
 class Plant(NamedTuple):
     """Arrays of the compiled loop; see `PlantDraft` for their meaning."""
@@ -60,6 +68,10 @@ class Plant(NamedTuple):
     swinging_viscous_of: NDArray[np.int64]
     payload_time: float
     bodies_after: Array
+    push_joint: NDArray[np.int64]
+    push_point: Array
+    push_force: Array
+    push_time: Array
 
 
 class Sensors(NamedTuple):
@@ -118,12 +130,11 @@ class PlantDraft:
         """Return an array of the plant, or of the torque's measurement."""
         return self.arrays[name] if name in self.arrays else np.asarray(getattr(self, name))
 
-    def append(self, family: str, joint: int, *values: float) -> None:
-        """Append a row to ``ripple`` or ``vibration``."""
-        names = ("joint", "order" if family == "ripple" else "frequency", "amplitude", "phase")
-        for name, value in zip(names, (joint, *values), strict=True):
+    def append(self, family: str, joint: int, *values: float | Array) -> None:
+        """Append a row to a family of `FAMILIES`, with its values in that order."""
+        for name, value in zip(("joint", *FAMILIES[family]), (joint, *values), strict=True):
             key = f"{family}_{name}"
-            self.arrays[key] = np.append(self.arrays[key], value)
+            self.arrays[key] = np.concatenate([self.arrays[key], np.array([value], dtype=float)])
 
     def plant(self) -> Plant:
         """Freeze the plant."""
@@ -137,7 +148,7 @@ class PlantDraft:
         )
         seen = np.any(a["coupling_coulomb"] != 0.0, axis=0)
         matters = (dry & (a["presliding"] == 0.0)) | (seen & (a["presliding"] == 0.0))
-        integers = {"parent", "ripple_joint", "vibration_joint", "signed_sine_of", "swinging_viscous_of"}
+        integers = {"parent", "signed_sine_of", "swinging_viscous_of", *(f"{name}_joint" for name in FAMILIES)}
         flags = {"prismatic", "elastic"}
         values: dict[str, Any] = {}
         for name in Plant._fields:
@@ -155,7 +166,6 @@ class PlantDraft:
 def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
     """Return a draft with no effect and no bodies; the arm fills in the rest."""
     zero = np.zeros(n)
-    none = np.zeros(0)
     per_joint = (
         "constant stribeck_amplitude asymmetry presliding warm_share position_share position_phase spring "
         "spring_rest elastic stiffness damping width signed_sine swinging_viscous"
@@ -164,8 +174,9 @@ def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
     arrays |= {name: np.ones(n) for name in ("stribeck_velocity", "warm_time", "efficiency")}
     arrays |= {name: np.zeros((n, n)) for name in ("coupling_viscous", "coupling_coulomb")}
     arrays |= {name: zero.copy() for name in ("signed_sine_of", "swinging_viscous_of")}
-    for family, second in (("ripple", "order"), ("vibration", "frequency")):
-        arrays |= {f"{family}_{name}": none.copy() for name in ("joint", second, "amplitude", "phase")}
+    for family, lengths in FAMILIES.items():
+        arrays[f"{family}_joint"] = np.zeros(0)
+        arrays |= {f"{family}_{name}": np.zeros((0, length) if length else 0) for name, length in lengths.items()}
     arrays["payload_time"] = np.array(np.inf)
     sensors = {name: zero.copy() for name in ("eccentricity", "eccentricity_order", "eccentricity_phase", "shift")}
     return PlantDraft(

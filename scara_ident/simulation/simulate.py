@@ -122,7 +122,7 @@ def simulate(
     motion : ReferenceMotion
         Interpolated where its samples are not those of the controller.
     effects : sequence of Effect
-        Sizes that were left open are taken from the arm.
+        Sizes that were left open are taken from the arm. Those of another recording are left out.
     seed : int
         Of noise and encoder zero; the same seed and repetition give the same recording.
     repetition : int
@@ -155,7 +155,8 @@ def simulate(
     """
     if ticks < 1:
         raise UsageError(f"ticks is {ticks}; expected 1 or more periods of the controller per sample")
-    moved, own = arm, resolved_effects(arm, effects)
+    name = f"{motion.name}_{repetition}"
+    moved, own = arm, resolved_effects(arm, [each for each in effects if each.recording in (None, name)])
     if run is not None:
         # Sizes that were left open are those of the arm, not of the run.
         moved = run.of(arm)
@@ -184,7 +185,7 @@ def simulate(
     if ticks > 1:
         wanted, true = wanted.every(ticks), true.every(ticks)
     recording = Recording(
-        name=f"{motion.name}_{repetition}",
+        name=name,
         trajectory=motion.name,
         repetition=repetition,
         joints=arm.robot.joints,
