@@ -1,4 +1,4 @@
-"""Forces on the links that come from outside the arm."""
+"""What comes to the links from outside the arm: forces on them, and what the last one carries."""
 
 from __future__ import annotations
 
@@ -8,6 +8,29 @@ from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
 from scara_ident.simulation.plant import Plant
 from scara_ident.simulation.spatial import rotate, rotate_back
+
+# Times closer than this are the same, s.
+SAME = 1e-9
+
+
+@compiled
+def carry(plant: Plant, t: float, bodies: Array) -> None:
+    """Fill ``bodies``, shape (n, 10), with the plant's own and what the last one carries from ``t`` on."""
+    bodies[:] = plant.bodies
+    for k in range(plant.payload_span.shape[0]):
+        begin, end = plant.payload_span[k]
+        if begin <= t + SAME < end:
+            bodies[-1] += plant.payload_body[k]
+
+
+@compiled
+def until_change(plant: Plant, t: float, left: float) -> float:
+    """Return how long, at most ``left``, the arm carries what it does at ``t``."""
+    for k in range(plant.payload_span.shape[0]):
+        for edge in plant.payload_span[k]:
+            if SAME < edge - t < left - SAME:
+                left = edge - t
+    return left
 
 
 @compiled

@@ -55,6 +55,7 @@ class Room(NamedTuple):
     spring: Array
     sign: Array
     force: Array
+    bodies: Array
 
 
 def make_room(n: int) -> Room:
@@ -62,7 +63,7 @@ def make_room(n: int) -> Room:
     v = [np.zeros(n) for _ in range(8)]
     return Room(
         np.zeros((n, n)), v[0], np.empty((n, 9)), np.empty((n, 3)), np.empty((n, 15)), np.empty((n, 10)),
-        np.zeros((n, n)), v[1], v[2], v[3], v[4], v[5], v[6], v[7], np.zeros((n, 3)),
+        np.zeros((n, n)), v[1], v[2], v[3], v[4], v[5], v[6], v[7], np.zeros((n, 3)), np.zeros((n, 10)),
     )  # fmt: skip
 
 
@@ -183,9 +184,8 @@ def accelerate(
     """
     q, v, theta, omega, mode = x.q, x.v, x.theta, x.omega, x.mode
     n = q.shape[0]
-    bodies = plant.bodies if t < plant.payload_time else plant.bodies_after
     dynamics(
-        plant.parent, plant.prismatic, plant.rotation, plant.offset, bodies, plant.gravity,
+        plant.parent, plant.prismatic, plant.rotation, plant.offset, room.bodies, plant.gravity,
         q, v, room.mass, room.bias, room.e, room.p, room.state, room.composite,
     )  # fmt: skip
     push(plant, t, room.e, room.p, room.force, room.bias)

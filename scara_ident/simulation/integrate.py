@@ -8,6 +8,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
+from scara_ident.simulation.external import carry
 from scara_ident.simulation.forces import Room, State, accelerate, settle
 from scara_ident.simulation.plant import Plant
 
@@ -72,8 +73,9 @@ def _runge_kutta(plant: Plant, room: Room, x: State, s: Stages, t: float, h: flo
 
 @compiled
 def first_stage(plant: Plant, room: Room, x: State, s: Stages, t: float, drive: Array) -> None:
-    """Fill stage 0 at the state itself, after deciding which standing joints stick."""
+    """Fill stage 0 at the state itself, after deciding what is carried and which standing joints stick."""
     n = x.q.shape[0]
+    carry(plant, t, room.bodies)
     standing = False
     for j in range(n):
         if plant.direction_matters[j]:

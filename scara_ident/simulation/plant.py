@@ -66,8 +66,8 @@ class Plant(NamedTuple):
     signed_sine_of: NDArray[np.int64]
     swinging_viscous: Array
     swinging_viscous_of: NDArray[np.int64]
-    payload_time: float
-    bodies_after: Array
+    payload_body: Array
+    payload_span: Array
     push_joint: NDArray[np.int64]
     push_point: Array
     push_force: Array
@@ -130,6 +130,11 @@ class PlantDraft:
         """Return an array of the plant, or of the torque's measurement."""
         return self.arrays[name] if name in self.arrays else np.asarray(getattr(self, name))
 
+    def carry(self, body: Array, span: Array) -> None:
+        """Add a payload to the last body: standard parameters in its turned frame, when it comes and when it goes, s."""
+        self.arrays["payload_body"] = np.vstack([self.arrays["payload_body"], body])
+        self.arrays["payload_span"] = np.vstack([self.arrays["payload_span"], span])
+
     def append(self, family: str, joint: int, *values: float | Array) -> None:
         """Append a row to a family of `FAMILIES`, with its values in that order."""
         for name, value in zip(("joint", *FAMILIES[family]), (joint, *values), strict=True):
@@ -152,11 +157,11 @@ class PlantDraft:
         flags = {"prismatic", "elastic"}
         values: dict[str, Any] = {}
         for name in Plant._fields:
-            if name in ("coupled", "direction_matters", "payload_time"):
+            if name in ("coupled", "direction_matters"):
                 continue
             kind = np.int64 if name in integers else np.bool_ if name in flags else np.float64
             values[name] = np.ascontiguousarray(a[name], dtype=kind)
-        return Plant(**values, coupled=coupled, direction_matters=matters, payload_time=float(a["payload_time"]))
+        return Plant(**values, coupled=coupled, direction_matters=matters)
 
     def sensing(self) -> Sensors:
         """Freeze the sensors."""
@@ -177,7 +182,7 @@ def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
     for family, lengths in FAMILIES.items():
         arrays[f"{family}_joint"] = np.zeros(0)
         arrays |= {f"{family}_{name}": np.zeros((0, length) if length else 0) for name, length in lengths.items()}
-    arrays["payload_time"] = np.array(np.inf)
+    arrays |= {"payload_body": np.zeros((0, 10)), "payload_span": np.zeros((0, 2))}
     sensors = {name: zero.copy() for name in ("eccentricity", "eccentricity_order", "eccentricity_phase", "shift")}
     return PlantDraft(
         n=n,

@@ -13,6 +13,7 @@ from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
+from scara_ident.simulation.effects.structure import Payload
 from scara_ident.simulation.inverse_dynamics import nominal_torque, torque_at_start
 from scara_ident.simulation.plant import PlantDraft
 from scara_ident.simulation.reference import ReferenceMotion
@@ -169,7 +170,7 @@ def simulate(
     # The name takes part, so that no two trajectories share their noise.
     random = np.random.default_rng([seed, repetition, zlib.crc32(motion.name.encode())])
     draft.sensors["shift"] = random.uniform(size=arm.robot.n)[back]
-    start = torque_at_start(moved, wanted)
+    start = torque_at_start(moved, wanted, loaded_bodies(moved, own))
     feed = np.zeros((len(wanted.time), arm.robot.n))
     if arm.controller.feed_forward:
         feed = nominal_torque(moved, wanted)[back].T
@@ -244,6 +245,15 @@ def free_motion(
 def resolved_effects(arm: VirtualArm, effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Return effects with all their sizes, those that were left open from the arm."""
     return tuple(effect.resolve(arm) for effect in effects)
+
+
+def loaded_bodies(arm: VirtualArm, effects: Sequence[Effect]) -> Array:
+    """Return the arm's bodies with what it carries at the first sample, shape (n, 10)."""
+    bodies = arm.bodies.copy()
+    for effect in effects:
+        if isinstance(effect, Payload) and effect.time <= 0.0:
+            bodies[np.argmax(arm.robot.order)] += effect.body
+    return bodies
 
 
 def _draft(arm: VirtualArm, effects: Sequence[Effect]) -> PlantDraft:

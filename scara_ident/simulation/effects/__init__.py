@@ -25,7 +25,7 @@ from scara_ident.simulation.effects.sensors import (
     TorqueGainMismatch,
     TorqueSensorNonlinearity,
 )
-from scara_ident.simulation.effects.structure import BaseTilt, PayloadChange
+from scara_ident.simulation.effects.structure import BaseTilt, Payload, PayloadChange
 from scara_ident.simulation.effects.transmission import Backlash, JointElasticity, TransmissionLoss
 from scara_ident.simulation.effects.unlisted import UnlistedSignedSine, UnlistedSwingingViscous
 
@@ -51,7 +51,7 @@ CATALOGUE: tuple[type[Effect], ...] = (
     Vibration,
 )
 # What an arm may meet and no effect of a diagnosis is called by.
-EVENTS: tuple[type[Effect], ...] = (Push,)
+EVENTS: tuple[type[Effect], ...] = (Push, Payload)
 UNLISTED: tuple[type[Effect], ...] = (UnlistedSignedSine, UnlistedSwingingViscous)
 EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in (*CATALOGUE, *EVENTS, *UNLISTED)}
 
@@ -104,13 +104,13 @@ def parse_effect(text: str) -> Effect:
             continue
         for pair in part.split(","):
             key, _, value = (word.strip() for word in pair.partition("="))
-            name = {**kind.parameter_names(), "recording": "recording"}.get(key)
-            if name is None:
+            attribute = {**kind.parameter_names(), "recording": "recording"}.get(key)
+            if attribute is None:
                 known = ", ".join((*kind.parameter_names(), "recording"))
                 raise UsageError(f"effect {text!r}: {kind.name} has no {key!r}; it has {known}")
-            if name in values:
+            if attribute in values:
                 raise UsageError(f"effect {text!r}: {key} is given twice")
-            values[name] = _value(kind, text, key, name, value)
+            values[attribute] = _value(kind, text, key, attribute, value)
     return kind(joint=joint, **values)
 
 
@@ -127,8 +127,9 @@ def _value(kind: type[Effect], text: str, key: str, name: str, value: str) -> fl
     except ValueError:
         numbers = ()
     if field.type == "Vector":
-        if len(numbers) != len(field.default):
-            raise UsageError(f"effect {text!r}: {key} is {value!r}; expected {len(field.default)} numbers as in 0/0/1")
+        length = len(getattr(kind, name))
+        if len(numbers) != length:
+            raise UsageError(f"effect {text!r}: {key} is {value!r}; expected {length} numbers as in 0/0/1")
         return numbers
     if len(numbers) != 1:
         raise UsageError(f"effect {text!r}: {key} is {value!r}; expected a number")

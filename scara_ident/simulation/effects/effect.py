@@ -75,7 +75,7 @@ class Effect:
             joint = self.first_choice(arm)
         index = arm.joint_index(joint) if joint is not None else 0
         sizes = self.sizes(arm, index)
-        left = {key: value for key, value in sizes.items() if _is_left(getattr(self, key))}
+        left: dict[str, Any] = {key: value for key, value in sizes.items() if _is_left(getattr(self, key))}
         resolved = replace(self, joint=joint, **left)
         for key in self.units:
             low, high = self.bounds.get(key, (-math.inf, math.inf))

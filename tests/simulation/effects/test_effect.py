@@ -40,6 +40,7 @@ NOTHING = [
     fx.OffsetDrift(rate=0.0),
     fx.Vibration(amplitude=0.0),
     fx.Push(force=0.0, time=0.3),
+    fx.Payload(mass=0.0),
     fx.UnlistedSignedSine(amplitude=0.0),
     fx.UnlistedSwingingViscous(viscous=0.0),
 ]
