@@ -1,4 +1,4 @@
-"""What comes to the links from outside the arm: forces on them, and what the last one carries."""
+"""What acts on the links beside their own drives: forces from outside, what the last one carries, shafts between joints."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from scara_ident.simulation.spatial import rotate, rotate_back
 
 # Times closer than this are the same, s.
 SAME = 1e-9
+# Way over which the dry friction of a shaft grows to 1 - 1/e of its size, rad (m): short beside any motion.
+SHAFT_WAY = 1e-4
 
 
 @compiled
@@ -65,3 +67,37 @@ def push(plant: Plant, t: float, e: Array, p: Array, force: Array, bias: Array) 
             x, y, z = rotate(e, link, x, y, z)
             x, y, z = x + p[link, 0], y + p[link, 1], z + p[link, 2]
             link = plant.parent[link]
+
+
+@compiled
+def shaft_inertia(plant: Plant, mass: Array) -> None:
+    """Add the inertia of what turns with two joints together to the mass matrix."""
+    for k in range(plant.shaft_joint.shape[0]):
+        i, j, size = plant.shaft_joint[k], plant.shaft_other[k], plant.shaft_inertia[k]
+        mass[i, i] += size
+        mass[j, j] += size
+        mass[i, j] += plant.shaft_sign[k] * size
+        mass[j, i] += plant.shaft_sign[k] * size
+
+
+@compiled
+def shaft_friction(plant: Plant, theta: Array, omega: Array, start: Array, dahl: Array, smooth: Array) -> None:
+    """Add the friction of what turns with two joints together to the torques of their drives.
+
+    Dry friction grows over `SHAFT_WAY` (Dahl 1968), from its states ``dahl`` at the positions ``start``, so that a shaft
+    need not be stopped and let go beside the joints.
+    """
+    for k in range(plant.shaft_joint.shape[0]):
+        i, j, sign = plant.shaft_joint[k], plant.shaft_other[k], plant.shaft_sign[k]
+        direction = slid(dahl[k], theta[i] - start[i] + sign * (theta[j] - start[j]), SHAFT_WAY)
+        torque = plant.shaft_viscous[k] * (omega[i] + sign * omega[j]) + plant.shaft_coulomb[k] * direction
+        smooth[i] += torque
+        smooth[j] += sign * torque
+
+
+@compiled
+def slid(before: float, way: float, distance: float) -> float:
+    """Return Dahl's state after a way in one direction, exactly."""
+    end = 1.0 if way > 0.0 else (-1.0 if way < 0.0 else 0.0)
+    after: float = end - (end - before) * np.exp(-abs(way) / distance)
+    return after

@@ -18,7 +18,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
-from scara_ident.simulation.external import push
+from scara_ident.simulation.external import push, shaft_friction, shaft_inertia, slid
 from scara_ident.simulation.plant import Plant
 from scara_ident.simulation.spatial import dynamics
 
@@ -26,7 +26,8 @@ from scara_ident.simulation.spatial import dynamics
 class State(NamedTuple):
     """Positions and velocities of links (q, v) and drives (theta, omega), sliding modes and presliding states.
 
-    A drive slides in the direction of its mode, +1 or -1, and sticks where that is 0.
+    A drive slides in the direction of its mode, +1 or -1, and sticks where that is 0. Presliding states are those of the
+    drives and then of the shafts.
     """
 
     q: Array
@@ -120,9 +121,7 @@ def _friction(plant: Plant, room: Room, t: float, x: State, start: Array) -> Non
         side = mode[j] if plant.direction_matters[j] else np.sign(w)
         if plant.presliding[j] > 0.0:
             # The exact solution of Dahl's equation over the way gone since the step began.
-            way = theta[j] - start[j]
-            end = 1.0 if way > 0.0 else (-1.0 if way < 0.0 else 0.0)
-            room.direction[j] = end - (end - dahl[j]) * np.exp(-abs(way) / plant.presliding[j])
+            room.direction[j] = slid(dahl[j], theta[j] - start[j], plant.presliding[j])
         else:
             room.direction[j] = side
         f = plant.friction[j]
@@ -149,6 +148,7 @@ def _friction(plant: Plant, room: Room, t: float, x: State, start: Array) -> Non
                 w = omega[k]
                 side = mode[k] if plant.direction_matters[k] else np.sign(w)
                 room.smooth[j] += plant.coupling_viscous[j, k] * w + plant.coupling_coulomb[j, k] * side
+    shaft_friction(plant, theta, omega, start, dahl[n:], room.smooth)
     for i in range(plant.ripple_joint.shape[0]):
         j = plant.ripple_joint[i]
         angle = plant.ripple_order[i] * theta[j] + plant.ripple_phase[i]
@@ -188,6 +188,7 @@ def accelerate(
         plant.parent, plant.prismatic, plant.rotation, plant.offset, room.bodies, plant.gravity,
         q, v, room.mass, room.bias, room.e, room.p, room.state, room.composite,
     )  # fmt: skip
+    shaft_inertia(plant, room.mass)
     push(plant, t, room.e, room.p, room.force, room.bias)
     _friction(plant, room, t, x, start)
     lossy = False

@@ -181,7 +181,7 @@ def track(
         How often a joint stopped; negative is -1 - the sample at which the motion became infinite.
     """
     samples, n = feed.shape
-    x = make_state(n)
+    x = make_state(n, len(plant.shaft_joint))
     for target, value in zip(x[:4], initial, strict=True):
         target[:] = value
     out = make_trace(samples, n)

@@ -19,6 +19,7 @@ from scara_ident.arrays import Array
 FAMILIES: dict[str, dict[str, int]] = {
     "ripple": {"order": 0, "amplitude": 0, "phase": 0},
     "vibration": {"frequency": 0, "amplitude": 0, "phase": 0},
+    "shaft": {"other": 0, "sign": 0, "inertia": 0, "viscous": 0, "coulomb": 0},
     "push": {"point": 3, "force": 3, "time": 3},
 }
 
@@ -68,6 +69,12 @@ class Plant(NamedTuple):
     swinging_viscous_of: NDArray[np.int64]
     payload_body: Array
     payload_span: Array
+    shaft_joint: NDArray[np.int64]
+    shaft_other: NDArray[np.int64]
+    shaft_sign: Array
+    shaft_inertia: Array
+    shaft_viscous: Array
+    shaft_coulomb: Array
     push_joint: NDArray[np.int64]
     push_point: Array
     push_force: Array
@@ -153,7 +160,13 @@ class PlantDraft:
         )
         seen = np.any(a["coupling_coulomb"] != 0.0, axis=0)
         matters = (dry & (a["presliding"] == 0.0)) | (seen & (a["presliding"] == 0.0))
-        integers = {"parent", "signed_sine_of", "swinging_viscous_of", *(f"{name}_joint" for name in FAMILIES)}
+        integers = {
+            "parent",
+            "shaft_other",
+            "signed_sine_of",
+            "swinging_viscous_of",
+            *(f"{name}_joint" for name in FAMILIES),
+        }
         flags = {"prismatic", "elastic"}
         values: dict[str, Any] = {}
         for name in Plant._fields:

@@ -331,6 +331,8 @@ def _stretch(draft: PlantDraft, torque: Array) -> Array:
 
 def _substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
     """Choose as many steps per sample as the stiffest elastic joint or presliding friction needs."""
+    from scara_ident.simulation.external import SHAFT_WAY
+
     arrays = draft.arrays
     link = arm.link_inertia()[np.argsort(arm.robot.order)]
     rotor = arrays["armature"]
@@ -340,6 +342,9 @@ def _substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
     dry = arrays["friction"][:, 0] + arrays["stribeck_amplitude"]
     sliding = arrays["presliding"]
     square += np.divide(4.0 * dry, sliding * (link + rotor), out=np.zeros(draft.n), where=sliding > 0.0)
+    for i, j, coulomb in zip(*(arrays[f"shaft_{name}"] for name in ("joint", "other", "coulomb")), strict=True):
+        both = np.array([i, j], dtype=int)
+        square[both] += 4.0 * coulomb / (SHAFT_WAY * (link + rotor)[both])
     needed = int(np.ceil(float(np.sqrt(square.max())) / (rate * STIFF_STEP)))
     if needed > MOST_SUBSTEPS:
         joint = arm.robot.joints[int(np.flatnonzero(arm.robot.order == int(np.argmax(square)))[0])]

@@ -64,6 +64,6 @@ def test_places_are_whole_numbers_whatever_they_were_in_the_draft(draft: PlantDr
     plant = draft.plant()
     kinds = {name: getattr(plant, name).dtype for name in Plant._fields if isinstance(getattr(plant, name), np.ndarray)}
     assert {name for name, kind in kinds.items() if kind == np.int64} == {
-        "parent", "push_joint", "ripple_joint", "vibration_joint", "signed_sine_of", "swinging_viscous_of",
+        "parent", "shaft_joint", "shaft_other", "push_joint", "ripple_joint", "vibration_joint", "signed_sine_of", "swinging_viscous_of",
     }  # fmt: skip
     assert all(getattr(plant, name).flags.c_contiguous for name in kinds)

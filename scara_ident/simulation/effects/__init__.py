@@ -25,6 +25,7 @@ from scara_ident.simulation.effects.sensors import (
     TorqueGainMismatch,
     TorqueSensorNonlinearity,
 )
+from scara_ident.simulation.effects.shaft import CoupledShaft
 from scara_ident.simulation.effects.structure import BaseTilt, Payload, PayloadChange
 from scara_ident.simulation.effects.transmission import Backlash, JointElasticity, TransmissionLoss
 from scara_ident.simulation.effects.unlisted import UnlistedSignedSine, UnlistedSwingingViscous
@@ -50,20 +51,20 @@ CATALOGUE: tuple[type[Effect], ...] = (
     OffsetDrift,
     Vibration,
 )
-# What an arm may meet and no effect of a diagnosis is called by.
-EVENTS: tuple[type[Effect], ...] = (Push, Payload)
+# What an arm may have or meet beside them.
+OTHERS: tuple[type[Effect], ...] = (Push, Payload, CoupledShaft)
 UNLISTED: tuple[type[Effect], ...] = (UnlistedSignedSine, UnlistedSwingingViscous)
-EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in (*CATALOGUE, *EVENTS, *UNLISTED)}
+EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in (*CATALOGUE, *OTHERS, *UNLISTED)}
 
 __all__ = [
     "BY_ARM",
     "CATALOGUE",
     "EFFECTS",
-    "EVENTS",
     "Effect",
+    "OTHERS",
     "UNLISTED",
     "parse_effect",
-    *(effect.__name__ for effect in (*CATALOGUE, *EVENTS, *UNLISTED)),
+    *(effect.__name__ for effect in (*CATALOGUE, *OTHERS, *UNLISTED)),
 ]
 
 

@@ -116,6 +116,20 @@ def vacant(effect: Effect, value: float, absent: float = 0.0) -> None:
         raise UsageError(f"{effect.name} is given twice for {effect.joint or 'the arm'}; give it once")
 
 
+def neighbour(effect: Effect, arm: VirtualArm) -> str:
+    """Return the joint after the effect's, for the last joint the one before it.
+
+    Raises
+    ------
+    UsageError
+        If the arm has one joint.
+    """
+    n, j = arm.robot.n, arm.joint_index(effect.joint or arm.robot.joints[0])
+    if n < 2:
+        raise UsageError(f"{effect.name}: {arm.robot.name} has one joint; a coupling needs two")
+    return arm.robot.joints[j + 1 if j + 1 < n else j - 1]
+
+
 def _numbers(value: object) -> Vector:
     """Return the numbers of a parameter, none where it is no number."""
     if isinstance(value, tuple):

@@ -41,6 +41,7 @@ NOTHING = [
     fx.Vibration(amplitude=0.0),
     fx.Push(force=0.0, time=0.3),
     fx.Payload(mass=0.0),
+    fx.CoupledShaft(inertia=0.0, viscous=0.0, coulomb=0.0),
     fx.UnlistedSignedSine(amplitude=0.0),
     fx.UnlistedSwingingViscous(viscous=0.0),
 ]
