@@ -26,6 +26,12 @@ def simulate(
             "direction=0/0/1,link=LINK; recording=NAME in that recording only. May be repeated.",
         ),
     ] = None,
+    link_encoder: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--link-encoder", metavar="JOINT", help="Joint with a second encoder behind its gear; repeatable."
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of noise and encoder zero.")] = 0,
     repetitions: Annotated[int, typer.Option(min=1, help="Recordings of each trajectory.")] = 1,
     output: Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the recordings.")] = Path("."),
@@ -42,6 +48,8 @@ def simulate(
     arm = virtual_arm(load_robot(robot))
     effects = [parse_effect(text) for text in effect or ()]
     motions = [named_motion(word, arm.robot) for word in trajectory]
+    for joint in link_encoder or ():
+        arm.joint_index(joint)
     made = [f"{motion.name}_{run}" for motion in motions for run in range(1, repetitions + 1)]
     for each in effects:
         if each.recording not in (None, *made):
@@ -52,7 +60,9 @@ def simulate(
             for repetition in range(1, repetitions + 1):
                 done = (place * repetitions + repetition - 1) / (len(motions) * repetitions)
                 work(f"simulating {motion.name}, run {repetition}", done)
-                result = simulate_run(arm, motion, effects=effects, seed=seed, repetition=repetition)
+                result = simulate_run(
+                    arm, motion, effects=effects, seed=seed, repetition=repetition, link_encoders=link_encoder or ()
+                )
                 with written_together(output) as folder:
                     path = write_simulation(result, folder)
                 console.written(output, path.name)

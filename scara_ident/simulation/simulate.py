@@ -108,6 +108,7 @@ def simulate(
     averaged: bool = False,
     substeps: int | None = None,
     record_velocity: bool = False,
+    link_encoders: Sequence[str] = (),
     noise: TorqueNoise = WHITE,
     run: RunState | None = None,
 ) -> SimulationResult:
@@ -138,6 +139,8 @@ def simulate(
         Integration steps per period of the controller; by default 4, more where an elastic joint needs them.
     record_velocity : bool
         Whether the recording has the velocity that the controller saw.
+    link_encoders : sequence of str
+        Joints with a second encoder behind the gear, of the same resolution at the joint and with a zero of its own.
     noise : TorqueNoise
         Its distribution; its standard deviation is the arm's.
     run : RunState, optional
@@ -194,8 +197,22 @@ def simulate(
         position=np.ascontiguousarray(measured[:, ::ticks]),
         effort=effort,
         velocity=np.ascontiguousarray(seen[:, ::ticks]) if record_velocity else None,
+        link_position=_link_position(arm, true, link_encoders, [seed, repetition, zlib.crc32(name.encode())]),
     )
     return SimulationResult(arm, own, wanted, recording, true, seed, repetition, rate, steps, stops)
+
+
+def _link_position(arm: VirtualArm, true: TrueMotion, joints: Sequence[str], seed: list[int]) -> Array | None:
+    """Return what second encoders read, shape (n, N), NaN for joints without one; None where there is none."""
+    if not joints:
+        return None
+    zero = np.random.default_rng(seed).uniform(size=arm.robot.n)
+    read = np.full(true.link_position.shape, np.nan)
+    for j in map(arm.joint_index, joints):
+        grid = arm.encoder_resolution[j]
+        link = true.link_position[j]
+        read[j] = grid * np.floor(link / grid + zero[j]) if grid > 0.0 else link
+    return read
 
 
 def free_motion(
