@@ -38,13 +38,15 @@ class CoupledShaft(Effect):
     sign: float = 1.0
 
     def sizes(self, arm: VirtualArm, joint: int) -> Mapping[str, float | Vector]:
-        """Give a third of the joint's rotor and friction, or shares of its torque where it has none."""
-        size = abs(float(arm.scale[joint]))
-        scale = size * float(arm.torque_scale[joint])
+        """Give a third of rotor and friction of the joint that has less, or shares of its torque where it has none."""
+        n = arm.robot.n
+        pair = [joint, joint + 1 if joint + 1 < n else max(joint - 1, 0)]
+        size = np.abs(arm.scale[pair])
+        scale = float(np.min(size * arm.torque_scale[pair]))
         return {
-            "inertia": float(0.3 * arm.armature[joint] or 0.01 * scale),
-            "viscous": float(0.3 * size * arm.friction[joint, 1] or 0.02 * scale),
-            "coulomb": float(0.3 * size * arm.friction[joint, 0] or 0.02 * scale),
+            "inertia": float(0.3 * arm.armature[pair].min() or 0.01 * scale),
+            "viscous": float(0.3 * np.min(size * arm.friction[pair, 1]) or 0.02 * scale),
+            "coulomb": float(0.3 * np.min(size * arm.friction[pair, 0]) or 0.02 * scale),
         }
 
     def first_choice(self, arm: VirtualArm) -> str:
