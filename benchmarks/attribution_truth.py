@@ -64,6 +64,7 @@ def one_set(kind: str, seed: int, robot: str, asked: Asked, limit: int) -> Item:
             "factors": list(made.factors),
             "conditions": made.conditions.as_dict(),
             "true": was["effects"],
+            "true_events": was.get("events", []),
             "simulated_seconds": time.perf_counter() - began,
             "found": [],
             "tentative": [],
@@ -107,6 +108,7 @@ def _compared(result: Diagnosis, made: VirtualSet, was: Item) -> Item:
             for effect in getattr(result, "tentative", ())
         ],
         "corrected": _corrected(result),
+        "events": told.get("events", []),
         "unexplained": told["unexplained"] and told["unexplained"]["joint"],
         "band": list(told["band_hz"].values()),
         "noise": told["noise_floor"],

@@ -120,7 +120,7 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Asked:
-    """Conditions that are asked for instead of drawn; None is drawn."""
+    """Conditions that are asked for instead of drawn; None is drawn. Events are there only where they are asked for."""
 
     rate: float | None = None
     bits: int | None = None
@@ -133,6 +133,7 @@ class Asked:
     motions: int | None = None
     duration: tuple[float, float] | None = None
     varied: bool | None = None
+    events: bool = False
 
 
 def draw_conditions(rng: np.random.Generator, asked: Asked) -> Conditions:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -23,6 +23,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 from virtual_conditions import Asked, Conditions, Noise, Start, draw_conditions, draw_lead, draw_states
+from virtual_events import draw_events, event_truth
 from virtual_motions import after_rest, random_motion
 
 from scara_ident.errors import ScaraIdentError
@@ -101,6 +102,8 @@ class VirtualSet:
     states: Sequence[RunState]
     training: Sequence[Recording]
     held_out: Sequence[Recording]
+    # Only where they are asked for.
+    events: Sequence[dict[str, Any]] | None = None
 
     def truth(self) -> dict[str, Any]:
         """Return what the arm was, and how each recording differed from it."""
@@ -114,7 +117,9 @@ class VirtualSet:
             }
             for recording, state in zip((*self.training, *self.held_out), self.states, strict=True)
         ]
-        was = {"kind": self.kind, "seed": self.seed, "factors": list(self.factors)}
+        was: dict[str, Any] = {"kind": self.kind, "seed": self.seed, "factors": list(self.factors)}
+        if self.events is not None:
+            was["events"] = self.events
         return was | {"conditions": self.conditions.as_dict(), "runs": runs} | truth(self.arm, self.effects)
 
 
@@ -247,7 +252,7 @@ def simulate_set(
     given : sequence of Effect
         Instead of drawn ones.
     """
-    arms, sorts, sizes, moves, states = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5))
+    arms, sorts, sizes, moves, states, meets = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(6))
     conditions = draw_conditions(sorts, asked)
     arm, described = random_arm(robot, conditions.stated, conditions.bits, folder, arms)
     effects, factors = (list(given), [1.0] * len(given)) if given else pick_effects(kind, arm, sizes)
@@ -260,9 +265,11 @@ def simulate_set(
     arm = replace(arm, torque_noise=conditions.noise * usual)
     drawn = draw_states(states, arm, conditions, usual)
     leads = [draw_lead(states, conditions) for _ in conditions.runs]
+    moved = [after_rest(motions[run.motion], lead) for run, lead in zip(conditions.runs, leads, strict=True)]
+    met = draw_events(meets, arm, moved) if asked.events else [()] * len(moved)
     for _ in range(ATTEMPTS):
         try:
-            recordings = _recorded(arm, motions, conditions, effects, drawn, leads, seed)
+            recordings, events = _recorded(arm, moved, conditions, effects, drawn, met, seed)
             break
         except ScaraIdentError as error:
             # An elastic joint may be more than a fast controller can hold, as on a real arm: then a slower one is taken.
@@ -271,30 +278,32 @@ def simulate_set(
         raise lost
     count = sum(not run.held_out for run in conditions.runs)
     return VirtualSet(
-        kind, seed, arm, described, effects, factors, conditions, drawn, recordings[:count], recordings[count:]
-    )
+        kind, seed, arm, described, effects, factors, conditions, drawn, recordings[:count], recordings[count:],
+        events if asked.events else None,
+    )  # fmt: skip
 
 
 def _recorded(
     arm: VirtualArm,
-    motions: Mapping[int, ReferenceMotion],
+    moved: Sequence[ReferenceMotion],
     conditions: Conditions,
     effects: Sequence[Effect],
     drawn: Sequence[RunState],
-    leads: Sequence[float],
+    met: Sequence[Sequence[Effect]],
     seed: int,
-) -> list[Recording]:
+) -> tuple[list[Recording], list[dict[str, Any]]]:
     noise = TorqueNoise(conditions.noise_kind, conditions.correlation_time)
-    recordings = []
-    for k, (run, state, lead) in enumerate(zip(conditions.runs, drawn, leads, strict=True)):
+    recordings, events = [], []
+    for k, (run, state, motion, own) in enumerate(zip(conditions.runs, drawn, moved, met, strict=True)):
         result = simulate(
-            arm, after_rest(motions[run.motion], lead), effects=effects, seed=seed, repetition=run.repetition,
+            arm, motion, effects=[*effects, *own], seed=seed, repetition=run.repetition,
             rate=conditions.rate, ticks=conditions.ticks, averaged=conditions.averaged, noise=noise, run=state,
         )  # fmt: skip
         name = f"run_{k + 1:02d}" if conditions.numbered else result.recording.name
         trajectory, repetition = split_name(name)
         recordings.append(replace(result.recording, name=name, trajectory=trajectory, repetition=repetition))
-    return recordings
+        events += [event_truth(arm, event, result, name) for event in own]
+    return recordings, events
 
 
 def _faster(control: Controller, factor: float) -> Controller:
@@ -343,6 +352,7 @@ def add_conditions(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--motions", type=int, help="number of different ones among them")
     parser.add_argument("--duration", type=float, nargs=2, help="s, least and most")
     parser.add_argument("--varied", action=argparse.BooleanOptionalAction, help="whether runs differ")
+    parser.add_argument("--events", action="store_true", help="pushes and a payload in some recordings")
 
 
 def asked_for(options: argparse.Namespace) -> Asked:

@@ -92,3 +92,54 @@ def test_runs_differ_only_where_they_are_said_to(sets: ModuleType, tmp_path: Pat
         assert np.all(np.abs(np.array(run["friction"]) - 1.0) <= size["friction"])
         assert np.all(np.abs(np.array(run["torque_scale"]) - 1.0) <= size["scale"])
         assert 0.0 <= run["delay"] <= size["delay"]
+
+
+@pytest.mark.parametrize("robot", ["scara03", "ur5"])
+def test_events_change_no_other_draw_and_are_told(sets: ModuleType, tmp_path: Path, robot: str) -> None:
+    plain, met = (
+        sets.simulate_set("none", 7, robot, tmp_path / str(events), small(sets, recordings=3, events=events))
+        for events in (False, True)
+    )
+    was = met.truth()
+    events = was.pop("events")
+    assert was == plain.truth()
+    assert events
+    touched = {event["recording"] for event in events}
+    for one, other in zip((*plain.training, *plain.held_out), (*met.training, *met.held_out), strict=True):
+        assert (one.name in touched) != np.array_equal(one.effort, other.effort)
+    for event in events:
+        (recording,) = [each for each in (*met.training, *met.held_out) if each.name == event["recording"]]
+        (before,) = [each for each in (*plain.training, *plain.held_out) if each.name == event["recording"]]
+        assert 0.0 <= event["from"] < event["to"] <= recording.time[-1]
+        changed = np.abs(recording.effort - before.effort)
+        first = recording.time[np.flatnonzero(changed.max(axis=0) > 0.0)[0]]
+        assert first >= min(each["from"] for each in events if each["recording"] == recording.name) - 0.01
+        assert max(event["rms"].values()) > 0.0
+        if event["kind"] == "push":
+            assert 5.0 <= event["parameters"]["force"] <= 30.0
+
+
+def test_the_torque_of_an_event_is_what_the_closed_loop_gives(sets: ModuleType, tmp_path: Path) -> None:
+    import virtual_events
+
+    from scara_ident.simulation import ideal, simulate
+    from tests.simulation.made import left_over, swing
+
+    arm = ideal(virtual_arm(load_robot("ur5")))
+    rng = np.random.default_rng(5)
+    motion = swing(arm.robot, 4.0, 0.2)
+    kinds = set()
+    for events in virtual_events.draw_events(rng, arm, [motion] * 6):
+        for effect in events:
+            if effect.name in kinds:
+                continue
+            kinds.add(effect.name)
+            result = simulate(arm, motion, effects=[effect])
+            told = virtual_events.event_truth(arm, effect, result, "swing")
+            time = result.recording.time
+            inside = (time >= told["from"]) & (time <= told["to"])
+            extra = left_over(arm, result.true)[:, inside]
+            rms = np.sqrt(np.nanmean(extra**2, axis=1))
+            # The edges of a push are counted with its full force.
+            np.testing.assert_allclose(list(told["rms"].values()), rms, rtol=0.15, atol=0.05)
+    assert "push" in kinds

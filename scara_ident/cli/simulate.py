@@ -19,30 +19,50 @@ def simulate(
     robot: options.Robot = None,
     effect: Annotated[
         list[str] | None,
-        typer.Option("--effect", metavar="NAME[:JOINT][:KEY=VALUE,..]", help="Effect to switch on; may be repeated."),
+        typer.Option(
+            "--effect",
+            metavar="NAME[:JOINT][:KEY=VALUE,..]",
+            help="Effect to switch on, such as spring:joint2:stiffness=0.05 or push:force=20,from=4.2,duration=0.8,"
+            "direction=0/0/1,link=LINK; recording=NAME in that recording only. May be repeated.",
+        ),
+    ] = None,
+    link_encoder: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--link-encoder", metavar="JOINT", help="Joint with a second encoder behind its gear; repeatable."
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of noise and encoder zero.")] = 0,
     repetitions: Annotated[int, typer.Option(min=1, help="Recordings of each trajectory.")] = 1,
     output: Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the recordings.")] = Path("."),
 ) -> None:
     """Record the virtual arm in closed loop, with what it really was in a JSON beside."""
+    from scara_ident.errors import UsageError
     from scara_ident.files import check_output, written_together
     from scara_ident.robot.robot import load_robot
     from scara_ident.simulation import parse_effect, virtual_arm, write_simulation
-    from scara_ident.simulation import simulate as run
+    from scara_ident.simulation import simulate as simulate_run
     from scara_ident.simulation.named import named_motion
 
     check_output(output)
     arm = virtual_arm(load_robot(robot))
     effects = [parse_effect(text) for text in effect or ()]
     motions = [named_motion(word, arm.robot) for word in trajectory]
+    for joint in link_encoder or ():
+        arm.joint_index(joint)
+    made = [f"{motion.name}_{run}" for motion in motions for run in range(1, repetitions + 1)]
+    for each in effects:
+        if each.recording not in (None, *made):
+            raise UsageError(f"{each.name}: no recording {each.recording!r}; there will be {', '.join(made)}")
     console = output_console()
     with progress() as work:
         for place, motion in enumerate(motions):
             for repetition in range(1, repetitions + 1):
                 done = (place * repetitions + repetition - 1) / (len(motions) * repetitions)
                 work(f"simulating {motion.name}, run {repetition}", done)
-                result = run(arm, motion, effects=effects, seed=seed, repetition=repetition)
+                result = simulate_run(
+                    arm, motion, effects=effects, seed=seed, repetition=repetition, link_encoders=link_encoder or ()
+                )
                 with written_together(output) as folder:
                     path = write_simulation(result, folder)
                 console.written(output, path.name)

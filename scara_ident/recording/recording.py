@@ -18,7 +18,7 @@ from scara_ident.errors import RecordingError, UsageError
 from scara_ident.recording.audit import Finding, Samples, audit
 from scara_ident.recording.files import IMPORTERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
-from scara_ident.robot.signal_map import Channel, Channels, contract_channels
+from scara_ident.robot.signal_map import SIGNALS, Channel, Channels, contract_channels
 
 if TYPE_CHECKING:
     from scara_ident.robot.robot import Robot
@@ -50,6 +50,8 @@ class Recording:
         As recorded, in rad/s (m/s) and rad/s^2 (m/s^2); None where they are absent for any joint.
     temperature : ndarray, shape (n, N), or None
         In deg C.
+    link_position : ndarray, shape (n, N), or None
+        Of a second encoder behind the gear, in rad or m; NaN for a joint without one, None where there is none.
     findings : tuple of Finding
         What the audit saw in the file and did about it.
     path : Path or None
@@ -71,15 +73,15 @@ class Recording:
     velocity: Array | None = None
     acceleration: Array | None = None
     temperature: Array | None = None
+    link_position: Array | None = None
     findings: tuple[Finding, ...] = ()
     path: Path | None = None
 
     def __post_init__(self) -> None:
         source = self.path or self.name
         shape = (len(self.joints), len(self.time))
-        for name in ("position", "effort", *OPTIONAL):
-            signal = getattr(self, name)
-            if signal is not None and np.shape(signal) != shape:
+        for name in SIGNALS:
+            if (signal := getattr(self, name)) is not None and np.shape(signal) != shape:
                 raise RecordingError(f"{source}: {name} has shape {np.shape(signal)}, joints and time ask for {shape}")
         if not np.all(np.diff(self.time) > 0):
             raise RecordingError(f"{source}: time is not strictly increasing")
@@ -137,7 +139,8 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
     needed = [channels.time, *channels.position, *(channels.effort if need_effort else ())]
     _refuse_missing(path, names, [channel.column for channel in needed], channels)
     optional, findings = _optional_channels(path, channels, names, () if need_effort else ("effort",))
-    wanted = [channel.column for channel in (*needed, *chain.from_iterable(optional.values()))]
+    second = {k: place for k, place in enumerate(channels.link_position) if place.column in names}
+    wanted = [channel.column for channel in (*needed, *chain.from_iterable(optional.values()), *second.values())]
     columns = read_columns(path, wanted, channels.topic)
     if shares_clock(path, channels.time.column):
         columns = _rows_of_the_arm(columns, [channel.column for channel in needed[1:]])
@@ -163,6 +166,9 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
             signals[signal] = values
         else:
             findings.append(_lacking(samples, signal, [channel.column for channel in places], values))
+    if second:
+        signals["link_position"] = link = np.full_like(samples.position, np.nan)
+        link[list(second)] = rows(list(second.values()))[:, samples.row - 1]
     if signals["effort"] is not None:
         signals["effort"] = signals["effort"] * robot.effort_gain[:, None]
 
@@ -266,13 +272,13 @@ def write_recording(recording: Recording, path: Path | str, *, effort_gain: Arra
         Another suffix, or a place that cannot be written to.
     """
     columns = {"time": recording.time}
-    for signal in ("position", "velocity", "acceleration", "effort", "temperature"):
-        values = getattr(recording, signal)
-        if values is None:
+    for signal in SIGNALS:
+        if (values := getattr(recording, signal)) is None:
             continue
         if signal == "effort" and effort_gain is not None:
             values = values / np.asarray(effort_gain, dtype=float)[:, None]
-        columns |= {f"{joint}.{signal}": row for joint, row in zip(recording.joints, values, strict=True)}
+        there = zip(recording.joints, values, strict=True)
+        columns |= {f"{joint}.{signal}": row for joint, row in there if not np.isnan(row).all()}
     write_columns(Path(path), columns)
 
 
@@ -339,8 +345,7 @@ def _optional_channels(
 
 
 def _lacking(samples: Samples, signal: str, names: Sequence[str], values: Array) -> Finding:
-    lacking = ~np.isfinite(values)
-    joint = int(np.argmax(lacking.any(axis=1)))
+    joint = int(np.argmax((lacking := ~np.isfinite(values)).any(axis=1)))
     said = (
         f"{names[joint]} is empty, NaN or infinite in {int(lacking[joint].sum())} of {samples.count} rows, "
         f"first in {samples.where(int(np.argmax(lacking[joint])))}: the {signal} columns are not used"

@@ -141,6 +141,7 @@ class RecordingDescription(BaseModel):
     acceleration: MotionDescription | None = None
     effort: SignalDescription | None = None
     temperature: SignalDescription | None = None
+    link_position: MotionDescription | None = None
 
 
 class RobotDescription(BaseModel):

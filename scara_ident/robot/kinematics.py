@@ -49,7 +49,7 @@ def tool_frame(robot: Robot, link: str | None = None) -> pin.Frame:
     found = next((frame for frame in bodies if frame.name == link), None)
     if found is None:
         names = ", ".join(frame.name for frame in bodies)
-        raise RobotError(f"{robot.urdf}: no link {link!r} for the tool; it has {names}")
+        raise RobotError(f"{robot.urdf}: no link {link!r}; it has {names}")
     if found.parentJoint == 0:
         raise RobotError(f"{robot.urdf}: no identified joint moves {link!r}; name a link that moves")
     return found

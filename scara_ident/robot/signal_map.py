@@ -13,7 +13,7 @@ from scara_ident.errors import RobotError
 from scara_ident.robot.description import MotionDescription, RecordingDescription, SignalDescription, TimeDescription
 from scara_ident.robot.units import COUNT, Unit, find_unit, table_of
 
-SIGNALS = ("position", "velocity", "acceleration", "effort", "temperature")
+SIGNALS = ("position", "velocity", "acceleration", "effort", "temperature", "link_position")
 # What a pattern may hold: the joint's name, its place in the robot description from 0, and from 1.
 PLACEHOLDERS = ("{joint}", "{index}", "{number}")
 
@@ -40,7 +40,7 @@ class Channels:
     Attributes
     ----------
     time : Channel
-    position, velocity, acceleration, effort, temperature : tuple of Channel
+    position, velocity, acceleration, effort, temperature, link_position : tuple of Channel
         One for each joint, in the robot's order. Efforts are converted to N m (N), or to A where a gain makes torque
         of them.
     declared : frozenset of str
@@ -55,6 +55,7 @@ class Channels:
     acceleration: tuple[Channel, ...]
     effort: tuple[Channel, ...]
     temperature: tuple[Channel, ...]
+    link_position: tuple[Channel, ...]
     declared: frozenset[str] = frozenset()
     topic: str | None = None
 
@@ -133,6 +134,7 @@ def _channels(
         acceleration=signals["acceleration"],
         effort=signals["effort"],
         temperature=signals["temperature"],
+        link_position=signals["link_position"],
         declared=declared,
         topic=topic,
     )

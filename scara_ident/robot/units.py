@@ -65,7 +65,7 @@ def table_of(signal: str, *, linear: bool) -> Mapping[str, Unit]:
 
     Parameters
     ----------
-    signal : {"time", "position", "velocity", "acceleration", "effort", "temperature"}
+    signal : {"time", "position", "velocity", "acceleration", "effort", "temperature", "link_position"}
     linear : bool
         Whether the numbers are lengths and forces, not angles and torques.
     """
@@ -76,6 +76,7 @@ def table_of(signal: str, *, linear: bool) -> Mapping[str, Unit]:
         "acceleration": (ANGLE_ACCELERATION, LENGTH_ACCELERATION),
         "effort": (TORQUE, FORCE),
         "temperature": (TEMPERATURE, TEMPERATURE),
+        "link_position": (ANGLE, LENGTH),
     }
     return tables[signal][linear]
 

@@ -168,7 +168,6 @@ class VirtualArm:
             "friction": size[:, None] * self.friction[back],
             "constant": draft.scale * self.torque_offset[back],
         }
-        draft.arrays["bodies_after"] = draft.arrays["bodies"].copy()
         draft.sensors["resolution"] = self.encoder_resolution[back]
         draft.sensors["torque_limit"] = robot.effort_limit[back]
         return draft

@@ -13,7 +13,7 @@ from numba import njit
 P = ParamSpec("P")
 R = TypeVar("R")
 
-SOURCES = ("compiled.py", "spatial.py", "plant.py", "forces.py", "integrate.py", "loop.py")
+SOURCES = ("compiled.py", "spatial.py", "plant.py", "external.py", "forces.py", "integrate.py", "loop.py")
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:

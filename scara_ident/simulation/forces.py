@@ -4,7 +4,7 @@ Every joint has one drive coordinate (the motor, seen through the gear) and one 
 unless the joint is elastic. With the torque ``load`` that goes through the gear to the link,
 
     drive  = armature x acceleration + dry x direction + smooth + loss(load, direction) x load
-    load   = (M(q) acceleration + h(q, v)) of the link.
+    load   = (M(q) acceleration + h(q, v) - J(q)^T force from outside) of the link.
 
 Where a joint slides its direction is +1 or -1; where it stands still it sticks as long as the friction that holds it
 stays within its bounds, which makes the contact a linear complementarity problem coupled by M.
@@ -18,6 +18,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
+from scara_ident.simulation.external import push, shaft_friction, shaft_inertia, slid
 from scara_ident.simulation.plant import Plant
 from scara_ident.simulation.spatial import dynamics
 
@@ -25,7 +26,8 @@ from scara_ident.simulation.spatial import dynamics
 class State(NamedTuple):
     """Positions and velocities of links (q, v) and drives (theta, omega), sliding modes and presliding states.
 
-    A drive slides in the direction of its mode, +1 or -1, and sticks where that is 0.
+    A drive slides in the direction of its mode, +1 or -1, and sticks where that is 0. Presliding states are those of the
+    drives and then of the shafts.
     """
 
     q: Array
@@ -53,6 +55,8 @@ class Room(NamedTuple):
     load: Array
     spring: Array
     sign: Array
+    force: Array
+    bodies: Array
 
 
 def make_room(n: int) -> Room:
@@ -60,7 +64,7 @@ def make_room(n: int) -> Room:
     v = [np.zeros(n) for _ in range(8)]
     return Room(
         np.zeros((n, n)), v[0], np.empty((n, 9)), np.empty((n, 3)), np.empty((n, 15)), np.empty((n, 10)),
-        np.zeros((n, n)), v[1], v[2], v[3], v[4], v[5], v[6], v[7],
+        np.zeros((n, n)), v[1], v[2], v[3], v[4], v[5], v[6], v[7], np.zeros((n, 3)), np.zeros((n, 10)),
     )  # fmt: skip
 
 
@@ -117,9 +121,7 @@ def _friction(plant: Plant, room: Room, t: float, x: State, start: Array) -> Non
         side = mode[j] if plant.direction_matters[j] else np.sign(w)
         if plant.presliding[j] > 0.0:
             # The exact solution of Dahl's equation over the way gone since the step began.
-            way = theta[j] - start[j]
-            end = 1.0 if way > 0.0 else (-1.0 if way < 0.0 else 0.0)
-            room.direction[j] = end - (end - dahl[j]) * np.exp(-abs(way) / plant.presliding[j])
+            room.direction[j] = slid(dahl[j], theta[j] - start[j], plant.presliding[j])
         else:
             room.direction[j] = side
         f = plant.friction[j]
@@ -146,6 +148,7 @@ def _friction(plant: Plant, room: Room, t: float, x: State, start: Array) -> Non
                 w = omega[k]
                 side = mode[k] if plant.direction_matters[k] else np.sign(w)
                 room.smooth[j] += plant.coupling_viscous[j, k] * w + plant.coupling_coulomb[j, k] * side
+    shaft_friction(plant, theta, omega, start, dahl[n:], room.smooth)
     for i in range(plant.ripple_joint.shape[0]):
         j = plant.ripple_joint[i]
         angle = plant.ripple_order[i] * theta[j] + plant.ripple_phase[i]
@@ -181,11 +184,12 @@ def accelerate(
     """
     q, v, theta, omega, mode = x.q, x.v, x.theta, x.omega, x.mode
     n = q.shape[0]
-    bodies = plant.bodies if t < plant.payload_time else plant.bodies_after
     dynamics(
-        plant.parent, plant.prismatic, plant.rotation, plant.offset, bodies, plant.gravity,
+        plant.parent, plant.prismatic, plant.rotation, plant.offset, room.bodies, plant.gravity,
         q, v, room.mass, room.bias, room.e, room.p, room.state, room.composite,
     )  # fmt: skip
+    shaft_inertia(plant, room.mass)
+    push(plant, t, room.e, room.p, room.force, room.bias)
     _friction(plant, room, t, x, start)
     lossy = False
     for j in range(n):

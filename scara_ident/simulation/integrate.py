@@ -8,6 +8,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
+from scara_ident.simulation.external import SHAFT_WAY, carry, slid
 from scara_ident.simulation.forces import Room, State, accelerate, settle
 from scara_ident.simulation.plant import Plant
 
@@ -26,9 +27,10 @@ class Stages(NamedTuple):
     new: State
 
 
-def make_state(n: int) -> State:
+def make_state(n: int, shafts: int = 0) -> State:
     """Allocate a state at rest."""
-    return State(*(np.zeros(n) for _ in range(6)))
+    q, v, theta, omega, mode = np.zeros((5, n))
+    return State(q, v, theta, omega, mode, np.zeros(n + shafts))
 
 
 def make_stages(x: State) -> Stages:
@@ -72,8 +74,9 @@ def _runge_kutta(plant: Plant, room: Room, x: State, s: Stages, t: float, h: flo
 
 @compiled
 def first_stage(plant: Plant, room: Room, x: State, s: Stages, t: float, drive: Array) -> None:
-    """Fill stage 0 at the state itself, after deciding which standing joints stick."""
+    """Fill stage 0 at the state itself, after deciding what is carried and which standing joints stick."""
     n = x.q.shape[0]
+    carry(plant, t, room.bodies)
     standing = False
     for j in range(n):
         if plant.direction_matters[j]:
@@ -155,11 +158,13 @@ def step(plant: Plant, room: Room, x: State, s: Stages, t: float, h: float, driv
                 accelerate(plant, room, t, x, x.theta, drive, s.a[0], s.alpha[0])
                 continue
             stopping, taken = _instant_of_stop(plant, room, x, s, t, left, drive, stopping)
+        for k in range(plant.shaft_joint.shape[0]):
+            i, j = plant.shaft_joint[k], plant.shaft_other[k]
+            way = s.new.theta[i] - x.theta[i] + plant.shaft_sign[k] * (s.new.theta[j] - x.theta[j])
+            x.dahl[n + k] = slid(x.dahl[n + k], way, SHAFT_WAY)
         for j in range(n):
             if plant.presliding[j] > 0.0:
-                way = s.new.theta[j] - x.theta[j]
-                end = 1.0 if way > 0.0 else -1.0
-                x.dahl[j] = end - (end - x.dahl[j]) * np.exp(-abs(way) / plant.presliding[j])
+                x.dahl[j] = slid(x.dahl[j], s.new.theta[j] - x.theta[j], plant.presliding[j])
             turned = plant.direction_matters[j] and s.new.omega[j] * x.mode[j] < 0.0
             x.q[j], x.v[j], x.theta[j], x.omega[j] = s.new.q[j], s.new.v[j], s.new.theta[j], s.new.omega[j]
             if j == stopping or turned:

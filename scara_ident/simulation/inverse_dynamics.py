@@ -10,11 +10,15 @@ from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.reference import ReferenceMotion
 
 
-def torque_at_start(arm: VirtualArm, motion: ReferenceMotion) -> Array:
-    """Return the torque of the arm without effects at the first sample, at the joint; at rest it is gravity's alone."""
+def torque_at_start(arm: VirtualArm, motion: ReferenceMotion, bodies: Array | None = None) -> Array:
+    """Return the torque of the arm without effects at the first sample, at the joint; at rest it is gravity's alone.
+
+    ``bodies``, shape (n, 10), stand for the arm's own where it carries something.
+    """
     v = motion.velocity[:, 0]
     a = np.where(v != 0.0, motion.acceleration[:, 0], 0.0)
-    return inverse_dynamics(arm, arm.bodies, motion.position[:, :1], v[:, None], a[:, None])[:, 0]
+    bodies = arm.bodies if bodies is None else bodies
+    return inverse_dynamics(arm, bodies, motion.position[:, :1], v[:, None], a[:, None])[:, 0]
 
 
 def nominal_torque(arm: VirtualArm, motion: ReferenceMotion) -> Array:

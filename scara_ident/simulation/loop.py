@@ -8,6 +8,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import compiled
+from scara_ident.simulation.external import SAME, until_change
 from scara_ident.simulation.forces import Room, State, make_room
 from scara_ident.simulation.integrate import Stages, first_stage, make_stages, make_state, step
 from scara_ident.simulation.plant import Plant, Sensors
@@ -125,7 +126,15 @@ def _track(
                     out.mode[k, j] = x.mode[j]
                 if k == samples - 1:
                     break
-            events += step(plant, room, x, s, now, h, drive)
+            left = h
+            while True:
+                part = until_change(plant, now, left)
+                events += step(plant, room, x, s, now, part, drive)
+                left -= part
+                if left <= SAME * h:
+                    break
+                now += part
+                first_stage(plant, room, x, s, now, drive)
         if not np.all(np.isfinite(x.theta)):
             return k
     return -1 - events
@@ -172,7 +181,7 @@ def track(
         How often a joint stopped; negative is -1 - the sample at which the motion became infinite.
     """
     samples, n = feed.shape
-    x = make_state(n)
+    x = make_state(n, len(plant.shaft_joint))
     for target, value in zip(x[:4], initial, strict=True):
         target[:] = value
     out = make_trace(samples, n)

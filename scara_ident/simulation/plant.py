@@ -14,6 +14,15 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 
+# What a joint may have several of -> lengths of their values, 0 for a number. The force of a push is in the base frame, its
+# point in the turned frame of its joint, its times are begin, end and length of the edges.
+FAMILIES: dict[str, dict[str, int]] = {
+    "ripple": {"order": 0, "amplitude": 0, "phase": 0},
+    "vibration": {"frequency": 0, "amplitude": 0, "phase": 0},
+    "shaft": {"other": 0, "sign": 0, "inertia": 0, "viscous": 0, "coulomb": 0},
+    "push": {"point": 3, "force": 3, "time": 3},
+}
+
 
 class Plant(NamedTuple):
     """Arrays of the compiled loop; see `PlantDraft` for their meaning."""
@@ -58,8 +67,18 @@ class Plant(NamedTuple):
     signed_sine_of: NDArray[np.int64]
     swinging_viscous: Array
     swinging_viscous_of: NDArray[np.int64]
-    payload_time: float
-    bodies_after: Array
+    payload_body: Array
+    payload_span: Array
+    shaft_joint: NDArray[np.int64]
+    shaft_other: NDArray[np.int64]
+    shaft_sign: Array
+    shaft_inertia: Array
+    shaft_viscous: Array
+    shaft_coulomb: Array
+    push_joint: NDArray[np.int64]
+    push_point: Array
+    push_force: Array
+    push_time: Array
 
 
 class Sensors(NamedTuple):
@@ -118,12 +137,16 @@ class PlantDraft:
         """Return an array of the plant, or of the torque's measurement."""
         return self.arrays[name] if name in self.arrays else np.asarray(getattr(self, name))
 
-    def append(self, family: str, joint: int, *values: float) -> None:
-        """Append a row to ``ripple`` or ``vibration``."""
-        names = ("joint", "order" if family == "ripple" else "frequency", "amplitude", "phase")
-        for name, value in zip(names, (joint, *values), strict=True):
+    def carry(self, body: Array, span: Array) -> None:
+        """Add a payload to the last body: standard parameters in its turned frame, when it comes and when it goes, s."""
+        self.arrays["payload_body"] = np.vstack([self.arrays["payload_body"], body])
+        self.arrays["payload_span"] = np.vstack([self.arrays["payload_span"], span])
+
+    def append(self, family: str, joint: int, *values: float | Array) -> None:
+        """Append a row to a family of `FAMILIES`, with its values in that order."""
+        for name, value in zip(("joint", *FAMILIES[family]), (joint, *values), strict=True):
             key = f"{family}_{name}"
-            self.arrays[key] = np.append(self.arrays[key], value)
+            self.arrays[key] = np.concatenate([self.arrays[key], np.array([value], dtype=float)])
 
     def plant(self) -> Plant:
         """Freeze the plant."""
@@ -137,15 +160,21 @@ class PlantDraft:
         )
         seen = np.any(a["coupling_coulomb"] != 0.0, axis=0)
         matters = (dry & (a["presliding"] == 0.0)) | (seen & (a["presliding"] == 0.0))
-        integers = {"parent", "ripple_joint", "vibration_joint", "signed_sine_of", "swinging_viscous_of"}
+        integers = {
+            "parent",
+            "shaft_other",
+            "signed_sine_of",
+            "swinging_viscous_of",
+            *(f"{name}_joint" for name in FAMILIES),
+        }
         flags = {"prismatic", "elastic"}
         values: dict[str, Any] = {}
         for name in Plant._fields:
-            if name in ("coupled", "direction_matters", "payload_time"):
+            if name in ("coupled", "direction_matters"):
                 continue
             kind = np.int64 if name in integers else np.bool_ if name in flags else np.float64
             values[name] = np.ascontiguousarray(a[name], dtype=kind)
-        return Plant(**values, coupled=coupled, direction_matters=matters, payload_time=float(a["payload_time"]))
+        return Plant(**values, coupled=coupled, direction_matters=matters)
 
     def sensing(self) -> Sensors:
         """Freeze the sensors."""
@@ -155,7 +184,6 @@ class PlantDraft:
 def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
     """Return a draft with no effect and no bodies; the arm fills in the rest."""
     zero = np.zeros(n)
-    none = np.zeros(0)
     per_joint = (
         "constant stribeck_amplitude asymmetry presliding warm_share position_share position_phase spring "
         "spring_rest elastic stiffness damping width signed_sine swinging_viscous"
@@ -164,9 +192,10 @@ def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
     arrays |= {name: np.ones(n) for name in ("stribeck_velocity", "warm_time", "efficiency")}
     arrays |= {name: np.zeros((n, n)) for name in ("coupling_viscous", "coupling_coulomb")}
     arrays |= {name: zero.copy() for name in ("signed_sine_of", "swinging_viscous_of")}
-    for family, second in (("ripple", "order"), ("vibration", "frequency")):
-        arrays |= {f"{family}_{name}": none.copy() for name in ("joint", second, "amplitude", "phase")}
-    arrays["payload_time"] = np.array(np.inf)
+    for family, lengths in FAMILIES.items():
+        arrays[f"{family}_joint"] = np.zeros(0)
+        arrays |= {f"{family}_{name}": np.zeros((0, length) if length else 0) for name, length in lengths.items()}
+    arrays |= {"payload_body": np.zeros((0, 10)), "payload_span": np.zeros((0, 2))}
     sensors = {name: zero.copy() for name in ("eccentricity", "eccentricity_order", "eccentricity_phase", "shift")}
     return PlantDraft(
         n=n,

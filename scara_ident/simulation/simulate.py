@@ -13,6 +13,7 @@ from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
+from scara_ident.simulation.effects.structure import Payload
 from scara_ident.simulation.inverse_dynamics import nominal_torque, torque_at_start
 from scara_ident.simulation.plant import PlantDraft
 from scara_ident.simulation.reference import ReferenceMotion
@@ -107,6 +108,7 @@ def simulate(
     averaged: bool = False,
     substeps: int | None = None,
     record_velocity: bool = False,
+    link_encoders: Sequence[str] = (),
     noise: TorqueNoise = WHITE,
     run: RunState | None = None,
 ) -> SimulationResult:
@@ -122,7 +124,7 @@ def simulate(
     motion : ReferenceMotion
         Interpolated where its samples are not those of the controller.
     effects : sequence of Effect
-        Sizes that were left open are taken from the arm.
+        Sizes that were left open are taken from the arm. Those of another recording are left out.
     seed : int
         Of noise and encoder zero; the same seed and repetition give the same recording.
     repetition : int
@@ -137,6 +139,8 @@ def simulate(
         Integration steps per period of the controller; by default 4, more where an elastic joint needs them.
     record_velocity : bool
         Whether the recording has the velocity that the controller saw.
+    link_encoders : sequence of str
+        Joints with a second encoder behind the gear, of the same resolution at the joint and with a zero of its own.
     noise : TorqueNoise
         Its distribution; its standard deviation is the arm's.
     run : RunState, optional
@@ -155,7 +159,8 @@ def simulate(
     """
     if ticks < 1:
         raise UsageError(f"ticks is {ticks}; expected 1 or more periods of the controller per sample")
-    moved, own = arm, resolved_effects(arm, effects)
+    name = f"{motion.name}_{repetition}"
+    moved, own = arm, resolved_effects(arm, [each for each in effects if each.recording in (None, name)])
     if run is not None:
         # Sizes that were left open are those of the arm, not of the run.
         moved = run.of(arm)
@@ -168,7 +173,7 @@ def simulate(
     # The name takes part, so that no two trajectories share their noise.
     random = np.random.default_rng([seed, repetition, zlib.crc32(motion.name.encode())])
     draft.sensors["shift"] = random.uniform(size=arm.robot.n)[back]
-    start = torque_at_start(moved, wanted)
+    start = torque_at_start(moved, wanted, loaded_bodies(moved, own))
     feed = np.zeros((len(wanted.time), arm.robot.n))
     if arm.controller.feed_forward:
         feed = nominal_torque(moved, wanted)[back].T
@@ -184,7 +189,7 @@ def simulate(
     if ticks > 1:
         wanted, true = wanted.every(ticks), true.every(ticks)
     recording = Recording(
-        name=f"{motion.name}_{repetition}",
+        name=name,
         trajectory=motion.name,
         repetition=repetition,
         joints=arm.robot.joints,
@@ -192,8 +197,22 @@ def simulate(
         position=np.ascontiguousarray(measured[:, ::ticks]),
         effort=effort,
         velocity=np.ascontiguousarray(seen[:, ::ticks]) if record_velocity else None,
+        link_position=_link_position(arm, true, link_encoders, [seed, repetition, zlib.crc32(name.encode())]),
     )
     return SimulationResult(arm, own, wanted, recording, true, seed, repetition, rate, steps, stops)
+
+
+def _link_position(arm: VirtualArm, true: TrueMotion, joints: Sequence[str], seed: list[int]) -> Array | None:
+    """Return what second encoders read, shape (n, N), NaN for joints without one; None where there is none."""
+    if not joints:
+        return None
+    zero = np.random.default_rng(seed).uniform(size=arm.robot.n)
+    read = np.full(true.link_position.shape, np.nan)
+    for j in map(arm.joint_index, joints):
+        grid = arm.encoder_resolution[j]
+        link = true.link_position[j]
+        read[j] = grid * np.floor(link / grid + zero[j]) if grid > 0.0 else link
+    return read
 
 
 def free_motion(
@@ -243,6 +262,15 @@ def free_motion(
 def resolved_effects(arm: VirtualArm, effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Return effects with all their sizes, those that were left open from the arm."""
     return tuple(effect.resolve(arm) for effect in effects)
+
+
+def loaded_bodies(arm: VirtualArm, effects: Sequence[Effect]) -> Array:
+    """Return the arm's bodies with what it carries at the first sample, shape (n, 10)."""
+    bodies = arm.bodies.copy()
+    for effect in effects:
+        if isinstance(effect, Payload) and effect.time <= 0.0:
+            bodies[np.argmax(arm.robot.order)] += effect.body
+    return bodies
 
 
 def _draft(arm: VirtualArm, effects: Sequence[Effect]) -> PlantDraft:
@@ -320,6 +348,8 @@ def _stretch(draft: PlantDraft, torque: Array) -> Array:
 
 def _substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
     """Choose as many steps per sample as the stiffest elastic joint or presliding friction needs."""
+    from scara_ident.simulation.external import SHAFT_WAY
+
     arrays = draft.arrays
     link = arm.link_inertia()[np.argsort(arm.robot.order)]
     rotor = arrays["armature"]
@@ -329,6 +359,9 @@ def _substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
     dry = arrays["friction"][:, 0] + arrays["stribeck_amplitude"]
     sliding = arrays["presliding"]
     square += np.divide(4.0 * dry, sliding * (link + rotor), out=np.zeros(draft.n), where=sliding > 0.0)
+    for i, j, coulomb in zip(*(arrays[f"shaft_{name}"] for name in ("joint", "other", "coulomb")), strict=True):
+        both = np.array([i, j], dtype=int)
+        square[both] += 4.0 * coulomb / (SHAFT_WAY * (link + rotor)[both])
     needed = int(np.ceil(float(np.sqrt(square.max())) / (rate * STIFF_STEP)))
     if needed > MOST_SUBSTEPS:
         joint = arm.robot.joints[int(np.flatnonzero(arm.robot.order == int(np.argmax(square)))[0])]

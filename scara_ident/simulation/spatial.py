@@ -21,7 +21,8 @@ TOLERANCE = 1e-12
 
 
 @compiled
-def _rotate(e: Array, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+def rotate(e: Array, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Turn a vector by the i-th of ``e``, shape (n, 9): from a joint's frame to its parent's."""
     return (
         e[i, 0] * x + e[i, 1] * y + e[i, 2] * z,
         e[i, 3] * x + e[i, 4] * y + e[i, 5] * z,
@@ -30,7 +31,8 @@ def _rotate(e: Array, i: int, x: float, y: float, z: float) -> tuple[float, floa
 
 
 @compiled
-def _rotate_back(e: Array, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+def rotate_back(e: Array, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Turn a vector the other way: from the frame of a joint's parent to its own."""
     return (
         e[i, 0] * x + e[i, 3] * y + e[i, 6] * z,
         e[i, 1] * x + e[i, 4] * y + e[i, 7] * z,
@@ -93,21 +95,21 @@ def dynamics(
         if k < 0:
             wx, wy, wz = 0.0, 0.0, 0.0
             dx, dy, dz = 0.0, 0.0, 0.0
-            ax, ay, az = _rotate_back(e, i, -gravity[0], -gravity[1], -gravity[2])
+            ax, ay, az = rotate_back(e, i, -gravity[0], -gravity[1], -gravity[2])
         else:
             ux, uy, uz = state[k, 0], state[k, 1], state[k, 2]
             gx, gy, gz = state[k, 3], state[k, 4], state[k, 5]
             px, py, pz = p[i, 0], p[i, 1], p[i, 2]
             cx, cy, cz = uy * pz - uz * py, uz * px - ux * pz, ux * py - uy * px
-            ax, ay, az = _rotate_back(
+            ax, ay, az = rotate_back(
                 e,
                 i,
                 state[k, 6] + gy * pz - gz * py + uy * cz - uz * cy,
                 state[k, 7] + gz * px - gx * pz + uz * cx - ux * cz,
                 state[k, 8] + gx * py - gy * px + ux * cy - uy * cx,
             )
-            wx, wy, wz = _rotate_back(e, i, ux, uy, uz)
-            dx, dy, dz = _rotate_back(e, i, gx, gy, gz)
+            wx, wy, wz = rotate_back(e, i, ux, uy, uz)
+            dx, dy, dz = rotate_back(e, i, gx, gy, gz)
         if prismatic[i]:
             ax += 2.0 * wy * v[i]
             ay -= 2.0 * wx * v[i]
@@ -147,8 +149,8 @@ def dynamics(
         j = i
         while True:
             k = parent[j]
-            fx, fy, fz = _rotate(e, j, fx, fy, fz)
-            tx, ty, tz = _rotate(e, j, tx, ty, tz)
+            fx, fy, fz = rotate(e, j, fx, fy, fz)
+            tx, ty, tz = rotate(e, j, tx, ty, tz)
             px, py, pz = p[j, 0], p[j, 1], p[j, 2]
             tx += py * fz - pz * fy
             ty += pz * fx - px * fz
@@ -161,8 +163,8 @@ def dynamics(
         k = parent[i]
         if k >= 0:
             px, py, pz = p[i, 0], p[i, 1], p[i, 2]
-            fx, fy, fz = _rotate(e, i, state[i, 9], state[i, 10], state[i, 11])
-            tx, ty, tz = _rotate(e, i, state[i, 12], state[i, 13], state[i, 14])
+            fx, fy, fz = rotate(e, i, state[i, 9], state[i, 10], state[i, 11])
+            tx, ty, tz = rotate(e, i, state[i, 12], state[i, 13], state[i, 14])
             state[k, 9] += fx
             state[k, 10] += fy
             state[k, 11] += fz
@@ -170,14 +172,14 @@ def dynamics(
             state[k, 13] += ty + pz * fx - px * fz
             state[k, 14] += tz + px * fy - py * fx
             m = c[0]
-            hx, hy, hz = _rotate(e, i, c[1], c[2], c[3])
+            hx, hy, hz = rotate(e, i, c[1], c[2], c[3])
             # I' = E I E^T: the columns of I E^T first, then E times them.
-            ax, ay, az = _rotate(e, i, c[4], c[5], c[7])
-            bx, by, bz = _rotate(e, i, c[5], c[6], c[8])
-            gx, gy, gz = _rotate(e, i, c[7], c[8], c[9])
-            ixx, ixy, ixz = _rotate(e, i, ax, bx, gx)
-            _, iyy, iyz = _rotate(e, i, ay, by, gy)
-            _, _, izz = _rotate(e, i, az, bz, gz)
+            ax, ay, az = rotate(e, i, c[4], c[5], c[7])
+            bx, by, bz = rotate(e, i, c[5], c[6], c[8])
+            gx, gy, gz = rotate(e, i, c[7], c[8], c[9])
+            ixx, ixy, ixz = rotate(e, i, ax, bx, gx)
+            _, iyy, iyz = rotate(e, i, ay, by, gy)
+            _, _, izz = rotate(e, i, az, bz, gz)
             along = 2.0 * (hx * px + hy * py + hz * pz) + m * (px * px + py * py + pz * pz)
             composite[k, 0] += m
             composite[k, 1] += hx + m * px

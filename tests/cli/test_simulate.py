@@ -50,8 +50,25 @@ def test_bad_usage_is_status_2_and_writes_nothing(command, trajectory: Path, tmp
         ["nowhere.csv"],
         [trajectory, "--effect", "magic"],
         [trajectory, "--effect", "spring:joint9"],
+        [trajectory, "--link-encoder", "joint9"],
         [trajectory, "--seed", "-1"],
     ):
         result = command("simulate", *words, "--output", out)
         assert result.status == 2
         assert not out.exists()
+
+
+def test_a_push_is_in_the_recording_named_and_a_second_encoder_in_all(command, trajectory: Path, tmp_path: Path):
+    words = ("simulate", trajectory, "--repetitions", "2", "--link-encoder", "joint2")
+    push = "push:force=9,from=0.1,duration=0.2,recording=short_2"
+    for name, more in (("plain", ()), ("pushed", ("--effect", push))):
+        assert command(*words, *more, "--output", tmp_path / name).status == 0
+    plain, pushed = (
+        [pl.read_parquet(tmp_path / name / f"short_{k}.parquet") for k in (1, 2)] for name in ("plain", "pushed")
+    )
+    assert pushed[0].equals(plain[0])
+    assert not pushed[1].equals(plain[1])
+    assert [name for name in plain[0].columns if "link" in name] == ["joint2.link_position"]
+    told = [json.loads((tmp_path / "pushed" / f"short_{k}.truth.json").read_text())["effects"] for k in (1, 2)]
+    assert told[0] == []
+    assert (told[1][0]["effect"], told[1][0]["parameters"]["from"]) == ("push", 0.1)

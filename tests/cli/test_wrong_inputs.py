@@ -115,6 +115,8 @@ OTHERS = [
     ("simulate loop.csv", 1, ("loop: time must have at least two samples and grow strictly",)),
     ("simulate path.csv --effect sprong", 2, ("'sprong': no such effect", "did you mean spring?")),
     ("simulate path.csv --effect spring:joint1:stifness=3", 2, ("has no 'stifness'", "it has stiffness")),
+    ("simulate path.csv --effect push:recording=path_2", 2, ("no recording 'path_2'", "there will be path_1")),
+    ("simulate path.csv --effect push:link=hand", 1, ("no link 'hand'", "it has")),
     ("simulate path.csv --effect spring:joint1:stiffness=soft", 2, ("stiffness is 'soft'", "expected a number")),
     ("simulate path.csv --effect spring:joint9", 2, ("no joint 'joint9'", "joint1, joint2")),
     ("simulate path.csv --effect spring:", 2, ("'spring:'", "expected NAME:JOINT:KEY=VALUE")),

@@ -100,6 +100,21 @@ def test_optional_columns_are_read_where_every_joint_has_them(robot, tmp_path):
     assert "joint1.acceleration" in recording.findings[0].message
 
 
+def test_a_second_encoder_may_be_on_some_joints_only_and_reads_back(robot, tmp_path):
+    made = columns()
+    made["joint2.link_position"] = made["joint2.position"] + 1e-3
+    made["joint2.link_position"][7] = np.nan
+    recording = read_recording(save(tmp_path / "a_1.csv", made), robot)
+    assert np.isnan(recording.link_position[0]).all()
+    np.testing.assert_allclose((recording.link_position - recording.position)[1, 8:], 1e-3, atol=1e-12)
+    assert np.isnan(recording.link_position[1, 7])
+    assert recording.findings == ()
+    write_recording(recording, tmp_path / "b_1.parquet")
+    again = read_recording(tmp_path / "b_1.parquet", robot)
+    np.testing.assert_array_equal(again.link_position, recording.link_position)
+    assert read_recording(save(tmp_path / "c_1.csv", columns()), robot).link_position is None
+
+
 def test_single_precision_and_whole_numbers_become_double(robot, tmp_path):
     made = {name: values.astype(np.float32) for name, values in columns().items()}
     made["joint1.temperature"] = made["joint2.temperature"] = np.full(4000, 31, dtype=np.int16)

@@ -12,6 +12,7 @@ from scara_ident.errors import UsageError
 from scara_ident.model.base_parameters import find_base_parameters, standard_regressor
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import VirtualArm, ideal, on_side, simulate, virtual_arm
+from scara_ident.simulation.effects import Backlash, JointElasticity
 from tests.arms import Link, write_urdf
 from tests.simulation.made import scara, swing
 
@@ -150,3 +151,20 @@ def test_another_arms_motion_is_refused() -> None:
     motion = replace(swing(scara().robot, 0.5), joints=("a", "b"))
     with pytest.raises(UsageError, match="moves a, b, the arm has joint1, joint2"):
         simulate(scara(), motion)
+
+
+def test_a_second_encoder_reads_the_link_and_changes_nothing_else() -> None:
+    arm = virtual_arm()
+    effects = [JointElasticity("joint1", 2400.0), Backlash("joint2", 0.002)]
+    motion = swing(arm.robot, 1.0)
+    plain = simulate(arm, motion, effects=effects, seed=2)
+    result = simulate(arm, motion, effects=effects, seed=2, link_encoders=["joint1"])
+    np.testing.assert_array_equal(result.recording.effort, plain.recording.effort)
+    assert plain.recording.link_position is None
+    read = result.recording.link_position
+    assert np.isnan(read[1]).all()
+    error = read[0] - result.true.link_position[0]
+    assert np.abs(error).max() <= arm.encoder_resolution[0]
+    assert np.abs(result.true.position - result.true.link_position)[0].max() > 20.0 * arm.encoder_resolution[0]
+    with pytest.raises(UsageError, match="its joints are joint1, joint2"):
+        simulate(arm, motion, link_encoders=["joint3"])

@@ -7,8 +7,9 @@ from difflib import get_close_matches
 from typing import Any
 
 from scara_ident.errors import UsageError
+from scara_ident.simulation.effects.contact import Push
 from scara_ident.simulation.effects.drive import Spring, TorqueRipple, Vibration
-from scara_ident.simulation.effects.effect import BY_ARM, Effect
+from scara_ident.simulation.effects.effect import BY_ARM, Effect, Vector
 from scara_ident.simulation.effects.friction import (
     AsymmetricFriction,
     FrictionCoupling,
@@ -24,7 +25,8 @@ from scara_ident.simulation.effects.sensors import (
     TorqueGainMismatch,
     TorqueSensorNonlinearity,
 )
-from scara_ident.simulation.effects.structure import BaseTilt, PayloadChange
+from scara_ident.simulation.effects.shaft import CoupledShaft
+from scara_ident.simulation.effects.structure import BaseTilt, Payload, PayloadChange
 from scara_ident.simulation.effects.transmission import Backlash, JointElasticity, TransmissionLoss
 from scara_ident.simulation.effects.unlisted import UnlistedSignedSine, UnlistedSwingingViscous
 
@@ -49,17 +51,20 @@ CATALOGUE: tuple[type[Effect], ...] = (
     OffsetDrift,
     Vibration,
 )
+# What an arm may have or meet beside them.
+OTHERS: tuple[type[Effect], ...] = (Push, Payload, CoupledShaft)
 UNLISTED: tuple[type[Effect], ...] = (UnlistedSignedSine, UnlistedSwingingViscous)
-EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in (*CATALOGUE, *UNLISTED)}
+EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in (*CATALOGUE, *OTHERS, *UNLISTED)}
 
 __all__ = [
     "BY_ARM",
     "CATALOGUE",
     "EFFECTS",
     "Effect",
+    "OTHERS",
     "UNLISTED",
     "parse_effect",
-    *(effect.__name__ for effect in (*CATALOGUE, *UNLISTED)),
+    *(effect.__name__ for effect in (*CATALOGUE, *OTHERS, *UNLISTED)),
 ]
 
 
@@ -70,7 +75,7 @@ def parse_effect(text: str) -> Effect:
     ----------
     text : str
         ``NAME``, ``NAME:JOINT``, ``NAME:JOINT:KEY=VALUE,KEY=VALUE`` or ``NAME:KEY=VALUE``; what is left out has a
-        default that suits the arm.
+        default that suits the arm. A vector is x/y/z; ``recording=NAME`` switches it on in that recording only.
 
     Raises
     ------
@@ -81,6 +86,8 @@ def parse_effect(text: str) -> Effect:
     --------
     >>> parse_effect("spring:joint2:stiffness=0.05")
     Spring(joint='joint2', stiffness=0.05, rest_position=0.3)
+    >>> parse_effect("push:force=15,from=4.2,direction=0/0/-1").direction
+    (0.0, 0.0, -1.0)
     """
     name, *rest = (part.strip() for part in text.split(":"))
     if name not in EFFECTS:
@@ -98,20 +105,33 @@ def parse_effect(text: str) -> Effect:
             continue
         for pair in part.split(","):
             key, _, value = (word.strip() for word in pair.partition("="))
-            if key in values:
+            attribute = {**kind.parameter_names(), "recording": "recording"}.get(key)
+            if attribute is None:
+                known = ", ".join((*kind.parameter_names(), "recording"))
+                raise UsageError(f"effect {text!r}: {kind.name} has no {key!r}; it has {known}")
+            if attribute in values:
                 raise UsageError(f"effect {text!r}: {key} is given twice")
-            values[key] = _number(kind, text, key, value)
+            values[attribute] = _value(kind, text, key, attribute, value)
     return kind(joint=joint, **values)
 
 
-def _number(kind: type[Effect], text: str, key: str, value: str) -> float | bool:
-    if key not in kind.parameter_names():
-        raise UsageError(f"effect {text!r}: {kind.name} has no {key!r}; it has {', '.join(kind.parameter_names())}")
-    if {field.name: field.type for field in fields(kind)}[key] == "bool":
+def _value(kind: type[Effect], text: str, key: str, name: str, value: str) -> float | bool | str | Vector:
+    field = next(item for item in fields(kind) if item.name == name)
+    if field.type == "str | None":
+        return value
+    if field.type == "bool":
         if value.lower() not in ("true", "false", "1", "0"):
             raise UsageError(f"effect {text!r}: {key} is {value!r}; expected true or false")
         return value.lower() in ("true", "1")
     try:
-        return float(value)
+        numbers = tuple(float(word) for word in value.split("/"))
     except ValueError:
-        raise UsageError(f"effect {text!r}: {key} is {value!r}; expected a number") from None
+        numbers = ()
+    if field.type == "Vector":
+        length = len(getattr(kind, name))
+        if len(numbers) != length:
+            raise UsageError(f"effect {text!r}: {key} is {value!r}; expected {length} numbers as in 0/0/1")
+        return numbers
+    if len(numbers) != 1:
+        raise UsageError(f"effect {text!r}: {key} is {value!r}; expected a number")
+    return numbers[0]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Literal, Self
 
 from scara_ident.errors import UsageError
@@ -12,6 +13,7 @@ from scara_ident.simulation.plant import PlantDraft
 
 # A size that is left to the arm: `Effect.resolve` puts a number that suits the arm's torques in its place.
 BY_ARM = math.nan
+Vector = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,8 @@ class Effect:
     ----------
     joint : str or None
         The joint that it belongs to; None is the first joint, or the whole arm where `whole_arm` says so.
+    recording : str or None
+        The only recording that has it, ``<trajectory>_<repetition>``; None is all of them.
     """
 
     name: ClassVar[str] = ""
@@ -36,15 +40,19 @@ class Effect:
     # Parameter -> array of the draft into which it is written; those that are brought to the joint side of the gear.
     arrays: ClassVar[dict[str, str]] = {}
     joint_side: ClassVar[tuple[str, ...]] = ()
+    # Parameter -> its name in text and JSON, where that is no name in Python.
+    spelled: ClassVar[dict[str, str]] = {}
 
     joint: str | None = None
+    recording: str | None = field(default=None, kw_only=True, repr=False)
 
     @classmethod
-    def parameter_names(cls) -> tuple[str, ...]:
-        """Names of the parameters, in order."""
-        return tuple(field.name for field in fields(cls) if field.name != "joint")
+    def parameter_names(cls) -> dict[str, str]:
+        """Return the parameters in order, name in text and JSON -> attribute."""
+        names = [item.name for item in fields(cls) if item.name not in ("joint", "recording")]
+        return {cls.spelled.get(name, name): name for name in names}
 
-    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+    def sizes(self, arm: VirtualArm, joint: int) -> Mapping[str, float | Vector]:
         """Return values for the parameters that are left to the arm."""
         return {key: float(share * arm.torque_scale[joint]) for key, share in self.shares.items()}
 
@@ -67,15 +75,16 @@ class Effect:
             joint = self.first_choice(arm)
         index = arm.joint_index(joint) if joint is not None else 0
         sizes = self.sizes(arm, index)
-        left = {key: value for key, value in sizes.items() if _is_left(getattr(self, key))}
+        left: dict[str, Any] = {key: value for key, value in sizes.items() if _is_left(getattr(self, key))}
         resolved = replace(self, joint=joint, **left)
         for key in self.units:
-            value = getattr(resolved, key)
             low, high = self.bounds.get(key, (-math.inf, math.inf))
-            if not math.isfinite(value) or not low <= value <= high:
-                raise UsageError(
-                    f"{self.name}: {key} is {value:g}; expected {_range(low, high)}{_unit(self.units[key])}"
-                )
+            for value in _numbers(getattr(resolved, key)):
+                if not math.isfinite(value) or not low <= value <= high:
+                    word = self.spelled.get(key, key)
+                    raise UsageError(
+                        f"{self.name}: {word} is {value:g}; expected {_range(low, high)}{_unit(self.units[key])}"
+                    )
         return resolved
 
     def place(self, arm: VirtualArm) -> int:
@@ -92,12 +101,13 @@ class Effect:
             array[j] = (abs(draft.scale[j]) if key in self.joint_side else 1.0) * getattr(self, key)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return name, joint and parameters, ready for JSON."""
-        return {
+        """Return name, joint and parameters, ready for JSON, and the recording where it is in one only."""
+        said = {
             "effect": self.name,
             "joint": self.joint,
-            "parameters": {key: getattr(self, key) for key in self.parameter_names()},
+            "parameters": {key: getattr(self, name) for key, name in self.parameter_names().items()},
         }
+        return said | ({} if self.recording is None else {"recording": self.recording})
 
 
 def vacant(effect: Effect, value: float, absent: float = 0.0) -> None:
@@ -106,8 +116,29 @@ def vacant(effect: Effect, value: float, absent: float = 0.0) -> None:
         raise UsageError(f"{effect.name} is given twice for {effect.joint or 'the arm'}; give it once")
 
 
+def neighbour(effect: Effect, arm: VirtualArm) -> str:
+    """Return the joint after the effect's, for the last joint the one before it.
+
+    Raises
+    ------
+    UsageError
+        If the arm has one joint.
+    """
+    n, j = arm.robot.n, arm.joint_index(effect.joint or arm.robot.joints[0])
+    if n < 2:
+        raise UsageError(f"{effect.name}: {arm.robot.name} has one joint; a coupling needs two")
+    return arm.robot.joints[j + 1 if j + 1 < n else j - 1]
+
+
+def _numbers(value: object) -> Vector:
+    """Return the numbers of a parameter, none where it is no number."""
+    if isinstance(value, tuple):
+        return value
+    return (float(value),) if isinstance(value, (int, float)) else ()
+
+
 def _is_left(value: object) -> bool:
-    return isinstance(value, float) and math.isnan(value)
+    return any(math.isnan(number) for number in _numbers(value))
 
 
 def _range(low: float, high: float) -> str:

@@ -7,9 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from scara_ident.errors import UsageError
 from scara_ident.simulation.arm import VirtualArm
-from scara_ident.simulation.effects.effect import BY_ARM, Effect, vacant
+from scara_ident.simulation.effects.effect import BY_ARM, Effect, neighbour, vacant
 from scara_ident.simulation.plant import PlantDraft
 
 
@@ -119,10 +118,7 @@ class FrictionCoupling(Effect):
 
     def other(self, arm: VirtualArm) -> str:
         """Name of the joint whose velocity drives the friction."""
-        n, j = arm.robot.n, arm.joint_index(self.joint or arm.robot.joints[0])
-        if n < 2:
-            raise UsageError(f"{self.name}: {arm.robot.name} has one joint; a coupling needs two")
-        return arm.robot.joints[j + 1 if j + 1 < n else j - 1]
+        return neighbour(self, arm)
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Set the row of the coupling matrices."""

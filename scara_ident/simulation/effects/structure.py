@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
+from scara_ident.arrays import Array
 from scara_ident.effects.links import gravity_size, point_mass
+from scara_ident.errors import UsageError
 from scara_ident.simulation.arm import VirtualArm
-from scara_ident.simulation.effects.effect import BY_ARM, Effect, vacant
+from scara_ident.simulation.effects.effect import BY_ARM, Effect, Vector, vacant
 from scara_ident.simulation.plant import PlantDraft
 
 
@@ -37,28 +40,58 @@ class BaseTilt(Effect):
 
 
 @dataclass(frozen=True)
-class PayloadChange(Effect):
-    """A point mass that the tool point carries from a time in the run on."""
+class Payload(Effect):
+    """A rigid body that the last link carries for the whole run, or from one time on, or to one.
 
-    name: ClassVar[str] = "payload_change"
-    equation: ClassVar[str] = "bodies += point mass at the tool for t >= time"
-    units: ClassVar[dict[str, str]] = {"mass": "kg", "time": "s"}
+    ``com`` and ``inertia`` (xx, xy, xz, yy, yz, zz about the centre of mass) are in the frame of the last link; the
+    centre of mass is the tool by default. It comes with the link's velocity and goes with it. A run that starts with it
+    starts with the torque that holds it. May be given several times.
+    """
+
+    name: ClassVar[str] = "payload"
+    equation: ClassVar[str] = "last body += mass, mass com, inertia for from <= t < to"
+    units: ClassVar[dict[str, str]] = {"mass": "kg", "time": "s", "com": "m", "inertia": "kg m^2", "until": "s"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"mass": (0.0, np.inf), "time": (0.0, np.inf)}
     whole_arm = "always"
+    spelled: ClassVar[dict[str, str]] = {"time": "from", "until": "to"}
     mass: float = BY_ARM
-    time: float = 2.0
+    time: float = 0.0
+    com: Vector = (BY_ARM,) * 3
+    inertia: Vector = (0.0,) * 6
+    until: float | None = None
 
-    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """Give a fifth of the mass of the last body, 1 kg at least."""
-        return {"mass": float(max(0.2 * arm.bodies[np.argmax(arm.robot.order), 0], 1.0))}
+    def sizes(self, arm: VirtualArm, joint: int) -> Mapping[str, float | Vector]:
+        """Give a fifth of the mass of the last body, 1 kg at least, at the tool."""
+        mass = float(max(0.2 * arm.bodies[np.argmax(arm.robot.order), 0], 1.0))
+        return {"mass": mass, "com": tuple(arm.tool.tolist())}
+
+    @property
+    def body(self) -> Array:
+        """Its standard parameters in the frame of the last link, shape (10,)."""
+        xx, xy, xz, yy, yz, zz = self.inertia
+        return np.asarray(self.mass * point_mass(np.array(self.com)) + np.array([0, 0, 0, 0, xx, xy, yy, xz, yz, zz]))
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
-        """Prepare the bodies after the change."""
+        """Hang it on the last body."""
         from scara_ident.simulation.spatial import turned_bodies, turned_frames
 
-        vacant(self, float(draft.arrays["payload_time"]), np.inf)
-        back = np.argsort(arm.robot.order)
-        bodies = arm.bodies[back].copy()
-        bodies[-1] += self.mass * point_mass(arm.tool)
-        draft.arrays["bodies_after"] = turned_bodies(turned_frames(arm.robot.model)[-1], bodies)
-        draft.arrays["payload_time"] = np.array(self.time)
+        xx, xy, xz, yy, yz, zz = self.inertia
+        axes = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if axes[0] < -1e-12 or axes[2] > (axes[0] + axes[1]) * (1.0 + 1e-9) + 1e-12:
+            raise UsageError(
+                f"{self.name}: inertia is that of no body; each principal moment is at most the others' sum"
+            )
+        until = np.inf if self.until is None else self.until
+        if until <= self.time:
+            raise UsageError(f"{self.name}: goes at {until:g} s, before it comes at {self.time:g} s")
+        turn = turned_frames(arm.robot.model)[-1][-1:]
+        draft.carry(turned_bodies(turn, self.body[None])[0], np.array([self.time, until]))
+
+
+@dataclass(frozen=True)
+class PayloadChange(Payload):
+    """A payload that comes during the run, by the name that a diagnosis has for it."""
+
+    name: ClassVar[str] = "payload_change"
+    spelled: ClassVar[dict[str, str]] = {"until": "to"}
+    time: float = 2.0

@@ -30,6 +30,8 @@ def test_names_are_the_contracts() -> None:
         ("spring:joint2", fx.Spring("joint2")),
         ("spring:joint2:stiffness=0.05", fx.Spring("joint2", stiffness=0.05)),
         ("time_delay:delay=0.002", fx.TimeDelay(delay=0.002)),
+        ("push:from=4.2,direction=0/0/-1", fx.Push(time=4.2, direction=(0.0, 0.0, -1.0))),
+        ("spring:joint2:recording=OJD_2", fx.Spring("joint2")),
         ("torque_ripple:joint1:order=4,amplitude=0.05,sensor=true", fx.TorqueRipple("joint1", 4.0, 0.05, sensor=True)),
     ],
 )
@@ -42,11 +44,15 @@ def test_text_stands_for_an_effect(text: str, expected: Effect) -> None:
     [
         ("sprang", "did you mean spring"),
         ("", "there are transmission_loss"),
-        ("spring:joint1:size=3", "stiffness, rest_position"),
         ("spring:joint1:stiffness=much", "expected a number"),
         ("spring:joint1:joint2", "expected NAME:JOINT"),
         ("spring:stiffness=1,stiffness=2", "given twice"),
         ("torque_ripple:sensor=3", "expected true or false"),
+        ("push:direction=1/0", "expected 3 numbers as in 0/0/1"),
+        ("push:direction=up", "expected 3 numbers"),
+        ("push:force=1/2", "expected a number"),
+        ("push:time=3", "it has force, from, duration, direction, link, point, edge, recording"),
+        ("spring:joint1:size=3", "it has stiffness, rest_position, recording"),
     ],
 )
 def test_text_that_stands_for_none_is_one_line(text: str, said: str) -> None:

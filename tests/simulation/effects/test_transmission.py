@@ -16,12 +16,13 @@ from scara_ident.simulation import (
     Effect,
     SimulationResult,
     ideal,
+    simulate,
     virtual_arm,
 )
 from scara_ident.simulation import effects as fx
 from tests.arms import example_urdf, rnea
 from tests.simulation.effects.runs import Array, assert_changes_by, load_at_motor, run
-from tests.simulation.made import friction, scara
+from tests.simulation.made import friction, scara, swing
 
 
 def test_transmission_loss_takes_power_in_both_directions_of_its_flow() -> None:
@@ -104,3 +105,26 @@ EQUATIONS: dict[Effect, Callable[[SimulationResult], Array]] = {
 @pytest.mark.parametrize("effect", EQUATIONS, ids=lambda effect: effect.name)
 def test_torque_changes_by_the_equation(effect: Effect) -> None:
     assert_changes_by(effect, EQUATIONS[effect])
+
+
+@pytest.mark.parametrize("stiffness", [1500.0, 1e5])
+@pytest.mark.parametrize(("name", "joint"), [("scara03", 0), ("ur5", 5), ("panda", 6)])
+def test_steps_of_half_the_length_give_the_same_link(name: str, joint: int, stiffness: float) -> None:
+    arm = scara() if name == "scara03" else ideal(virtual_arm(load_robot(name)))
+    motion = swing(arm.robot, 0.15, amplitude=0.2)
+    effects = [fx.JointElasticity(arm.robot.joints[joint], stiffness)]
+    whole = simulate(arm, motion, effects=effects)
+    half = simulate(arm, motion, effects=effects, substeps=2 * whole.substeps).true
+    stretch = np.abs(half.position - half.link_position).max()
+    assert np.abs(whole.true.link_position - half.link_position).max() < 1e-5 * stretch
+
+
+@pytest.mark.parametrize("width", [0.0005, 0.005])
+def test_clearance_is_gone_through_on_a_six_axis_arm(width: float) -> None:
+    arm = ideal(virtual_arm(load_robot("ur5")))
+    names = arm.robot.joints[0], arm.robot.joints[3]
+    result = simulate(arm, swing(arm.robot, 2.0, 0.3), effects=[fx.Backlash(name, width) for name in names])
+    for j in (0, 3):
+        stretch = (result.true.position - result.true.link_position)[j]
+        assert np.abs(result.true.load[j, np.abs(stretch) < 0.5 * width]).max(initial=0.0) < 1e-9
+        assert np.ptp(stretch) > width
