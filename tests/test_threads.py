@@ -43,3 +43,22 @@ def test_blas_has_one_thread_inside_and_its_own_again_outside():
         with pytest.raises(KeyError), one_blas_thread():
             raise KeyError
         assert blas_threads() == before
+
+
+def test_what_is_wanted_side_by_side_within_is_done_one_after_the_other():
+    def inner(item: int) -> int:
+        return threading.get_ident()
+
+    def outer(item: int) -> set[int]:
+        return {threading.get_ident(), *side_by_side(inner, range(3))}
+
+    assert all(len(threads) == 1 for threads in side_by_side(outer, range(4)))
+
+
+def test_of_several_errors_the_first_item_s_is_raised_and_the_next_call_works():
+    def fails(item: int) -> int:
+        raise ValueError(item)
+
+    with pytest.raises(ValueError, match="0"):
+        side_by_side(fails, range(4))
+    assert side_by_side(abs, [-1, 2]) == [1, 2]

@@ -13,7 +13,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import weighted
-from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.observations import Observations, informations, observe
 from scara_ident.motion.position_noise import encoder_step, noise_level, noisier
 from scara_ident.motion.prepared import PreparedData
 
@@ -36,8 +36,8 @@ def noise_bias(observations: Observations, weights: Array, value: Array) -> Arra
     """
     if max(noise_shares(observations.data), default=0.0) < NEGLIGIBLE:
         return None
-    again = observe(observations.model, noisier(observations.data))
-    return np.asarray(weighted(again.by_joint, weights).solve().value - value)
+    again = informations(observations.model, noisier(observations.data))
+    return np.asarray(weighted(again, weights).solve().value - value)
 
 
 def noise_torque(observations: Observations, value: Array) -> Array:

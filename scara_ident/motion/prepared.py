@@ -16,18 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.motion.motion import (
-    HIGHEST_CUT,
-    ROWS_AT_ONCE,
-    Motion,
-    Stretch,
-    low_pass,
-    low_pass_every,
-    motion_of,
-    stretches,
-    torque_of,
-    with_effort_of,
-)
+from scara_ident.motion.low_pass import HIGHEST_CUT, ROWS_AT_ONCE, low_pass, low_pass_every
+from scara_ident.motion.motion import Motion, Stretch, motion_of, stretches, torque_of, with_effort_of
 from scara_ident.motion.trajectories import Trajectories, trajectories_of
 from scara_ident.recording.recording import Recording
 from scara_ident.threads import side_by_side
@@ -162,7 +152,7 @@ class PreparedStretch:
             Columns of the joint's equation, or its torque.
         """
         step, band = self.steps[joint], self.bands[joint]
-        low = low_pass_every(self.fade[joint] * signals, self.rate, band, step)
+        low = low_pass_every(signals, self.rate, band, step, self.fade[joint])
         return np.asarray(np.sqrt(step) * low[:, self.kept[joint] // step])
 
     def rows_of(self, signals: Sequence[tuple[int, Array]]) -> list[Array]:
@@ -176,8 +166,7 @@ class PreparedStretch:
         def passed(places: list[int]) -> list[Array]:
             joints = [signals[place][0] for place in places]
             step, band = keys[places[0]]
-            faded = fade[joints] * np.array([signals[place][1] for place in places])
-            low = low_pass_every(faded, self.rate, band, step)
+            low = low_pass_every(np.array([signals[place][1] for place in places]), self.rate, band, step, fade[joints])
             return [np.sqrt(step) * row[kept[joint] // step] for joint, row in zip(joints, low, strict=True)]
 
         made = side_by_side(passed, parts) if len(parts) > 1 else [passed(places) for places in parts]
