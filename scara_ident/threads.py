@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar, overload
 
 from threadpoolctl import ThreadpoolController
 
@@ -15,6 +15,28 @@ T = TypeVar("T")
 # Loops of NumPy hold the interpreter's lock between their calls, so that more than two threads wait for each other.
 THREADS = 2
 _LOCAL = threading.local()
+
+
+class made_once(Generic[T]):
+    """`functools.cached_property` without the lock that it has in Python 3.11.
+
+    That lock is one for all instances, so that what two threads make for two recordings they make one after the other.
+    """
+
+    def __init__(self, function: Callable[[Any], T]) -> None:
+        self.function = function
+        self.__doc__ = function.__doc__
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> made_once[T]: ...
+    @overload
+    def __get__(self, instance: object, owner: type) -> T: ...
+    def __get__(self, instance: object | None, owner: type) -> made_once[T] | T:
+        if instance is None:
+            return self
+        value = self.function(instance)
+        instance.__dict__[self.function.__name__] = value
+        return value
 
 
 @cache
