@@ -239,7 +239,7 @@ def narrowest_bands(model: TorqueModel, stretches: int, moving: Array) -> Array:
 def _moving(data: PreparedData) -> Array:
     """Return the time in which each joint moves, s, shape (n,)."""
     slow = _thinned(data.at((FIRST_BAND,) * len(data.bands)), FIRST_BAND * FIRST_WIDENING / HIGHEST_BAND)
-    times = [np.count_nonzero(~part.rest, axis=1) / part.rate for part in slow.stretches]
+    times = side_by_side(lambda part: np.count_nonzero(~part.rest, axis=1) / part.rate, slow.stretches)
     return np.asarray(np.sum(times, axis=0))
 
 
