@@ -2,17 +2,41 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar, overload
 
 from threadpoolctl import ThreadpoolController
 
 T = TypeVar("T")
 # Loops of NumPy hold the interpreter's lock between their calls, so that more than two threads wait for each other.
 THREADS = 2
+_LOCAL = threading.local()
+
+
+class made_once(Generic[T]):
+    """`functools.cached_property` without the lock that it has in Python 3.11.
+
+    That lock is one for all instances, so that what two threads make for two recordings they make one after the other.
+    """
+
+    def __init__(self, function: Callable[[Any], T]) -> None:
+        self.function = function
+        self.__doc__ = function.__doc__
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> made_once[T]: ...
+    @overload
+    def __get__(self, instance: object, owner: type) -> T: ...
+    def __get__(self, instance: object | None, owner: type) -> made_once[T] | T:
+        if instance is None:
+            return self
+        value = self.function(instance)
+        instance.__dict__[self.function.__name__] = value
+        return value
 
 
 @cache
@@ -20,14 +44,61 @@ def _controller() -> ThreadpoolController:
     return ThreadpoolController()
 
 
+@cache
+def _pool() -> ThreadPoolExecutor:
+    """The threads beside the caller's, made once: to start one takes as long as to factor a small matrix."""
+
+    def busy() -> None:
+        _LOCAL.alone = _LOCAL.beside = True
+
+    return ThreadPoolExecutor(max_workers=THREADS - 1, initializer=busy)
+
+
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Hold BLAS to one thread: on the small panels of a factor, two take seven times as long as one."""
-    with _controller().limit(limits=1, user_api="blas"):
+    if getattr(_LOCAL, "alone", False):
         yield
+        return
+    with _controller().limit(limits=1, user_api="blas"):
+        _LOCAL.alone = True
+        try:
+            yield
+        finally:
+            _LOCAL.alone = False
 
 
 def side_by_side(function: Callable[..., T], *items: Iterable[Any]) -> list[T]:
-    """Apply a function to items in two threads with one BLAS thread each, and return the results in order."""
-    with one_blas_thread(), ThreadPoolExecutor(max_workers=THREADS) as pool:
-        return list(pool.map(function, *items))
+    """Apply a function to items in two threads with one BLAS thread each, and return the results in order.
+
+    What such a function wants side by side itself is done one after the other: both threads are at work.
+    """
+    work = list(zip(*items, strict=False))
+    if len(work) < 2 or getattr(_LOCAL, "beside", False):
+        with one_blas_thread():
+            return [function(*arguments) for arguments in work]
+    results: list[Any] = [None] * len(work)
+    errors: dict[int, BaseException] = {}
+    places = iter(range(len(work)))
+
+    def take_turns() -> None:
+        for place in places:
+            try:
+                results[place] = function(*work[place])
+            except BaseException as error:
+                errors[place] = error
+            if errors:
+                return
+
+    with one_blas_thread():
+        others = [_pool().submit(take_turns) for _ in range(THREADS - 1)]
+        _LOCAL.beside = True
+        take_turns()
+        _LOCAL.beside = False
+        for other in others:
+            # One that has not begun, as it serves another caller, is not waited for.
+            if not other.cancel():
+                other.result()
+    if errors:
+        raise errors[min(errors)]
+    return results

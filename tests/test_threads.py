@@ -7,7 +7,7 @@ import threading
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from scara_ident.threads import one_blas_thread, side_by_side
+from scara_ident.threads import made_once, one_blas_thread, side_by_side
 from tests.shared import PATIENCE
 
 
@@ -43,3 +43,39 @@ def test_blas_has_one_thread_inside_and_its_own_again_outside():
         with pytest.raises(KeyError), one_blas_thread():
             raise KeyError
         assert blas_threads() == before
+
+
+def test_what_is_wanted_side_by_side_within_is_done_one_after_the_other():
+    def inner(item: int) -> int:
+        return threading.get_ident()
+
+    def outer(item: int) -> set[int]:
+        return {threading.get_ident(), *side_by_side(inner, range(3))}
+
+    assert all(len(threads) == 1 for threads in side_by_side(outer, range(4)))
+
+
+def test_of_several_errors_the_first_item_s_is_raised_and_the_next_call_works():
+    def fails(item: int) -> int:
+        raise ValueError(item)
+
+    with pytest.raises(ValueError, match="0"):
+        side_by_side(fails, range(4))
+    assert side_by_side(abs, [-1, 2]) == [1, 2]
+
+
+def test_what_is_made_once_is_made_for_two_instances_at_the_same_time():
+    both = threading.Barrier(2)
+
+    class Slow:
+        @made_once
+        def value(self) -> int:
+            """Return what both have to be at work for."""
+            both.wait(PATIENCE)
+            return id(self)
+
+    slow = [Slow(), Slow()]
+    assert side_by_side(lambda item: item.value, slow) == [id(item) for item in slow]
+    # A third time nobody would come to the barrier.
+    assert slow[0].value == id(slow[0])
+    assert Slow.value.__doc__ == "Return what both have to be at work for."

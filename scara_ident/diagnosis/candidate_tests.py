@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import TypeVar
 
 import numpy as np
@@ -13,7 +14,7 @@ from scara_ident.diagnosis.candidates import Rows
 from scara_ident.diagnosis.cluster_test import cluster_test
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel, Products, products_of
-from scara_ident.threads import one_blas_thread
+from scara_ident.threads import side_by_side
 
 T = TypeVar("T")
 # Columns whose products are made together: more of them take more memory than time.
@@ -87,7 +88,10 @@ def examine(
         Columns of each on the rows of every joint that it acts on.
     criteria : SelectionCriteria, optional
     """
-    return _in_groups(candidates, lambda group: _examinations(model, products_of(model, group), criteria))
+    if len(candidates):
+        # Made once, and not in two threads.
+        _ = model.released
+    return _in_groups(model, candidates, lambda group: _examinations(model, products_of(model, group), criteria))
 
 
 def held_out_gains(
@@ -104,20 +108,23 @@ def held_out_gains(
             float(gain) for gain in np.where(seen, np.sum(np.where(voting, saved, 0.0), axis=0) / (before or 1.0), 0.0)
         ]
 
-    return _in_groups(candidates, gains)
+    return _in_groups(model, candidates, gains)
 
 
-def _in_groups(candidates: Sequence[Rows], function: Callable[[Sequence[Rows]], Sequence[T]]) -> list[T]:
+def _in_groups(
+    model: FittedModel, candidates: Sequence[Rows], function: Callable[[Sequence[Rows]], Sequence[T]]
+) -> list[T]:
     """Apply a function to candidates of as many columns each, and return the results in the order of the candidates."""
     widths = [len(next(iter(rows.values()))) for rows in candidates]
-    found: dict[int, T] = {}
-    with one_blas_thread():
-        for k in dict.fromkeys(widths):
-            same = [place for place, width in enumerate(widths) if width == k]
-            size = max(1, _COLUMNS // k)
-            for start in range(0, len(same), size):
-                group = same[start : start + size]
-                found |= dict(zip(group, function([candidates[place] for place in group]), strict=True))
+    groups: list[list[int]] = []
+    for k in dict.fromkeys(widths):
+        same = [place for place, width in enumerate(widths) if width == k]
+        size = max(1, _COLUMNS // k)
+        groups += [same[start : start + size] for start in range(0, len(same), size)]
+    if len(groups) > 1:
+        _ = model.residual, model.basis_products, model.basis_scores
+    results = side_by_side(lambda group: function([candidates[place] for place in group]), groups)
+    found = dict(zip(chain.from_iterable(groups), chain.from_iterable(results), strict=True))
     return [found[place] for place in range(len(candidates))]
 
 

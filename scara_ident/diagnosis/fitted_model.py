@@ -18,6 +18,7 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Rows
 from scara_ident.estimation.information import orthonormal, weighted
 from scara_ident.estimation.observations import JointRows
+from scara_ident.threads import THREADS, side_by_side
 
 # What a block leaves to the others of a direction is at least this share: less is rounding.
 LEAST_REDUNDANCY = 1e-9
@@ -50,7 +51,7 @@ class FittedModel:
     @cached_property
     def root(self) -> Array:
         """Sums of columns that are orthonormal on all weighted rows, shape (m, r)."""
-        whole = weighted([rows.information(self.parameters) for rows in self.joints], self.weights)
+        whole = weighted(side_by_side(lambda rows: rows.information(self.parameters), self.joints), self.weights)
         return orthonormal(whole.regressor_factor)
 
     @cached_property
@@ -112,14 +113,19 @@ class FittedModel:
     @cached_property
     def released(self) -> Array:
         """Inverse of what each block leaves to the others of the orthonormal columns, shape (blocks, r, r)."""
-        left = np.eye(self.root.shape[1]) - self.basis_products
-        # Where something is left of every direction the plain inverse is as good, in a fifth of the time.
-        strong = np.linalg.norm(self.basis_products, axis=(1, 2)) < WELL_SHARED
-        result = np.empty_like(left)
-        result[strong] = np.linalg.inv(left[strong])
-        held, directions = np.linalg.eigh(left[~strong])
-        kept = np.maximum(held, LEAST_REDUNDANCY)
-        result[~strong] = (directions / kept[:, None]) @ directions.transpose(0, 2, 1)
+        result = np.empty_like(self.basis_products)
+
+        def invert(some: slice) -> None:
+            products = self.basis_products[some]
+            left = np.eye(products.shape[-1]) - products
+            # Where something is left of every direction the plain inverse is as good, in a fifth of the time.
+            strong = np.linalg.norm(products, axis=(1, 2)) < WELL_SHARED
+            result[some][strong] = np.linalg.inv(left[strong])
+            held, directions = np.linalg.eigh(left[~strong])
+            kept = np.maximum(held, LEAST_REDUNDANCY)
+            result[some][~strong] = (directions / kept[:, None]) @ directions.transpose(0, 2, 1)
+
+        side_by_side(invert, [slice(k, None, THREADS) for k in range(THREADS)])
         return result
 
     @cached_property

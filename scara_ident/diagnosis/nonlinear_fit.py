@@ -21,7 +21,7 @@ from scara_ident.effects.links import largest_armature
 from scara_ident.estimation.information import Information, weighted
 from scara_ident.estimation.observations import JointRows
 from scara_ident.robot.rotors import GUESS_FACTOR
-from scara_ident.threads import one_blas_thread
+from scara_ident.threads import one_blas_thread, side_by_side
 
 # Step for the derivative by a nonlinear parameter, as a share of it: small beside its curvature, large beside rounding.
 DERIVATIVE_STEP = 1e-3
@@ -185,7 +185,7 @@ def linearise(
 
 def _pooled(joints: Sequence[JointRows], parameters: int, weights: Array) -> Information:
     with one_blas_thread():
-        return weighted([rows.information(parameters) for rows in joints], weights)
+        return weighted(side_by_side(lambda rows: rows.information(parameters), joints), weights)
 
 
 def _change(

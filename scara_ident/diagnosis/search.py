@@ -26,7 +26,7 @@ from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import HIGHEST_CUT
+from scara_ident.motion.low_pass import HIGHEST_CUT
 from scara_ident.motion.prepared import PreparedData
 from scara_ident.progress import Work
 

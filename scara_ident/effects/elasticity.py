@@ -12,7 +12,7 @@ from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.links import lagging, link_inertia, shared, usual_link_inertia
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion.motion import HIGHEST_CUT, differentiate
+from scara_ident.motion.low_pass import HIGHEST_CUT, differentiate
 
 # The torque that winds up a gear keeps this many times the band, so that the band itself is left alone.
 LOAD_BAND = 3.0

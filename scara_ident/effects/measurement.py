@@ -13,7 +13,8 @@ from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.parameters import Coefficient, Member, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion.motion import HIGHEST_CUT, UNIFORM_TOLERANCE, differentiate
+from scara_ident.motion.low_pass import HIGHEST_CUT, differentiate
+from scara_ident.motion.motion import UNIFORM_TOLERANCE
 from scara_ident.motion.spline import cubic_spline
 from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.recording import Recording

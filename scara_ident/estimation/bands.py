@@ -21,7 +21,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.least_squares import weighted_value
-from scara_ident.estimation.observations import kept_rows, observe
+from scara_ident.estimation.observations import informations, kept_rows
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Stretch, motion_of, torque_of
 from scara_ident.motion.prepared import END_PERIODS, PreparedData, PreparedStretch
@@ -162,7 +162,7 @@ class _Spectra:
         data = self.data.at(tuple(bands.tolist()))
         # One that is too short for these bands, or at rest, has nothing to say.
         kept = np.flatnonzero(side_by_side(kept_rows, data.recordings)).tolist()
-        return self.judged(bands, weighted_value(observe(self.model, data.of(kept) if kept else data)))
+        return self.judged(bands, weighted_value(informations(self.model, data.of(kept) if kept else data)))
 
     def judged(self, bands: Array, value: Array) -> _Fit:
         """Say how far up parameters that were fitted in some bands explain each joint's torque."""
@@ -239,7 +239,7 @@ def narrowest_bands(model: TorqueModel, stretches: int, moving: Array) -> Array:
 def _moving(data: PreparedData) -> Array:
     """Return the time in which each joint moves, s, shape (n,)."""
     slow = _thinned(data.at((FIRST_BAND,) * len(data.bands)), FIRST_BAND * FIRST_WIDENING / HIGHEST_BAND)
-    times = [np.count_nonzero(~part.rest, axis=1) / part.rate for part in slow.stretches]
+    times = side_by_side(lambda part: np.count_nonzero(~part.rest, axis=1) / part.rate, slow.stretches)
     return np.asarray(np.sum(times, axis=0))
 
 

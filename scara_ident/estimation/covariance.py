@@ -76,26 +76,38 @@ def block_covariance(
 
 @dataclass(frozen=True, eq=False)
 class _Scores:
-    """Of one joint, block by block: scores (blocks, r) in the directions of the root, and their products (blocks, r, r)."""
+    """Of one joint, block by block: scores and their products in the directions that its columns tell apart.
 
+    Attributes
+    ----------
+    turn : ndarray, shape (r, k)
+        These directions, orthonormal, among those of the root.
+    scores : ndarray, shape (blocks, k)
+    products : ndarray, shape (blocks, k, k)
+    """
+
+    turn: Array
     scores: Array
     products: Array
 
 
 def _scores(rows: JointRows, weight: float, root: Array, value: Array) -> _Scores:
-    half = weight * (rows.table[:-1].T @ root[rows.columns])
+    # The columns of a joint are fewer than the parameters, so that its products need not be as large.
+    turn, factor = np.linalg.qr(root[rows.columns].T)
+    half = weight * (factor @ rows.table[:-1])
     residual = weight * (rows.table[-1] - value[rows.columns] @ rows.table[:-1])
-    size = root.shape[1]
+    size = len(half)
     scores, products = np.zeros((len(rows.counts), size)), np.zeros((len(rows.counts), size, size))
     for b, (start, stop) in enumerate(pairwise(rows.starts)):
-        part = half[start:stop]
-        scores[b], products[b] = part.T @ residual[start:stop], part.T @ part
-    return _Scores(scores, products)
+        part = half[:, start:stop]
+        scores[b], products[b] = part @ residual[start:stop], part @ part.T
+    return _Scores(turn, scores, products)
 
 
 def _scattered(joints: Sequence[_Scores], owner: NDArray[np.intp]) -> Array | None:
     """Scatter of the scores block by block; None where a block leaves no residual to judge a direction by."""
-    products, scores = sum(joint.products for joint in joints), sum(joint.scores for joint in joints)
+    products = sum(joint.turn @ joint.products @ joint.turn.T for joint in joints)
+    scores = sum(joint.scores @ joint.turn.T for joint in joints)
     # With H = half half', half' (1 - H)^-1/2 = (1 - half' half)^-1/2 half': the smaller of two symmetric problems.
     leverage, directions = np.linalg.eigh(products)
     if np.any(leverage[:, -1] > FULL_LEVERAGE):
@@ -118,7 +130,8 @@ def _pooled(joints: Sequence[_Scores], root: Array) -> Array:
     for joint in joints:
         # tr(H (1 - H)): leverages of a part of the rows are at most 1.
         expected = float(np.sum(np.trace(joint.products, axis1=1, axis2=2)) - np.sum(joint.products**2))
-        share = root @ np.sum(joint.products, axis=0) @ root.T
+        turned = root @ joint.turn
+        share = turned @ np.sum(joint.products, axis=0) @ turned.T
         if expected > NO_REDUNDANCY:
             matrix += float(np.sum(joint.scores**2)) / expected * share
         else:

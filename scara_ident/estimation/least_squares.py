@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from scara_ident.arrays import Array
@@ -112,9 +114,10 @@ def least_squares(
     )
 
 
-def weighted_value(observations: Observations) -> Array:
-    """Return the parameters of `wls` alone, shape (p,), without the work of their covariance."""
-    return value_and_weights(observations)[0]
+def weighted_value(joints: Sequence[Information]) -> Array:
+    """Return the parameters of `wls` alone, shape (p,), from all rows of each joint."""
+    with one_blas_thread():
+        return weighted(joints, 1.0 / joint_noise(joints)).solve().value
 
 
 def value_and_weights(observations: Observations) -> tuple[Array, Array]:

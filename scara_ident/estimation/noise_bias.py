@@ -8,14 +8,16 @@ than chance is what Durbin, Wu and Hausman test. The estimate is left as it is, 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import weighted
-from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.observations import Observations, informations, observe
 from scara_ident.motion.position_noise import encoder_step, noise_level, noisier
-from scara_ident.motion.prepared import PreparedData
+from scara_ident.motion.prepared import PreparedData, PreparedRecording
+from scara_ident.threads import side_by_side
 
 # Share of an acceleration's square that is noise within the band: less biases an inertia by less than a hundredth of a percent.
 NEGLIGIBLE = 1e-4
@@ -36,8 +38,8 @@ def noise_bias(observations: Observations, weights: Array, value: Array) -> Arra
     """
     if max(noise_shares(observations.data), default=0.0) < NEGLIGIBLE:
         return None
-    again = observe(observations.model, noisier(observations.data))
-    return np.asarray(weighted(again.by_joint, weights).solve().value - value)
+    again = informations(observations.model, noisier(observations.data))
+    return np.asarray(weighted(again, weights).solve().value - value)
 
 
 def noise_torque(observations: Observations, value: Array) -> Array:
@@ -64,9 +66,10 @@ def noise_shares(data: PreparedData) -> list[float]:
 
     White position noise of variance s^2 at a rate r has the acceleration ``2 s^2 / r (2 pi)^4 f^5 / 5`` up to f.
     """
-    found = []
-    for item in data.recordings:
+
+    def of_recording(item: PreparedRecording) -> list[float]:
         part = item.longest
+        found = []
         for joint, band in enumerate(data.bands):
             if band is None or not np.any(part.used[joint]):
                 continue
@@ -75,7 +78,9 @@ def noise_shares(data: PreparedData) -> list[float]:
             power = 2.0 * noise**2 / part.rate * (2.0 * np.pi) ** 4 * band**5 / 5.0
             whole = float(np.mean(part.motion.a[joint][part.used[joint]] ** 2))
             found.append(power / whole if whole > 0.0 else 0.0)
-    return found
+        return found
+
+    return list(chain.from_iterable(side_by_side(of_recording, data.recordings)))
 
 
 def bias_sentence(names: Sequence[str], bias: Array, std: Array) -> str | None:

@@ -10,17 +10,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
-from scara_ident.estimation.information import Information
+from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
-from scara_ident.threads import side_by_side
+from scara_ident.threads import THREADS, side_by_side
 
 # Columns of every joint at every sample of a stretch, (k, N) each.
 Raw = tuple[Array, ...]
@@ -300,15 +301,61 @@ def kept_rows(item: PreparedRecording) -> int:
     return sum(len(kept) for part in item.stretches if part.usable for kept in part.kept)
 
 
-def _observed(model: TorqueModel, item: PreparedRecording) -> tuple[tuple[Raw, ...], Sequence[JointRows]]:
-    """Return the columns of a recording at every sample, and its rows."""
-    raw = tuple(model.joint_columns(part.motion) for part in item.stretches)
-    return raw, _recording_rows(item, raw)
+def informations(model: TorqueModel, data: PreparedData) -> tuple[Information, ...]:
+    """Return `Observations.by_joint` of what `observe` would make, without keeping any row.
+
+    Parameters
+    ----------
+    model : TorqueModel
+    data : PreparedData
+        With effort.
+
+    Raises
+    ------
+    RecordingError
+        If no row of a recording is left.
+    """
+    longest = max((part.samples for part in data.stretches), default=0)
+
+    def of_some(items: Sequence[PreparedRecording]) -> list[list[Information]]:
+        # The same memory for all: to ask the system for it takes as long as to fill it.
+        memory = [np.empty((len(own) + 1) * longest) for own in model.active]
+        return [[rows.information(len(rows.columns)) for rows in _observed(model, item, memory)[1]] for item in items]
+
+    turns = [data.recordings[k::THREADS] for k in range(min(THREADS, len(data.recordings)))]
+    each = list(chain.from_iterable(side_by_side(of_some, turns)))
+    nothing = [[Information.empty(len(own)) for own in model.active]]
+    return tuple(
+        merge(parts).embed(own, len(model.columns))
+        for own, parts in zip(model.active, zip(*(each or nothing), strict=True), strict=True)
+    )
 
 
-def _recording_rows(item: PreparedRecording, raws: tuple[Raw, ...]) -> list[JointRows]:
-    usable = [(part, raw) for part, raw in zip(item.stretches, raws, strict=True) if part.usable]
-    if not any(len(kept) for part, _ in usable for kept in part.kept):
+def _observed(
+    model: TorqueModel, item: PreparedRecording, memory: Sequence[Array] | None = None
+) -> tuple[tuple[Raw, ...], Sequence[JointRows]]:
+    """Return the columns of a recording at every sample, and its rows; the columns are overwritten if memory is given."""
+    raws, parts = [], []
+    for part in item.stretches:
+        shapes = [(len(own) + 1, part.samples) for own in model.active]
+        if memory is None:
+            tables = [np.empty(shape) for shape in shapes]
+        else:
+            tables = [own[: shape[0] * shape[1]].reshape(shape) for own, shape in zip(memory, shapes, strict=True)]
+        raw = model.joint_columns(part.motion, [table[:-1] for table in tables])
+        for table, torque in zip(tables, part.torque, strict=True):
+            table[-1] = torque
+        raws.append(raw)
+        if part.usable:
+            # Made once, and not in two threads.
+            _ = part.fade, part.kept
+            parts.append((part, side_by_side(part.rows, range(len(tables)), tables)))
+    return tuple(raws), _recording_rows(item, parts)
+
+
+def _recording_rows(item: PreparedRecording, parts: Sequence[tuple[PreparedStretch, list[Array]]]) -> list[JointRows]:
+    """Return the rows of a recording from those of its usable stretches, joint by joint."""
+    if not any(len(kept) for part, _ in parts for kept in part.kept):
         samples = sum(part.samples for part in item.stretches)
         raise RecordingError(
             f"{item.recording.path or item.name}: nothing is left of {samples} samples once the ends and the times "
@@ -316,17 +363,17 @@ def _recording_rows(item: PreparedRecording, raws: tuple[Raw, ...]) -> list[Join
         )
     found = []
     for j in range(len(item.bands)):
-        tables, starts, counts, total = [], [], [], 0
-        for part, raw in usable:
-            tables.append(part.rows(j, np.concatenate([raw[j], part.torque[j : j + 1]])))
+        starts, counts, total = [], [], 0
+        for part, _ in parts:
             begin = part.block_starts(j)
             starts.append(begin[:-1] + total)
             counts.append(part.steps[j] * np.diff(begin).astype(float))
             total += int(begin[-1])
+        tables = [tables[j] for _, tables in parts]
         found.append(
             JointRows(
                 np.arange(tables[0].shape[0] - 1),
-                np.concatenate(tables, axis=1),
+                tables[0] if len(tables) == 1 else np.concatenate(tables, axis=1),
                 np.concatenate([*starts, [total]]),
                 np.concatenate(counts),
             )

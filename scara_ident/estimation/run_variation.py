@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.estimation.variance_components import components, expected
 from scara_ident.model.terms.friction import Friction, Offset
 from scara_ident.robot.robot import Robot
 from scara_ident.threads import side_by_side
@@ -26,10 +27,6 @@ KINDS = ("friction", "torque scale", "offset", "delay")
 
 # With fewer recordings than this none can be told from the parameters.
 LEAST_RUNS = 3
-# Rise of twice the logarithm of the likelihood below which chance explains a component, which cannot be negative: 1 %.
-CHANCE = 5.41
-# Steps of expectation and maximisation; each takes a share of what is left.
-STEPS = 40
 # Of differences below this share of the torque nothing is said in words.
 SPOKEN_OF = 0.01
 # Directions of a run below this share of the largest are not told apart.
@@ -198,13 +195,15 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
 
-    def of_joint(joint: int, rows: JointRows) -> JointVariation | None:
-        bounds = rows.starts[firsts]
+    def of_joint(joint: int, rows: JointRows) -> _Sums | None:
         directions = _directions(observations, joint, rows, value)
         left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
-        return _estimated(directions, left, rows.starts, firsts, bounds)
+        return _sums(directions, left, rows.starts, firsts)
 
-    return RunVariation(tuple(side_by_side(of_joint, range(len(joints)), joints)))
+    sums = side_by_side(of_joint, range(len(joints)), joints)
+    told = [item for item in sums if item is not None]
+    estimated = iter(_estimated(told) if told else ())
+    return RunVariation(tuple(None if item is None else next(estimated) for item in sums))
 
 
 def _directions(observations: Observations, joint: int, rows: JointRows, value: Array) -> Array:
@@ -237,48 +236,69 @@ def _of_columns(
     )
 
 
-def _estimated(
-    directions: Array, left: Array, starts: NDArray[np.intp], firsts: NDArray[np.intp], bounds: NDArray[np.intp]
-) -> JointVariation | None:
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Of one joint, in units of the noise of one row: what its runs say of differences along each direction.
+
+    Attributes
+    ----------
+    directions : ndarray, shape (kinds, N)
+    products : ndarray, shape (runs, kinds, kinds)
+    aims : ndarray, shape (runs, kinds)
+    back : ndarray, shape (kinds,)
+        The unit of each direction; 0 where a kind does nothing.
+    noise : float
+    bounds : ndarray of int, shape (runs + 1,)
+    """
+
+    directions: Array
+    products: Array
+    aims: Array
+    back: Array
+    noise: float
+    bounds: NDArray[np.intp]
+
+
+def _sums(directions: Array, left: Array, starts: NDArray[np.intp], firsts: NDArray[np.intp]) -> _Sums | None:
+    bounds = starts[firsts]
     runs, kinds = len(bounds) - 1, len(directions)
     size = np.sqrt(np.sum(directions**2, axis=1) / runs)
     shown = size > 0.0
     if not np.any(shown) or not np.any(left):
         return None
-    unit = directions[shown] / size[shown, None]
-    products, aims, noise, spread = _of_runs(unit, left, starts, firsts, bounds)
+    found, by_residual, noise, spread = _of_runs(directions[shown] / size[shown, None], left, starts, firsts)
     if noise == 0.0:
         return None
-    # In units of the noise of one row; the memory of the noise makes directions less sure than white noise would.
+    # The memory of the noise makes directions less sure than white noise would.
     scale = 1.0 / np.sqrt(spread)
-    products = products * np.outer(scale, scale)
-    aims = aims * scale / noise
-    active = np.ones((1, np.count_nonzero(shown)), dtype=bool)
-    variances, likelihoods = _most_likely(products, aims, active)
-    while np.any(active):
-        # All that lack one more kind, in one go.
-        kept, variance, best = active[0], variances[0], likelihoods[0]
-        active = kept & ~np.eye(len(kept), dtype=bool)[kept]
-        variances, likelihoods = _most_likely(products, aims, active)
-        weakest = int(np.argmax(likelihoods))
-        if 2.0 * (best - likelihoods[weakest]) > CHANCE:
-            break
-        active, variances, likelihoods = active[[weakest]], variances[[weakest]], likelihoods[[weakest]]
-    else:
-        return None
-    std, of_run = np.zeros(kinds), np.zeros((runs, kinds))
-    # Parameters are fitted to all runs, so that these lie about their own mean.
-    back = scale * noise / size[shown]
-    std[shown] = np.sqrt(variance * runs / (runs - 1.0)) * back
-    of_run[:, shown] = _expected(products, aims, variance)[0] * back
-    return JointVariation(directions, std, of_run, noise, bounds)
+    products, aims, back = np.zeros((runs, kinds, kinds)), np.zeros((runs, kinds)), np.zeros(kinds)
+    products[:, np.outer(shown, shown)] = (found * np.outer(scale, scale)).reshape(runs, -1)
+    aims[:, shown] = by_residual * scale / noise
+    back[shown] = scale * noise / size[shown]
+    return _Sums(directions, products, aims, back, noise, bounds)
+
+
+def _estimated(joints: Sequence[_Sums]) -> list[JointVariation | None]:
+    """Return how runs differ on each of some joints."""
+    products, aims = np.array([item.products for item in joints]), np.array([item.aims for item in joints])
+    runs = aims.shape[1]
+    variances = components(products, aims, np.array([item.back > 0.0 for item in joints]))
+    means, _ = expected(products, aims, variances)
+    found: list[JointVariation | None] = []
+    for item, variance, mean in zip(joints, variances, means, strict=True):
+        # Parameters are fitted to all runs, so that these lie about their own mean.
+        std = np.sqrt(variance * runs / (runs - 1.0)) * item.back
+        some = bool(np.any(variance))
+        found.append(JointVariation(item.directions, std, mean * item.back, item.noise, item.bounds) if some else None)
+    return found
 
 
 def _of_runs(
-    unit: Array, left: Array, starts: NDArray[np.intp], firsts: NDArray[np.intp], bounds: NDArray[np.intp]
+    unit: Array, left: Array, starts: NDArray[np.intp], firsts: NDArray[np.intp]
 ) -> tuple[Array, Array, float, Array]:
     """Return per run products of directions and with the residual, the noise of a row, and its spread by its memory."""
     products, aims = [], []
+    bounds = starts[firsts]
     squares = rows = 0.0
     scatter, white = np.zeros(len(unit)), np.zeros(len(unit))
     for run, (start, stop) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
@@ -290,59 +310,11 @@ def _of_runs(
         squares += float(rest @ rest)
         rows += max(0.0, stop - start - len(unit))
         blocks = starts[firsts[run] : firsts[run + 1] + 1]
-        scores = np.array([own[:, a - start : b - start] @ rest[a - start : b - start] for a, b in zip(blocks[:-1], blocks[1:], strict=True)])  # fmt: skip
-        scatter += np.sum(scores**2, axis=0)
+        # Blocks without rows have no score.
+        begins = blocks[:-1][np.diff(blocks) > 0] - start
+        if len(begins):
+            scatter += np.sum(np.add.reduceat(own * rest, begins, axis=1) ** 2, axis=1)
         white += np.diag(product)
     variance = squares / rows if rows else 0.0
     spread = np.maximum(1.0, scatter / np.maximum(variance * white, np.finfo(float).tiny))
     return np.array(products), np.array(aims), float(np.sqrt(variance)), spread
-
-
-def _expected(products: Array, aims: Array, variance: Array) -> tuple[Array, Array]:
-    """Return how far each run lies off along each direction, and the variance of that.
-
-    Parameters
-    ----------
-    products : ndarray, shape (runs, k, k)
-    aims : ndarray, shape (runs, k)
-    variance : ndarray, shape (..., k)
-        Of sets of directions; zero leaves a direction out.
-
-    Returns
-    -------
-    tuple of ndarray, each of shape (..., runs, k)
-    """
-    root = np.sqrt(variance)[..., None, :]
-    inner = products * (root[..., :, None] * root[..., None, :])
-    place = np.arange(inner.shape[-1])
-    inner[..., place, place] += 1.0
-    spread = root[..., :, None] * np.linalg.inv(inner) * root[..., None, :]
-    return (spread @ aims[..., None])[..., 0], spread[..., place, place]
-
-
-def _most_likely(products: Array, aims: Array, active: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return the variances that are most likely, and the logarithm of their likelihood, for sets of active kinds.
-
-    Parameters
-    ----------
-    products : ndarray, shape (runs, k, k)
-    aims : ndarray, shape (runs, k)
-    active : ndarray of bool, shape (sets, k)
-        The variances of the others are zero.
-
-    Returns
-    -------
-    tuple of ndarray, shapes (sets, k) and (sets,)
-    """
-    alone = np.diagonal(products, axis1=1, axis2=2)
-    # The first guess leaves nothing to chance.
-    guess = np.mean((aims / np.maximum(alone, np.finfo(float).tiny)) ** 2, axis=0)
-    variance = np.where(active, guess, 0.0)
-    for _ in range(STEPS):
-        mean, spread = _expected(products, aims, variance)
-        variance = np.mean(mean**2 + spread, axis=-2)
-    root = np.sqrt(variance)[:, None, :]
-    grown = np.eye(len(guess)) + products * (root[..., :, None] * root[..., None, :])
-    mean, _ = _expected(products, aims, variance)
-    likelihood = 0.5 * np.sum(mean * aims, axis=(-2, -1)) - 0.5 * np.sum(np.linalg.slogdet(grown)[1], axis=-1)
-    return variance, likelihood

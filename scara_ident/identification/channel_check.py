@@ -109,7 +109,7 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
         return ()
     faults: list[ChannelFault] = []
     for _ in range(2 * len(joints)):
-        fitted = weighted_value(held)
+        fitted = weighted_value(held.by_joint)
         errors, pushing = _relative(fitted, held), _pushing(fitted, held)
         suspects = _suspects(errors, pushing)
         if not suspects:
@@ -123,7 +123,7 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
                 continue
             # A turned sign must take the push away; signs that an exchange brings to light are the next round's.
             allowed = np.count_nonzero(pushing) - (signal != "effort and position")
-            if not exchanged and np.count_nonzero(_pushing(weighted_value(other), other)) > allowed:
+            if not exchanged and np.count_nonzero(_pushing(weighted_value(other.by_joint), other)) > allowed:
                 continue
             names = tuple(joints[j] for j in chosen)
             best = ChannelFault(signal, names, exchanged, score, mended), other
@@ -204,7 +204,7 @@ def _held_out(observations: Observations) -> tuple[Array, float]:
     for which in range(PIECES):
         fitted = np.flatnonzero(piece != which)
         parts = tuple(rows.part(fitted) for rows in observations.joints)
-        value = weighted_value(replace(observations, joints=parts, owner=owner[fitted]))
+        value = weighted_value(replace(observations, joints=parts, owner=owner[fitted]).by_joint)
         for j, rows in enumerate(observations.joints):
             residual = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
             total = np.concatenate([[0.0], np.cumsum(residual**2)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -80,9 +81,9 @@ class TorqueModel:
         """Columns that can differ from zero on each joint."""
         return tuple(np.flatnonzero(row) for row in self.pattern)
 
-    def joint_columns(self, motion: Motion) -> tuple[Array, ...]:
-        """Return for each joint the columns that act on it, each of shape (k, N), see `active`."""
-        found = tuple(np.empty((len(active), motion.samples)) for active in self.active)
+    def joint_columns(self, motion: Motion, into: Sequence[Array] | None = None) -> tuple[Array, ...]:
+        """Return for each joint the columns that act on it, each of shape (k, N), see `active`; in arrays that are given."""
+        found = tuple(np.empty((len(own), motion.samples)) for own in self.active) if into is None else tuple(into)
         start = np.zeros(self.robot.n, dtype=np.intp)
         for term in self.terms:
             stop = start + np.count_nonzero(term.pattern, axis=1)

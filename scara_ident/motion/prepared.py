@@ -9,28 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.motion.motion import (
-    HIGHEST_CUT,
-    ROWS_AT_ONCE,
-    Motion,
-    Stretch,
-    low_pass,
-    low_pass_every,
-    motion_of,
-    stretches,
-    torque_of,
-    with_effort_of,
-)
+from scara_ident.motion.low_pass import HIGHEST_CUT, ROWS_AT_ONCE, low_pass, low_pass_every
+from scara_ident.motion.motion import Motion, Stretch, motion_of, stretches, torque_of, with_effort_of
 from scara_ident.motion.trajectories import Trajectories, trajectories_of
 from scara_ident.recording.recording import Recording
-from scara_ident.threads import side_by_side
+from scara_ident.threads import made_once, side_by_side
 
 Bands = Sequence[float | None]
 
@@ -87,7 +76,7 @@ class PreparedStretch:
         """Number of samples N."""
         return len(self.stretch.time)
 
-    @cached_property
+    @made_once
     def motion(self) -> Motion:
         """Filtered position, velocity and acceleration on the whole time grid."""
         return motion_of(self.stretch, position_cuts(self.rate, self.bands))
@@ -97,7 +86,7 @@ class PreparedStretch:
         """Recorded torque, shape (n, N), not filtered."""
         return torque_of(self.stretch)
 
-    @cached_property
+    @made_once
     def trim(self) -> int:
         """Samples left out at each end."""
         slowest = min((band for band in self.bands if band is not None), default=np.inf)
@@ -108,29 +97,29 @@ class PreparedStretch:
         """Whether anything is left between its ends."""
         return self.samples > 2 * self.trim + 1
 
-    @cached_property
+    @made_once
     def rest(self) -> NDArray[np.bool_]:
         """Where each joint stands still, shape (n, N), widened by the memory of the position's filter."""
         return standstill(self.stretch, self.motion, self.bands)
 
-    @cached_property
+    @made_once
     def fade(self) -> Array:
         """Weight of both sides of the equation, shape (n, N): 0 at rest, 1 away from it, see `fading`."""
         return fading(self.rest, self.rate, self.bands)
 
-    @cached_property
+    @made_once
     def used(self) -> NDArray[np.bool_]:
         """Samples that say something, shape (n, N): neither at rest nor at the ends."""
         used = ~self.rest
         used[:, : self.trim] = used[:, max(self.trim, self.samples - self.trim) :] = False
         return used
 
-    @cached_property
+    @made_once
     def steps(self) -> tuple[int, ...]:
         """How many samples one kept row of each joint stands for."""
         return tuple(row_step(self.rate, band) for band in self.bands)
 
-    @cached_property
+    @made_once
     def blocks(self) -> NDArray[np.intp]:
         """Bounds of the blocks of time, samples, shape (blocks + 1,)."""
         slowest = min((band for band in self.bands if band is not None), default=np.inf)
@@ -138,7 +127,7 @@ class PreparedStretch:
         inside = self.samples - 2 * self.trim
         return np.linspace(self.trim, self.samples - self.trim, max(1, round(inside / length)) + 1).astype(np.intp)
 
-    @cached_property
+    @made_once
     def kept(self) -> tuple[NDArray[np.intp], ...]:
         """Samples whose rows are kept, joint by joint."""
         first, last = self.blocks[0], self.blocks[-1]
@@ -162,7 +151,7 @@ class PreparedStretch:
             Columns of the joint's equation, or its torque.
         """
         step, band = self.steps[joint], self.bands[joint]
-        low = low_pass_every(self.fade[joint] * signals, self.rate, band, step)
+        low = low_pass_every(signals, self.rate, band, step, self.fade[joint])
         return np.asarray(np.sqrt(step) * low[:, self.kept[joint] // step])
 
     def rows_of(self, signals: Sequence[tuple[int, Array]]) -> list[Array]:
@@ -176,8 +165,7 @@ class PreparedStretch:
         def passed(places: list[int]) -> list[Array]:
             joints = [signals[place][0] for place in places]
             step, band = keys[places[0]]
-            faded = fade[joints] * np.array([signals[place][1] for place in places])
-            low = low_pass_every(faded, self.rate, band, step)
+            low = low_pass_every(np.array([signals[place][1] for place in places]), self.rate, band, step, fade[joints])
             return [np.sqrt(step) * row[kept[joint] // step] for joint, row in zip(joints, low, strict=True)]
 
         made = side_by_side(passed, parts) if len(parts) > 1 else [passed(places) for places in parts]
@@ -188,7 +176,7 @@ class PreparedStretch:
         """Return a signal of a joint's equation, shape (..., N), faded out towards rest and within the joint's band."""
         return low_pass(self.fade[joint] * signal, self.rate, self.bands[joint], self.steps[joint])
 
-    @cached_property
+    @made_once
     def smooth_torque(self) -> Array:
         """Recorded torque within the bands at every sample, shape (n, N)."""
         return np.array([self.smooth(j, row) for j, row in enumerate(self.torque)])

@@ -10,6 +10,7 @@ from scara_ident.arrays import Array
 from scara_ident.motion.motion import Stretch, torque_of
 from scara_ident.motion.prepared import PreparedData
 from scara_ident.motion.trajectories import LARGEST_SHIFT, SAME_RATE, alignment
+from scara_ident.threads import side_by_side
 
 
 def repeatability(data: PreparedData) -> dict[str, Array]:
@@ -32,12 +33,9 @@ def repeatability(data: PreparedData) -> dict[str, Array]:
     for label, item in zip(data.labels, data.recordings, strict=True):
         if item.recording.effort is not None:
             groups.setdefault(label, []).append(item.longest.stretch)
-    found = {}
-    for trajectory, group in groups.items():
-        sigma = _scatter(group) if len(group) > 1 else None
-        if sigma is not None:
-            found[trajectory] = sigma
-    return found
+    repeated = {trajectory: group for trajectory, group in groups.items() if len(group) > 1}
+    found = side_by_side(_scatter, repeated.values())
+    return {trajectory: sigma for trajectory, sigma in zip(repeated, found, strict=True) if sigma is not None}
 
 
 def _scatter(longest: Sequence[Stretch]) -> Array | None:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scara_ident.motion.motion import Stretch, differentiate
+from scara_ident.motion.low_pass import differentiate
+from scara_ident.motion.motion import Stretch
 from scara_ident.recording.recording import Recording
 
 # What is worth saying: a lag of more than this many samples, a gain off by more, a part that is not velocity.

@@ -18,7 +18,8 @@ from scara_ident.effects.effect import EffectTerm
 from scara_ident.estimation.observations import Observations
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
-from scara_ident.motion.motion import Motion, low_pass
+from scara_ident.motion.low_pass import low_pass
+from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import PreparedStretch
 
 

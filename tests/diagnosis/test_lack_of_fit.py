@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.lack_of_fit import lack_of_fit
-from scara_ident.motion.motion import low_pass
+from scara_ident.motion.low_pass import low_pass
 from tests.diagnosis.made import BANDS, exact_runs, fitted, residuals_of, with_torque
 
 

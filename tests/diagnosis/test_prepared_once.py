@@ -43,7 +43,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Counts, Diagnosis]:
 
         patch.setattr(owner, name, wrapped)
 
-    def columns_of(model: TorqueModel, motion: Motion) -> Hashable:
+    def columns_of(model: TorqueModel, motion: Motion, *_: Any) -> Hashable:
         effects = tuple((term.effect, term.member) for term in model.terms if isinstance(term, EffectTerm))
         return model.name, effects, states(motion)
 

@@ -123,7 +123,7 @@ def test_an_undetermined_parameter_has_infinite_std_and_the_others_keep_theirs(m
 def test_the_value_alone_is_that_of_wls(model: TorqueModel):
     w, u, _ = made(model)
     given = linear(model, "a_1", w, u, 100)
-    np.testing.assert_array_equal(weighted_value(given), wls(given).value)
+    np.testing.assert_array_equal(weighted_value(given.by_joint), wls(given).value)
     np.testing.assert_array_equal(value_and_weights(given)[1], wls(given).weights)
 
 

@@ -15,9 +15,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scara_ident.errors import RecordingError
 from scara_ident.estimation import ols
 from scara_ident.estimation.information import Information, merge
-from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.observations import Observations, informations, observe
 from scara_ident.model.model import TorqueModel, build_model
-from scara_ident.motion.motion import low_pass
+from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.prepared import prepare, row_step
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
@@ -334,3 +334,13 @@ def test_the_first_terms_alone_are_the_model_of_them(model: TorqueModel, one: Re
     value = np.linspace(0.1, 1.0, found.parameters)
     for part, whole in zip(found.predicted(value), wanted.predicted(value), strict=True):
         assert_allclose(part, whole, rtol=0, atol=1e-12)
+
+
+def test_the_factors_alone_are_those_of_the_rows(model: TorqueModel, one: Recording):
+    gap = np.arange(len(one.time)) // 1000 != 2
+    cut = replace(one, name="swing_3", time=one.time[gap], position=one.position[:, gap], effort=one.effort[:, gap])
+    data = prepare([one, swing(model.robot, "swing_2", 1), cut], (10.0, 25.0))
+    assert len(data.stretches) == 4
+    for found, wanted in zip(informations(model, data), observe(model, data).by_joint, strict=True):
+        assert_same(found, wanted)
+    assert all(information.rows == 0.0 for information in informations(model, prepare([], BANDS)))

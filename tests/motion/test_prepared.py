@@ -14,7 +14,8 @@ import scara_ident.motion.prepared
 from scara_ident.errors import RecordingError
 from scara_ident.identification.identify import identify
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import low_pass, stretches
+from scara_ident.motion.low_pass import low_pass
+from scara_ident.motion.motion import stretches
 from scara_ident.motion.prepared import (
     BLOCK_SECONDS,
     PreparedStretch,
@@ -211,14 +212,14 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter:
         return stretches(recording)
 
     def filtered(signal, rate, cut):
-        count[signal.ctypes.data, cut] += 1
+        count.update((row.tobytes(), cut) for row in np.atleast_2d(signal))
         return differentiate(signal, rate, cut)
 
     joint_columns = TorqueModel.joint_columns
 
-    def columns(model, motion):
+    def columns(model, motion, *into):
         count[motion] += 1
-        return joint_columns(model, motion)
+        return joint_columns(model, motion, *into)
 
     monkeypatch.setattr(TorqueModel, "joint_columns", columns)
     monkeypatch.setattr(scara_ident.motion.prepared, "stretches", cut)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.motion.motion import low_pass
+from scara_ident.motion.low_pass import low_pass
 from scara_ident.report.traces import kept, traces
 from tests.report.simulated import made, resting, run
 

@@ -1,0 +1,100 @@
+"""Variance components of runs by maximum likelihood, on all joints at once.
+
+Each run lies off the mean along some directions, of which its rows tell with a known precision. The variances are found
+by expectation and maximisation (Searle, Casella and McCulloch 1992, "Variance Components", section 8.3), and kinds that
+chance explains are left out one by one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+
+# Rise of twice the logarithm of the likelihood below which chance explains a component, which cannot be negative: 1 %.
+CHANCE = 5.41
+# Steps of expectation and maximisation; each takes a share of what is left.
+STEPS = 40
+
+
+def components(products: Array, aims: Array, kept: NDArray[np.bool_]) -> Array:
+    """Return the variance of each kind on each joint, shape (joints, kinds); 0 where chance explains it.
+
+    Kinds are left out one by one, on all joints in the same steps.
+
+    Parameters
+    ----------
+    products : ndarray, shape (joints, runs, kinds, kinds)
+    aims : ndarray, shape (joints, runs, kinds)
+    kept : ndarray of bool, shape (joints, kinds)
+        Kinds that may differ.
+    """
+    kept = kept.copy()
+    (variances, likely) = (found[:, 0] for found in _most_likely(products, aims, kept[:, None]))
+    going = np.flatnonzero(np.any(kept, axis=1))
+    while len(going):
+        active = kept[going]
+        # All that lack one more kind, in one go.
+        fewer = active[:, None] & ~np.eye(active.shape[1], dtype=bool)
+        found, likelihoods = _most_likely(products[going], aims[going], fewer)
+        likelihoods = np.where(active, likelihoods, -np.inf)
+        weakest = np.argmax(likelihoods, axis=1)
+        place = np.arange(len(going))
+        by_chance = 2.0 * (likely[going] - likelihoods[place, weakest]) <= CHANCE
+        place, weakest, going = place[by_chance], weakest[by_chance], going[by_chance]
+        kept[going, weakest] = False
+        variances[going], likely[going] = found[place, weakest], likelihoods[place, weakest]
+        going = going[np.any(kept[going], axis=1)]
+    return np.where(kept, variances, 0.0)
+
+
+def expected(products: Array, aims: Array, variance: Array) -> tuple[Array, Array]:
+    """Return how far each run lies off along each direction, and the variance of that.
+
+    Parameters
+    ----------
+    products : ndarray, shape (..., runs, k, k)
+    aims : ndarray, shape (..., runs, k)
+    variance : ndarray, shape (..., k)
+        Zero leaves a direction out.
+
+    Returns
+    -------
+    tuple of ndarray, each of shape (..., runs, k)
+    """
+    root = np.sqrt(variance)[..., None, :]
+    inner = products * (root[..., :, None] * root[..., None, :])
+    place = np.arange(inner.shape[-1])
+    inner[..., place, place] += 1.0
+    spread = root[..., :, None] * np.linalg.inv(inner) * root[..., None, :]
+    return (spread @ aims[..., None])[..., 0], spread[..., place, place]
+
+
+def _most_likely(products: Array, aims: Array, active: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Return the variances that are most likely, and the logarithm of their likelihood, for sets of active kinds.
+
+    Parameters
+    ----------
+    products : ndarray, shape (joints, runs, k, k)
+    aims : ndarray, shape (joints, runs, k)
+    active : ndarray of bool, shape (joints, sets, k)
+        The variances of the others are zero.
+
+    Returns
+    -------
+    tuple of ndarray, shapes (joints, sets, k) and (joints, sets)
+    """
+    products, aims = products[:, None], aims[:, None]
+    alone = np.diagonal(products, axis1=-2, axis2=-1)
+    # The first guess leaves nothing to chance.
+    guess = np.mean((aims / np.maximum(alone, np.finfo(float).tiny)) ** 2, axis=-2)
+    variance = np.where(active, guess, 0.0)
+    for _ in range(STEPS):
+        mean, spread = expected(products, aims, variance)
+        variance = np.mean(mean**2 + spread, axis=-2)
+    root = np.sqrt(variance)[..., None, :]
+    grown = np.eye(guess.shape[-1]) + products * (root[..., :, None] * root[..., None, :])
+    mean, _ = expected(products, aims, variance)
+    likelihood = 0.5 * np.sum(mean * aims, axis=(-2, -1)) - 0.5 * np.sum(np.linalg.slogdet(grown)[1], axis=-1)
+    return variance, likelihood
