@@ -211,12 +211,26 @@ def main() -> None:
             push = made.push
             ends = (min(e.start for e in own) - push.start, max(e.stop for e in own) - push.stop) if own else None
             size = size_of(robot, made)
-            rows.append({"size": size, "found": bool(own), "ends": ends, "noise": made.noise, "missing": made.missing, "differ": made.differ})
-            rows[-1] |= {"kinds": {event.kind for event in own}, "score": max((event.score for event in own), default=0.0)}
+            rows.append(
+                {
+                    "size": size,
+                    "found": bool(own),
+                    "ends": ends,
+                    "noise": made.noise,
+                    "missing": made.missing,
+                    "differ": made.differ,
+                }
+            )
+            rows[-1] |= {
+                "kinds": {event.kind for event in own},
+                "score": max((event.score for event in own), default=0.0),
+            }
             if given.verbose or (size > CLEAR and (ends is None or max(map(abs, ends)) > TIMELY)):
                 print(f"set {k}: {push} {rows[-1]}", flush=True)
     print(f"{k} sets, {seconds / 3600.0:.2f} h; {np.median(cost):.3f} s a set to look (median)")
-    print(f"false events: {sum(false.values())}, {sum(false.values()) / seconds * 36000.0:.2f} in 10 h; by effect missing: {dict(false)}")
+    print(
+        f"false events: {sum(false.values())}, {sum(false.values()) / seconds * 36000.0:.2f} in 10 h; by effect missing: {dict(false)}"
+    )
     clear = [row for row in rows if row["size"] > CLEAR]
     if clear:
         got = [row for row in clear if row["found"]]

@@ -213,7 +213,12 @@ def diagnose(
     if negligible is not None:
         notes.append(f"{negligible}; corrected in the data, not counted as an effect")
     validation_after = _with_effects(found, validation_before)
-    in_held_out = held_out_events(after.value, outcome.training, validation_after)
+    # Where something stays unexplained that is why a whole recording is, and no event.
+    in_held_out = tuple(
+        event
+        for event in held_out_events(after.value, outcome.training, validation_after)
+        if event.kind != "unknown" or np.isfinite(event.score) or outcome.unexplained is None
+    )
     events += in_held_out
     notes += [event.sentence(robot) for event in events]
     shown = held_out_evidence(

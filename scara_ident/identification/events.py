@@ -10,8 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from scara_ident.arrays import Array
+from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.identification.event_search import Binned, Segment, binned, bounded_noise, standing_out
+from scara_ident.identification.binned_residual import Binned, binned, bounded_noise
+from scara_ident.identification.event_search import Segment, standing_out
 from scara_ident.identification.usable import check_rows
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
 from scara_ident.motion.trajectories import LARGEST_SHIFT, SAME_RATE, alignment
@@ -93,9 +95,7 @@ class Event:
 
 
 @one_blas_thread()
-def find_events(
-    observations: Observations, value: Array, fitted: Observations | None = None
-) -> tuple[Event, ...]:
+def find_events(observations: Observations, value: Array, fitted: Observations | None = None) -> tuple[Event, ...]:
     """Find what is local in time in recordings; what was left out of them counts again.
 
     Parameters
@@ -115,10 +115,14 @@ def find_events(
         owner += [len(data.recordings) + k for k in more[2]]
     noise = bounded_noise(parts, left, owner)
     stretches = [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, left, strict=True)]
+    plain = stretches
+    if fitted is None:
+        least = _residuals(observations, weighted_value(observations))[1]
+        plain = [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, least, strict=True)]
     whole = {id(part): row for part, row in zip(parts, left, strict=True)}
     found = [
         _event(robot, data, item, whole[id(item.binned.part)], held_out=fitted is not None)
-        for item in standing_out(stretches)
+        for item in standing_out(stretches, plain)
         if item.binned.recording < len(data.recordings) and not _repeated(item, stretches, data)
     ]
     return tuple(sorted(found, key=lambda event: (data_place(data, event.recording), event.start)))
@@ -162,7 +166,9 @@ def without_events(observations: Observations, events: Sequence[Event]) -> Obser
 
 def left_out(data: PreparedData, events: Sequence[Event]) -> PreparedData:
     """Return recordings that count as at rest during events, and at no other time for one."""
-    recordings = tuple(_left_out(item, [event for event in events if event.recording == item.name]) for item in data.recordings)
+    recordings = tuple(
+        _left_out(item, [event for event in events if event.recording == item.name]) for item in data.recordings
+    )
     same = all(a is b for a, b in zip(recordings, data.recordings, strict=True))
     return data if same else replace(data, recordings=recordings)
 
@@ -176,7 +182,11 @@ def _left_out(item: PreparedRecording, events: Sequence[Event]) -> PreparedRecor
             inside |= (time >= event.start - MARGIN) & (time <= event.stop + MARGIN)
         same = np.array_equal(inside, part.left_out) or not (np.any(inside) or np.any(part.left_out))
         parts.append(part if same else replace(part, left_out=inside if np.any(inside) else False))
-    return item if all(a is b for a, b in zip(parts, item.stretches, strict=True)) else replace(item, stretches=tuple(parts))
+    return (
+        item
+        if all(a is b for a, b in zip(parts, item.stretches, strict=True))
+        else replace(item, stretches=tuple(parts))
+    )
 
 
 def same_events(one: Sequence[Event], other: Sequence[Event]) -> bool:
@@ -197,7 +207,9 @@ def _event(robot: Robot, data: PreparedData, segment: Segment, left: Array, *, h
     item = segment.binned
     inside = slice(segment.start * item.size, segment.stop * item.size)
     size = np.sqrt(np.mean(left[:, inside] ** 2, axis=1))
-    ranked = [int(j) for j in np.argsort(-segment.score) if segment.score[j] >= min(SHARED, float(np.max(segment.score)))]
+    ranked = [
+        int(j) for j in np.argsort(-segment.score) if segment.score[j] >= min(SHARED, float(np.max(segment.score)))
+    ]
     record = data.recordings[item.recording]
     times = item.part.stretch.time[inside] - record.recording.time[0]
     shown = tuple(robot.joints[j] for j in ranked)
