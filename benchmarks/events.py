@@ -180,6 +180,7 @@ def main() -> None:
     parser.add_argument("--recordings", type=int, default=100, help="with a push each; without, in all")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--quiet", action="store_true", help="no pushes: false events an hour")
+    parser.add_argument("--minutes", type=float, default=np.inf, help="no further set after so long")
     parser.add_argument("--verbose", action="store_true")
     given = parser.parse_args()
     assert set(get_args(TorqueNoise.__annotations__["kind"]) or ("white", "coloured", "heavy"))
@@ -189,7 +190,8 @@ def main() -> None:
     cost: list[float] = []
     false: Counter[str] = Counter()
     rows: list[dict[str, Any]] = []
-    while done < given.recordings:
+    until = time.monotonic() + 60.0 * given.minutes
+    while done < given.recordings and time.monotonic() < until:
         made = made_set(robot, arm, np.random.default_rng([given.seed, k]), not given.quiet)
         k += 1
         done += len(made.recordings) if given.quiet else 1

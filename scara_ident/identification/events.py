@@ -271,8 +271,6 @@ def _repeated(segment: Segment, stretches: Sequence[Binned], data: PreparedData)
     """Whether another run of the same motion has the like at the same place: then it is the motion's doing."""
     own = segment.binned
     label = data.labels[own.recording]
-    joint = int(np.argmax(segment.score))
-    mean = _mean(own, joint, segment.start, segment.stop)
     for other in stretches:
         among = other.recording < len(data.recordings) and other.recording != own.recording
         if not among or data.labels[other.recording] != label:
@@ -284,13 +282,13 @@ def _repeated(segment: Segment, stretches: Sequence[Binned], data: PreparedData)
         if shift is None:
             continue
         moved = round(shift / own.size)
-        like = _mean(other, joint, segment.start - moved, segment.stop - moved)
-        if like * np.sign(mean) > REPEATED * abs(mean):
+        bins = np.arange(segment.start, segment.stop)
+        bins = bins[(bins >= moved) & (bins - moved < other.left.shape[1])]
+        shown = segment.score >= min(1.0, float(np.max(segment.score)))
+        here = own.known[shown][:, bins] * own.left[shown][:, bins]
+        there = other.known[shown][:, bins - moved] * other.left[shown][:, bins - moved]
+        power = np.sum(here**2, axis=1)
+        like = np.sum(here * there, axis=1) / np.where(power > 0.0, power, np.inf)
+        if len(like) and float(np.median(like)) > REPEATED:
             return True
     return False
-
-
-def _mean(item: Binned, joint: int, start: int, stop: int) -> float:
-    inside = slice(max(0, start), max(0, stop))
-    known, left = item.known[joint, inside], item.left[joint, inside]
-    return float(np.sum(known * left) / np.sum(known)) if np.sum(known) > 0.0 else 0.0
