@@ -14,20 +14,23 @@ from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
 from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
-from scara_ident.diagnosis.model_selection import Unexplained, rms_of, select_model
+from scara_ident.diagnosis.model_selection import Outcome, Unexplained, rms_of, select_model
 from scara_ident.diagnosis.screening import Dependence
 from scara_ident.diagnosis.search import Search, SearchTask, corrected
 from scara_ident.diagnosis.selection_step import SelectionStep, observed_at_every_sample
 from scara_ident.diagnosis.tentative import TentativeEffect, tentative_effects
-from scara_ident.diagnosis.work import searching
+from scara_ident.diagnosis.work import first, searching
 from scara_ident.effects import Effect, Parameter
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.errors import RecordingError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.robust import robust_fit
 from scara_ident.identification.channel_check import channel_faults
+from scara_ident.identification.events import Event, find_events, same_events, without_events
 from scara_ident.identification.identify import check_bands, check_held_out
+from scara_ident.identification.recording_check import held_out_events, without_stretches
 from scara_ident.identification.usable import check_rows, usable_in_bands, with_rows
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.progress import Tell, Work, silent
@@ -103,6 +106,8 @@ class Diagnosis:
     notes : tuple of str
     rotors : tuple of RotorInertia
         Behind the gears that found effects depend on.
+    events : tuple of Event
+        What is local in time: left out of every fit, or in recordings that were held out.
     """
 
     verdict: Verdict
@@ -123,6 +128,7 @@ class Diagnosis:
     dependences: tuple[Dependence, ...]
     notes: tuple[str, ...]
     rotors: tuple[RotorInertia, ...] = ()
+    events: tuple[Event, ...] = ()
 
     @property
     def robot(self) -> Robot:
@@ -191,7 +197,7 @@ def diagnose(
         raise RecordingError("; ".join(str(fault) for fault in faults))
     families = available_effects() if catalogue is None else tuple(catalogue)
     task = SearchTask(base, families, criteria, searching(work, band_given=given))
-    outcome = select_model(task, observations, free=not given)
+    outcome, events = _without_events(task, observations, free=not given)
     work("comparing what was found with what else it could be", task.progress.stop)
     found, after = outcome.search, outcome.after
     step = replace(found.step, weights=after.weights)
@@ -207,10 +213,18 @@ def diagnose(
     if negligible is not None:
         notes.append(f"{negligible}; corrected in the data, not counted as an effect")
     validation_after = _with_effects(found, validation_before)
+    # Where something stays unexplained that is why a whole recording is, and no event.
+    in_held_out = tuple(
+        event
+        for event in held_out_events(after.value, outcome.training, validation_after)
+        if event.kind != "unknown" or np.isfinite(event.score) or outcome.unexplained is None
+    )
+    events += in_held_out
+    notes += [event.sentence(robot) for event in events]
     shown = held_out_evidence(
         evidence(found, outcome.residuals, outcome.fit_after, criteria),
         rms_of(after.value, outcome.training),
-        rms_of(after.value, validation_after),
+        rms_of(after.value, without_stretches(validation_after, in_held_out)),
         criteria,
     )
     verdict = _verdict(outcome.unexplained is not None, bool(effects), shown)
@@ -233,7 +247,20 @@ def diagnose(
         outcome.dependences[:NAMED_DEPENDENCES],
         tuple(notes),
         parameters.rotors,
+        events,
     )
+
+
+def _without_events(task: SearchTask, observations: Observations, *, free: bool) -> tuple[Outcome, tuple[Event, ...]]:
+    """Search without what is local in time, and again if with the effects found that is something else."""
+    events = find_events(observations, robust_fit(observations).value)
+    now, left = first(task.progress)
+    outcome = select_model(replace(task, progress=now), without_events(observations, events), free=free)
+    remaining = find_events(outcome.training, robust_fit(outcome.training).value)
+    if same_events(events, remaining):
+        return outcome, events
+    left("searching again without what is local in time")
+    return select_model(replace(task, progress=left), without_events(observations, remaining), free=free), remaining
 
 
 def _verdict(unexplained: bool, found: bool, shown: Sequence[Evidence]) -> Verdict:

@@ -210,7 +210,8 @@ class Observations:
         used, rested = np.zeros(len(self.joints)), np.zeros(len(self.joints))
         for part, _ in self._stretches():
             used += np.count_nonzero(part.used, axis=1)
-            rested += np.count_nonzero(part.rest[:, part.trim : part.samples - part.trim], axis=1)
+            rest = part.rest & np.logical_not(part.left_out)
+            rested += np.count_nonzero(rest[:, part.trim : part.samples - part.trim], axis=1)
         return tuple(float(share) for share in rested / np.maximum(used + rested, 1.0))
 
     def with_torque(self, data: PreparedData) -> Observations:
@@ -251,7 +252,7 @@ def observe(model: TorqueModel, data: PreparedData, known: Observations | None =
     data : PreparedData
         With effort.
     known : Observations, optional
-        Of the same model; recordings that it holds in the same bands are not observed again.
+        Of the same model; recordings that it holds in the same bands, with the same left out, are not observed again.
 
     Returns
     -------
@@ -265,15 +266,13 @@ def observe(model: TorqueModel, data: PreparedData, known: Observations | None =
     held = (
         {}
         if known is None or known.data.bands != data.bands
-        else {id(item.data.recordings[0].recording): item for item in known.each}
+        else {_key(item.data.recordings[0]): item for item in known.each}
     )
-    items = [
-        held[id(item.recording)].data.recordings[0] if id(item.recording) in held else item for item in data.recordings
-    ]
+    items = [held[_key(item)].data.recordings[0] if _key(item) in held else item for item in data.recordings]
     data = replace(data, recordings=tuple(items))
 
     def of_recording(item: PreparedRecording) -> tuple[tuple[Raw, ...], Sequence[JointRows]]:
-        same = held.get(id(item.recording))
+        same = held.get(_key(item))
         return _observed(model, item) if same is None else (same.raw[0], same.joints)
 
     parts = side_by_side(of_recording, data.recordings)
@@ -294,6 +293,11 @@ def observe(model: TorqueModel, data: PreparedData, known: Observations | None =
         )
     whole = np.concatenate([np.zeros(0), *owner]).astype(np.intp)
     return Observations(model, data, tuple(joints), whole, tuple(raw for raw, _ in parts))
+
+
+def _key(item: PreparedRecording) -> tuple[int, ...]:
+    """Return what tells recordings in the same bands apart: which one it is, and what of it is left out."""
+    return (id(item.recording), *(id(part.left_out) for part in item.stretches))
 
 
 def kept_rows(item: PreparedRecording) -> int:

@@ -18,8 +18,11 @@ from scara_ident.estimation.consistent.options import ConsistentOptions
 from scara_ident.estimation.estimate import paper_criteria
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.robust import disagreement, robust_fit
 from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.channel_check import channel_faults
+from scara_ident.identification.events import Event, find_events, without_events
+from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.repeatability import repeatability
@@ -47,6 +50,8 @@ class Identification:
         J_d and J_k of the training recordings for the paper's 2500 samples.
     notes : tuple of str
         What was found in the data and what was done about it.
+    events : tuple of Event
+        What is local in time: left out of the fit, or in recordings that were held out.
     """
 
     estimate: Estimate
@@ -58,6 +63,7 @@ class Identification:
     log_det: float
     condition: float
     notes: tuple[str, ...]
+    events: tuple[Event, ...] = ()
 
     @property
     def model(self) -> TorqueModel:
@@ -136,14 +142,25 @@ def identify(
     progress("absorbing the recordings", 0.5)
     training, validated = observe(equation, data), observe(equation, held_out)
     check_rows(training)
-    notes += [str(fault) for fault in channel_faults(training)]
+    faults = channel_faults(training)
+    notes += [str(fault) for fault in faults]
+    progress("looking for events", 0.6)
+    # With a wrong sign or exchanged joints nothing is explained anywhere.
+    robust = None if faults else robust_fit(training)
+    events = () if robust is None else find_events(training, robust.value)
+    training = without_events(training, events)
     progress("estimating", 0.7)
     noise = repeatability(data)
     estimate, history = estimate_by(method, training, options)
+    differs = None if robust is None else disagreement(estimate, robust)
+    events += () if faults else held_out_events(estimate.value, training, validated)
+    notes += [event.sentence(robot) for event in events] + ([] if differs is None else [differs])
     if isinstance(estimate, ConsistentEstimate):
         notes += estimate.notes
     log_det, condition = paper_criteria(training)
-    return Identification(estimate, history, data.bands, training, validated, noise, log_det, condition, tuple(notes))
+    return Identification(
+        estimate, history, data.bands, training, validated, noise, log_det, condition, tuple(notes), events
+    )
 
 
 def identified_arm(identification: Identification) -> ConsistentEstimate | None:

@@ -92,7 +92,7 @@ def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
     recordings = []
     for item in data.recordings:
         steps = [encoder_step(row) for row in item.recording.position]
-        parts = tuple(PreparedStretch(_noisier(part, steps, rng), part.bands) for part in item.stretches)
+        parts = tuple(replace(part, stretch=_noisier(part, steps, rng)) for part in item.stretches)
         recordings.append(PreparedRecording(item.recording, parts))
     return replace(data, recordings=tuple(recordings))
 

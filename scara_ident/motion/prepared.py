@@ -56,10 +56,13 @@ class PreparedStretch:
     stretch : Stretch
     bands : tuple of float or None, one per joint
         Low-pass on both sides of each joint's equation, Hz; None filters nothing.
+    left_out : ndarray of bool, shape (N,), or False
+        Samples that count as at rest, for an event left out of the fit.
     """
 
     stretch: Stretch
     bands: tuple[float | None, ...]
+    left_out: NDArray[np.bool_] | bool = False
 
     @property
     def name(self) -> str:
@@ -100,7 +103,7 @@ class PreparedStretch:
     @made_once
     def rest(self) -> NDArray[np.bool_]:
         """Where each joint stands still, shape (n, N), widened by the memory of the position's filter."""
-        return standstill(self.stretch, self.motion, self.bands)
+        return standstill(self.stretch, self.motion, self.bands) | self.left_out
 
     @made_once
     def fade(self) -> Array:
@@ -189,8 +192,7 @@ class PreparedRecording:
     Attributes
     ----------
     recording : Recording
-    stretches : tuple of PreparedStretch
-        At least one.
+    stretches : tuple of PreparedStretch, at least one
     """
 
     recording: Recording
@@ -215,14 +217,12 @@ class PreparedRecording:
         """Return it in other bands; what does not depend on them is shared."""
         if tuple(bands) == self.bands:
             return self
-        return replace(self, stretches=tuple(PreparedStretch(part.stretch, tuple(bands)) for part in self.stretches))
+        return replace(self, stretches=tuple(replace(part, bands=tuple(bands)) for part in self.stretches))
 
     def with_effort_of(self, recording: Recording) -> PreparedRecording:
         """Return it with the effort of another recording of the same samples; the motion is shared."""
-        return PreparedRecording(
-            recording,
-            tuple(PreparedStretch(with_effort_of(part.stretch, recording), part.bands) for part in self.stretches),
-        )
+        parts = (replace(part, stretch=with_effort_of(part.stretch, recording)) for part in self.stretches)
+        return PreparedRecording(recording, tuple(parts))
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,6 +58,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
             for effect in diagnosis.effects
         ],
         "tentative": [dict(vars(item)) for item in diagnosis.tentative],
+        "events": [event.entry for event in diagnosis.events],
         "evidence": {
             item.joint: {
                 "noise": item.shown,
@@ -345,8 +346,14 @@ def diagnosis_markdown(diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]]
 
 
 def _certainty(content: dict[str, Any], diagnosis: Diagnosis) -> list[str]:
-    """Return what is worth a look, whether what is left is noise, and how runs differ, as Markdown."""
+    """Return events, what is worth a look, whether what is left is noise, and how runs differ, as Markdown."""
     lines = []
+    if content["events"]:
+        lines += ["", "## Events", "", "| recording | from | to | joints | rms | kind |", "|---|---|---|---|---|---|"]
+        lines += [
+            f"| {row['recording']} | {row['from']:.2f} | {row['to']:.2f} | {', '.join(row['joints'])} | {row['rms']:.3g} | {row['kind']} |"
+            for row in content["events"]
+        ]
     if content["tentative"]:
         lines += ["", "## Worth a look, not added", "", "| effect | joint | gain | p | why not | settled by |"]
         lines += ["|---|---|---|---|---|---|"]

@@ -62,6 +62,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
             kind: {item.name: _left_out(robot, item) for item in items.each}
             for kind, items in (("training", identification.training), ("validation", identification.validation))
         },
+        "events": [event.entry for event in identification.events],
         "summary": list(sentences(identification)),
         "notes": list(identification.notes),
     }

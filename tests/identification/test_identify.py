@@ -272,7 +272,8 @@ def test_what_the_audits_found_is_noted(robot: Robot, clean: Recording):
 def test_progress_names_the_steps(robot: Robot, clean: Recording):
     told: list[tuple[str, float]] = []
     identify(robot, [clean], progress=lambda step, done: told.append((step, done)))
-    assert [step for step, _ in told] == ["choosing the bands", "absorbing the recordings", "estimating"]
+    steps = ["choosing the bands", "absorbing the recordings", "looking for events", "estimating"]
+    assert [step for step, _ in told] == steps
     assert 0.0 == told[0][1] < told[1][1] < told[2][1] < 1.0
 
 

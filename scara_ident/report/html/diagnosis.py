@@ -31,6 +31,7 @@ from scara_ident.report.html.blocks import (
 from scara_ident.report.html.candidates import candidate_blocks
 from scara_ident.report.html.certainty import evidence_blocks, tentative_blocks
 from scara_ident.report.html.chapters import Chapter, chapters
+from scara_ident.report.html.events import events_blocks
 from scara_ident.report.html.experiments import next_experiments
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.parameters import digits
@@ -189,6 +190,11 @@ def _evidence(context: DiagnosisContext) -> Sequence[Block]:
     return evidence_blocks(context.content)
 
 
+def _events(context: DiagnosisContext) -> Sequence[Block]:
+    """What was local in time."""
+    return events_blocks(context.diagnosis.robot, context.diagnosis.events)
+
+
 def _variation(context: DiagnosisContext) -> Sequence[Block]:
     """How runs differ."""
     found = context.diagnosis
@@ -295,6 +301,7 @@ SECTIONS: tuple[Section, ...] = (
     NamedSection("next", "What to do next", _next),
     NamedSection("left", "What is left", _left),
     NamedSection("evidence", "Is it noise?", _evidence),
+    NamedSection("events", "Events", _events),
     NamedSection("variation", "How runs differ", _variation),
     NamedSection("torque-section", "Torque", _torque),
     NamedSection("candidates", "Candidates", _candidates),

@@ -10,6 +10,7 @@ from pathlib import Path
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.identification.identify import Identification, undetermined
 from scara_ident.report.html.blocks import Block, Heading, Paragraph, count
+from scara_ident.report.html.events import events_blocks
 from scara_ident.report.html.friction import friction_group
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.parameters import (
@@ -91,6 +92,11 @@ def _parameters(context: IdentificationContext) -> list[Block]:
     return blocks
 
 
+def _events(context: IdentificationContext) -> Sequence[Block]:
+    """What was local in time."""
+    return events_blocks(context.identification.model.robot, context.identification.events)
+
+
 def _variation(context: IdentificationContext) -> Sequence[Block]:
     """How runs differ."""
     found = context.identification
@@ -123,6 +129,7 @@ def _convergence(context: IdentificationContext) -> list[Block]:
 SECTIONS: tuple[Section, ...] = (
     NamedSection("prediction", "Prediction", _prediction),
     NamedSection("parameters", "Parameters", _parameters),
+    NamedSection("events", "Events", _events),
     NamedSection("variation", "How runs differ", _variation),
     NamedSection("friction", "Friction", _friction_curves),
     NamedSection("residual", "Residual", _residual),

@@ -1,0 +1,129 @@
+"""A residual in bins of time, bounded sample by sample so that a single one says little."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.motion.prepared import PreparedStretch, standstill
+
+# Length of a bin, s.
+BIN = 0.04
+# Standard deviations at which a sample's residual is bounded, and the normal's over its median absolute value.
+BOUND = 5.0
+NORMAL = 1.4826
+# Nothing is said of a joint slower than this share of its peak speed, where friction is known least.
+SLOW = 0.05
+# Share of a window that has to be used, or nothing is said of it.
+FILLED = 0.6
+# Samples of a stretch that its standard deviation is taken from.
+ENOUGH = 5000
+
+
+@dataclass(frozen=True, eq=False)
+class Binned:
+    """A stretch's residual in bins of time.
+
+    Attributes
+    ----------
+    recording : int
+        Place of its recording.
+    part : PreparedStretch
+    size : int
+        Samples in a bin.
+    raw : ndarray, shape (n, M * size)
+        Residual at every sample, nothing filtered, N m or N.
+    used : ndarray of bool, shape (n, M * size)
+        Samples that count.
+    noise : ndarray, shape (n,)
+        Standard deviation that samples are bounded by.
+    state : tuple of ndarray, shape (n, M)
+        Position, velocity, acceleration and predicted torque in the middle of each bin.
+    taken : ndarray, shape (n, M)
+        What is taken off the residual before it is bounded.
+    """
+
+    recording: int
+    part: PreparedStretch
+    size: int
+    raw: Array
+    used: NDArray[np.bool_]
+    noise: Array
+    state: tuple[Array, Array, Array, Array]
+    taken: Array
+
+    @cached_property
+    def known(self) -> Array:
+        """Share of each bin that is used, shape (n, M)."""
+        return np.asarray(self.used.reshape(*self.taken.shape, self.size).mean(axis=2))
+
+    @cached_property
+    def left(self) -> Array:
+        """Mean residual over what is used of each bin, bounded sample by sample, shape (n, M)."""
+        return self.bounded(BOUND)
+
+    def bounded(self, bound: float) -> Array:
+        """Return the mean residual of bins with samples bounded at so many standard deviations, shape (n, M)."""
+        shape = (*self.taken.shape, self.size)
+        most = (bound * self.noise)[:, None, None]
+        inside = np.clip(self.raw.reshape(shape) - self.taken[:, :, None], -most, most) * self.used.reshape(shape)
+        return np.asarray(inside.mean(axis=2) / np.maximum(self.known, 1.0 / self.size))
+
+    def without(self, more: Array) -> Binned:
+        """Return it with more taken off the residual, shape (n, M)."""
+        return replace(self, taken=self.taken + more)
+
+    @property
+    def width(self) -> float:
+        """Length of a bin, s."""
+        return self.size / self.part.rate
+
+    @cached_property
+    def sums(self) -> tuple[Array, Array]:
+        """Sums of residual and use up to each bin, shape (n, M + 1)."""
+        zero = np.zeros((len(self.left), 1))
+        each = (self.left * self.known, self.known)
+        return tuple(np.concatenate([zero, np.cumsum(item, axis=1)], axis=1) for item in each)  # type: ignore[return-value]
+
+    def means(self, length: int) -> Array:
+        """Return the mean over windows of so many bins, shape (n, M - length + 1); NaN where too little is used."""
+        total, used = (item[:, length:] - item[:, :-length] for item in self.sums)
+        return np.where(used >= FILLED * length, total / np.maximum(used, FILLED), np.nan)
+
+
+def bounded_noise(parts: Sequence[PreparedStretch], left: Sequence[Array], owner: Sequence[int]) -> dict[int, Array]:
+    """Return for each recording the standard deviation of each joint's residual by its median, the larger of its and all's."""
+    used = [part.used for part in parts]
+
+    def scale(chosen: Sequence[int]) -> Array:
+        found = []
+        for j in range(len(left[0])):
+            values = np.concatenate([left[k][j][used[k][j]][:: max(1, len(left[k][j]) // ENOUGH)] for k in chosen])
+            found.append(NORMAL * float(np.median(np.abs(values))) if len(values) else 0.0)
+        return np.array(found)
+
+    everything = scale(range(len(parts)))
+    return {
+        k: np.maximum(everything, scale([i for i, own in enumerate(owner) if own == k])) for k in dict.fromkeys(owner)
+    }
+
+
+def binned(recording: int, part: PreparedStretch, left: Array, noise: Array) -> Binned:
+    """Return the residual of a stretch, shape (n, N), in bins; what an event left out counts again."""
+    size = max(1, round(BIN * part.rate))
+    count = part.samples // size
+    used = part.used
+    if np.any(part.left_out):
+        used = ~standstill(part.stretch, part.motion, part.bands)
+        used[:, : part.trim] = used[:, max(part.trim, part.samples - part.trim) :] = False
+    motion, middle = part.motion, slice(size // 2, count * size, size)
+    speed = np.abs(motion.v)
+    used = (used & (speed > SLOW * np.max(speed, axis=1, keepdims=True)))[:, : count * size]
+    signals = (motion.q, motion.v, motion.a, part.torque - left)
+    q, v, a, load = (row[:, middle] for row in signals)
+    return Binned(recording, part, size, left[:, : count * size], used, noise, (q, v, a, load), np.zeros_like(q))

@@ -1,0 +1,254 @@
+"""Where in time a residual stands out from what it is elsewhere: short, rare, and nothing that the motion repeats.
+
+Of the residual of a robust fit in bins what the motion makes is taken off (see `event_background`). Means over windows of 0.15
+to 2 s are compared with their own scale (the median absolute value over all recordings, and over this one), in
+which colour of the noise and what the model lacks everywhere are included. A stretch stands out where such a mean is beyond
+what the largest of each second lets expect once in ten hours (Gumbel's law; Coles, *An Introduction to Statistical Modeling of
+Extreme Values*, 2001). Its ends are where the likelihood that the variance is larger between them is largest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.identification.binned_residual import FILLED, NORMAL, Binned
+from scara_ident.identification.event_background import without_states, without_trends
+
+# Lengths of the windows, s.
+WINDOWS = (0.16, 0.32, 0.6, 1.2, 2.0)
+# Windows that a scale is taken from at the least, and seconds that the largest are.
+LEAST_WINDOWS, LEAST_SECONDS = 20, 5
+# At most one false event in so many seconds, and the least mean that counts, in standard deviations of its windows.
+FALSE_EVERY = 36_000.0
+LEAST_SCORE = 6.5
+# What a model lacks makes the largest larger than that law; found by benchmarks/events.py.
+HEAVIER = 1.4
+# One event and the windows beside it are in at most so many seconds.
+EVENT_SECONDS = 5.0
+# Least rms of an event in standard deviations of a bin, and the share of it that least squares leave too.
+LEAST_SIZE, LEAST_BEFORE = 2.0, 0.5
+# What lasts longer than this, s, and than this share of its recording is a change of the arm. What does not stand out surely is
+# seen for so long, s, before and after it within the other: how an arm starts and stops is no event.
+LONGEST, LONGEST_SHARE = 3.0, 0.15
+SEEN, BESIDE = 0.3, 1.0
+# Where speed, acceleration or torque are above this share of all, only what stands out by so much is an event.
+USUAL, SURE = 0.97, 2.2
+# Events are rare: a residual that stands out in more of the time than this is the model's doing.
+RARE = 0.2
+# A joint helps to find the ends of an event if it stands out by this share of what would make it one.
+AT_ENDS = 0.45
+# Events looked for in a stretch, and how far one may reach to either side of what stands out most, s.
+MOST_IN_STRETCH = 12
+REACH = 5.0
+# Its ends are looked for again between so long within and so long beyond them, s.
+EDGE = (0.3, 0.6)
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A stretch of time that stands out.
+
+    Attributes
+    ----------
+    binned : Binned
+    start, stop : int
+        Bins, the second not in it.
+    score : ndarray, shape (n,)
+        By how much each joint stands out, 1 where that alone would be an event.
+    """
+
+    binned: Binned
+    start: int
+    stop: int
+    score: Array
+
+
+def standing_out(stretches: Sequence[Binned], fitted: Sequence[Binned]) -> list[Segment]:
+    """Return the stretches of time that stand out, in the order in which they come.
+
+    Parameters
+    ----------
+    stretches : sequence of Binned
+        Of all recordings, of parameters that no event has steered.
+    fitted : sequence of Binned
+        The same of least squares: what that explains is a state of motion that the robust fit took for an outlier.
+    """
+    pairs = [pair for pair in zip(stretches, fitted, strict=True) if pair[0].taken.shape[1] > 1]
+    if not pairs:
+        return []
+    stretches, plain = [item for item, _ in pairs], [item for _, item in pairs]
+    stretches = without_trends(without_states(stretches))
+    scores = _scores(stretches)
+    found = []
+    for item, original, score in zip(stretches, plain, scores, strict=True):
+        sigma = _bin_noise(stretches, item)
+        for segment in _segments(item, score, sigma):
+            size, before = _sizes(item, original, segment)
+            large = (size > LEAST_SIZE * sigma) & (before > LEAST_BEFORE * size)
+            shown = large & (segment.score >= 1.0)
+            if np.any(shown) and _local(segment) and not _novel(segment, stretches, shown):
+                found.append(segment)
+    total = sum(item.left.shape[1] * item.width for item in stretches)
+    lasting = sum((segment.stop - segment.start) * segment.binned.width for segment in found)
+    return found if lasting <= RARE * total else []
+
+
+def _sizes(item: Binned, original: Binned, segment: Segment) -> tuple[Array, Array]:
+    """Return the rms of each joint in a segment, and as much of it as was there before anything was taken off, (n,) each."""
+    inside = slice(segment.start, segment.stop)
+    known, left = item.known[:, inside], item.left[:, inside]
+    weight = np.maximum(np.sum(known, axis=1), 1e-9)
+    size = np.sqrt(np.sum(known * left**2, axis=1) / weight)
+    return size, np.sum(known * left * original.left[:, inside], axis=1) / weight / np.maximum(size, 1e-300)
+
+
+def _local(segment: Segment) -> bool:
+    """Whether it is short, and a joint that shows it is seen before and after it."""
+    item = segment.binned
+    length = (segment.stop - segment.start) * item.width
+    beside, seen = round(BESIDE / item.width), SEEN / item.width
+    shown = item.known[segment.score >= 1.0]
+    before = np.sum(shown[:, max(0, segment.start - beside) : segment.start], axis=1)
+    after = np.sum(shown[:, segment.stop : segment.stop + beside], axis=1)
+    whole = item.left.shape[1] * item.width
+    seen_beside = bool(np.any((before >= seen) & (after >= seen))) or float(np.max(segment.score)) >= SURE
+    return length <= max(LONGEST, LONGEST_SHARE * whole) and seen_beside
+
+
+def _novel(segment: Segment, stretches: Sequence[Binned], shown: NDArray[np.bool_]) -> bool:
+    """Whether the arm is then faster, or loaded more, than nearly ever: the model is not known there."""
+    item, inside = segment.binned, slice(segment.start, segment.stop)
+    for j in np.flatnonzero(shown & (segment.score < SURE)):
+        for k in (1, 2, 3):
+            usual = np.concatenate([np.abs(other.state[k][j]) for other in stretches])
+            if np.median(np.abs(item.state[k][j, inside])) > np.quantile(usual, USUAL):
+                shown = shown & (np.arange(len(shown)) != j)
+    return not np.any(shown)
+
+
+def _scores(stretches: Sequence[Binned]) -> list[list[tuple[int, Array]]]:
+    """Return for each stretch the means over windows of every length, as shares of what would be an event, (n, windows)."""
+    n = len(stretches[0].left)
+    scaled: list[list[tuple[int, Array]]] = [[] for _ in stretches]
+    for window in WINDOWS:
+        lengths = [max(1, round(window / item.width)) for item in stretches]
+        means = [
+            np.abs(item.means(length)) if item.left.shape[1] > length else np.full((n, 0), np.nan)
+            for item, length in zip(stretches, lengths, strict=True)
+        ]
+        whole = _median(means)
+        for k, (item, mean) in enumerate(zip(stretches, means, strict=True)):
+            own = [other for other, part in zip(means, stretches, strict=True) if part.recording == item.recording]
+            scale = np.maximum(whole, _median(own))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                scaled[k].append((lengths[k], np.where(scale[:, None] > 0.0, mean / scale[:, None], np.nan)))
+    tops = [_by_second(item, scores) for item, scores in zip(stretches, scaled, strict=True)]
+    limits = np.array([_limit(np.concatenate([top[j] for top in tops]), n) for j in range(n)])
+    return [[(length, score / limits[:, None]) for length, score in scores] for scores in scaled]
+
+
+def _median(means: Sequence[Array]) -> Array:
+    together = np.concatenate(means, axis=1)
+    found = np.zeros(len(together))
+    for j, row in enumerate(together):
+        known = row[np.isfinite(row)]
+        found[j] = NORMAL * float(np.median(known)) if len(known) >= LEAST_WINDOWS else np.nan
+    return np.nan_to_num(found, nan=0.0)
+
+
+def _by_second(item: Binned, scores: Sequence[tuple[int, Array]]) -> Array:
+    """Return the largest score of each second, of any window, shape (n, seconds); NaN where none is known."""
+    n, count = item.left.shape
+    best = np.full((n, count), -1.0)
+    for length, score in scores:
+        if score.shape[1]:
+            inside = best[:, length // 2 : length // 2 + score.shape[1]]
+            np.fmax(inside, score, out=inside)
+    second = max(1, round(1.0 / item.width))
+    whole = count // second
+    top = best[:, : whole * second].reshape(n, whole, second).max(axis=2)
+    return np.where(top > 0.0, top, np.nan)
+
+
+def _limit(tops: Array, joints: int) -> float:
+    """Return the score that the largest of a second exceeds on any joint once in `FALSE_EVERY`, by Gumbel's law."""
+    tops = tops[np.isfinite(tops)]
+    if len(tops) < LEAST_SECONDS:
+        return np.inf
+    # One event and the windows beside it are in so many seconds; of few seconds the upper quantile is lower.
+    share = float(np.clip(1.0 - EVENT_SECONDS / len(tops), 0.6, 0.8))
+    middle, upper = np.quantile(tops, (0.5, share))
+    spread = (upper - middle) / (np.log(-np.log(0.5)) - np.log(-np.log(share)))
+    expected = -np.log(-np.log(0.5)) * -spread + middle + spread * np.log(FALSE_EVERY * joints)
+    return max(LEAST_SCORE, HEAVIER * float(expected))
+
+
+def _bin_noise(stretches: Sequence[Binned], item: Binned) -> Array:
+    """Return the standard deviation of single bins of each joint by their median, the larger of all's and its recording's."""
+    groups = (stretches, [other for other in stretches if other.recording == item.recording])
+    found = []
+    for group in groups:
+        each = [np.where(other.known > FILLED, np.abs(other.left), np.nan) for other in group]
+        found.append(_median(each))
+    return np.maximum(*found)
+
+
+def _segments(item: Binned, scores: Sequence[tuple[int, Array]], noise: Array) -> Iterator[Segment]:
+    """Give what stands out most, then what does beside it, and so on."""
+    n, count = item.left.shape
+    free = np.ones(count, dtype=bool)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = np.where((item.known > FILLED) & (noise[:, None] > 0.0), item.left / noise[:, None], 0.0)
+    for _ in range(MOST_IN_STRETCH):
+        best, place, long = 1.0, -1, 0
+        for length, score in scores:
+            if not score.shape[1]:
+                continue
+            taken = np.concatenate([[0], np.cumsum(~free)])
+            open_ = taken[length:] == taken[:-length]
+            top = np.where(open_, np.nanmax(np.nan_to_num(score, nan=0.0), axis=0), 0.0)
+            k = int(np.argmax(top))
+            if top[k] > best:
+                best, place, long = float(top[k]), k, length
+        if place < 0:
+            return
+        window = slice(place, place + long)
+        share = np.zeros(n)
+        for length, score in scores:
+            near = score[:, max(0, place - length // 2) : place + max(1, long - length // 2)]
+            if near.shape[1]:
+                share = np.fmax(share, np.nanmax(np.nan_to_num(near, nan=0.0), axis=1))
+        own = share >= min(AT_ENDS, best)
+        power = np.maximum(np.mean(relative[own][:, window] ** 2, axis=1), 2.0)
+        # Of log variance: what is between the ends has the power of the window, what is outside has 1.
+        value = np.minimum(relative[own] ** 2, 4.0 * power[:, None])
+        likelihood = np.sum(0.5 * (value * (1.0 - 1.0 / power[:, None]) - np.log(power[:, None])), axis=0)
+        likelihood[~free] = -np.inf
+        middle, reach = place + long // 2, int(REACH / item.width)
+        before = np.cumsum(likelihood[max(0, middle - reach) : middle + 1][::-1])
+        after = np.cumsum(likelihood[middle : middle + reach])
+        start = middle - int(np.argmax(before))
+        stop = middle + int(np.argmax(after)) + 1
+        within, beyond = (round(seconds / item.width) for seconds in EDGE)
+        open_bins = np.where(free, relative, 0.0)
+        start = stop - _reach(open_bins[:, :stop][:, ::-1], stop - start, within, beyond)
+        stop = start + _reach(open_bins[:, start:], stop - start, within, beyond)
+        pad = max(1, round(0.1 / item.width))
+        free[max(0, min(start, place) - pad) : max(stop, place + long) + pad] = False
+        yield Segment(item, start, stop, share)
+
+
+def _reach(relative: Array, length: int, near: int, far: int) -> int:
+    """Return how many bins from the first on a shift of the mean lasts, which is known to last about so many.
+
+    By likelihood, with the mean of each joint as it is shortly before the end; a joint that shows nothing counts for nothing.
+    """
+    mean = np.mean(relative[:, max(0, length - near) : length], axis=1, keepdims=True)
+    first = max(0, length - near)
+    likelihood = np.cumsum(np.sum(2.0 * relative * mean - mean**2, axis=0)[first : length + far])
+    return first + int(np.argmax(likelihood)) + 1 if len(likelihood) else length

@@ -1,0 +1,294 @@
+"""Events: what is local in time is no parameter. Found on a robust fit, named, and kept out of the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from scara_ident.arrays import Array
+from scara_ident.estimation.least_squares import weighted_value
+from scara_ident.estimation.observations import Observations, observe
+from scara_ident.identification.binned_residual import Binned, binned, bounded_noise
+from scara_ident.identification.event_search import Segment, standing_out
+from scara_ident.identification.usable import check_rows
+from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
+from scara_ident.motion.trajectories import LARGEST_SHIFT, SAME_RATE, alignment
+from scara_ident.robot.kinematics import tool_frame
+from scara_ident.robot.robot import Robot
+from scara_ident.threads import one_blas_thread
+
+# Events closer than this are one; as much is left out on either side, because the ends are known to that, s.
+MARGIN = 0.1
+# A constant force at the tool explains at least this share of the squared residual of a contact there.
+FITS = 0.75
+# States at which the tool's Jacobian is taken.
+STATES = 40
+# Two lists hold the same event where their times overlap by this share.
+SAME = 0.5
+# Another joint is named with an event if it stands out by this share of what would make it one.
+SHARED = 0.45
+# Share of a repetition's residual at the same place that makes it the motion's doing.
+REPEATED = 0.4
+
+
+@dataclass(frozen=True)
+class Event:
+    """A stretch of a recording that is not explained while others are.
+
+    Attributes
+    ----------
+    recording : str
+    start, stop : float
+        Seconds since the recording began.
+    joints : tuple of str
+        Where it shows, the strongest first.
+    rms : float
+        Of the residual on the first of them, N m or N.
+    kind : {"contact", "push", "other payload", "unknown"}
+        ``contact``: a constant force at the tool explains it; ``push``: it loads the inner joints only, as a force on a
+        link before the tool does; ``other payload``: of a whole recording, a body on the last link does; ``unknown``: none.
+    score : float
+        By how much it stands out: from 1 on an event, infinite for a whole recording.
+    held_out : bool
+        Whether the recording took no part in the fit anyway.
+    force : tuple of float or None
+        What acts on the tool in a contact, in the base frame, N; a direction that the arm cannot feel is 0.
+    """
+
+    recording: str
+    start: float
+    stop: float
+    joints: tuple[str, ...]
+    rms: float
+    kind: str
+    score: float = np.inf
+    held_out: bool = False
+    force: tuple[float, float, float] | None = None
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """As in the JSON results."""
+        found = {
+            "recording": self.recording,
+            "from": round(self.start, 3),
+            "to": round(self.stop, 3),
+            "joints": list(self.joints),
+            "rms": self.rms,
+            "kind": self.kind,
+        }
+        return found if self.force is None else {**found, "force": list(self.force)}
+
+    def sentence(self, robot: Robot) -> str:
+        """Return it in words."""
+        unit = robot.torque_unit(robot.joints.index(self.joints[0]))
+        force = "" if self.force is None else f", {np.linalg.norm(self.force):.3g} N at the tool"
+        where = f"{self.rms:.3g} {unit} on {self.joints[0]}"
+        more = f" and {', '.join(self.joints[1:])}" if len(self.joints) > 1 else ""
+        done = "" if self.held_out else "; left out of the fit"
+        if np.isinf(self.score):
+            return f"{self.recording} is explained much worse than the recordings fitted ({self.kind}): {where}{more}{done}"
+        return f"{self.recording}: {self.kind} from {self.start:.2f} to {self.stop:.2f} s, {where}{more}{force}{done}"
+
+
+@one_blas_thread()
+def find_events(observations: Observations, value: Array, fitted: Observations | None = None) -> tuple[Event, ...]:
+    """Find what is local in time in recordings; what was left out of them counts again.
+
+    Parameters
+    ----------
+    observations : Observations
+        With the columns at every sample.
+    value : ndarray, shape (p,)
+        Parameters that no event has steered, see `robust_fit`.
+    fitted : Observations, optional
+        Of the recordings that were fitted, where these are others: what is usual shows there too.
+    """
+    data, robot = observations.data, observations.model.robot
+    parts, left, owner = _residuals(observations, value)
+    if fitted is not None:
+        more = _residuals(fitted, value)
+        parts, left = [*parts, *more[0]], [*left, *more[1]]
+        owner += [len(data.recordings) + k for k in more[2]]
+    noise = bounded_noise(parts, left, owner)
+    stretches = [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, left, strict=True)]
+    plain = stretches
+    if fitted is None:
+        least = _residuals(observations, weighted_value(observations))[1]
+        plain = [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, least, strict=True)]
+    whole = {id(part): row for part, row in zip(parts, left, strict=True)}
+    found = [
+        _event(robot, data, item, whole[id(item.binned.part)], held_out=fitted is not None)
+        for item in standing_out(stretches, plain)
+        if item.binned.recording < len(data.recordings) and not _repeated(item, stretches, data)
+    ]
+    return tuple(sorted(found, key=lambda event: (data_place(data, event.recording), event.start)))
+
+
+def _residuals(observations: Observations, value: Array) -> tuple[list[PreparedStretch], list[Array], list[int]]:
+    """Return the stretches that are long enough, their residual (n, N), not filtered, and the place of their recording."""
+    data = observations.data
+    places = [k for k, item in enumerate(data.recordings) for _ in item.stretches]
+    found = zip(data.stretches, observations.predicted(value), places, strict=True)
+    usable = [(part, part.torque - predicted, k) for part, predicted, k in found if part.usable]
+    return [part for part, _, _ in usable], [left for _, left, _ in usable], [k for _, _, k in usable]
+
+
+def data_place(data: PreparedData, name: str) -> int:
+    """Return the place of a recording by its name."""
+    return next(k for k, item in enumerate(data.recordings) if item.name == name)
+
+
+def without_events(observations: Observations, events: Sequence[Event]) -> Observations:
+    """Return observations with events, and nothing else, left out; the columns at every sample are shared.
+
+    Parameters
+    ----------
+    observations : Observations
+    events : sequence of Event
+        Those of other recordings do not matter.
+
+    Raises
+    ------
+    RecordingError
+        If too little is left.
+    """
+    data = left_out(observations.data, events)
+    if data is observations.data:
+        return observations
+    found = observe(observations.model, data, known=observations)
+    check_rows(found)
+    return found
+
+
+def left_out(data: PreparedData, events: Sequence[Event]) -> PreparedData:
+    """Return recordings that count as at rest during events, and at no other time for one."""
+    recordings = tuple(
+        _left_out(item, [event for event in events if event.recording == item.name]) for item in data.recordings
+    )
+    same = all(a is b for a, b in zip(recordings, data.recordings, strict=True))
+    return data if same else replace(data, recordings=recordings)
+
+
+def _left_out(item: PreparedRecording, events: Sequence[Event]) -> PreparedRecording:
+    parts = []
+    for part in item.stretches:
+        time = part.stretch.time - item.recording.time[0]
+        inside = np.zeros(len(time), dtype=bool)
+        for event in events:
+            inside |= (time >= event.start - MARGIN) & (time <= event.stop + MARGIN)
+        same = np.array_equal(inside, part.left_out) or not (np.any(inside) or np.any(part.left_out))
+        parts.append(part if same else replace(part, left_out=inside if np.any(inside) else False))
+    return (
+        item
+        if all(a is b for a, b in zip(parts, item.stretches, strict=True))
+        else replace(item, stretches=tuple(parts))
+    )
+
+
+def same_events(one: Sequence[Event], other: Sequence[Event]) -> bool:
+    """Whether two lists hold the same events, whose ends may differ a little."""
+
+    def held(event: Event, events: Sequence[Event]) -> bool:
+        both = (
+            min(event.stop, item.stop) - max(event.start, item.start)
+            for item in events
+            if item.recording == event.recording
+        )
+        return max(both, default=0.0) >= SAME * (event.stop - event.start)
+
+    return all(held(event, other) for event in one) and all(held(event, one) for event in other)
+
+
+def _event(robot: Robot, data: PreparedData, segment: Segment, left: Array, *, held_out: bool) -> Event:
+    item = segment.binned
+    inside = slice(segment.start * item.size, segment.stop * item.size)
+    size = np.sqrt(np.mean(left[:, inside] ** 2, axis=1))
+    ranked = [
+        int(j) for j in np.argsort(-segment.score) if segment.score[j] >= min(SHARED, float(np.max(segment.score)))
+    ]
+    record = data.recordings[item.recording]
+    times = item.part.stretch.time[inside] - record.recording.time[0]
+    shown = tuple(robot.joints[j] for j in ranked)
+    force, fit = tool_force(robot, item, segment)
+    inner = max(ranked) < robot.n - 1
+    kind = "contact" if fit >= FITS and len(ranked) > 1 else "push" if inner else "unknown"
+    return Event(
+        record.name,
+        float(times[0]),
+        float(times[-1]),
+        shown,
+        float(size[ranked[0]]),
+        kind,
+        float(np.max(segment.score)),
+        held_out,
+        tuple(float(x) for x in force) if kind == "contact" else None,  # type: ignore[arg-type]
+    )
+
+
+def tool_force(robot: Robot, item: Binned, segment: Segment) -> tuple[Array, float]:
+    """Return the constant force on the tool, base frame, N, shape (3,), that fits an event best, and the share it explains.
+
+    A force f on the tool at the end of the Jacobian J takes ``J.T @ f`` from the torque that the drives have to give.
+    """
+    bins = np.arange(segment.start, segment.stop)
+    bins = bins[:: max(1, len(bins) // STATES)]
+    frame = tool_frame(robot)
+    place = robot.model.getFrameId(frame.name, pin.FrameType.BODY)
+    model_data = robot.model.createData()
+    rows, rights = [], []
+    spread = np.sqrt(np.mean(item.left**2, axis=1)) + 1e-12
+    left = item.bounded(np.inf)
+    back = np.argsort(robot.order)
+    for k in bins:
+        q = _configuration(robot, item.state[0][back, k])
+        jacobian = pin.computeFrameJacobian(robot.model, model_data, q, place, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        turned = -(jacobian[:3][:, robot.order] * robot.row_scale).T
+        weight = np.where(item.known[:, k] > 0.5, 1.0 / spread, 0.0)
+        rows.append(weight[:, None] * turned)
+        rights.append(weight * left[:, k])
+    matrix, right = np.concatenate(rows), np.concatenate(rights)
+    force = np.linalg.lstsq(matrix, right, rcond=1e-3)[0]
+    total = float(right @ right)
+    return force, 1.0 - float(np.sum((right - matrix @ force) ** 2)) / total if total > 0.0 else 0.0
+
+
+def _configuration(robot: Robot, angle: Array) -> Array:
+    """Return Pinocchio's configuration of joint positions in its own order."""
+    full = pin.neutral(robot.model)
+    for joint in list(robot.model.joints)[1:]:
+        if joint.nq == 1:
+            full[joint.idx_q] = angle[joint.idx_v]
+        else:
+            full[joint.idx_q : joint.idx_q + 2] = np.cos(angle[joint.idx_v]), np.sin(angle[joint.idx_v])
+    return np.asarray(full)
+
+
+def _repeated(segment: Segment, stretches: Sequence[Binned], data: PreparedData) -> bool:
+    """Whether another run of the same motion has the like at the same place: then it is the motion's doing."""
+    own = segment.binned
+    label = data.labels[own.recording]
+    for other in stretches:
+        among = other.recording < len(data.recordings) and other.recording != own.recording
+        if not among or data.labels[other.recording] != label:
+            continue
+        rate = own.part.rate
+        if abs(other.part.rate / rate - 1.0) > SAME_RATE:
+            continue
+        shift = alignment(own.part.stretch.position, other.part.stretch.position, round(LARGEST_SHIFT * rate))
+        if shift is None:
+            continue
+        moved = round(shift / own.size)
+        bins = np.arange(segment.start, segment.stop)
+        bins = bins[(bins >= moved) & (bins - moved < other.left.shape[1])]
+        shown = segment.score >= min(1.0, float(np.max(segment.score)))
+        here = own.known[shown][:, bins] * own.left[shown][:, bins]
+        there = other.known[shown][:, bins - moved] * other.left[shown][:, bins - moved]
+        power = np.sum(here**2, axis=1)
+        like = np.sum(here * there, axis=1) / np.where(power > 0.0, power, np.inf)
+        if len(like) and float(np.median(like)) > REPEATED:
+            return True
+    return False

@@ -1,0 +1,56 @@
+"""What is no event: a trend of a run, and what other recordings have at the same state of motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scara_ident.identification.binned_residual import Binned, binned
+from scara_ident.identification.event_background import without_states, without_trends
+from scara_ident.motion.prepared import prepare
+from scara_ident.robot.robot import load_robot
+from tests.arms import swing
+
+ROBOT = load_robot()
+STRETCHES = prepare([swing(ROBOT, f"r{k}", seed=k, seconds=20.0, rate=250.0) for k in range(4)], (8.0, 8.0)).stretches
+
+
+def made(added: list[np.ndarray]) -> list[Binned]:
+    """Residuals of white noise and what is added on the first joint."""
+    rng = np.random.default_rng(2)
+    found = []
+    for k, (part, more) in enumerate(zip(STRETCHES, added, strict=True)):
+        left = 0.1 * rng.standard_normal((2, part.samples))
+        left[0] += more
+        # The predicted torque, a state, is the recorded one less this residual.
+        found.append(binned(k, part, left, np.full(2, 0.5)))
+    return found
+
+
+def size(item: Binned) -> float:
+    return float(np.sqrt(np.mean(item.left[0, item.known[0] > 0.9] ** 2)))
+
+
+def test_an_offset_and_a_drift_of_a_run_are_taken_off_and_a_push_is_not():
+    added = [np.zeros(part.samples) for part in STRETCHES]
+    added[1] += 0.3 + 0.4 * np.arange(len(added[1])) / len(added[1])
+    added[2][2000:2250] += 0.4
+    before = made(added)
+    after = without_trends(before)
+    assert size(before[1]) > 0.4
+    assert size(after[1]) < 0.06
+    push = slice(2000 // before[2].size + 1, 2250 // before[2].size - 1)
+    assert np.mean(after[2].left[0, push]) > 0.9 * np.mean(before[2].left[0, push])
+
+
+def test_what_comes_with_the_motion_in_all_recordings_is_taken_off_and_what_happens_once_is_not():
+    speed = max(float(np.abs(part.motion.v[0]).max()) for part in STRETCHES)
+    falling = [
+        0.5 * np.sign(part.motion.v[0]) * np.exp(-np.abs(part.motion.v[0]) / (0.2 * speed)) for part in STRETCHES
+    ]
+    before = made(falling)
+    after = without_states(before)
+    assert all(size(new) < 0.5 * size(old) for old, new in zip(before, after, strict=True))
+    once = [np.zeros(part.samples) for part in STRETCHES]
+    once[3][1500:1750] = 0.5
+    alone = without_states(made(once))[3]
+    assert np.mean(alone.left[0, 152:173]) > 0.4

@@ -1,0 +1,69 @@
+"""What stands out in time: a step of some tenths of a second, and neither heavy tails nor what the motion repeats."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.identification.binned_residual import binned, bounded_noise
+from scara_ident.identification.event_search import Segment, standing_out
+from scara_ident.motion.prepared import PreparedStretch, prepare
+from scara_ident.robot.robot import load_robot
+from tests.arms import swing
+
+ROBOT = load_robot()
+RATE = 250.0
+STRETCHES = prepare([swing(ROBOT, f"r{k}", seed=k, seconds=20.0, rate=RATE) for k in range(4)], (8.0, 8.0)).stretches
+
+
+def searched(left: list[np.ndarray]) -> list[Segment]:
+    """What stands out where so much is left of the recorded torque, which has it in it."""
+    parts = [with_more(part, row) for part, row in zip(STRETCHES, left, strict=True)]
+    noise = bounded_noise(parts, left, range(len(parts)))
+    stretches = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
+    return standing_out(stretches, stretches)
+
+
+def with_more(part: PreparedStretch, torque: np.ndarray) -> PreparedStretch:
+    return replace(part, stretch=replace(part.stretch, torque=part.torque + torque))
+
+
+def white(seed: int = 0) -> list[np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return [rng.standard_normal((2, part.samples)) for part in STRETCHES]
+
+
+@pytest.mark.parametrize("seconds", [0.3, 1.0, 2.0])
+def test_a_push_of_three_times_the_noise_is_found_within_a_tenth_of_a_second(seconds: float):
+    left = white()
+    first = int(7.0 * RATE)
+    left[2][0, first : first + int(seconds * RATE)] += 3.0
+    (found,) = searched(left)
+    assert found.binned.recording == 2
+    assert found.start * found.binned.width == pytest.approx(7.0, abs=0.1)
+    assert found.stop * found.binned.width == pytest.approx(7.0 + seconds, abs=0.1)
+    assert found.score[0] > 1.0 > found.score[1]
+
+
+def test_heavy_tails_and_noise_that_remembers_are_no_event():
+    rng = np.random.default_rng(1)
+    heavy = [rng.standard_t(3, (2, part.samples)) for part in STRETCHES]
+    assert searched(heavy) == []
+    coloured = white(2)
+    for row in coloured:
+        for k in range(1, row.shape[1]):
+            row[:, k] += np.exp(-1.0 / (0.1 * RATE)) * row[:, k - 1]
+    assert searched(coloured) == []
+
+
+def test_what_depends_on_the_motion_is_no_event():
+    left = [row + 4.0 * (np.abs(part.motion.v) < 0.15) for row, part in zip(white(3), STRETCHES, strict=True)]
+    assert searched(left) == []
+
+
+def test_a_change_that_lasts_is_no_event():
+    left = white(4)
+    left[1][0, int(8.0 * RATE) :] += 3.0
+    assert searched(left) == []

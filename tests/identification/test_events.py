@@ -1,0 +1,93 @@
+"""Events of recordings: found, named with the force on the tool, left out of the fit, and never twice."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.robust import robust_fit
+from scara_ident.identification.events import Event, find_events, left_out, same_events, without_events
+from scara_ident.identification.identify import identify
+from scara_ident.model.model import build_model
+from scara_ident.motion.prepared import prepare
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import load_robot
+from tests.arms import noisy, swing
+from tests.truth.pushes import pushed
+
+ROBOT = load_robot()
+FORCE = np.array([12.0, -9.0, 0.0])
+START, STOP = 6.0, 7.2
+
+
+def runs() -> list[Recording]:
+    rng = np.random.default_rng(5)
+    return [noisy(swing(ROBOT, f"swing{k}", seed=k, seconds=15.0, rate=250.0), rng, 0.01) for k in range(4)]
+
+
+def observed(recordings: list[Recording]) -> Observations:
+    return observe(build_model(ROBOT, "complete"), prepare(recordings, (8.0, 8.0)))
+
+
+def test_a_push_is_found_with_its_times_and_force_and_only_that():
+    plain = runs()
+    observations = observed([pushed(ROBOT, plain[0], FORCE, START, STOP), *plain[1:]])
+    (event,) = find_events(observations, robust_fit(observations).value)
+    assert (event.recording, event.kind) == ("swing0", "contact")
+    assert event.start == pytest.approx(START, abs=0.1)
+    assert event.stop == pytest.approx(STOP, abs=0.1)
+    assert event.force == pytest.approx(FORCE, abs=0.1 * float(np.linalg.norm(FORCE)))
+    assert set(event.entry) == {"recording", "from", "to", "joints", "rms", "kind", "force"}
+    assert "left out of the fit" in event.sentence(ROBOT)
+    other = observed(plain)
+    assert find_events(other, robust_fit(other).value) == ()
+
+
+def test_the_stretch_is_out_of_rows_and_found_again():
+    plain = runs()
+    observations = observed([pushed(ROBOT, plain[0], FORCE, START, STOP), *plain[1:]])
+    events = find_events(observations, robust_fit(observations).value)
+    rest = without_events(observations, events)
+    part, whole = rest.data.stretches[0], observations.data.stretches[0]
+    inside = (part.stretch.time >= START) & (part.stretch.time <= STOP)
+    assert not np.any(part.used[:, inside])
+    assert np.array_equal(part.used[:, ~part.left_out], whole.used[:, ~part.left_out])
+    # What is shared is not made again, and at rest is only what was.
+    assert rest.each[1].joints[0].table is observations.each[1].joints[0].table or np.array_equal(
+        rest.each[1].joints[0].table, observations.each[1].joints[0].table
+    )
+    assert rest.left_out_rest == pytest.approx(observations.left_out_rest, abs=0.03)
+    assert same_events(find_events(rest, robust_fit(rest).value), events)
+    assert left_out(rest.data, ()).stretches[0].left_out is False
+
+
+def test_events_are_the_same_where_most_of_their_time_is():
+    one = Event("a", 1.0, 2.0, ("joint1",), 1.0, "contact")
+    assert same_events((one,), (replace(one, start=1.2, stop=2.3),))
+    assert not same_events((one,), (replace(one, recording="b"),))
+    assert not same_events((one,), ())
+    assert same_events((), ())
+
+
+def test_identify_leaves_it_out_and_says_so():
+    plain = runs()
+    found = identify(ROBOT, [*plain[1:], pushed(ROBOT, plain[0], FORCE, START, STOP)], bands=(8.0, 8.0))
+    truth = identify(ROBOT, plain, bands=(8.0, 8.0))
+    assert [event.recording for event in found.events] == ["swing0"]
+    assert any("swing0: contact from" in note for note in found.notes)
+    known = ~truth.estimate.undetermined
+    shift = np.abs(found.estimate.value - truth.estimate.value)[known] / truth.estimate.std[known]
+    # All that differs is 1.4 s of 60.
+    assert shift.max() < 1.0
+    assert truth.events == ()
+
+
+def test_a_repetition_with_the_like_makes_it_the_motions_doing():
+    plain = runs()
+    again = noisy(replace(swing(ROBOT, "again", seed=0, seconds=15.0, rate=250.0)), np.random.default_rng(9), 0.01)
+    both = [pushed(ROBOT, run, FORCE, START, STOP) for run in (plain[0], again)]
+    observations = observed([*both, *plain[1:]])
+    assert find_events(observations, robust_fit(observations).value) == ()

@@ -1,0 +1,48 @@
+"""Held-out recordings that are explained much worse: another payload is called one, and a good one is not named."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scara_ident.identification.identify import identify
+from scara_ident.identification.recording_check import without_stretches
+from scara_ident.robot.robot import load_robot
+from tests.truth.pushes import pushed
+from tests.truth.scenes import formula_run
+
+ROBOT = load_robot("ur5")
+
+
+def run(name: str, seed: int, payload: float = 0.0):
+    """15 s of a UR5; a payload of so many kg at 0.1 m from the last joint, by a second arm's bodies."""
+    if not payload:
+        return formula_run(ROBOT, name, [31, seed], seconds=15.0, rate=125.0, bits=18)
+    import pinocchio as pin
+
+    loaded = load_robot("ur5")
+    last = loaded.model.njoints - 1
+    body = pin.Inertia(payload, np.array([0.0, 0.0, 0.1]), np.diag([0.01, 0.01, 0.01]))
+    loaded.model.inertias[last] = loaded.model.inertias[last] + body
+    return formula_run(loaded, name, [31, seed], seconds=15.0, rate=125.0, bits=18)
+
+
+def test_a_loaded_held_out_recording_is_named():
+    training = [run(f"run{k}", k) for k in range(4)]
+    found = identify(ROBOT, training, validation=[run("plain", 8), run("loaded", 9, 3.0)])
+    (event,) = found.events
+    assert (event.recording, event.kind, event.held_out) == ("loaded", "other payload", True)
+    assert any("loaded is explained much worse" in note for note in found.notes)
+
+
+def test_a_push_in_a_held_out_recording_is_no_other_payload():
+    training = [run(f"run{k}", k) for k in range(4)]
+    held_out = pushed(ROBOT, run("pushed", 8), np.array([20.0, 0.0, -15.0]), 6.0, 7.5)
+    found = identify(ROBOT, training, validation=[held_out])
+    (event,) = found.events
+    assert event.held_out
+    assert abs(event.start - 6.0) < 0.1
+    assert abs(event.stop - 7.5) < 0.1
+    rest = without_stretches(found.validation, found.events)
+    value = found.estimate.value
+    assert rest.joints[0].rms(value) < 0.5 * found.validation.joints[0].rms(value)
+    assert without_stretches(found.validation, ()) is found.validation
