@@ -36,7 +36,7 @@ FACTORS = (0.03, 3.0)
 # Standard deviations that a shaft's least seen part has at the detection limit: what the search asks of it and a margin.
 LIMIT = 6.0
 STRENGTHS = (0.0, 3.0, LIMIT, 20.0, 60.0, np.inf)
-ASKED = Asked(rate=200.0, recordings=4, motions=4, duration=(10.0, 15.0))
+ASKED = Asked(rate=200.0, recordings=4, motions=4, duration=(10.0, 15.0), varied=False)
 NAME = "coupled_shaft"
 
 

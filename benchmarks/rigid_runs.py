@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from virtual_conditions import Asked, Conditions, draw_conditions
+from virtual_conditions import Asked, Conditions, draw_conditions, draw_states
 from virtual_motions import random_motion
 from virtual_sets import random_arm, usual_torque
 
@@ -55,9 +55,9 @@ class RigidRuns:
 
 
 def rigid_runs(robot: str, seed: int, folder: Path, asked: Asked) -> RigidRuns:
-    """Draw an arm, its motions and conditions, and simulate it; runs do not differ but for noise."""
-    arms, sorts, moves = (np.random.default_rng(part) for part in np.random.SeedSequence(seed).spawn(3))
-    conditions = draw_conditions(sorts, replace(asked, varied=False, averaged=False, start="with the motion"))
+    """Draw an arm, its motions and conditions, and simulate it; what is added is not changed by what runs differ in."""
+    arms, sorts, moves, states = (np.random.default_rng(part) for part in np.random.SeedSequence(seed).spawn(4))
+    conditions = draw_conditions(sorts, replace(asked, averaged=False, start="with the motion"))
     arm, described = random_arm(robot, conditions.stated, conditions.bits, folder, arms)
     motions = {}
     for run in conditions.runs:
@@ -67,11 +67,11 @@ def rigid_runs(robot: str, seed: int, folder: Path, asked: Asked) -> RigidRuns:
     arm = replace(arm, torque_noise=conditions.noise * usual)
     noise = TorqueNoise(conditions.noise_kind, conditions.correlation_time)
     results = []
-    for run in conditions.runs:
+    for run, state in zip(conditions.runs, draw_states(states, arm, conditions, usual), strict=True):
         results.append(
             simulate(
                 arm, motions[run.motion], seed=seed, repetition=run.repetition, rate=conditions.rate,
-                ticks=conditions.ticks, averaged=False, noise=noise,
+                ticks=conditions.ticks, averaged=False, noise=noise, run=state,
             )
         )  # fmt: skip
     # Names tell nothing, so that nothing can be told by them.
