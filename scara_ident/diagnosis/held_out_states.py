@@ -74,10 +74,8 @@ def held_out_states(found: Search, value: Array, weights: Array, data: PreparedD
             item = chosen[k]
             chosen[k] = replace(item, member=item.effect.in_recordings(scene, item.member, frozenset([name])))
         words = [found.chosen[k].label(found.scene) for k in seen.get(name, ())]
-        why = f"acts: {'; '.join(words)}" if words else "no effect of some recordings acts"
-        if name not in seen:
-            why = "is too short to tell what acts, and none is taken to"
-        notes.append(f"{name}: its first third says that {why}" if name in seen else f"{name}: its first third {why}")
+        shown = f"shows {'; '.join(words) or 'no effect that acts in some recordings only'}"
+        notes.append(f"{name}: its first third {shown if name in seen else 'is too short to show which effects act'}")
     rest, useless = with_rows(prepare([rest for _, rest in parted], data.bands), needed=False)
     return HeldOut(rest, scene, tuple(chosen), (*notes, "errors held out are of the other two thirds", *useless))
 

@@ -125,9 +125,12 @@ class PayloadOfRecordings(Effect):
     ----------
     unloaded : frozenset of str
         Recordings known to be without payload.
+    at_tool : bool
+        Whether it is known to be a compact weight at the tool: on an arm with vertical axes its mass is then much surer.
     """
 
     unloaded: frozenset[str] = frozenset()
+    at_tool: bool = False
 
     name = PayloadChange.name
     summary = "a payload in {recordings}, not in the others"
@@ -160,22 +163,24 @@ class PayloadOfRecordings(Effect):
         meaning = "{} of a payload in the frame of the last joint"
         return tuple(
             Column(f"payload_{BODY_PARAMETERS[k]}", None, BODY_UNITS[k], meaning.format(BODY_PARAMETERS[k]))
-            for k in _shown(scene.robot, BODY_COLUMNS, BODY_COLUMN_SHARE)
+            for k in self._told(scene.robot)
         )
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque per standard parameter of the payload in recordings of the group, else zero."""
         robot, names = signals.scene.robot, list(signals.scene.start)
-        shown = list(_shown(robot, BODY_COLUMNS, BODY_COLUMN_SHARE))
+        shown = list(self._told(robot))
         name = signals.motion.name
         if name not in names or not member.partner_place >> names.index(name) & 1:
             return np.zeros((len(shown), *signals.motion.q.shape))
+        if self.at_tool:
+            return [_at_tool(signals)]
         make = lambda: tool_of(robot).columns(robot, signals.motion)[:, shown]  # noqa: E731
         return np.moveaxis(shared(signals.motion, "payload body", make), 1, 0)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where the mass is negative, or more than the arm weighs."""
-        if _shown(scene.robot, BODY_COLUMNS, BODY_COLUMN_SHARE)[0] != 0:
+        if self._told(scene.robot)[0] != 0:
             return None
         if value[0] < -SEEN_STDS * std[0]:
             return "its mass would be negative: these recordings carry less than the others"
@@ -183,7 +188,7 @@ class PayloadOfRecordings(Effect):
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return mass and centre of mass where they can be told, and the body's standard parameters."""
-        shown = _shown(scene.robot, BODY_COLUMNS, BODY_COLUMN_SHARE)
+        shown = self._told(scene.robot)
         plain = super().parameters(scene, member, value, covariance).values()
         found = {"mass" if k == 0 else BODY_PARAMETERS[k]: item for k, item in zip(shown, plain, strict=True)}
         if shown[0] == 0 and value[0] > SEEN_STDS * deviation(covariance):
@@ -195,6 +200,10 @@ class PayloadOfRecordings(Effect):
                     spread = slope[None] @ covariance @ slope[:, None]
                     found[f"com_{axis}"] = Parameter(float(value[place] / value[0]), deviation(spread), "m")
         return found
+
+    def _told(self, robot: Robot) -> tuple[int, ...]:
+        """Return the standard parameters that are estimated."""
+        return (0,) if self.at_tool else _shown(robot, BODY_COLUMNS, BODY_COLUMN_SHARE)
 
 
 class GravityCounterbalance(Sinusoid):

@@ -50,7 +50,7 @@ def test_a_payload_is_told_by_the_first_part_and_errors_are_of_the_rest():
         assert part.recording.time[0] - whole.recording.time[0] == pytest.approx(FIRST_PART * length, abs=0.01)
         assert part.recording.time[-1] == whole.recording.time[-1]
     assert states.scene.start["r_10"] == held.recordings[0].recording.time[0]
-    assert "r_11: its first third says that no effect" in states.notes[1]
+    assert "r_11: its first third shows no effect" in states.notes[1]
 
 
 def test_the_rest_of_a_recording_does_not_say_what_it_carries():

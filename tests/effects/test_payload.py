@@ -127,6 +127,13 @@ def test_the_payload_of_some_recordings_is_recovered():
     for name, true in (("com_x", point[0]), ("com_y", point[1])):
         assert found[name].value == pytest.approx(true, abs=4.0 * found[name].std)
         assert found[name].std < 0.02
+    # Where its place is known the mass is all there is to estimate.
+    known = PayloadOfRecordings(at_tool=True)
+    scene, mass, spread = fit(build_model(robot), data, known, member, rounds=1)
+    assert known.parameters(scene, member, mass, spread)["mass"].value == pytest.approx(
+        0.8, abs=4.0 * spread[0, 0] ** 0.5
+    )
+    assert spread[0, 0] ** 0.5 < 0.02
     assert "negative" in str(effect.inadmissible(scene, member, -value, np.sqrt(np.diag(covariance))))
 
 

@@ -41,8 +41,8 @@ def test_a_payload_is_found_by_torque_and_told_in_recordings_held_out():
     moments = np.array([effect.parameters[name].value for name in ("mx", "my", "mz")])
     true = PAYLOAD.mass * np.asarray(PAYLOAD.lever)
     assert np.linalg.norm(moments - true) < 0.05 * np.linalg.norm(true)
-    assert any("run_5: its first third says that acts: payload_change" in note for note in found.notes)
-    assert any("run_6: its first third says that no effect" in note for note in found.notes)
+    assert any("run_5: its first third shows payload_change" in note for note in found.notes)
+    assert any("run_6: its first third shows no effect" in note for note in found.notes)
 
     # A model that knows which recordings are loaded is no better on the recordings held out.
     family = PayloadOfRecordings()
