@@ -29,6 +29,9 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     (again,) = examine(step.noisier.model, own, criteria)
     left = without_noise(found, again)
     share = float(left @ found.products @ left) / float(found.value @ found.products @ found.value)
+    if share >= 1.0:
+        # What is no smaller without the noise was not made by it.
+        return None
     p_value = significance(left, found.covariance, found.freedom, found.products)
     if p_value * step.tried <= criteria.family_error and decision.gain * share >= criteria.least_gain:
         return None
