@@ -29,6 +29,14 @@ def diagnose(
     model: options.Model = "complete",
     validate: options.Validate = None,
     band: options.Band = None,
+    unloaded: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--unloaded",
+            metavar="RECORDING",
+            help="Recording known to be without payload; may be repeated. One to train on.",
+        ),
+    ] = None,
     effects: Annotated[
         str | None,
         typer.Option(
@@ -51,13 +59,15 @@ def diagnose(
     arm = load_robot(robot)
     with progress() as work:
         work("reading the recordings")
-        training, useless = read_usable(recordings, arm)
+        training, useless = read_usable([*recordings, *(unloaded or ())], arm)
+        bare, _ = read_usable(unloaded or (), arm, needed=False)
         held_out, more = read_usable(validate or (), arm, needed=False)
         result = run(
             arm,
             training,
             model=model,
             validation=held_out,
+            unloaded=[item.name for item in bare],
             bands=None if band is None else [band] * arm.n,
             catalogue=None if effects is None else effects_named(*_parted(effects)),
             progress=work.part(READING_SHARE, 1.0),

@@ -92,8 +92,8 @@ def cluster_test(
     return ClusterTest(np.where(known, p_value, 1.0), into @ unbiased @ into.transpose(0, 2, 1), least)
 
 
-def significance(value: Array, covariance: Array, freedom: float) -> float:
-    """Return the probability that coefficients of no size would be as large, Hotelling's test.
+def significance(value: Array, covariance: Array, freedom: float, products: Array) -> float:
+    """Return the probability that coefficients of no size would be as large, Hotelling's test, or `_either`.
 
     Parameters
     ----------
@@ -101,14 +101,17 @@ def significance(value: Array, covariance: Array, freedom: float) -> float:
     covariance : ndarray, shape (k, k)
     freedom : float
         Degrees of freedom of the covariance.
+    products : ndarray, shape (k, k)
+        Products of what the model leaves of the candidate's columns, which say the directions that can be asked alone.
     """
     if not np.all(np.isfinite(covariance)):
         return 1.0
-    size = np.sqrt(np.diag(covariance))
-    size = np.where(size == 0.0, 1.0, size)
-    scaled = covariance / np.outer(size, size)
-    rank = np.atleast_1d(np.linalg.matrix_rank(scaled, rtol=_RANK, hermitian=True))
-    return float(_hotelling((value / size)[None], scaled[None], np.atleast_1d(freedom), rank)[0])
+    _, back, rank = _whitening(products[None])
+    whitened, spread = back @ value, back @ covariance[None] @ back.transpose(0, 2, 1)
+    each = np.full(whitened.shape, freedom)
+    together = _hotelling(whitened, spread, each[:, 0], rank)
+    few = (rank > 1) & (freedom - rank + 1.0 < FEW)
+    return float(np.where(few, _either(together, whitened, spread, each, rank), together)[0])
 
 
 def _either(together: Array, value: Array, covariance: Array, freedom: Array, rank: NDArray[np.intp]) -> Array:

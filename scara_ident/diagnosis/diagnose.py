@@ -13,6 +13,7 @@ from scara_ident.diagnosis.confounding import Confounder, confounders
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
 from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
+from scara_ident.diagnosis.held_out_states import HeldOut, held_out_states
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.model_selection import Outcome, Unexplained, rms_of, select_model
 from scara_ident.diagnosis.screening import Dependence
@@ -23,7 +24,7 @@ from scara_ident.diagnosis.work import first, searching
 from scara_ident.effects import Effect, Parameter
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.catalogue import available_effects
-from scara_ident.errors import RecordingError
+from scara_ident.errors import RecordingError, UsageError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import robust_fit
@@ -144,6 +145,7 @@ def diagnose(
     *,
     model: str | TorqueModel = "complete",
     validation: Sequence[Recording] = (),
+    unloaded: Sequence[str] = (),
     bands: Sequence[float | None] | None = None,
     catalogue: Sequence[Effect] | None = None,
     criteria: SelectionCriteria = CRITERIA,
@@ -159,7 +161,10 @@ def diagnose(
     model : str or TorqueModel, optional
         The base model, as in `identify`.
     validation : sequence of Recording, optional
-        Recordings that no choice sees; they are only predicted, before and after.
+        Recordings that no choice sees; they are only predicted, before and after. Where an effect was found that acts in
+        some recordings only, the first third of each tells whether it acts there, and errors are of the rest.
+    unloaded : sequence of str, optional
+        Names of those of ``recordings`` that are known to be without payload.
     bands : sequence of float or None, one per joint, optional
         Low-pass on both sides; by default the widest band that any joint's data allow, for all joints.
     catalogue : sequence of Effect, optional
@@ -176,13 +181,18 @@ def diagnose(
     Raises
     ------
     UsageError
-        If a recording is both fitted and held out, or a band is no frequency that the slowest recording carries.
+        If a recording is both fitted and held out, one named as unloaded is not among those to fit, or a band is no frequency that the slowest recording carries.
     RecordingError
         If none of the recordings can be used, or they have fewer rows than the model has parameters (one of several that
         cannot be used is left out with a note), or channels are not what the mapping says (see `channel_faults`).
     """
     work = Work(progress)
     check_held_out(recordings, validation)
+    strange = sorted({*unloaded} - {item.name for item in recordings})
+    if strange:
+        raise UsageError(
+            f"{strange[0]}: named as unloaded, but not among the recordings to diagnose; give it there too"
+        )
     if bands is not None:
         check_bands(robot, bands, (*recordings, *validation))
     base = build_model(robot, model) if isinstance(model, str) else model
@@ -195,7 +205,8 @@ def diagnose(
     faults = channel_faults(observations)
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))
-    families = available_effects() if catalogue is None else tuple(catalogue)
+    known = frozenset(unloaded)
+    families = tuple(item.knowing(known) for item in (available_effects() if catalogue is None else catalogue))
     task = SearchTask(base, families, criteria, searching(work, band_given=given))
     outcome, events = _without_events(task, observations, free=not given)
     work("comparing what was found with what else it could be", task.progress.stop)
@@ -203,7 +214,9 @@ def diagnose(
     step = replace(found.step, weights=after.weights)
     held_out, useless = with_rows(held_out.at(found.bands), needed=False)
     notes += [note for note in useless if note not in notes]
-    validation_before = observe(base, held_out)
+    held = held_out_states(found, after.value, after.weights, held_out)
+    notes += held.notes
+    validation_before = observe(base, held.data)
     parameters = physical_parameters(step) if found.chosen else PhysicalParameters((), ())
     effects = _effects(found, step, parameters)
     notes += [f"{item.label} is not counted: {item.why}" for item in outcome.demoted]
@@ -212,7 +225,7 @@ def diagnose(
     negligible = _negligible(found)
     if negligible is not None:
         notes.append(f"{negligible}; corrected in the data, not counted as an effect")
-    validation_after = _with_effects(found, validation_before)
+    validation_after = _with_effects(found, held, validation_before)
     # Where something stays unexplained that is why a whole recording is, and no event.
     in_held_out = tuple(
         event
@@ -271,15 +284,16 @@ def _verdict(unexplained: bool, found: bool, shown: Sequence[Evidence]) -> Verdi
     return "explained" if found else "complete"
 
 
-def _with_effects(found: Search, before: Observations) -> Observations:
+def _with_effects(found: Search, held: HeldOut, before: Observations) -> Observations:
     """Return held-out observations, corrected as the training ones were, with the effects found."""
     if not before.data.recordings:
         return replace(before, model=found.model)
     if found.correction is not None:
         data = corrected(before.data, found.correction.candidate, found.correction.value)
         before = before.with_torque(data)
-    scene = replace(found.scene, columns=columns_at_hand(before))
-    return observed_at_every_sample(replace(found.step, scene=scene, columns=CandidateColumns(before)))
+    scene = replace(held.scene, columns=columns_at_hand(before))
+    step = replace(found.step, scene=scene, columns=CandidateColumns(before), chosen=held.chosen)
+    return observed_at_every_sample(step)
 
 
 def _effects(found: Search, step: SelectionStep, parameters: PhysicalParameters) -> list[FoundEffect]:

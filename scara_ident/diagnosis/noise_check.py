@@ -29,7 +29,10 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     (again,) = examine(step.noisier.model, own, criteria)
     left = without_noise(found, again)
     share = float(left @ found.products @ left) / float(found.value @ found.products @ found.value)
-    p_value = significance(left, found.covariance, found.freedom)
+    if share >= 1.0:
+        # What is no smaller without the noise was not made by it.
+        return None
+    p_value = significance(left, found.covariance, found.freedom, found.products)
     if p_value * step.tried <= criteria.family_error and decision.gain * share >= criteria.least_gain:
         return None
     return f"the noise of the positions makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"

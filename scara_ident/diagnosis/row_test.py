@@ -42,7 +42,7 @@ def examine_rows(model: FittedModel, candidate: Rows, found: Examination) -> Exa
         Its ``p_value`` holds for both tests together; covariance and freedom are of the smaller one.
     """
     covariance, freedom = _by_rows(model, candidate, found)
-    p_value = significance(found.value, covariance, freedom)
+    p_value = significance(found.value, covariance, freedom, found.products)
     together = min(1.0, 2.0 * min(p_value, found.p_value))
     if p_value >= found.p_value:
         return replace(found, p_value=together)

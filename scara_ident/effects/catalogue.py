@@ -16,6 +16,7 @@ from scara_ident.effects.payload import FreePayloadChange, GravityCounterbalance
 from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
+from scara_ident.effects.shaft import CoupledShaft
 from scara_ident.effects.tilt import BaseTilt, NominalBaseTilt
 from scara_ident.registry import Registry
 
@@ -47,6 +48,8 @@ CATALOGUE: tuple[Effect, ...] = (
     Backlash(),
     InertiaCoupling(),
     DriveCoupling(),
+    CoupledShaft(),
+    CoupledShaft("difference"),
 )
 
 

@@ -34,7 +34,7 @@ class InertiaCoupling(Effect):
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return the pairs of joints where the base model does not span it."""
-        return tuple(Member(j, (), k) for j, k in _unspanned(scene.model.rigid_body))
+        return tuple(Member(j, (), k) for j, k in unspanned_pairs(scene.model.rigid_body))
 
     def rows(self, scene: Scene, member: Member) -> list[int]:
         """Return the two joints."""
@@ -90,7 +90,7 @@ def _exchanged(scale: Array, a: Array, j: int, k: int) -> Array:
 
 
 @lru_cache(maxsize=16)
-def _unspanned(term: RigidBody) -> tuple[tuple[int, int], ...]:
+def unspanned_pairs(term: RigidBody) -> tuple[tuple[int, int], ...]:
     """Return the pairs of joints whose shared inertia the rigid bodies' columns do not span, from random states."""
     robot = term.robot
     motion = random_motion(robot, np.random.default_rng(0), 20 + 2 * len(term.columns))

@@ -88,6 +88,8 @@ class Effect(ABC):
         Whether the columns depend on the present estimate, ``scene.value`` or ``scene.armatures``.
     resonant : bool
         Whether the columns hold in a band that ends below a resonance; see `resonance`.
+    by_recording : bool
+        Whether it acts in some recordings and not in others; see `in_recordings`.
     seeded_by : {"order", "frequency"} or None
         The lines of a residual's spectrum that suggest a member; see `seeds`.
     view : View
@@ -106,6 +108,7 @@ class Effect(ABC):
     at_rest: ClassVar[bool] = False
     follows_estimate: ClassVar[bool] = False
     resonant: ClassVar[bool] = False
+    by_recording: ClassVar[bool] = False
     seeded_by: ClassVar[Literal["order", "frequency"] | None] = None
     view: ClassVar[View] = OWN
     experiment: ClassVar[str] = "record the same path at two speeds, in both directions, with and without a payload"
@@ -222,6 +225,14 @@ class Effect(ABC):
     def seeds(self, scene: Scene, joint: int, line: SpectralLine) -> tuple[Member, ...]:
         """Return the members that a line of a joint's residual suggests."""
         return (Member(joint, (line.position,)),) if line.kind == self.seeded_by else ()
+
+    def knowing(self, unloaded: frozenset[str]) -> Effect:
+        """Return the family that knows the names of recordings in which the arm carries nothing."""
+        return self
+
+    def in_recordings(self, scene: Scene, member: Member, names: frozenset[str]) -> Member:
+        """Return the member that also acts in further recordings of the scene."""
+        return member
 
     def geared_joint(self, member: Member) -> int | None:
         """Return the joint on the torque behind whose gear it depends, and so on the rotor's share of an inertia."""

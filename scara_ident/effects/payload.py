@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -12,14 +12,14 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.links import point_mass, shared, tool_of
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
+from scara_ident.effects.recording_groups import groups_by_torque
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid
 from scara_ident.effects.spanned import rows_by_sample
 from scara_ident.model.base_parameters import BODY_PARAMETERS, BODY_UNITS
 from scara_ident.model.terms import Column
 from scara_ident.motion.motion import Motion
-from scara_ident.recording.recording import split_name
 from scara_ident.robot.robot import Robot
 
 # Instants tried over a run with the mounting known; a tenth of a run apart, which refinement bridges.
@@ -30,10 +30,10 @@ INSTANTS_FREE = 4
 FREE_COLUMNS = 4
 # A further one must add this share of the torque of the first, or it is noise that is fitted.
 FREE_COLUMN_SHARE = 0.02
+# Of a payload through whole recordings all is told that is more than rounding.
+BODY_COLUMNS, BODY_COLUMN_SHARE = 10, 1e-3
 # Masses and moments of inertia are seen to be there this many standard deviations from none: 0.3 % two-sided.
 SEEN_STDS = 3.0
-# Groups of recordings tried, for time: every one is a candidate.
-GROUP_LIMIT = 24
 # A tool nearer to the last joint than this, m, says nothing of how far out an unknown payload sits.
 SHORTEST_ARM = 0.1
 
@@ -113,36 +113,97 @@ class FreePayloadChange(PayloadChange):
         return dict(zip(names, found, strict=True))
 
 
-class PayloadOfRecordings(PayloadChange):
-    """A mass at the tool point in some recordings and not in others.
+@dataclass(frozen=True)
+class PayloadOfRecordings(Effect):
+    """A body that the last link carries in some recordings and not in others, mounted anyhow.
 
-    Groups tried: recordings whose names share a word, each recording alone, and all from some recording on in the
-    order of time; the mass counts from the first recording, whose payload is part of the last link. Where all have
-    the same payload, nothing but a known mass can tell it.
+    The recordings are told by their torque, see `groups_by_torque`; their group is a member's partner, a bit for each
+    recording in the order of the scene. Where all have the same payload the base model absorbs it, and nothing but a known
+    mass can tell it.
+
+    Attributes
+    ----------
+    unloaded : frozenset of str
+        Recordings known to be without payload.
+    at_tool : bool
+        Whether it is known to be a compact weight at the tool: on an arm with vertical axes its mass is then much surer.
     """
 
+    unloaded: frozenset[str] = frozenset()
+    at_tool: bool = False
+
+    name = PayloadChange.name
     summary = "a payload in {recordings}, not in the others"
-    coefficients = (Coefficient("mass", "kg", "mass at the tool in {recordings}"),)
-    nonlinear = ()
+    view = PayloadChange.view
+    experiment = PayloadChange.experiment
+    by_recording = True
+
+    def knowing(self, unloaded: frozenset[str]) -> PayloadOfRecordings:
+        """Return the family that knows which recordings are without payload."""
+        return replace(self, unloaded=unloaded)
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
-        """Return one per group of recordings; the group's number stands for a partner."""
-        return tuple(Member(None, (), k) for k in range(len(self._groups(scene))))
+        """Return one per group of recordings."""
+        told = [k for k in _shown(scene.robot, BODY_COLUMNS, BODY_COLUMN_SHARE) if k < 4]
+        found = groups_by_torque(scene, told, self.unloaded) if told else ()
+        return tuple(self.in_recordings(scene, Member(None), group) for group in found)
+
+    def in_recordings(self, scene: Scene, member: Member, names: frozenset[str]) -> Member:
+        """Return the member that also acts in further recordings of the scene."""
+        bits = sum(1 << k for k, name in enumerate(scene.start) if name in names)
+        return replace(member, partner=bits if member.partner is None else member.partner | bits)
 
     def words(self, scene: Scene, member: Member) -> dict[str, Any]:
         """Add the recordings of the group."""
-        group = sorted(self._groups(scene)[member.partner_place])
-        return {"recordings": ", ".join(group) if len(group) <= 4 else f"{group[0]} and {len(group) - 1} others"}
+        group = [name for k, name in enumerate(scene.start) if member.partner_place >> k & 1]
+        return {"recordings": ", ".join(group)}
+
+    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
+        """Describe those of the body's standard parameters that the torque tells."""
+        meaning = "{} of a payload in the frame of the last joint"
+        return tuple(
+            Column(f"payload_{BODY_PARAMETERS[k]}", None, BODY_UNITS[k], meaning.format(BODY_PARAMETERS[k]))
+            for k in self._told(scene.robot)
+        )
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
-        """Return the torque of 1 kg at the tool in recordings of the group, else zero."""
-        if signals.motion.name not in self._groups(signals.scene)[member.partner_place]:
-            return [np.zeros_like(signals.motion.q)]
-        return [_at_tool(signals)]
+        """Return the torque per standard parameter of the payload in recordings of the group, else zero."""
+        robot, names = signals.scene.robot, list(signals.scene.start)
+        shown = list(self._told(robot))
+        name = signals.motion.name
+        if name not in names or not member.partner_place >> names.index(name) & 1:
+            return np.zeros((len(shown), *signals.motion.q.shape))
+        if self.at_tool:
+            return [_at_tool(signals)]
+        make = lambda: tool_of(robot).columns(robot, signals.motion)[:, shown]  # noqa: E731
+        return np.moveaxis(shared(signals.motion, "payload body", make), 1, 0)
 
-    def _groups(self, scene: Scene) -> tuple[frozenset[str], ...]:
-        ordered = sorted(scene.start, key=lambda name: scene.start[name])
-        return _groups_of(tuple(ordered))
+    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
+        """Say so where the mass is negative, or more than the arm weighs."""
+        if self._told(scene.robot)[0] != 0:
+            return None
+        if value[0] < -SEEN_STDS * std[0]:
+            return "its mass would be negative: these recordings carry less than the others"
+        return _too_heavy(scene, float(value[0]), float(std[0]))
+
+    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
+        """Return mass and centre of mass where they can be told, and the body's standard parameters."""
+        shown = self._told(scene.robot)
+        plain = super().parameters(scene, member, value, covariance).values()
+        found = {"mass" if k == 0 else BODY_PARAMETERS[k]: item for k, item in zip(shown, plain, strict=True)}
+        if shown[0] == 0 and value[0] > SEEN_STDS * deviation(covariance):
+            for axis, k in zip("xyz", (1, 2, 3), strict=True):
+                if k in shown:
+                    place = shown.index(k)
+                    slope = np.zeros(len(value))
+                    slope[[0, place]] = -value[place] / value[0] ** 2, 1.0 / value[0]
+                    spread = slope[None] @ covariance @ slope[:, None]
+                    found[f"com_{axis}"] = Parameter(float(value[place] / value[0]), deviation(spread), "m")
+        return found
+
+    def _told(self, robot: Robot) -> tuple[int, ...]:
+        """Return the standard parameters that are estimated."""
+        return (0,) if self.at_tool else _shown(robot, BODY_COLUMNS, BODY_COLUMN_SHARE)
 
 
 class GravityCounterbalance(Sinusoid):
@@ -199,7 +260,7 @@ def _too_heavy(scene: Scene, mass: float, std: float) -> str | None:
 
 
 @lru_cache(maxsize=8)
-def _shown(robot: Robot) -> tuple[int, ...]:
+def _shown(robot: Robot, most: int = FREE_COLUMNS, share: float = FREE_COLUMN_SHARE) -> tuple[int, ...]:
     """Return the standard parameters of a payload that tell most, each beside those before it, mass first if it can."""
     tool = tool_of(robot)
     rng = np.random.default_rng(0)
@@ -212,10 +273,10 @@ def _shown(robot: Robot) -> tuple[int, ...]:
     largest = float(np.max(np.linalg.norm(rows, axis=0))) or 1.0
     chosen: list[int] = []
     left = rows.copy()
-    while len(chosen) < FREE_COLUMNS:
+    while len(chosen) < most:
         size = np.linalg.norm(left, axis=0)
-        k = 0 if not chosen and size[0] > FREE_COLUMN_SHARE * largest else int(np.argmax(size))
-        if size[k] <= FREE_COLUMN_SHARE * largest:
+        k = 0 if not chosen and size[0] > share * largest else int(np.argmax(size))
+        if size[k] <= share * largest:
             break
         chosen.append(k)
         direction = left[:, k] / size[k]
@@ -234,20 +295,3 @@ def _loaded_by_gravity(robot: Robot) -> tuple[bool, ...]:
     torque = np.abs(standard_regressor(robot, q, rest, rest)).max(axis=(1, 2))
     largest = float(torque.max(initial=0.0))
     return tuple(bool(largest > 0.0 and torque[j] > 1e-4 * largest and not robot.prismatic[j]) for j in range(robot.n))
-
-
-@lru_cache(maxsize=32)
-def _groups_of(names: tuple[str, ...]) -> tuple[frozenset[str], ...]:
-    """Return groups of recordings, given in the order of time, that leave out the first."""
-    everything = frozenset(names)
-    words: dict[str, set[str]] = {}
-    for name in names:
-        trajectory, repetition = split_name(name)
-        for word in (trajectory, f"repetition {repetition}", *re.split(r"[\W_]+", trajectory)):
-            words.setdefault(word, set()).add(name)
-    proposals = [frozenset(group) for group in words.values()]
-    proposals += [frozenset(names[k:]) for k in range(1, len(names))]
-    proposals += [frozenset([name]) for name in names]
-    # A group and its complement say the same; the one without the first recording counts what was added since.
-    proposals = [everything - group if names[0] in group else group for group in proposals]
-    return tuple(dict.fromkeys(group for group in proposals if group))[:GROUP_LIMIT]

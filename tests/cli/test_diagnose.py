@@ -50,3 +50,11 @@ def test_what_cannot_be_read_or_used_is_said_in_a_line(command, folder: Path):
     assert command("diagnose").status == 2
     assert command("diagnose", run, "--model", "full").status == 2
     assert "held out" in command("diagnose", run, "--validate", run).err
+
+
+def test_recordings_can_be_named_as_without_payload(command, folder: Path, tmp_path: Path):
+    runs = sorted(folder.glob("*.parquet"))[:3]
+    result = command("diagnose", *runs[1:], "--unloaded", runs[0], "--effects", "payload_change", "--json")
+    assert result.status == 0
+    # What is named as unloaded is trained on too, once.
+    assert {run.stem for run in runs} == set(json.loads(result.out)["recordings"]["training"])

@@ -98,14 +98,27 @@ def test_a_column_of_one_block_cannot_be_tested():
 
 
 def test_significance_is_students_and_hotellings():
-    assert significance(np.array([3.0]), np.array([[4.0]]), 7.0) == pytest.approx(2.0 * stats.t.sf(1.5, 7.0))
+    one, both = np.eye(1), np.array([[2.0, 0.3], [0.3, 1.0]])
+    assert significance(np.array([3.0]), np.array([[4.0]]), 7.0, one) == pytest.approx(2.0 * stats.t.sf(1.5, 7.0))
     value, covariance = np.array([1.0, 2.0]), np.array([[0.3, 0.1], [0.1, 0.5]])
     wald = value @ np.linalg.solve(covariance, value)
-    assert significance(value, covariance, 12.0) == pytest.approx(stats.f.sf(wald * 11.0 / 24.0, 2, 11.0))
-    # Units change nothing, and where freedom is used up nothing is significant.
-    scale = np.array([1e6, 1e-6])
+    assert significance(value, covariance, 12.0, both) == pytest.approx(stats.f.sf(wald * 11.0 / 24.0, 2, 11.0))
+    # Units change nothing.
+    scale, inverse = np.array([1e6, 1e-6]), np.array([1e-6, 1e6])
     assert_allclose(
-        significance(value * scale, covariance * np.outer(scale, scale), 12.0), significance(value, covariance, 12.0)
+        significance(value * scale, covariance * np.outer(scale, scale), 12.0, both * np.outer(inverse, inverse)),
+        significance(value, covariance, 12.0, both),
     )
-    assert significance(value, covariance, 0.9) == 1.0
-    assert significance(value, np.full((2, 2), np.inf), 12.0) == 1.0
+    assert significance(value, np.full((2, 2), np.inf), 12.0, both) == 1.0
+
+
+def test_many_columns_with_little_freedom_are_tested_one_by_one():
+    # Twice, for together they were asked as well.
+    value, covariance = np.array([0.1, 30.0, 0.1]), np.diag([1.0, 4.0, 1.0])
+    assert significance(value, covariance, 3.0, np.eye(3)) == pytest.approx(2.0 * 3.0 * 2.0 * stats.t.sf(15.0, 3.0))
+
+
+def test_of_many_coefficients_in_few_blocks_no_more_are_significant():
+    rng = np.random.default_rng(4)
+    found = np.concatenate([p_values(rng, 12, 4, 2.5, 8) for _ in range(60)])
+    assert np.mean(found < 0.01) <= 0.03

@@ -36,5 +36,5 @@ def test_what_the_noise_makes_is_taken_off_and_what_the_arm_does_is_left(true: f
     assert once.p_value < 1e-12
     left = without_noise(once, twice)
     assert abs(left[0]) == pytest.approx(true, abs=0.07)
-    p_value = significance(left, once.covariance, once.freedom)
+    p_value = significance(left, once.covariance, once.freedom, once.products)
     assert (p_value < 1e-6) if true else (p_value > 1e-3)

@@ -66,7 +66,7 @@ def test_of_white_noise_the_covariance_is_that_of_least_squares():
     every = np.vstack([columns, tried])
     expected = np.linalg.inv(every @ every.T)[3:, 3:]
     assert_allclose(np.diag(by_rows.covariance), np.diag(expected), rtol=0.2)
-    assert by_rows.p_value <= 2.0 * significance(item.value, item.covariance, item.freedom)
+    assert by_rows.p_value <= 2.0 * significance(item.value, item.covariance, item.freedom, item.products)
 
 
 def test_the_smaller_of_both_counts_twice():
@@ -76,7 +76,7 @@ def test_the_smaller_of_both_counts_twice():
     model = model_of(slow(rng, 3, blocks * ROWS, 8.0), rng.standard_normal(blocks * ROWS), blocks)
     (item,) = examine(model, [{0: tried}])
     again = examine_rows(model, {0: tried}, item)
-    alone = significance(item.value, again.covariance, again.freedom)
+    alone = significance(item.value, again.covariance, again.freedom, item.products)
     assert again.p_value == pytest.approx(min(1.0, 2.0 * min(item.p_value, alone)))
 
 

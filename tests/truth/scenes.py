@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from scara_ident.recording.recording import Recording
@@ -58,3 +60,11 @@ def formula_run(
     step = 2.0 * np.pi / 2**bits
     seen = np.round(q / step) * step if bits else q
     return noisy(recording(robot, name, time, seen, torque), rng, noise * np.sqrt(np.mean(torque**2, axis=1)))
+
+
+def payload_torque(robot: Robot, payload: pin.Inertia) -> Added:
+    """Torque, at the joints, of a body fixed to the last joint of a robot: Pinocchio's with it less that without it."""
+    model = robot.model.copy()
+    model.appendBodyToJoint(model.njoints - 1, payload, pin.SE3.Identity())
+    laden = replace(robot, model=model)
+    return lambda t, q, v, a, load: rnea(laden, q, v, a) - rnea(robot, q, v, a)

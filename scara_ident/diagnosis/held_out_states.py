@@ -1,0 +1,134 @@
+"""Which of the effects that act in some recordings act in a held-out one: told by its first part, judged on the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
+from scara_ident.diagnosis.search import Search, corrected
+from scara_ident.effects import Scene
+from scara_ident.estimation.observations import Observations, observe
+from scara_ident.identification.usable import with_rows
+from scara_ident.motion.prepared import PreparedData, prepare
+from scara_ident.recording.recording import Recording
+
+# Of a held-out recording this share says in which state it was; it is not among the errors.
+FIRST_PART = 1.0 / 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Held-out recordings and the state that the arm was in.
+
+    Attributes
+    ----------
+    data : PreparedData
+        What errors are of: the recordings, without their first part where that told their state.
+    scene : Scene
+        That knows when they began.
+    chosen : tuple of Candidate
+        The effects found, which also act in those of them that they were seen in.
+    notes : tuple of str
+    """
+
+    data: PreparedData
+    scene: Scene
+    chosen: tuple[Candidate, ...]
+    notes: tuple[str, ...]
+
+
+def held_out_states(found: Search, value: Array, weights: Array, data: PreparedData) -> HeldOut:
+    """Find the state of held-out recordings, each by its own first part.
+
+    Parameters
+    ----------
+    found : Search
+    value : ndarray, shape (p,)
+        Parameters of the model with the effects found.
+    weights : ndarray, shape (n,)
+    data : PreparedData
+        The held-out recordings, in the bands of the search.
+    """
+    optional = [k for k, item in enumerate(found.chosen) if item.effect.by_recording]
+    if not optional or not data.recordings:
+        return HeldOut(data, found.scene, found.chosen, ())
+    start = {item.name: float(item.recording.time[0]) for item in data.recordings}
+    scene = replace(found.scene, start={**found.scene.start, **start})
+    parted = [_parted(item.recording) for item in data.recordings]
+    heads, _ = with_rows(prepare([head for head, _ in parted], data.bands), needed=False)
+    chosen, seen, notes = list(found.chosen), {}, []
+    if heads.recordings:
+        observations = observe(found.base, heads)
+        if found.correction is not None:
+            now = corrected(heads, found.correction.candidate, found.correction.value)
+            observations = observations.with_torque(now)
+        for one in observations.each:
+            seen[one.name] = _acting(one, scene, chosen, optional, value, weights)
+    for name in start:
+        for k in seen.get(name, ()):
+            item = chosen[k]
+            chosen[k] = replace(item, member=item.effect.in_recordings(scene, item.member, frozenset([name])))
+        words = [found.chosen[k].label(found.scene) for k in seen.get(name, ())]
+        shown = f"shows {'; '.join(words) or 'no effect that acts in some recordings only'}"
+        notes.append(f"{name}: its first third {shown if name in seen else 'is too short to show which effects act'}")
+    rest, useless = with_rows(prepare([rest for _, rest in parted], data.bands), needed=False)
+    return HeldOut(rest, scene, tuple(chosen), (*notes, "errors held out are of the other two thirds", *useless))
+
+
+def _acting(
+    one: Observations, scene: Scene, chosen: Sequence[Candidate], optional: Sequence[int], value: Array, weights: Array
+) -> tuple[int, ...]:
+    """Return which of the effects act in a recording: those that leave the least of it."""
+    names = frozenset([one.name])
+    here = replace(scene, columns=columns_at_hand(one))
+    everywhere = [
+        replace(item, member=item.effect.in_recordings(here, item.member, names)) if k in optional else item
+        for k, item in enumerate(chosen)
+    ]
+    rows = CandidateColumns(one).rows(here, everywhere)
+    stop = np.cumsum([one.parameters, *(len(next(iter(item.values()))) for item in rows)])
+    left = [item.table[-1] - value[item.columns] @ item.table[:-1] for item in one.joints]
+    added = [
+        {joint: value[a:b] @ part for joint, part in item.items()}
+        for item, a, b in zip(rows, stop[:-1], stop[1:], strict=True)
+    ]
+    best: tuple[float, tuple[int, ...]] = (np.inf, ())
+    for which in product((False, True), repeat=len(optional)):
+        acting = tuple(k for k, acts in zip(optional, which, strict=True) if acts)
+        total = 0.0
+        for joint, weight in enumerate(weights):
+            error = left[joint].copy()
+            for k, torque in enumerate(added):
+                if (k in acting or k not in optional) and joint in torque:
+                    error -= torque[joint]
+            total += float(weight**2 * error @ error)
+        best = min(best, (total, acting))
+    return best[1]
+
+
+def _parted(recording: Recording) -> tuple[Recording, Recording]:
+    """Return the first part of a recording, and the rest."""
+    edge = recording.time[0] + FIRST_PART * (recording.time[-1] - recording.time[0])
+    place = int(np.searchsorted(recording.time, edge))
+    return _window(recording, slice(None, place)), _window(recording, slice(place, None))
+
+
+def _window(recording: Recording, window: slice) -> Recording:
+    def cut(signal: Array | None) -> Array | None:
+        return None if signal is None else signal[:, window]
+
+    return replace(
+        recording,
+        time=recording.time[window],
+        position=recording.position[:, window],
+        effort=cut(recording.effort),
+        velocity=cut(recording.velocity),
+        acceleration=cut(recording.acceleration),
+        temperature=cut(recording.temperature),
+        link_position=cut(recording.link_position),
+    )

@@ -1,0 +1,70 @@
+"""Groups of recordings: told by torque, not by names; none where nothing differs, and none of what is known to be bare."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from scara_ident.diagnosis.search import scene_of
+from scara_ident.effects import Scene
+from scara_ident.effects.payload import PayloadOfRecordings
+from scara_ident.effects.recording_groups import groups_by_torque
+from scara_ident.estimation.least_squares import wls
+from scara_ident.estimation.observations import observe
+from scara_ident.model.model import build_model
+from scara_ident.motion.prepared import prepare
+from scara_ident.robot.robot import load_robot
+from tests.truth.scenes import formula_run, payload_torque
+
+FIRST_MOMENTS = (0, 1, 2, 3)
+BOX = pin.Inertia.FromBox(0.6, 0.1, 0.15, 0.05)
+HEAVY = pin.Inertia(1.5, np.array([0.05, -0.03, 0.1]), np.diag([0.004, 0.005, 0.006]))
+
+
+def scene(carried: Sequence[pin.Inertia | None], noise: float = 0.02) -> Scene:
+    """Recordings of a UR5, one for each payload."""
+    robot = load_robot("ur5")
+    runs = [
+        formula_run(
+            robot, f"r_{k}", [3, k], seconds=10.0, rate=100.0, noise=noise,
+            added=None if body is None else payload_torque(robot, body),
+        )
+        for k, body in enumerate(carried)
+    ]  # fmt: skip
+    observations = observe(build_model(robot), prepare(runs, (5.0,) * robot.n))
+    return scene_of(observations.model, wls(observations).value, observations)
+
+
+def groups(found: Scene, unloaded: Sequence[str] = ()) -> list[set[str]]:
+    return [set(group) for group in groups_by_torque(found, FIRST_MOMENTS, frozenset(unloaded))]
+
+
+@pytest.fixture(scope="module")
+def some() -> Scene:
+    return scene([BOX, None, None, BOX, None])
+
+
+def test_recordings_with_a_payload_are_told_by_their_torque(some: Scene):
+    assert groups(some)[0] == {"r_0", "r_3"}
+
+
+def test_what_is_known_to_be_bare_is_in_no_group(some: Scene):
+    assert groups(some, ["r_1", "r_4"])[0] == {"r_0", "r_3"}
+    # Told the wrong way round, the others carry less: the effect then says so.
+    assert groups(some, ["r_0", "r_3"])[0] == {"r_1", "r_2", "r_4"}
+    family = PayloadOfRecordings().knowing(frozenset(["r_0", "r_3"]))
+    assert family.description(some, family.members(some)[0]) == "a payload in r_1, r_2, r_4, not in the others"
+
+
+def test_two_payloads_make_three_groups():
+    found = groups(scene([None, BOX, HEAVY, None, HEAVY, BOX]))
+    assert found[0] in ({"r_2", "r_4"}, {"r_1", "r_2", "r_4", "r_5"})
+    assert {"r_2", "r_4"} in found
+
+
+def test_where_all_carry_the_same_there_is_no_group():
+    assert groups(scene([BOX] * 4)) == []
+    assert groups(scene([None] * 2, noise=0.05)) == []
