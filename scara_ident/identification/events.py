@@ -117,7 +117,7 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
     stretches = [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, left, strict=True)]
     plain = stretches
     if fitted is None:
-        least = _residuals(observations, weighted_value(observations))[1]
+        least = _residuals(observations, weighted_value(observations.by_joint))[1]
         plain = [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, least, strict=True)]
     whole = {id(part): row for part, row in zip(parts, left, strict=True)}
     found = [
