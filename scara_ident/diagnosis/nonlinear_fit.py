@@ -26,6 +26,8 @@ ROUNDS, TIED_ROUNDS = 6, 24
 SETTLED = 0.1
 # A rise of the squared error by more than this share turns a step back; loads that settle may raise it by less.
 RISE = 1e-5
+# A step that lowers the squared error by a smaller share is the last of a coarse fit.
+LEAST_FALL = 0.03
 # Of a step no less than this share is tried.
 SHORTEST_SHARE = 0.01
 # Directions whose singular value, columns scaled to unit length, is below this share of the largest take no step.
@@ -283,7 +285,7 @@ def tune(
     chosen: Sequence[Candidate],
     rotor_inertia_std: float,
     *,
-    least_fall: float = 0.0,
+    coarse: bool = False,
 ) -> tuple[Scene, tuple[Candidate, ...]]:
     """Fit the nonlinear parameters of all effects in a model together, and settle the loads that they depend on.
 
@@ -291,8 +293,8 @@ def tune(
     ----------
     scene, columns, weights, chosen, rotor_inertia_std
         See `linearise`.
-    least_fall : float, optional
-        A step that lowers the squared error by a smaller share is the last.
+    coarse : bool, optional
+        Whether near the best is enough, as for a candidate that is only judged.
 
     Returns
     -------
@@ -319,7 +321,7 @@ def tune(
             past = np.concatenate([now.value[:size] - best.value[:size], change])
             spread = np.concatenate([std[:size], std[best.linear :]])
             moved = float(np.max(np.abs(past) / np.maximum(spread, np.finfo(float).tiny)))
-        arrived = best is not None and best.error - now.error < least_fall * best.error
+        arrived = coarse and best is not None and best.error - now.error < LEAST_FALL * best.error
         best = now
         if moved < SETTLED or arrived:
             break

@@ -30,9 +30,6 @@ from scara_ident.motion.low_pass import HIGHEST_CUT
 from scara_ident.motion.prepared import PreparedData
 from scara_ident.progress import Work
 
-# Where an effect is fitted to be judged, a step that lowers the squared error by less than this share is the last.
-LEAST_FALL = 0.03
-
 
 @dataclass(frozen=True, eq=False)
 class Correction:
@@ -317,9 +314,7 @@ def _fitted(
     found = []
     for scene, candidate in begins.values():
         everything = (*step.chosen, candidate)
-        scene, chosen = tune(
-            scene, step.columns, step.weights, everything, criteria.rotor_inertia_std, least_fall=LEAST_FALL
-        )
+        scene, chosen = tune(scene, step.columns, step.weights, everything, criteria.rotor_inertia_std, coarse=True)
         own = replace(step, scene=scene)
         found.append((own, own.judge([chosen[-1]])[0]))
     return found
