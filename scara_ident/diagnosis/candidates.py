@@ -97,6 +97,16 @@ class CandidateColumns:
         self._make(scene, [item for item in candidates if _key(scene, item) not in self._raw], keep=True)
         return [self._raw[_key(scene, item)] for item in candidates]
 
+    def slopes(self, scene: Scene, candidate: Candidate) -> tuple[Array, ...]:
+        """Return a tied candidate's `Effect.slopes` within the bands, shape (p + 1 + s, N) on the N rows of each joint."""
+        parts = [part for part in self.observations.data.stretches if part.usable]
+        found: list[list[Array]] = [[] for _ in self.observations.joints]
+        for part in parts:
+            slopes = candidate.effect.slopes(self._signals_of(scene, part), candidate.member)
+            for joint, own in enumerate(slopes):
+                found[joint].append(part.rows(joint, own))
+        return tuple(np.concatenate(own, axis=1) for own in found)
+
     def predicted(self, scene: Scene, chosen: Sequence[Candidate], value: Array) -> tuple[Array, ...]:
         """Return the torque that the base model with effects predicts on every stretch, shape (n, N) each."""
         start = self.observations.parameters

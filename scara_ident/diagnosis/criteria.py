@@ -142,12 +142,6 @@ class SelectionCriteria:
         1.3, "of the band", "with an effect found the search is repeated where the band grows by so much"
     )
     most_widenings: int = _criterion(2, "times", "bands grow no further")
-    narrower: tuple[float, ...] = _criterion(
-        (0.63, 0.4), "of the band", "tried for an effect with a resonance: two thirds of an octave each"
-    )
-    below_resonance: float = _criterion(
-        1.5, "of the band", "columns of an effect with a resonance hold in a band that ends so far below it"
-    )
     # Effects that stand for another.
     least_of_repeatable: float = _criterion(
         0.5, "of what repeats", "where most of it stays unexplained, an effect that removes less stands for another"

@@ -9,8 +9,9 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, Rows
-from scara_ident.diagnosis.nonlinear_fit import DERIVATIVE_STEP, Linearised, linearise
+from scara_ident.diagnosis.nonlinear_fit import Linearised, linearise
 from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.diagnosis.unknowns import DERIVATIVE_STEP
 from scara_ident.effects import Parameter
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.information import merge

@@ -23,8 +23,6 @@ from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
-from scara_ident.identification.usable import with_rows
-from scara_ident.motion.prepared import PreparedData
 
 
 @dataclass(frozen=True)
@@ -107,16 +105,15 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
         # What was missing had hidden how far up the motion explains the torque, and other effects with it.
         columns = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands))))
         now, left = next_of(left)
-        found = _searched(replace(task, progress=now), columns, ())
-    if free and (found.unexplained is not None or not _below_resonance(found, criteria)):
-        now, left = next_of(left)
-        columns, found = _narrowed(replace(task, progress=now), data, columns, found)
+        found = _searched(replace(task, progress=now), columns, (), found.search)
     return _without_proxies(replace(task, progress=left), columns, found)
 
 
-def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[str]) -> Outcome:
+def _searched(
+    task: SearchTask, columns: CandidateColumns, without: Collection[str], known: Search | None = None
+) -> Outcome:
     now, tests = search_and_rest(task.progress)
-    found = search(replace(task, progress=now), columns, without=without)
+    found = search(replace(task, progress=now), columns, without=without, known=known)
     tests("testing what is left")
     training = observed_at_every_sample(found.step)
     after = wls(training)
@@ -141,8 +138,8 @@ def _searched(task: SearchTask, columns: CandidateColumns, without: Collection[s
     if repeating or depending:
         # What the positions' noise does to the columns may repeat too; and what is small beside the torque is not called one.
         torque = [item.torque_rms if item.rows else 0.0 for item in training.by_joint]
-        known = np.maximum(noise_torque(training, after.value), criteria.least_remainder * np.array(torque))
-        large = dict(zip(joints, known.tolist(), strict=True))
+        least_rms = np.maximum(noise_torque(training, after.value), criteria.least_remainder * np.array(torque))
+        large = dict(zip(joints, least_rms.tolist(), strict=True))
         repeating = [fit for fit in repeating if fit.missing > large[fit.joint]]
         depending = [item for item in depending if item.rms > large[item.joint]]
     unexplained = _unexplained(repeating, depending, criteria)
@@ -178,39 +175,6 @@ def _band(found: Outcome) -> float:
     return max(band or np.inf for band in found.search.bands)
 
 
-def _resonances(found: Search) -> list[float]:
-    """Return the resonance of every effect found that has one, Hz."""
-    found_at = (candidate.effect.resonance(candidate.member) for candidate in found.chosen)
-    return [frequency for frequency in found_at if frequency is not None]
-
-
-def _below_resonance(found: Outcome, criteria: SelectionCriteria) -> bool:
-    return all(resonance >= criteria.below_resonance * _band(found) for resonance in _resonances(found.search))
-
-
-def _narrowed(
-    task: SearchTask, data: PreparedData, columns: CandidateColumns, wide: Outcome
-) -> tuple[CandidateColumns, Outcome]:
-    """Look for an effect with a resonance in bands that end below it, and keep what leaves nothing over."""
-    resonant = tuple(effect for effect in task.catalogue if effect.resonant)
-    band = _band(wide)
-    if not resonant or not np.isfinite(band):
-        return columns, wide
-    left = task.progress
-    for share in task.criteria.narrower:
-        # Runs that are too short for so narrow a band are left out of this search.
-        short, _ = with_rows(data.at((share * band,) * len(data.bands)), needed=True)
-        narrow = CandidateColumns(observe(task.model, short))
-        now, left = next_of(left)
-        if not search(replace(task, catalogue=resonant, progress=now), narrow).chosen:
-            continue
-        now, left = next_of(left)
-        found = _searched(replace(task, progress=now), narrow, ())
-        if found.unexplained is None and _resonances(found.search) and _below_resonance(found, task.criteria):
-            return narrow, found
-    return columns, wide
-
-
 def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome) -> Outcome:
     """Search again without effects that stand for another, or for none."""
     demoted: dict[str, Decision] = {}
@@ -221,7 +185,7 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
             break
         demoted |= {item.label: item for item in reversed(proxies)}
         now, left = next_of(left)
-        found = _searched(replace(task, progress=now), columns, tuple(demoted))
+        found = _searched(replace(task, progress=now), columns, tuple(demoted), found.search)
     return replace(found, demoted=tuple(demoted.values()))
 
 

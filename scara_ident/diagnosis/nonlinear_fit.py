@@ -1,14 +1,12 @@
 """Fitting the nonlinear parameters of all effects in a model together, by Gauss and Newton.
 
-Armatures are among them: where the base model cannot tell a rotor from its link, the load that a gear transmits follows
-from the nominal rotor inertia only, which a data sheet gives without shaft, brake and wave generator, and which is
-guessed where nobody states it (`scara_ident.robot.rotors`). It enters with that uncertainty as a prior: its logarithm is
-a parameter with a normal distribution, and what that costs stands in the standard deviations of the effects' parameters.
+Columns of an effect may follow from the bodies as strongly as from its own parameters, as an elastic joint's do. Such an
+effect is tied: it says what its coefficient is and what its torque changes by, and the columns of the bodies take that up.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,66 +14,26 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
-from scara_ident.effects import Scene
-from scara_ident.effects.links import largest_armature
-from scara_ident.estimation.information import Information, weighted
+from scara_ident.diagnosis.unknowns import Unknown, unknowns_of
+from scara_ident.effects import Scene, Tie
+from scara_ident.estimation.information import Information, merge, weighted
 from scara_ident.estimation.observations import JointRows
-from scara_ident.robot.rotors import GUESS_FACTOR
 from scara_ident.threads import one_blas_thread, side_by_side
 
-# Step for the derivative by a nonlinear parameter, as a share of it: small beside its curvature, large beside rounding.
-DERIVATIVE_STEP = 1e-3
-# A longer one for an armature's logarithm: the flights in a clearance begin and end at samples, which a short step does not move.
-ARMATURE_STEP = 2e-2
-# Steps of Gauss and Newton; most fits settle in three, and a search has further ones.
-ROUNDS = 6
+# Steps of Gauss and Newton; most fits settle in three, and a search has further ones. A tied effect comes from far away.
+ROUNDS, TIED_ROUNDS = 6, 24
 # Standard deviations by which the last step may still move something: less is of no account.
 SETTLED = 0.1
-# A step moves a parameter by no more than this share of it, and an armature's logarithm by this: the linear model holds no further.
-LONGEST_STEP = 0.5
 # A rise of the squared error by more than this share turns a step back; loads that settle may raise it by less.
 RISE = 1e-5
-# An armature stays within so many standard deviations of its prior.
-WIDEST = 4.0
+# A step that lowers the squared error by a smaller share is the last of a coarse fit.
+LEAST_FALL = 0.03
+# Of a step no less than this share is tried.
+SHORTEST_SHARE = 0.01
 # Directions whose singular value, columns scaled to unit length, is below this share of the largest take no step.
 STEPLESS = 1e-9
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """A nonlinear parameter.
-
-    Attributes
-    ----------
-    owner : int or None
-        Place of the effect whose it is; None for the logarithm of an armature.
-    place : int
-        Which of the effect's, or the joint.
-    value : float
-    lower, upper : float
-    nominal, spread : float
-        Prior mean and standard deviation; infinite spread without one.
-    """
-
-    owner: int | None
-    place: int
-    value: float
-    lower: float
-    upper: float
-    nominal: float = 0.0
-    spread: float = np.inf
-
-    @property
-    def step(self) -> float:
-        """For a derivative."""
-        if self.owner is None:
-            return ARMATURE_STEP
-        return DERIVATIVE_STEP * (abs(self.value) if self.value else self.upper - self.lower)
-
-    def moved(self, change: float) -> float:
-        """Return its value after a step, within its bounds and not too far at once."""
-        reach = LONGEST_STEP if self.owner is None else LONGEST_STEP * abs(self.value) if self.value else np.inf
-        return float(np.clip(self.value + np.clip(change, -reach, reach), self.lower, self.upper))
+# A row that ties a coefficient is so many times as weighty as all rows that it acts on.
+TIGHTNESS = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +51,8 @@ class Linearised:
         Columns of the base model, of the effects, and the change of the torque per unit of each nonlinear parameter.
     information : Information
         Of all weighted rows; its parameters are k linear ones, then s nonlinear ones.
+    ties : Information
+        Rows that hold the coefficients of tied effects to what the nonlinear parameters and the rigid bodies say of them.
     """
 
     scene: Scene
@@ -101,6 +61,7 @@ class Linearised:
     places: tuple[slice, ...]
     joints: tuple[JointRows, ...]
     information: Information
+    ties: Information
 
     @property
     def linear(self) -> int:
@@ -110,7 +71,7 @@ class Linearised:
     @cached_property
     def value(self) -> Array:
         """Linear parameters that fit best at the present nonlinear ones, shape (k,)."""
-        return self.information.select(range(self.linear)).solve().value
+        return _solved(self.information, self.ties, self.linear)
 
     @cached_property
     def rows(self) -> int:
@@ -125,9 +86,22 @@ class Linearised:
 
     @property
     def error(self) -> float:
-        """Squared residual with what the priors add to it."""
+        """Squared residual with what the priors add to it, the bodies as they were where effects follow from them."""
         prior = sum(((item.value - item.nominal) / item.spread) ** 2 for item in self.unknowns)
-        return self.variance * (self.rows + prior)
+        left = self.variance * self.rows
+        if len(self.ties.factor):
+            value = np.concatenate([_solved(self.information, self._held, self.linear), np.zeros(len(self.unknowns))])
+            left = self.information.residual_sum(value)
+        return left + self.variance * prior
+
+    @property
+    def _held(self) -> Information:
+        """The ties, and rows that hold the rigid bodies to the present estimate."""
+        place = self.scene.model.place(self.scene.model.rigid_body)
+        size = np.linalg.norm(self.information.factor[:, place], axis=0)
+        rows = np.zeros((len(size), self.information.parameters + 1))
+        rows[:, place], rows[:, -1] = np.diag(size), size * self.scene.value[place]
+        return merge([self.ties, Information(TIGHTNESS * rows, 0.0)])
 
     @property
     def prior(self) -> Information:
@@ -139,10 +113,10 @@ class Linearised:
             weight = np.sqrt(self.variance) / item.spread
             rows[row, self.linear + k] = weight
             rows[row, -1] = weight * (item.nominal - item.value)
-        return Information(rows, 0.0)
+        return merge([Information(rows, 0.0), self.ties])
 
     def solve(self) -> tuple[Array, Array]:
-        """Return the best change of the nonlinear parameters and the white standard deviations of all parameters."""
+        """Return the best parameters, nonlinear ones as a change, and the white standard deviations of all."""
         rows = np.vstack([self.information.factor, self.prior.factor])
         columns, target = rows[:, :-1], rows[:, -1]
         size = np.linalg.norm(columns, axis=0)
@@ -151,7 +125,7 @@ class Linearised:
         kept = singular > STEPLESS * singular[0]
         half = right[kept].T / singular[kept]
         best = half @ (left[:, kept].T @ target) / size
-        return best[self.linear :], np.sqrt(self.variance * np.sum(half**2, axis=1)) / size
+        return best, np.sqrt(self.variance * np.sum(half**2, axis=1)) / size
 
 
 def linearise(
@@ -170,17 +144,92 @@ def linearise(
         Standard deviation of a stated rotor inertia, as a share of it.
     """
     observations = columns.observations
-    unknowns = _unknowns(scene, chosen, rotor_inertia_std)
+    unknowns = unknowns_of(scene, chosen, rotor_inertia_std)
     own = columns.rows(scene, chosen)
     bounds = observations.parameters + np.cumsum([0, *(len(next(iter(rows.values()))) for rows in own)])
     places = tuple(slice(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True))
     joints = with_columns(observations, own)
-    linear = int(bounds[-1])
-    value = _pooled(joints, linear, weights).solve().value
-    changes = [_change(scene, columns, chosen, item, places, value) for item in unknowns]
+    linear, total = int(bounds[-1]), int(bounds[-1]) + len(unknowns)
+    slopes: dict[int, tuple[Array, ...]] = {}
+    ties = []
+    for owner, candidate in enumerate(chosen):
+        tie = candidate.effect.tie(scene, candidate.member)
+        if tie is not None:
+            slopes[owner] = columns.slopes(scene, candidate)
+            joints = _with_slopes(joints, slopes[owner], scene)
+            size = _size(joints, int(bounds[owner]), weights)
+            ties.append(TIGHTNESS * size * _tie_row(scene, chosen, unknowns, owner, tie, int(bounds[owner]), linear))
+    held = Information(np.array(ties).reshape(-1, total + 1), 0.0)
+    value = _solved(_pooled(joints, total, weights), held, linear)
+    changes = [_change(scene, columns, chosen, item, places, value, slopes) for item in unknowns]
     extended = tuple(_beside(rows, joint, changes, linear) for joint, rows in enumerate(joints))
-    information = _pooled(extended, linear + len(unknowns), weights)
-    return Linearised(scene, tuple(chosen), unknowns, places, extended, information)
+    information = _pooled(extended, total, weights)
+    return Linearised(scene, tuple(chosen), unknowns, places, extended, information, held)
+
+
+def _solved(information: Information, ties: Information, linear: int) -> Array:
+    """Return the linear parameters that fit best where the nonlinear ones stay, ties kept."""
+    held = Information(ties.factor[:, [*range(linear), -1]], 0.0)
+    return merge([information.select(range(linear)), held]).solve().value
+
+
+def _with_slopes(joints: Sequence[JointRows], slopes: Sequence[Array], scene: Scene) -> tuple[JointRows, ...]:
+    """Return rows whose columns of the rigid bodies have what an effect's torque changes by with their parameters.
+
+    The torque has it too, at the present parameters, so that what is left stays what it is.
+    """
+    place = scene.model.place(scene.model.rigid_body)
+    found = []
+    for rows, all_slopes in zip(joints, slopes, strict=True):
+        own = all_slopes[: place.stop - place.start]
+        bodies = np.arange(place.start, place.stop)
+        missing = bodies[~np.isin(bodies, rows.columns) & np.any(own != 0.0, axis=1)]
+        places = np.concatenate([rows.columns, missing])
+        table = np.concatenate([rows.table[:-1], np.zeros((len(missing), rows.table.shape[1])), rows.table[-1:]])
+        inside = (places >= place.start) & (places < place.stop)
+        table[:-1][inside] += own[places[inside] - place.start]
+        table[-1] += scene.value[place] @ own
+        found.append(JointRows(places, table, rows.starts, rows.counts))
+    return tuple(found)
+
+
+def _tie_row(
+    scene: Scene,
+    chosen: Sequence[Candidate],
+    unknowns: Sequence[Unknown],
+    owner: int,
+    tie: Tie,
+    column: int,
+    linear: int,
+) -> Array:
+    """Return the row that ties an effect's coefficient, shape (k + s + 1,)."""
+    place = scene.model.place(scene.model.rigid_body)
+    by_bodies = tie.slopes[: place.stop - place.start]
+    row = np.zeros(linear + len(unknowns) + 1)
+    row[column] = 1.0
+    row[place] = -by_bodies
+    row[-1] = tie.value - by_bodies @ scene.value[place]
+    for k, item in enumerate(unknowns):
+        which, factor = _slope_of(scene, chosen, item, owner)
+        if which is not None:
+            row[linear + k] = -factor * tie.slopes[which]
+    return row
+
+
+def _slope_of(scene: Scene, chosen: Sequence[Candidate], item: Unknown, owner: int) -> tuple[int | None, float]:
+    """Return which of a tied effect's slopes is by a nonlinear parameter, and what to multiply it with."""
+    bodies = len(scene.model.rigid_body.columns)
+    if item.owner == owner:
+        return bodies + 1 + item.place, 1.0
+    if item.owner is None and chosen[owner].effect.geared_joint(chosen[owner].member) == item.place:
+        return bodies, scene.armature(item.place)
+    return None, 0.0
+
+
+def _size(joints: Sequence[JointRows], column: int, weights: Array) -> float:
+    """Return the weighted length of a column."""
+    parts = (rows.table[:-1][rows.columns == column] for rows in joints)
+    return float(np.linalg.norm([w * np.linalg.norm(part) for w, part in zip(weights, parts, strict=True)]))
 
 
 def _pooled(joints: Sequence[JointRows], parameters: int, weights: Array) -> Information:
@@ -195,11 +244,18 @@ def _change(
     item: Unknown,
     places: Sequence[slice],
     value: Array,
+    slopes: Mapping[int, tuple[Array, ...]],
 ) -> dict[int, Array]:
     """Return the change of each joint's torque per unit of a nonlinear parameter, shape (N,)."""
     total: dict[int, Array] = {}
     for owner, place in enumerate(places):
         if item.owner is not None and owner != item.owner:
+            continue
+        if owner in slopes:
+            which, factor = _slope_of(scene, chosen, item, owner)
+            if which is not None:
+                for joint, own in enumerate(slopes[owner]):
+                    total[joint] = total.get(joint, 0.0) + factor * own[which]
             continue
         sides: list[Rows] = []
         for sign in (1.0, -1.0):
@@ -223,7 +279,13 @@ def _beside(rows: JointRows, joint: int, changes: Sequence[dict[int, Array]], fi
 
 
 def tune(
-    scene: Scene, columns: CandidateColumns, weights: Array, chosen: Sequence[Candidate], rotor_inertia_std: float
+    scene: Scene,
+    columns: CandidateColumns,
+    weights: Array,
+    chosen: Sequence[Candidate],
+    rotor_inertia_std: float,
+    *,
+    coarse: bool = False,
 ) -> tuple[Scene, tuple[Candidate, ...]]:
     """Fit the nonlinear parameters of all effects in a model together, and settle the loads that they depend on.
 
@@ -231,6 +293,8 @@ def tune(
     ----------
     scene, columns, weights, chosen, rotor_inertia_std
         See `linearise`.
+    coarse : bool, optional
+        Whether near the best is enough, as for a candidate that is only judged.
 
     Returns
     -------
@@ -241,67 +305,47 @@ def tune(
         return scene, ()
     size = columns.observations.parameters
     best: Linearised | None = None
-    change = np.zeros(0)
-    for _ in range(ROUNDS):
+    step, share, std = np.zeros(0), 1.0, np.zeros(0)
+    tied = any(item.effect.tie(scene, item.member) is not None for item in chosen)
+    for _ in range(TIED_ROUNDS if tied else ROUNDS):
         now = linearise(scene, columns, weights, chosen, rotor_inertia_std)
         if best is not None and now.error > (1.0 + RISE) * best.error:
-            change = 0.5 * change
-            scene, chosen = _moved(best, change)
+            share *= 0.5
+            if share < SHORTEST_SHARE:
+                break
+            scene, chosen = _moved(best, step, share)
             continue
         moved = np.inf
-        change, std = now.solve()
         if best is not None:
+            change = share * step[best.linear :]
             past = np.concatenate([now.value[:size] - best.value[:size], change])
-            spread = np.concatenate([std[:size], std[len(now.value) :]])
+            spread = np.concatenate([std[:size], std[best.linear :]])
             moved = float(np.max(np.abs(past) / np.maximum(spread, np.finfo(float).tiny)))
+        arrived = coarse and best is not None and best.error - now.error < LEAST_FALL * best.error
         best = now
-        if moved < SETTLED:
+        if moved < SETTLED or arrived:
             break
-        scene, chosen = _moved(best, change)
+        step, std = now.solve()
+        reach = [item.reach / max(abs(x), 1e-300) for item, x in zip(now.unknowns, step[now.linear :], strict=True)]
+        share = min([1.0, *reach])
+        scene, chosen = _moved(best, step, share)
     assert best is not None
     return replace(best.scene, value=best.value[:size]), best.chosen
 
 
-def _unknowns(scene: Scene, chosen: Sequence[Candidate], rotor_inertia_std: float) -> tuple[Unknown, ...]:
-    """Return the nonlinear parameters of the effects, then the armatures."""
-    found = [
-        Unknown(owner, place, candidate.member.nonlinear[place], parameter.lower, parameter.upper)
-        for owner, candidate in enumerate(chosen)
-        for place, parameter in enumerate(candidate.effect.nonlinear)
-    ]
-    joints = [candidate.effect.geared_joint(candidate.member) for candidate in chosen]
-    for joint in dict.fromkeys(joint for joint in joints if joint is not None):
-        nominal = scene.nominal_armature(joint)
-        if scene.told_armature(joint) is None and nominal > 0.0:
-            found.append(_armature(scene, joint, nominal, rotor_inertia_std))
-    return tuple(found)
-
-
-def _armature(scene: Scene, joint: int, nominal: float, rotor_inertia_std: float) -> Unknown:
-    """Return the logarithm of an armature as an unknown; a guess leaves the link some inertia."""
-    stated = bool(scene.robot.rotor_stated[joint])
-    spread = rotor_inertia_std if stated else float(np.log(GUESS_FACTOR))
-    mean = float(np.log(nominal))
-    lower, upper = mean - WIDEST * spread, mean + WIDEST * spread
-    if not stated:
-        upper = min(upper, float(np.log(largest_armature(scene, joint))))
-        lower = min(lower, upper - WIDEST * spread)
-    held = min(float(np.log(scene.armature(joint))), upper)
-    return Unknown(None, joint, held, lower, upper, mean, spread)
-
-
-def _moved(state: Linearised, change: Array) -> tuple[Scene, tuple[Candidate, ...]]:
-    """Return scene and effects with the nonlinear parameters changed, within their bounds and not too far at once."""
+def _moved(state: Linearised, step: Array, share: float) -> tuple[Scene, tuple[Candidate, ...]]:
+    """Return scene and effects after a share of a step, the nonlinear parameters within their bounds."""
     chosen = list(state.chosen)
     armatures = dict(state.scene.armatures)
-    for item, step in zip(state.unknowns, change, strict=True):
-        value = item.moved(step)
+    for item, change in zip(state.unknowns, step[state.linear :], strict=True):
+        value = item.moved(share * change)
         if item.owner is None:
             armatures[item.place] = float(np.exp(value))
         else:
             chosen[item.owner] = _moved_candidate(chosen[item.owner], item.place, value)
-    size = len(state.scene.model.columns)
-    return replace(state.scene, value=state.value[:size], armatures=armatures), tuple(chosen)
+    old = state.scene.value
+    bodies = old + share * (step[: len(old)] - old)
+    return replace(state.scene, value=bodies, armatures=armatures), tuple(chosen)
 
 
 def _moved_candidate(candidate: Candidate, place: int, value: float) -> Candidate:

@@ -157,7 +157,9 @@ class SearchTask:
     progress: Work = field(default_factory=Work)
 
 
-def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[str] = ()) -> Search:
+def search(
+    task: SearchTask, columns: CandidateColumns, *, without: Collection[str] = (), known: Search | None = None
+) -> Search:
     """Find what the model lacks.
 
     Parameters
@@ -167,6 +169,8 @@ def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[s
         On the rows of the base model, with what is known already from an earlier search on them.
     without : collection of str, optional
         Labels of candidates that are not to be tried.
+    known : Search, optional
+        An earlier one in other bands, where fits of tied effects may begin.
     """
     criteria = task.criteria
     observations = uncorrected = columns.observations
@@ -195,7 +199,7 @@ def search(task: SearchTask, columns: CandidateColumns, *, without: Collection[s
         decisions += step.judge([item for item in seeds if item.label(scene) not in taken])
         if len(steps) >= criteria.most_effects:
             break
-        winner, refused = _choose(step, decisions)
+        winner, refused, scene = _choose(step, decisions, known)
         decisions = [item for item in decisions if item.label not in refused] + list(refused.values())
         if winner is None:
             break
@@ -250,25 +254,70 @@ def corrected(data: PreparedData, candidate: Candidate, value: Array) -> Prepare
     return replace(data, recordings=tuple(mended))
 
 
-def _choose(step: SelectionStep, decisions: Sequence[Decision]) -> tuple[Decision | None, dict[str, Decision]]:
-    """Refine the best families; return the best acceptable member that is sound, and those better that are not."""
+def _choose(
+    step: SelectionStep, decisions: Sequence[Decision], known: Search | None
+) -> tuple[Decision | None, dict[str, Decision], Scene]:
+    """Refine the best families; return the best acceptable member that is sound, those better that are not, and its scene."""
     criteria = step.criteria
-    accepted = [item for item in best_of_each(decisions).values() if item.accepted]
-    accepted.sort(key=lambda item: -item.examination.held_out)
-    refused: dict[str, Decision] = {}
+    best = list(best_of_each(decisions).values())
+    first = [item for item in best if item.candidate.effect.fitted_first]
+    accepted = [item for item in best if item.accepted and not item.candidate.effect.fitted_first]
+    found = _fitted(step, first, max((item.gain for item in accepted), default=0.0), known)
+    refused = {item.label: item for _, item in found if not item.accepted}
+    open_ = [(step, item) for item in accepted] + [(own, item) for own, item in found if item.accepted]
+    open_.sort(key=lambda pair: -pair[1].examination.held_out)
     # Where the best are refused, the next best may still be sound.
-    while accepted:
-        enough = criteria.near_best * accepted[0].examination.held_out
-        leaders = [item for item in accepted if item.examination.held_out >= enough][: criteria.most_refined]
-        refined = (item for item in step.refine(leaders) if item.accepted)
-        for decision in sorted(refined, key=lambda item: -item.examination.held_out):
-            why = _insignificant(step, decision.candidate) or noise_objection(step, decision)
-            why = why or variation_objection(step, decision)
+    while open_:
+        enough = criteria.near_best * open_[0][1].examination.held_out
+        leaders = [pair for pair in open_ if pair[1].examination.held_out >= enough][: criteria.most_refined]
+        refined = step.refine([item for own, item in leaders if own is step])
+        pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in leaders if pair[0] is not step]
+        for own, decision in sorted(pairs, key=lambda pair: -pair[1].examination.held_out):
+            why = _insignificant(own, decision.candidate) or noise_objection(own, decision)
+            why = why or variation_objection(own, decision)
             if why is None:
-                return decision, refused
+                return decision, refused, own.scene
             refused[decision.label] = decision.refused(why)
-        accepted = accepted[len(leaders) :]
-    return None, refused
+        open_ = open_[len(leaders) :]
+    return None, refused, step.scene
+
+
+def _fitted(
+    step: SelectionStep, candidates: Sequence[Decision], best: float, known: Search | None
+) -> list[tuple[SelectionStep, Decision]]:
+    """Fit those of some candidates that promise something, all else with them, and judge them there.
+
+    Parameters
+    ----------
+    step : SelectionStep
+    candidates : sequence of Decision
+        The best grid points of families that are fitted first.
+    best : float
+        Largest gain among the other families.
+    known : Search or None
+        See `search`.
+
+    Returns
+    -------
+    list of (SelectionStep, Decision)
+        With the step at the estimate that goes with the candidate.
+    """
+    criteria = step.criteria
+    enough = max(criteria.least_gain, criteria.near_best * best)
+    worth = sorted((item for item in candidates if item.gain >= enough), key=lambda item: -item.gain)
+    begins = {item.label: (step.scene, item.candidate) for item in worth[: criteria.most_refined]}
+    if known is not None:
+        # Found in another band: from there it is near.
+        scene = replace(step.scene, value=known.scene.value, armatures=known.scene.armatures)
+        labels = {item.label for item in candidates}
+        begins |= {item.label(scene): (scene, item) for item in known.chosen if item.label(scene) in labels}
+    found = []
+    for scene, candidate in begins.values():
+        everything = (*step.chosen, candidate)
+        scene, chosen = tune(scene, step.columns, step.weights, everything, criteria.rotor_inertia_std, coarse=True)
+        own = replace(step, scene=scene)
+        found.append((own, own.judge([chosen[-1]])[0]))
+    return found
 
 
 def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:

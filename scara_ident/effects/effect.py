@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, deviation
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.terms import Column
 from scara_ident.motion.motion import Motion
@@ -86,8 +86,8 @@ class Effect(ABC):
         Whether a joint that does not move in the recordings can show it.
     follows_estimate : bool
         Whether the columns depend on the present estimate, ``scene.value`` or ``scene.armatures``.
-    resonant : bool
-        Whether the columns hold in a band that ends below a resonance; see `resonance`.
+    fitted_first : bool
+        Whether it is judged at the estimate fitted with it only: its columns at the estimate without it are poor ones.
     by_recording : bool
         Whether it acts in some recordings and not in others; see `in_recordings`.
     seeded_by : {"order", "frequency"} or None
@@ -107,7 +107,7 @@ class Effect(ABC):
     all_joints: ClassVar[bool] = False
     at_rest: ClassVar[bool] = False
     follows_estimate: ClassVar[bool] = False
-    resonant: ClassVar[bool] = False
+    fitted_first: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
     seeded_by: ClassVar[Literal["order", "frequency"] | None] = None
     view: ClassVar[View] = OWN
@@ -238,9 +238,18 @@ class Effect(ABC):
         """Return the joint on the torque behind whose gear it depends, and so on the rotor's share of an inertia."""
         return None
 
-    def resonance(self, member: Member) -> float | None:
-        """Return the frequency, Hz, below which the band of the columns must end."""
+    def tie(self, scene: Scene, member: Member) -> Tie | None:
+        """Return what the only coefficient is by the nonlinear parameters; None where it is free."""
         return None
+
+    def slopes(self, signals: Signals, member: Member) -> Array:
+        """Return the derivatives of a tied member's torque, its coefficient held, by what `Tie.slopes` names.
+
+        Returns
+        -------
+        ndarray, shape (n, p + 1 + s, N)
+        """
+        raise NotImplementedError(f"{self.name} is tied and has no slopes")
 
     def corrects_data(self, member: Member) -> bool:
         """Whether it is taken out of the recordings instead of becoming a term of the model."""

@@ -9,17 +9,18 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
-from scara_ident.effects.links import lagging, link_inertia, shared, usual_link_inertia
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
+from scara_ident.effects.links import lagging, link_inertia, usual_link_inertia, usual_link_inertia_slopes
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, deviation
 from scara_ident.effects.signals import Scene, Signals
+from scara_ident.effects.two_mass import TwoMasses
 from scara_ident.motion.low_pass import HIGHEST_CUT, differentiate
 
 # The torque that winds up a gear keeps this many times the band, so that the band itself is left alone.
 LOAD_BAND = 3.0
 # The link's lag in a clearance keeps this many times the band: beyond it its second derivative is noise.
 LAG_BAND = 1.5
-# Frequencies of the link against its held motor that are tried, in bands: from within it to where only the lag is seen.
-FREQUENCIES = (0.7, 1.2, 2.0, 4.0)
+# Frequencies of the link against its held motor that are tried, a factor apart, from the lowest to so many bands.
+SPACING, HIGHEST_TRIED = 1.6, 4.0
 # Limits of these frequencies, Hz, which hold for arms.
 LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 2.0, 200.0
 # Damping ratio of that swinging. Gears have 0.03 to 0.1, but then the phase after a few swings depends on inertia and
@@ -74,14 +75,15 @@ class JointElasticity(BehindGear):
         NonlinearParameter("frequency", "Hz", LOWEST_FREQUENCY, HIGHEST_FREQUENCY),
         NonlinearParameter("_damping_ratio", "1", LOWEST_DAMPING, HIGHEST_DAMPING),
     )
-    resonant = True
+    fitted_first = True
     view = View("acceleration")
     experiment = "excite above 5 Hz with short steps, and look for a resonance that stays at its frequency"
 
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
-        """Return frequencies from below the band to far above it."""
-        frequencies = (float(np.clip(x * scene.band, LOWEST_FREQUENCY, HIGHEST_FREQUENCY)) for x in FREQUENCIES)
-        return ((frequency, DAMPING) for frequency in dict.fromkeys(frequencies))
+        """Return frequencies from the lowest to far above the band."""
+        highest = min(HIGHEST_TRIED * scene.band, HIGHEST_FREQUENCY)
+        count = max(1, round(np.log(highest / LOWEST_FREQUENCY) / np.log(SPACING)))
+        return ((float(frequency), DAMPING) for frequency in np.geomspace(LOWEST_FREQUENCY, highest, count + 1))
 
     def words(self, scene: Scene, member: Member) -> dict[str, Any]:
         """Add the unit of the compliance, at the joint."""
@@ -90,20 +92,21 @@ class JointElasticity(BehindGear):
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the change of torque per compliance."""
-        j = member.place
-        inertia, usual = self.inertia(signals, member)
-        if usual == 0.0:
-            return [np.zeros_like(signals.motion.q)]
-        load = shared(
-            signals, ("smooth load", j), lambda: _differentiated(signals, _load(signals, j), LOAD_BAND)[0]
-        )  # fmt: skip
-        stiffness = (2.0 * np.pi * member.nonlinear[0]) ** 2 * usual
-        damping = 2.0 * member.nonlinear[1] * np.sqrt(stiffness * usual)
-        return [stiffness * lagging(signals, j, swing(load, inertia, stiffness, damping, 1.0 / signals.motion.rate))]
+        masses = TwoMasses(signals, member.place, *member.nonlinear)
+        return [masses.stiffness * masses.change if masses.inertia > 0.0 else np.zeros_like(signals.motion.q)]
 
-    def resonance(self, member: Member) -> float:
-        """Return the frequency of the link against its held motor, Hz."""
-        return member.nonlinear[0]
+    def tie(self, scene: Scene, member: Member) -> Tie | None:
+        """Return the compliance that goes with the frequency."""
+        inertia = usual_link_inertia(scene, member.place)
+        if not inertia > 0.0:
+            return None
+        compliance = 1.0 / (inertia * (2.0 * np.pi * member.nonlinear[0]) ** 2)
+        bodies = np.append(usual_link_inertia_slopes(scene, member.place), -1.0)
+        return Tie(compliance, -compliance * np.append(bodies / inertia, [2.0 / member.nonlinear[0], 0.0]))
+
+    def slopes(self, signals: Signals, member: Member) -> Array:
+        """Return the derivatives with the compliance as it is."""
+        return TwoMasses(signals, member.place, *member.nonlinear).slopes()
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where a spring does not pull back, or would swing slower than is seen."""
@@ -129,42 +132,6 @@ class JointElasticity(BehindGear):
     def description(self, scene: Scene, member: Member) -> str:
         """Say what else it may be on the first joint."""
         return self.summary + (", or a base that yields about the same axis" if member.joint == 0 else "")
-
-
-def swing(torque: Array, inertia: Array, stiffness: float, damping: float, step: float) -> tuple[Array, Array, Array]:
-    """Solve ``inertia x'' + damping x' + stiffness x = torque`` from the static x at the start.
-
-    Parameters
-    ----------
-    torque, inertia : ndarray, shape (N,)
-        N at least 3.
-    stiffness, damping : float
-    step : float
-        s per sample.
-
-    Returns
-    -------
-    tuple of ndarray, each of shape (N,)
-        x, its derivative and its second derivative.
-
-    Notes
-    -----
-    Newmark's constant-average scheme (stable at any step), written as one banded triangular system.
-    """
-    from scipy.linalg import solve_banded
-
-    count = len(torque)
-    mean = 0.25 * (torque[2:] + 2.0 * torque[1:-1] + torque[:-2])
-    heavy = inertia[1:-1] / step**2
-    bands = np.ones((3, count))
-    bands[0, 2:] = heavy + damping / (2.0 * step) + 0.25 * stiffness
-    bands[1, 1:-1] = -2.0 * heavy + 0.5 * stiffness
-    bands[1, 0] = 0.0
-    bands[2, :-2] = heavy - damping / (2.0 * step) + 0.25 * stiffness
-    start = torque[:2] / stiffness
-    x = np.asarray(solve_banded((2, 0), bands, np.concatenate([start, mean])))
-    first = np.gradient(x, step)
-    return x, first, (torque - damping * first - stiffness * x) / inertia
 
 
 class Backlash(BehindGear):

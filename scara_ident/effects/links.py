@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
+from scara_ident.model.terms import RigidBody
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.kinematics import place_of, tool_frame
 from scara_ident.robot.robot import Robot
@@ -194,6 +195,12 @@ def usual_link_inertia(scene: Scene, joint: int) -> float:
     return float(np.mean(_moved_inertia(scene, joint))) - scene.armature(joint)
 
 
+def usual_link_inertia_slopes(scene: Scene, joint: int) -> Array:
+    """Return the derivatives of `usual_link_inertia` by the parameters of the rigid bodies, shape (p,)."""
+    moved = np.mean(_inertia_columns(scene.model.rigid_body, joint), axis=0)
+    return np.asarray(moved - scene.armature_slopes(joint))
+
+
 def largest_armature(scene: Scene, joint: int) -> float:
     """Return the armature that would leave the link no inertia in its most folded pose; infinite where misjudged."""
     moved = _moved_inertia(scene, joint)
@@ -203,18 +210,20 @@ def largest_armature(scene: Scene, joint: int) -> float:
 
 def _moved_inertia(scene: Scene, joint: int) -> Array:
     """Return the inertia that a joint moves with its rotor, the others held, over 40 poses, at the joint, shape (40,)."""
-    robot = scene.robot
+    term = scene.model.rigid_body
+    return np.asarray(_inertia_columns(term, joint) @ scene.value[scene.model.place(term)])
 
-    def make() -> Array:
-        reach = np.where(robot.prismatic, 1.0, np.pi)[:, None]
-        q = reach * np.random.default_rng(0).uniform(-1.0, 1.0, (robot.n, 40))
-        rest, pushed = np.zeros_like(q), np.zeros_like(q)
-        pushed[joint] = 1.0
-        motion = Motion("poses", "poses", np.arange(40.0), q, rest, rest, None, 1.0)
-        change = rigid_torque(scene, motion, q, rest, pushed) - rigid_torque(scene, motion, q, rest, rest)
-        return np.asarray(change[joint] / robot.row_scale[joint])
 
-    return shared(scene, ("moved inertia", joint), make)
+@lru_cache(maxsize=32)
+def _inertia_columns(term: RigidBody, joint: int) -> Array:
+    """Return that inertia per parameter of the rigid bodies, shape (40, p)."""
+    robot = term.robot
+    reach = np.where(robot.prismatic, 1.0, np.pi)[:, None]
+    q = reach * np.random.default_rng(0).uniform(-1.0, 1.0, (robot.n, 40))
+    rest, pushed = np.zeros_like(q), np.zeros_like(q)
+    pushed[joint] = 1.0
+    still, moved = (Motion("poses", "poses", np.arange(40.0), q, rest, a, None, 1.0) for a in (rest, pushed))
+    return np.asarray((term.regressor(moved) - term.regressor(still))[joint].T / robot.row_scale[joint])
 
 
 def guessed_armatures(scene: Scene) -> dict[int, float]:

@@ -46,6 +46,7 @@ class TorqueSensorNonlinearity(Effect):
     coefficients = (Coefficient("cubic", "1/{square}", "cube of the torque in what {joint} records"),)
     at_rest = True
     follows_estimate = True
+    fitted_first = True
     view = View("torque")
     experiment = "hold a known load at several torques, or repeat with a payload at the same speed"
 

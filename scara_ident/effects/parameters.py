@@ -100,6 +100,22 @@ class Member:
         return self.partner
 
 
+@dataclass(frozen=True, eq=False)
+class Tie:
+    """What an effect's only coefficient is by its nonlinear parameters and by the rigid bodies.
+
+    Attributes
+    ----------
+    value : float
+    slopes : ndarray, shape (p + 1 + s,)
+        Derivatives by the parameters of the rigid bodies, by the armature where these do not tell it, and by the nonlinear
+        parameters.
+    """
+
+    value: float
+    slopes: Array
+
+
 def deviation(covariance: Array, place: int = 0) -> float:
     """Return the standard deviation of one coefficient."""
     return float(np.sqrt(max(covariance[place, place], 0.0)))

@@ -73,13 +73,14 @@ class Scene:
 
     def told_armature(self, joint: int) -> float | None:
         """Armature N^2 Jm of a joint where the base model tells it apart from the links, else None."""
+        slopes = self.armature_slopes(joint)
+        return float(slopes @ self.value[self.model.place(self.model.rigid_body)]) if np.any(slopes) else None
+
+    def armature_slopes(self, joint: int) -> Array:
+        """Derivatives of `armature` by the parameters of the rigid bodies, shape (p,): 1 at the one that tells it."""
         term = self.model.rigid_body
-        wanted = 10 * self.robot.n + joint
-        for place, k in enumerate(term.kept):
-            row = term.base.grouping[k]
-            if int(term.base.kept[k]) == wanted and np.count_nonzero(row) == 1:
-                return float(self.value[self.model.place(term)][place])
-        return None
+        alone = np.count_nonzero(term.base.grouping[term.kept], axis=1) == 1
+        return np.asarray(alone & (term.base.kept[term.kept] == 10 * self.robot.n + joint), dtype=float)
 
 
 @dataclass(frozen=True, eq=False)

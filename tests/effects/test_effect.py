@@ -115,7 +115,6 @@ def test_every_member_has_words_columns_and_rows_that_agree(effect):
         resolution = effect.resolution(scene, member)
         assert resolution is None or len(resolution) == len(effect.nonlinear)
         assert effect.geared_joint(member) in (None, member.joint)
-        assert (effect.resonance(member) is not None) == effect.resonant
 
 
 @EVERY

@@ -6,32 +6,12 @@ import numpy as np
 import pytest
 
 from scara_ident.effects import Member, Signals
-from scara_ident.effects.elasticity import Backlash, JointElasticity, flank, swing
+from scara_ident.effects.elasticity import Backlash, JointElasticity, flank
 from scara_ident.effects.links import lagging, usual_link_inertia
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
 from tests.effects.scenes import columns, fit, moving, scene_of, wandering
-
-
-@pytest.mark.parametrize("frequency", [3.0, 40.0])
-def test_a_forced_link_swings_as_the_closed_form_says(frequency: float):
-    step, inertia, stiffness, damping = 5e-4, 2.0, 2.0 * (2 * np.pi * 12.0) ** 2, 30.0
-    time = np.arange(8000) * step
-    w = 2 * np.pi * frequency
-    x, first, second = swing(np.cos(w * time), np.full(8000, inertia), stiffness, damping, step)
-    gain = 1.0 / (stiffness - inertia * w**2 + 1j * w * damping)
-    steady = slice(4000, 7990)
-    for part, order in ((x, 0), (first, 1), (second, 2)):
-        expected = np.real(gain * (1j * w) ** order * np.exp(1j * w * time))
-        assert np.abs(part - expected)[steady].max() < 0.01 * np.abs(gain) * w**order
-
-
-def test_a_slow_load_winds_the_gear_up_by_load_over_stiffness():
-    load = 5.0 + 3.0 * np.sin(np.arange(2000) / 300.0)
-    x, _, second = swing(load, np.full(2000, 0.5), 8e4, 20.0, 1e-3)
-    assert x == pytest.approx(load / 8e4, rel=1e-3)
-    assert np.all(np.isfinite(second))
 
 
 def test_a_free_link_crosses_its_clearance_as_a_falling_body():

@@ -1,0 +1,112 @@
+"""Elastic joints, clearance and bent torque sensors of the virtual SCARA03: what a diagnosis says, beside the truth.
+
+    python benchmarks/elasticity.py [--seeds 2] [--first 0] [--kind elastic backlash sensor] [--seconds 15]
+
+Of every size and seed four random motions are fitted and a fifth is held out (`virtual_motions.py`), at 500 Hz with the
+encoders' steps and the paper's noise. The held-out error is over that of the model with the true nonlinear parameters at
+the true estimate, its linear ones fitted to the same rows; the worst joint is shown.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from virtual_motions import random_motion
+
+from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
+from scara_ident.diagnosis.model_selection import rms_of
+from scara_ident.effects import EffectTerm, Member, Scene
+from scara_ident.effects.catalogue import effects_named
+from scara_ident.effects.links import usual_link_inertia
+from scara_ident.estimation import wls
+from scara_ident.estimation.observations import observe
+from scara_ident.model.model import TorqueModel
+from scara_ident.simulation import SimulationResult, parse_effect, simulate, truth, virtual_arm
+
+STIFFNESSES = (1500.0, 2400.0, 4000.0, 7000.0, 12000.0, 20000.0)
+WIDTHS = (5e-4, 1e-3, 2e-3, 5e-3)
+BENT = (0.22, -0.22)
+KINDS = ("fourier", "points", "sweep", "fourier", "sweep")
+RATE = 500.0
+
+
+def cases(kind: str) -> Iterator[tuple[str, str, float]]:
+    """Give the effect as the command line has it, the parameter that is compared, and its true value."""
+    arm = virtual_arm()
+    if kind == "elastic":
+        yield from ((f"joint_elasticity:joint1:stiffness={x:g}", "stiffness", x) for x in STIFFNESSES)
+    elif kind == "backlash":
+        yield from ((f"backlash:{joint}:width={x:g}", "width", x) for joint in arm.robot.joints for x in WIDTHS)
+    else:
+        # At the torque limit, full torque, so much is added to it.
+        for joint, limit in zip(arm.robot.joints, np.abs(arm.robot.torque_limit), strict=True):
+            for share in BENT:
+                cubic = share / limit**2
+                yield f"torque_sensor_nonlinearity:{joint}:cubic={cubic:.6g}", "cubic", cubic
+
+
+def runs(effect: str, seed: int, seconds: float) -> list[SimulationResult]:
+    """Simulate four runs to fit and one to hold out."""
+    arm, rng = virtual_arm(), np.random.default_rng([17, seed])
+    motions = [random_motion(f"m{k}", arm, kind, seconds, rng) for k, kind in enumerate(KINDS)]
+    return [simulate(arm, item, effects=[parse_effect(effect)], seed=seed, rate=RATE, ticks=2) for item in motions]
+
+
+def true_member(found: Diagnosis, runs: Sequence[SimulationResult]) -> tuple[Scene, Member]:
+    """Return the scene at the arm's own parameters, and the member with the effect's own nonlinear ones."""
+    arm, effect = runs[0].arm, runs[0].effects[0]
+    value = np.array([item["value"] for item in truth(arm)["parameters"]])
+    scene = replace(found.search.scene, value=value, armatures=dict(enumerate(arm.armature.tolist())), columns={})
+    joint = arm.joint_index(str(effect.joint))
+    sizes = vars(effect)
+    if effect.name == "joint_elasticity":
+        inertia, link, rotor = usual_link_inertia(scene, joint), arm.link_inertia()[joint], arm.armature[joint]
+        omega = np.sqrt(sizes["stiffness"] / inertia)
+        # Its damping ratio is that of motor and link, both free.
+        ratio = sizes["damping_ratio"] * np.sqrt(link * rotor / (link + rotor) / inertia)
+        return scene, Member(joint, (float(omega / (2.0 * np.pi)), float(ratio)))
+    return scene, Member(joint, (sizes["width"],) if effect.name == "backlash" else ())
+
+
+def against_truth(found: Diagnosis, runs: Sequence[SimulationResult]) -> float:
+    """Return the held-out error over that of the true model, on the worst joint."""
+    scene, member = true_member(found, runs)
+    (family,) = effects_named(runs[0].effects[0].name)
+    base = found.search.base
+    model = TorqueModel(base.name, base.robot, (*base.terms, EffectTerm(family, member, scene)))
+    best = wls(observe(model, found.search.data))
+    true = rms_of(best.value, observe(model, found.validation_after.data))
+    own = rms_of(found.after.value, found.validation_after)
+    return max(a / b for a, b in zip(own, true, strict=True) if a is not None and b is not None)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--kind", nargs="+", default=["elastic", "backlash", "sensor"])
+    parser.add_argument("--seconds", type=float, default=15.0)
+    given = parser.parse_args()
+    print(f"{'effect':52}{'seed':>5} {'verdict':12}{'found':>24}{'error':>8}{'held out':>9}  other effects")
+    for kind in given.kind:
+        for effect, name, true in cases(kind):
+            for seed in range(given.first, given.first + given.seeds):
+                made = runs(effect, seed, given.seconds)
+                recordings = [item.recording for item in made]
+                found = diagnose(made[0].arm.robot, recordings[:-1], validation=recordings[-1:])
+                wanted = (made[0].effects[0].name, made[0].effects[0].joint)
+                own = [item for item in found.effects if (item.effect, item.joint) == wanted]
+                others = ", ".join(f"{item.effect} {item.joint}" for item in found.effects if item not in own)
+                line = f"{effect:52}{seed:5d} {found.verdict:12}"
+                if own:
+                    value = own[0].parameters[name]
+                    line += f"{f'{value.value:.5g} +- {value.std:.2g}':>24}{value.value / true - 1.0:8.1%}"
+                    line += f"{against_truth(found, made):9.3f}"
+                print(line + ("" if own else f"{'-':>24}{'-':>8}{'-':>9}") + f"  {others}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

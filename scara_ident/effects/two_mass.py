@@ -1,0 +1,296 @@
+"""Two masses at one joint: the motor moves as recorded, and the link behind its elastic gear follows.
+
+With the link's position q and the motor's theta, the lag x = theta - q follows from the link's row of the equations of
+motion (Spong 1987),
+
+    tau_j(q, q', q'') = k x + d x'
+
+where tau_j is the torque that the gear passes on to the links. Given the rigid bodies, stiffness and damping this is an
+ordinary differential equation for x under the recorded motion of all motors. It holds below, at and above the frequency
+sqrt(k / inertia), at which the link swings while its motor is held. It is solved by Newton's method, each step of which is
+linear in x; so are its derivatives by the parameters of the rigid bodies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.effects.links import (
+    lagging,
+    rigid_slopes,
+    rigid_torque,
+    usual_link_inertia,
+    usual_link_inertia_slopes,
+)
+from scara_ident.effects.signals import Signals
+from scara_ident.motion.low_pass import low_pass
+from scara_ident.motion.motion import Motion
+
+# Newton's steps, the first from no lag: each squares the error, which for the first is the lag itself in rad.
+STEPS = 2
+# Of a smaller lag, rad or m, what is of second order is this share of its torque and is left out, which saves most of the time.
+SMALL_LAG = 5e-3
+# Radians of the free swing per sample up to which the scheme of fourth order is taken; it is stable up to 2.45.
+FINE_STEP = 2.0
+# A link's inertia stays above this share of its usual one, however folded, where the estimate is a poor one.
+LEAST_INERTIA = 0.1
+# Gravity does not take away more than the rest of a gear's stiffness.
+LEAST_SPRING = 0.1
+# A swing at the beginning that is seen with less than this share of the other one's strength is not looked for.
+UNSEEN = 1e-3
+
+Lag = tuple[Array, Array, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class TwoMasses:
+    """A joint's motor and link on a stretch of motion.
+
+    Attributes
+    ----------
+    signals : Signals
+    joint : int
+    frequency : float
+        Of the link against its held motor, Hz: with its usual inertia it is the square root of stiffness over inertia.
+    damping_ratio : float
+        Of that swinging.
+    """
+
+    signals: Signals
+    joint: int
+    frequency: float
+    damping_ratio: float
+
+    @cached_property
+    def inertia(self) -> float:
+        """Usual inertia of the link, at the joint; not above 0 where misjudged."""
+        return usual_link_inertia(self.signals.scene, self.joint)
+
+    @property
+    def stiffness(self) -> float:
+        """N m/rad or N/m, at the joint."""
+        return self.inertia * (2.0 * np.pi * self.frequency) ** 2
+
+    @property
+    def damping(self) -> float:
+        """N m s/rad or N s/m, at the joint."""
+        return 4.0 * np.pi * self.damping_ratio * self.frequency * self.inertia
+
+    @cached_property
+    def _slopes(self) -> Lag:
+        """Derivatives of the torque of the links by position, velocity and acceleration, at the joint, each (N,)."""
+        signals, j = self.signals, self.joint
+        by_q, by_v, by_a = (slope[j] / signals.scene.robot.row_scale[j] for slope in rigid_slopes(signals, j))
+        return by_q, by_v, np.maximum(by_a - signals.scene.armature(j), LEAST_INERTIA * self.inertia)
+
+    @cached_property
+    def swing(self) -> Swing:
+        """The equation for x about no lag."""
+        by_q, by_v, by_a = self._slopes
+        spring = np.maximum(self.stiffness + by_q, LEAST_SPRING * self.stiffness)
+        return Swing(by_a, self.damping + by_v, spring, 1.0 / self.signals.motion.rate)
+
+    @cached_property
+    def lag(self) -> Lag:
+        """Motor less link, and its first two derivatives, each (N,)."""
+        lag = self.swing.solve(self._load(self.signals.rigid[self.joint], self.signals.motion.a[self.joint]))
+        recorded = self.signals.motion.torque
+        if self._initial is not None and recorded is not None:
+            signals, j = self.signals, self.joint
+            left = recorded[j] - signals.predicted[j] - lagging(signals, j, lag)[j]
+            lag = self._initial.added(lag, self._initial.state(left, (lag[0], lag[1])))
+        for _ in range(0 if _small(lag) else STEPS - 1):
+            behind = self._behind(lag)
+            load = self._load(self._torque(behind)[self.joint], behind.a[self.joint])
+            by_q, by_v, by_a = self._slopes
+            lag = self.swing.solve(load + by_q * lag[0] + by_v * lag[1] + by_a * lag[2], lag[0][:2])
+        return lag
+
+    @cached_property
+    def _initial(self) -> InitialState | None:
+        """What the recorded torque says of how the link swung when the recording began; None where none was recorded."""
+        signals, j = self.signals, self.joint
+        trim = int(np.ceil(signals.motion.rate / signals.scene.band))
+        if signals.motion.torque is None or signals.motion.samples <= 4 * trim:
+            return None
+        free = self.swing.solve(np.zeros((2, signals.motion.samples)), np.array([[1.0, 1.0], [0.0, self.swing.step]]))
+        torque = np.array([lagging(signals, j, (free[0][k], free[1][k], free[2][k])) for k in range(2)])
+        return InitialState(free, torque, j, signals.motion.rate, signals.scene.band, slice(trim, -trim))
+
+    @cached_property
+    def change(self) -> Array:
+        """Torque of all joints less that with a rigid gear, recorded side, shape (n, N)."""
+        scene, j = self.signals.scene, self.joint
+        if _small(self.lag):
+            return lagging(self.signals, j, self.lag)
+        result = self._torque(self._behind(self.lag)) - self.signals.rigid
+        result[j] += scene.robot.row_scale[j] * scene.armature(j) * self.lag[2]
+        return np.asarray(result)
+
+    def slopes(self) -> Array:
+        """Return the derivatives of stiffness times `change`, over the stiffness, shape (n, p + 3, N).
+
+        They are by the parameters of the rigid bodies, by the armature where these do not tell it, by the frequency and by
+        the damping ratio.
+        """
+        scene, motion, j = self.signals.scene, self.signals.motion, self.joint
+        term, scale = scene.model.rigid_body, scene.robot.row_scale[j]
+        behind, (x, first, second) = self._behind(self.lag), self.lag
+        columns = term.regressor(behind)
+        p = columns.shape[1]
+        result = np.zeros((scene.robot.n, p + 3, motion.samples))
+        result[:, :p] = columns - term.regressor(motion)
+        rotor = np.append(scene.armature_slopes(j), 1.0)[:, None]
+        usual = np.append(usual_link_inertia_slopes(scene, j), -1.0)[:, None]
+        omega, ratio = 2.0 * np.pi * self.frequency, self.damping_ratio
+        right = np.empty((p + 3, motion.samples))
+        right[: p + 1] = -rotor * behind.a[j] - usual * (omega**2 * x + 2.0 * ratio * omega * first)
+        right[:p] += columns[j] / scale
+        right[p + 1] = -4.0 * np.pi * self.inertia * (omega * x + ratio * first)
+        right[p + 2] = -2.0 * omega * self.inertia * first
+        lags = self.swing.solve(right)
+        result[j, : p + 1] += scale * rotor * second
+        for k in range(p + 3):
+            result[:, k] += lagging(self.signals, j, (lags[0][k], lags[1][k], lags[2][k]))
+        if self._initial is not None:
+            # The swing at the beginning is fitted again whatever the parameters are.
+            whole = result[j].copy()
+            whole[:p] += term.regressor(motion)[j]
+            result -= np.einsum("kc,cjt->jkt", self._initial.state(whole, (x, first)), self._initial.torque)
+        share = np.append(usual[:, 0] / self.inertia, [2.0 / self.frequency, 0.0])
+        return result + share[:, None] * self.change[:, None]
+
+    def _behind(self, lag: Lag) -> Motion:
+        """Return the motion with the joint's link in place of its motor."""
+        motion = self.signals.motion
+        q, v, a = motion.q.copy(), motion.v.copy(), motion.a.copy()
+        for part, own in zip((q, v, a), lag, strict=True):
+            part[self.joint] -= own
+        return Motion(motion.name, motion.trajectory, motion.time, q, v, a, None, motion.rate)
+
+    def _torque(self, motion: Motion) -> Array:
+        return rigid_torque(self.signals.scene, motion, motion.q, motion.v, motion.a)
+
+    def _load(self, torque: Array, acceleration: Array) -> Array:
+        """Return the torque that the gear passes on, at the joint, of that with the rotor on the link."""
+        scene, j = self.signals.scene, self.joint
+        return np.asarray(torque / scene.robot.row_scale[j] - scene.armature(j) * acceleration)
+
+
+def _small(lag: Lag) -> bool:
+    return bool(np.max(np.abs(lag[0])) < SMALL_LAG)
+
+
+@dataclass(frozen=True, eq=False)
+class InitialState:
+    """How a link swung when a recording began, as far as the torque of its joint says.
+
+    Attributes
+    ----------
+    free : tuple of ndarray, each of shape (2, N)
+        x and its derivatives after a unit of x, and of its derivative, at the first sample.
+    torque : ndarray, shape (2, n, N)
+        What they add to the torques.
+    joint : int
+    rate, band : float
+        Hz; the torque is looked at within the band.
+    used : slice
+        Samples away from the ends, where the continuation of filtered signals is a guess.
+    """
+
+    free: Lag
+    torque: Array
+    joint: int
+    rate: float
+    band: float
+    used: slice
+
+    @cached_property
+    def _seen(self) -> Array:
+        return low_pass(self.torque[:, self.joint], self.rate, self.band)[:, self.used]
+
+    def state(self, torque: Array, lag: tuple[Array, Array]) -> Array:
+        """Return x and its derivative, beside those assumed, that explain a torque of the joint.
+
+        Parameters
+        ----------
+        torque : ndarray, shape (..., N)
+        lag : tuple of ndarray, shape (N,)
+            x and its derivative, as large as which a swing at the beginning may be.
+
+        Returns
+        -------
+        ndarray, shape (..., 2)
+        """
+        left = low_pass(torque, self.rate, self.band)[..., self.used]
+        sizes = np.array([np.mean(part**2) for part in lag])
+        normal = self._seen @ self._seen.T
+        # What cannot be seen stays as assumed.
+        normal += np.diag(UNSEEN * np.trace(normal * sizes) / sizes)
+        return np.asarray(left @ self._seen.T @ np.linalg.inv(normal))
+
+    def added(self, lag: Lag, state: Array) -> Lag:
+        """Return x and its derivatives with the swing that a state at the first sample makes."""
+        x, first, second = (part + state @ own for part, own in zip(lag, self.free, strict=True))
+        return x, first, second
+
+
+@dataclass(frozen=True, eq=False)
+class Swing:
+    """The equation ``inertia x'' + damping x' + stiffness x = torque`` at uniform samples.
+
+    Attributes
+    ----------
+    inertia, damping, stiffness : ndarray, shape (N,)
+    step : float
+        s per sample.
+    """
+
+    inertia: Array
+    damping: Array
+    stiffness: Array
+    step: float
+
+    def solve(self, torque: Array, start: Array | None = None) -> Lag:
+        """Return x, its derivative and its second derivative.
+
+        Parameters
+        ----------
+        torque : ndarray, shape (..., N)
+            N at least 3.
+        start : ndarray, shape (..., 2), optional
+            x at the first two samples, by default the static x.
+
+        Returns
+        -------
+        tuple of ndarray, each of that shape
+
+        Notes
+        -----
+        Newmark's method as one banded triangular system: the scheme of Fox and Goodwin, of fourth order in the frequency,
+        where it is stable, else the constant mean acceleration, which always is (Hughes, The Finite Element Method, 2000,
+        section 9.1).
+        """
+        from scipy.linalg import solve_banded
+
+        shape = np.shape(torque)
+        rows = np.reshape(torque, (-1, shape[-1]))
+        fastest = float(np.max(self.stiffness / self.inertia)) * self.step**2
+        beta = 1.0 / 12.0 if fastest < FINE_STEP**2 else 0.25
+        mean = beta * (rows[:, 2:] + rows[:, :-2]) + (1.0 - 2.0 * beta) * rows[:, 1:-1]
+        heavy, slow = self.inertia[1:-1] / self.step**2, self.damping[1:-1] / (2.0 * self.step)
+        spring = self.stiffness[1:-1]
+        bands = np.ones((3, shape[-1]))
+        bands[0, 2:] = heavy + slow + beta * spring
+        bands[1, 1:-1] = -2.0 * heavy + (1.0 - 2.0 * beta) * spring
+        bands[1, 0] = 0.0
+        bands[2, :-2] = heavy - slow + beta * spring
+        start = rows[:, :2] / self.stiffness[:2] if start is None else np.reshape(start, (-1, 2))
+        x = np.asarray(solve_banded((2, 0), bands, np.concatenate([start, mean], axis=1).T)).T
+        first = np.gradient(x, self.step, axis=1)
+        second = (rows - self.damping * first - self.stiffness * x) / self.inertia
+        return x.reshape(shape), first.reshape(shape), second.reshape(shape)

@@ -1,0 +1,33 @@
+"""What is known of nonlinear parameters before the fit: bounds, steps, and priors of rotors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.unknowns import LONGEST_STEP, unknowns_of
+from scara_ident.effects import Member
+from scara_ident.effects.gear import TransmissionLoss
+from scara_ident.effects.links import largest_armature
+from scara_ident.model.model import build_model
+from scara_ident.robot.rotors import GUESS_FACTOR
+from tests.diagnosis.made import NOISE, exact_runs, step_beside
+
+
+def test_a_rotor_that_nobody_stated_has_a_wide_prior_within_what_the_estimate_leaves_room_for() -> None:
+    step = step_beside(exact_runs(), [Candidate(TransmissionLoss(), Member(0, (0.05,)))], 1.0 / np.array(NOISE))
+    (stated,) = [
+        item for item in unknowns_of(step.scene, step.chosen, CRITERIA.rotor_inertia_std) if item.owner is None
+    ]
+    robot = replace(step.scene.robot, rotor_stated=np.zeros(2, dtype=bool))
+    scene = replace(step.scene, model=build_model(robot, "complete"))
+    (guessed,) = [item for item in unknowns_of(scene, step.chosen, CRITERIA.rotor_inertia_std) if item.owner is None]
+    assert stated.spread == CRITERIA.rotor_inertia_std
+    assert guessed.spread == np.log(GUESS_FACTOR)
+    assert guessed.nominal == np.log(robot.rotor_guess.armature[0])
+    assert guessed.upper <= np.log(largest_armature(scene, 0))
+    assert guessed.reach == LONGEST_STEP
+    assert guessed.moved(100.0) == guessed.upper

@@ -1,0 +1,125 @@
+"""Motor and link at an elastic joint: closed forms, derivatives by differences, and a two-mass arm by another integrator."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from scara_ident.effects import Scene, Signals
+from scara_ident.effects.two_mass import Swing, TwoMasses
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import load_robot
+from tests.arms import Array
+from tests.effects.scenes import moving, scene_of
+
+STEP = 2e-3
+
+
+@pytest.mark.parametrize(("frequency", "step"), [(3.0, 5e-4), (40.0, 5e-4), (9.0, 1e-2), (30.0, 1e-2)])
+def test_a_forced_link_swings_as_the_closed_form_says(frequency: float, step: float):
+    inertia, stiffness, damping, count = 2.0, 2.0 * (2 * np.pi * 12.0) ** 2, 30.0, round(4.0 / step)
+    time = np.arange(count) * step
+    w = 2 * np.pi * frequency
+    whole = np.ones(count)
+    found = Swing(inertia * whole, damping * whole, stiffness * whole, step).solve(np.cos(w * time))
+    gain = 1.0 / (stiffness - inertia * w**2 + 1j * w * damping)
+    steady = slice(count // 2, count - 10)
+    # The scheme of fourth order errs by (w step)^4 / 240 of the square of the frequency.
+    allowed = 0.01 if w * step < 1.0 else 0.2
+    expected = np.real(gain * np.exp(1j * w * time))
+    assert np.abs(found[0] - expected)[steady].max() < allowed * np.abs(gain)
+
+
+def test_a_link_let_go_swings_at_its_own_frequency_and_dies_away():
+    count, omega, ratio = 3000, 2 * np.pi * 5.0, 0.05
+    whole, time = np.ones(count), np.arange(count) * STEP
+    swing = Swing(whole, 2.0 * ratio * omega * whole, omega**2 * whole, STEP)
+    damped = omega * np.sqrt(1.0 - ratio**2)
+    expected = np.exp(-ratio * omega * time) * (np.cos(damped * time) + ratio * omega / damped * np.sin(damped * time))
+    x, first, second = swing.solve(np.zeros(count), expected[:2])
+    assert np.abs(x - expected).max() < 2e-3
+    assert np.abs(second + omega**2 * x + 2.0 * ratio * omega * first).max() < 1e-9
+
+
+def test_a_slow_load_winds_the_gear_up_by_load_over_stiffness():
+    load, whole = 5.0 + 3.0 * np.sin(np.arange(2000) / 300.0), np.ones(2000)
+    x, _, second = Swing(0.5 * whole, 20.0 * whole, 8e4 * whole, 1e-3).solve(load)
+    assert x == pytest.approx(load / 8e4, rel=1e-3)
+    assert np.all(np.isfinite(second))
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_slopes_are_the_differences_of_the_torque_once_the_start_is_forgotten(joint: int):
+    scene, item = scene_of(load_robot()), moving(load_robot(), 4.0)
+    item = replace(item, torque=None)
+
+    def scaled(value: Array, armature: float = 0.0, frequency: float = 4.5, ratio: float = 0.1) -> Array:
+        other = replace(scene, value=value, armatures={0: scene.armatures[0] + armature})
+        masses = TwoMasses(Signals(other, item), joint, frequency, ratio)
+        return (masses.stiffness * masses.change / stiffness)[:, 1000:]
+
+    stiffness = TwoMasses(Signals(scene, item), joint, 4.5, 0.1).stiffness
+    found = TwoMasses(Signals(scene, item), joint, 4.5, 0.1).slopes()[:, :, 1000:]
+    bodies = len(scene.model.rigid_body.columns)
+    for k in range(bodies):
+        step = 1e-3 * np.eye(len(scene.value))[k]
+        expected = (scaled(scene.value + step) - scaled(scene.value - step)) / 2e-3
+        assert np.abs(found[:, k] - expected).max() < 0.02 * np.abs(expected).max() + 1e-5 * np.abs(found).max()
+    for k, (name, step) in enumerate((("armature", 1e-3), ("frequency", 1e-3), ("ratio", 1e-4))):
+        if name == "armature" and scene.told_armature(joint) is not None:
+            continue
+        at = {"armature": 0.0, "frequency": 4.5, "ratio": 0.1}[name]
+        expected = (scaled(scene.value, **{name: at + step}) - scaled(scene.value, **{name: at - step})) / (2.0 * step)
+        # Slopes are taken about no lag, and err by its size, here some hundredths of a radian.
+        assert np.abs(found[:, bodies + k] - expected).max() < 0.05 * np.abs(expected).max()
+
+
+def swinging(stiffness: float, damping: float, start: float) -> tuple[Scene, Motion, Array]:
+    """The SCARA03 with an elastic second joint, its link integrated by Runge and Kutta; the link begins off by a swing."""
+    robot = load_robot()
+    scene = scene_of(robot, name="basic")
+    term = scene.model.rigid_body
+    item = moving(robot, 4.0, rate=1.0 / STEP, seed=4)
+    rotor = scene.armature(1)
+    value = scene.value[scene.model.place(term)]
+    span = item.time[-1]
+
+    def at(t: float, part: Array) -> Array:
+        return np.array([np.interp(t, item.time, row) for row in part])
+
+    def torque(q: Array, v: Array, a: Array) -> Array:
+        one = Motion("m", "m", np.zeros(1), q[:, None], v[:, None], a[:, None], None, 1.0)
+        return term.torque(one, value)[:, 0] / robot.row_scale
+
+    def rate(t: float, state: Array) -> Array:
+        q, v, a = at(t, item.q), at(t, item.v), at(t, item.a)
+        spring = stiffness * (q[1] - state[0]) + damping * (v[1] - state[1])
+        q[1], v[1], a[1] = state[0], state[1], 0.0
+        still = torque(q, v, a)[1]
+        a[1] = 1.0
+        inertia = torque(q, v, a)[1] - still - rotor
+        return np.array([state[1], (spring - still) / inertia])
+
+    first = np.array([item.q[1, 0] - start, item.v[1, 0]])
+    path = solve_ivp(rate, (0.0, span), first, t_eval=item.time, rtol=1e-7, atol=1e-9).y
+    q, v, a = item.q.copy(), item.v.copy(), item.a.copy()
+    q[1], v[1] = path
+    a[1] = [rate(t, state)[1] for t, state in zip(item.time, path.T, strict=True)]
+    moved = Motion("m", "m", item.time, q, v, a, None, item.rate)
+    change = term.torque(moved, value) - term.torque(item, value)
+    change[1] += robot.row_scale[1] * rotor * (item.a[1] - a[1])
+    return scene, replace(item, torque=Signals(scene, item).predicted + change), change
+
+
+@pytest.mark.parametrize("frequency", [3.0, 9.0])
+@pytest.mark.parametrize("start", [0.0, 0.01])
+def test_the_torque_is_that_of_a_two_mass_arm_by_runge_and_kutta(frequency: float, start: float):
+    scene = scene_of(load_robot(), name="basic", band=15.0)
+    masses = TwoMasses(Signals(scene, moving(load_robot())), 1, frequency, 0.04)
+    scene, item, change = swinging(masses.stiffness, masses.damping, start)
+    found = TwoMasses(Signals(scene, item), 1, frequency, 0.04).change
+    inside = slice(100, -100)
+    assert np.abs(found - change)[:, inside].max() < 0.02 * np.abs(change)[:, inside].max()

@@ -1,0 +1,61 @@
+"""An elastic first joint from soft to stiff, clearance, and a torque sensor that bends: found, and nothing else.
+
+`tests/effects/test_two_mass.py` has two masses by another integrator.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import parse_effect, simulate, virtual_arm
+from tests.effects.scenes import wandering
+
+SECONDS, RATE = 14.0, 500.0
+
+
+def virtual(effect: str, seed: int) -> list[Recording]:
+    arm = virtual_arm()
+    return [
+        simulate(arm, wandering(arm, f"t{k}", 10 * seed + k, SECONDS), effects=[parse_effect(effect)], seed=k, rate=RATE).recording
+        for k in range(5)
+    ]  # fmt: skip
+
+
+def diagnosed(runs: list[Recording]) -> Diagnosis:
+    return diagnose(load_robot(), runs[:-1], validation=runs[-1:])
+
+
+def alone(found: Diagnosis, effect: str, joint: str, name: str) -> float:
+    """The value of a parameter of the only effect."""
+    assert found.verdict == "explained"
+    (item,) = found.effects
+    assert (item.effect, item.joint) == (effect, joint)
+    return item.parameters[name].value
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stiffness", [1500.0, 2400.0, 4000.0])
+def test_a_soft_first_joint_is_found_alone_with_its_stiffness(stiffness: float):
+    """Commit a6cf3ca: `unexplained` below 5000 N m/rad."""
+    found = diagnosed(virtual(f"joint_elasticity:joint1:stiffness={stiffness}", 1))
+    assert alone(found, "joint_elasticity", "joint1", "stiffness") == pytest.approx(stiffness, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [0.001, 0.004])
+def test_clearance_is_found_alone_with_its_width(width: float):
+    """Commit a6cf3ca: `unexplained` at 4 mrad."""
+    found = diagnosed(virtual(f"backlash:joint1:width={width}", 2))
+    assert alone(found, "backlash", "joint1", "width") == pytest.approx(width, rel=0.15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.22, -0.22])
+def test_a_sensor_that_bends_by_22_percent_at_full_torque_is_found_alone(share: float):
+    """Commit a6cf3ca: `unexplained`."""
+    cubic = share / float(load_robot().torque_limit[0]) ** 2
+    found = diagnosed(virtual(f"torque_sensor_nonlinearity:joint1:cubic={cubic}", 3))
+    assert alone(found, "torque_sensor_nonlinearity", "joint1", "cubic") == pytest.approx(cubic, rel=0.1)
