@@ -88,6 +88,12 @@ class SelectionCriteria:
         0.6, "of the best gain", "families worth refining before one is chosen: a grid point loses up to 40 %"
     )
     most_refined: int = _criterion(4, "families", "refined at once, for time")
+    least_gain_to_fit: float = _criterion(
+        0.1,
+        "share of squared residual",
+        "a joint whose gear may be elastic is simulated anew in every step of a fit, for time",
+    )
+    most_fitted: int = _criterion(2, "candidates", "fitted with all else in one round, for time")
     # What is left over.
     remainder: float = _criterion(
         0.08,

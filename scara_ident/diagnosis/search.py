@@ -303,9 +303,11 @@ def _fitted(
         With the step at the estimate that goes with the candidate.
     """
     criteria = step.criteria
-    enough = max(criteria.least_gain, criteria.near_best * best)
-    worth = sorted((item for item in candidates if item.gain >= enough), key=lambda item: -item.gain)
-    begins = {item.label: (step.scene, item.candidate) for item in worth[: criteria.most_refined]}
+    enough = max(criteria.least_gain_to_fit, criteria.near_best * best)
+    # A fit is dear: only what chance would not bring among so many at a grid point is worth one.
+    sure = [item for item in candidates if item.examination.p_value * step.tried <= 1.0]
+    worth = sorted((item for item in sure if item.gain >= enough), key=lambda item: -item.gain)
+    begins = {item.label: (step.scene, item.candidate) for item in worth[: criteria.most_fitted]}
     if known is not None:
         # Found in another band: from there it is near.
         scene = replace(step.scene, value=known.scene.value, armatures=known.scene.armatures)
