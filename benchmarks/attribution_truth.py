@@ -153,8 +153,6 @@ def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, dict[str,
     scene, bands = result.search.scene, result.search.bands
     joints = made.robot.joints
     delays = [effect.as_dict()["parameters"]["delay"] for effect in made.effects if effect.name == "time_delay"]
-    # What the delays of the runs have in common is there, whatever else is.
-    delays.append(float(np.mean([state.delay for state in made.states[: len(made.training)]])))
     others = [_candidates(effect, made) for effect in made.effects if effect.name != "time_delay"]
     training, held_out = (
         prepare([shifted(item, sum(delays)) for item in items], bands) for items in (made.training, made.held_out)
