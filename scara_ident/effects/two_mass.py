@@ -92,7 +92,9 @@ class TwoMasses:
         """The equation for x about no lag."""
         by_q, by_v, by_a = self._slopes
         spring = np.maximum(self.stiffness + by_q, LEAST_SPRING * self.stiffness)
-        return Swing(by_a, self.damping + by_v, spring, 1.0 / self.signals.motion.rate)
+        # Coriolis torques of a poor estimate must not feed the swing.
+        damping = np.maximum(self.damping + by_v, 0.0)
+        return Swing(by_a, damping, spring, 1.0 / self.signals.motion.rate)
 
     @cached_property
     def lag(self) -> Lag:
@@ -143,7 +145,8 @@ class TwoMasses:
         columns = term.regressor(behind)
         p = columns.shape[1]
         result = np.zeros((scene.robot.n, p + 3, motion.samples))
-        result[:, :p] = columns - term.regressor(motion)
+        recorded = self._recorded(p)
+        result[:, :p] = columns - recorded
         rotor = np.append(scene.armature_slopes(j), 1.0)[:, None]
         usual = np.append(usual_link_inertia_slopes(scene, j), -1.0)[:, None]
         omega, ratio = 2.0 * np.pi * self.frequency, self.damping_ratio
@@ -159,10 +162,20 @@ class TwoMasses:
         if self._initial is not None:
             # The swing at the beginning is fitted again whatever the parameters are.
             whole = result[j].copy()
-            whole[:p] += term.regressor(motion)[j]
+            whole[:p] += recorded[j]
             result -= np.einsum("kc,cjt->jkt", self._initial.state(whole, (x, first)), self._initial.torque)
         share = np.append(usual[:, 0] / self.inertia, [2.0 / self.frequency, 0.0])
         return result + share[:, None] * self.change[:, None]
+
+    def _recorded(self, p: int) -> Array:
+        """Return the rigid bodies' columns at the recorded motion, which are at hand, shape (n, p, N)."""
+        model, motion = self.signals.scene.model, self.signals.motion
+        place = model.place(model.rigid_body)
+        result = np.zeros((len(model.active), p, motion.samples))
+        for joint, (own, rows) in enumerate(zip(model.active, self.signals.columns, strict=True)):
+            rigid = (own >= place.start) & (own < place.stop)
+            result[joint, own[rigid] - place.start] = rows[rigid]
+        return result
 
     def _behind(self, lag: Lag) -> Motion:
         """Return the motion with the joint's link in place of its motor."""
