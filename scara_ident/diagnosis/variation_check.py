@@ -13,7 +13,7 @@ from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.gain import gains
 from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.estimation.run_variation import RunVariation, run_variation
+from scara_ident.estimation.run_variation import ASSUMED_DELAY, LEAST_RUNS, RunVariation, assumed_delays, run_variation
 
 
 def variation_objection(step: SelectionStep, decision: Decision) -> str | None:
@@ -30,7 +30,12 @@ def variation_objection(step: SelectionStep, decision: Decision) -> str | None:
     (own,) = step.columns.rows(step.scene, [decision.candidate])
     chosen = step.columns.rows(step.scene, step.chosen)
     value = np.concatenate([found.model_value, found.value])
-    variation = run_variation(step.observations, with_columns(step.observations, [*chosen, own]), value)
+    joints = with_columns(step.observations, [*chosen, own])
+    variation = run_variation(step.observations, joints, value)
+    why = "runs differ from one another by as much: with that counted as noise"
+    if len(step.observations.data.recordings) < LEAST_RUNS and not decision.candidate.corrects_data:
+        variation = assumed_delays(step.observations, joints, value)
+        why = f"a delay of each run by some {ASSUMED_DELAY * 1e3:g} ms does as much: with that counted as noise"
     if not variation:
         return None
     model = whitened(step.model, variation)
@@ -43,7 +48,7 @@ def variation_objection(step: SelectionStep, decision: Decision) -> str | None:
     tried = 1 if decision.candidate.corrects_data else step.tried
     if again.p_value * tried <= step.criteria.family_error:
         return None
-    return f"runs differ from one another by as much: with that counted as noise p = {again.p_value:.1e}"
+    return f"{why} p = {again.p_value:.1e}"
 
 
 def whitened(model: FittedModel, variation: RunVariation) -> FittedModel:

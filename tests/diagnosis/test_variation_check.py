@@ -8,6 +8,7 @@ import pytest
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.variation_check import variation_objection
 from scara_ident.effects import Member
+from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
 from tests.diagnosis.made import step_beside, with_torque
 from tests.estimation.test_run_variation import runs
@@ -33,6 +34,27 @@ def test_what_differs_from_run_to_run_is_no_effect():
 
 def test_where_runs_do_not_differ_there_is_no_objection():
     made = with_torque(runs(np.random.default_rng(3), (0.0,) * 4), 1, lambda motion: 0.05 * motion.q[1])
+    step = step_beside(made)
+    (decision,) = step.judge([Candidate(Spring(), Member(1))])
+    assert variation_objection(step, decision) is None
+
+
+def test_in_two_runs_a_late_joint_may_be_late_in_each_by_itself():
+    # Late by 4 ms: too few runs to say how they differ.
+    late = [shifted(item, -0.004) for item in runs(np.random.default_rng(4), (0.0,) * 4, 2)]
+    step = step_beside(late)
+    (decision,) = step.judge([Candidate(TimeDelay(), Member(1))])
+    assert decision.accepted
+    why = variation_objection(step, decision)
+    assert why is not None
+    assert "a delay of each run by some 3 ms" in why
+    # One of all joints is taken out of the data instead, and asked nothing of the kind.
+    (common,) = step.judge([Candidate(TimeDelay(), Member(None))])
+    assert variation_objection(step, common) is None
+
+
+def test_an_effect_that_is_no_delay_stands_in_two_runs():
+    made = with_torque(runs(np.random.default_rng(5), (0.0,) * 4, 2), 1, lambda motion: 0.05 * motion.q[1])
     step = step_beside(made)
     (decision,) = step.judge([Candidate(Spring(), Member(1))])
     assert variation_objection(step, decision) is None
