@@ -22,6 +22,7 @@ from typing import Any, get_args
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from virtual_conditions import Noise
 from virtual_motions import KINDS, random_motion
 
 from scara_ident.errors import ScaraIdentError
@@ -40,6 +41,7 @@ from scara_ident.simulation.spatial import configuration
 
 Array = NDArray[np.float64]
 RATES = (125.0, 250.0)
+NOISES: tuple[Noise, ...] = get_args(Noise)
 MISSING = ("none", "none", "none", "none", "none", "stribeck", "loss", "ripple", "spring", "all")
 FORCE, LASTING = (5.0, 30.0), (0.3, 2.0)
 # Rise and fall of a push, s.
@@ -73,10 +75,10 @@ class Set:
 def made_set(robot: Robot, arm: VirtualArm, rng: np.random.Generator, pushed: bool) -> Set:
     """Draw recordings, and a push in one of them."""
     count, rate = int(rng.integers(3, 7)), float(rng.choice(RATES))
-    missing, kind = str(rng.choice(MISSING)), str(rng.choice(("white", "coloured", "heavy")))
+    missing, kind = str(rng.choice(MISSING)), NOISES[int(rng.choice(len(NOISES)))]
     differ, repeated = bool(rng.random() < 0.5), bool(rng.random() < 0.33)
     level = float(np.exp(rng.uniform(np.log(0.005), np.log(0.05))))
-    noise = TorqueNoise(kind, float(np.exp(rng.uniform(np.log(0.005), np.log(0.1)))))  # type: ignore[arg-type]
+    noise = TorqueNoise(kind, float(np.exp(rng.uniform(np.log(0.005), np.log(0.1)))))
     bits = int(rng.integers(16, 22))
     scale = np.abs(robot.row_scale)[:, None]
     place = int(rng.integers(count))

@@ -175,8 +175,11 @@ class PayloadOfRecordings(Effect):
             return np.zeros((len(shown), *signals.motion.q.shape))
         if self.at_tool:
             return [_at_tool(signals)]
-        make = lambda: tool_of(robot).columns(robot, signals.motion)[:, shown]  # noqa: E731
-        return np.moveaxis(shared(signals.motion, "payload body", make), 1, 0)
+
+        def body() -> Array:
+            return tool_of(robot).columns(robot, signals.motion)[:, shown]
+
+        return np.moveaxis(shared(signals.motion, "payload body", body), 1, 0)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where the mass is negative, or more than the arm weighs."""

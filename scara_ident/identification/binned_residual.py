@@ -86,9 +86,7 @@ class Binned:
     @cached_property
     def sums(self) -> tuple[Array, Array]:
         """Sums of residual and use up to each bin, shape (n, M + 1)."""
-        zero = np.zeros((len(self.left), 1))
-        each = (self.left * self.known, self.known)
-        return tuple(np.concatenate([zero, np.cumsum(item, axis=1)], axis=1) for item in each)  # type: ignore[return-value]
+        return _up_to_each(self.left * self.known), _up_to_each(self.known)
 
     def means(self, length: int) -> Array:
         """Return the mean over windows of so many bins, shape (n, M - length + 1); NaN where too little is used."""
@@ -127,3 +125,7 @@ def binned(recording: int, part: PreparedStretch, left: Array, noise: Array) -> 
     signals = (motion.q, motion.v, motion.a, part.torque - left)
     q, v, a, load = (row[:, middle] for row in signals)
     return Binned(recording, part, size, left[:, : count * size], used, noise, (q, v, a, load), np.zeros_like(q))
+
+
+def _up_to_each(signal: Array) -> Array:
+    return np.concatenate([np.zeros((len(signal), 1)), np.cumsum(signal, axis=1)], axis=1)

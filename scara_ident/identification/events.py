@@ -225,7 +225,7 @@ def _event(robot: Robot, data: PreparedData, segment: Segment, left: Array, *, h
         kind,
         float(np.max(segment.score)),
         held_out,
-        tuple(float(x) for x in force) if kind == "contact" else None,  # type: ignore[arg-type]
+        (float(force[0]), float(force[1]), float(force[2])) if kind == "contact" else None,
     )
 
 
