@@ -181,7 +181,8 @@ def diagnose(
     Raises
     ------
     UsageError
-        If a recording is both fitted and held out, one named as unloaded is not among those to fit, or a band is no frequency that the slowest recording carries.
+        If a recording is both fitted and held out, one named as unloaded is not among those to fit, or a band is no
+        frequency that the slowest recording carries.
     RecordingError
         If none of the recordings can be used, or they have fewer rows than the model has parameters (one of several that
         cannot be used is left out with a note), or channels are not what the mapping says (see `channel_faults`).
