@@ -27,8 +27,6 @@ class Controller:
         N m/rad, N m/(rad s), N m s/rad, at the joint.
     cutoff, damping : float
         Natural frequency, Hz, and damping factor of the low-pass on the differentiated encoder position.
-    feed_forward : bool
-        Whether the torque that the nominal model (URDF, friction) needs along the reference is added.
     """
 
     proportional: Array
@@ -36,7 +34,6 @@ class Controller:
     derivative: Array
     cutoff: float = 100.0
     damping: float = 1.0
-    feed_forward: bool = False
 
     def gains(self, rate: float, order: NDArray[np.intp]) -> Gains:
         """Return the loop's gains in Pinocchio's order, the filter for ``rate`` samples per second."""

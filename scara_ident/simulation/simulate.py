@@ -14,10 +14,11 @@ from scara_ident.recording.recording import Recording
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.effects.structure import Payload
-from scara_ident.simulation.inverse_dynamics import nominal_torque, torque_at_start
+from scara_ident.simulation.inverse_dynamics import torque_at_start
 from scara_ident.simulation.plant import PlantDraft
 from scara_ident.simulation.reference import ReferenceMotion
 from scara_ident.simulation.runs import RunState, TorqueNoise
+from scara_ident.simulation.torque_sensor import recorded_effort
 
 # Integration steps per controller period: on the SCARA03 the energy then drifts by 4e-15 in 10 s, and friction that
 # depends on speed, spring and ripple effects are resolved with a margin.
@@ -111,6 +112,7 @@ def simulate(
     link_encoders: Sequence[str] = (),
     noise: TorqueNoise = WHITE,
     run: RunState | None = None,
+    feed: Array | None = None,
 ) -> SimulationResult:
     """Let the virtual arm follow a motion in closed loop.
 
@@ -145,6 +147,8 @@ def simulate(
         Its distribution; its standard deviation is the arm's.
     run : RunState, optional
         In what this run differs from the arm; by default in nothing.
+    feed : ndarray, shape (n, ticks), optional
+        Torque on the effort side, added to the PID's at every tick of the controller; its integral then starts at 0.
 
     Returns
     -------
@@ -153,7 +157,8 @@ def simulate(
     Raises
     ------
     UsageError
-        If the motion is not of this arm's joints, an effect does not fit, or ``ticks`` is not 1 or more.
+        If the motion is not of this arm's joints, an effect does not fit, ``ticks`` is under 1, or ``feed`` is too short or
+        too long.
     ScaraIdentError
         If the controller loses the arm.
     """
@@ -174,17 +179,20 @@ def simulate(
     random = np.random.default_rng([seed, repetition, zlib.crc32(motion.name.encode())])
     draft.sensors["shift"] = random.uniform(size=arm.robot.n)[back]
     start = torque_at_start(moved, wanted, loaded_bodies(moved, own))
-    feed = np.zeros((len(wanted.time), arm.robot.n))
-    if arm.controller.feed_forward:
-        feed = nominal_torque(moved, wanted)[back].T
-        start = np.zeros(arm.robot.n)
+    added = np.zeros((arm.robot.n, len(wanted.time))) if feed is None else np.asarray(feed, dtype=float)
+    start = start if feed is None else np.zeros(arm.robot.n)
+    if added.shape != wanted.position.shape:
+        raise UsageError(f"feed has shape {added.shape}; expected {wanted.position.shape}, a column per tick")
     position, velocity = wanted.position[back], wanted.velocity[back]
     steps = _substeps(moved, draft, control) if substeps is None else substeps
     measured, seen, true, stops = _run(
-        moved, draft, control, steps, np.stack([position.T, velocity.T]), feed, start[back],
+        moved, draft, control, steps, np.stack([position.T, velocity.T]),
+        (arm.scale[:, None] * added)[back].T, start[back],
         position[:, 0], velocity[:, 0], f"{motion.name} on {arm.robot.name}",
     )  # fmt: skip
-    effort = _recorded_effort(arm, draft, true, 1.0 / control, ticks if averaged else 1)[:, ::ticks]
+    effort = recorded_effort(arm, draft, true.effort, true.position, 1.0 / control, ticks if averaged else 1)[
+        :, ::ticks
+    ]
     effort = effort + arm.torque_noise[:, None] * noise.draw(random, effort.shape, rate)
     if ticks > 1:
         wanted, true = wanted.every(ticks), true.every(ticks)
@@ -370,29 +378,3 @@ def _substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
             "lower its stiffness or raise its presliding distance"
         )
     return max(SUBSTEPS, needed)
-
-
-def _recorded_effort(arm: VirtualArm, draft: PlantDraft, true: TrueMotion, period: float, window: int) -> Array:
-    """Torque as its sensor gives it, without noise: the mean over ``window`` periods about each tick, shape (n, N)."""
-    order = arm.robot.order
-    n, samples = true.effort.shape
-    ticks = np.arange(samples + 1.0)
-    recorded = np.empty((n, samples))
-    for i in range(n):
-        u = true.effort[i]
-        row = order[i]
-        # The torque is constant between ticks, so its integral is linear there and the mean is exact.
-        integral = np.concatenate([[0.0], np.cumsum(u)])
-        middle = ticks[:-1] - draft.delay[row] / period
-        ends = []
-        for edge in (middle - 0.5 * window, middle + 0.5 * window):
-            inside = np.interp(edge, ticks, integral)
-            inside += np.minimum(edge, 0.0) * u[0] + np.maximum(edge - samples, 0.0) * u[-1]
-            ends.append(inside)
-        u = (ends[1] - ends[0]) / window
-        for joint, per_turn, amplitude, phase in draft.pickup:
-            if joint == row:
-                u = u + amplitude * np.sin(per_turn * true.position[i] + phase)
-        u = u + draft.cubic[row] * u**3
-        recorded[i] = draft.gain[row] * u + draft.shift[row] + draft.drift[row] * ticks[:-1] * period
-    return recorded

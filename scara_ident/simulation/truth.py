@@ -55,7 +55,6 @@ def truth(arm: VirtualArm, effects: Sequence[Effect] = ()) -> dict[str, Any]:
             "derivative": arm.controller.derivative.tolist(),
             "velocity_cutoff": arm.controller.cutoff,
             "velocity_damping": arm.controller.damping,
-            "feed_forward": arm.controller.feed_forward,
         },
         "tool": arm.tool.tolist(),
         "effects": [effect.resolve(arm).as_dict() for effect in effects],

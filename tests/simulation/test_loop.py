@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.errors import ScaraIdentError
+from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.simulation import simulate, virtual_arm
+from scara_ident.simulation.inverse_dynamics import nominal_torque
 from scara_ident.simulation.loop import velocity_filter
 from tests.simulation.made import scara, swing
 
@@ -29,9 +30,11 @@ def test_closed_loop_reverses_without_chatter() -> None:
 def test_feed_forward_takes_most_of_the_error_away() -> None:
     arm = scara()
     motion = swing(arm.robot, 3.0)
-    fed = replace(arm, controller=replace(arm.controller, feed_forward=True))
-    errors = [np.abs(simulate(x, motion).true.position - motion.position).max() for x in (arm, fed)]
+    feed = nominal_torque(arm, motion) / arm.scale[:, None]
+    errors = [np.abs(simulate(arm, motion, feed=x).true.position - motion.position).max() for x in (None, feed)]
     assert errors[1] < 0.2 * errors[0]
+    with pytest.raises(UsageError, match=r"feed has shape \(2, 5\); expected \(2, 3001\)"):
+        simulate(arm, motion, feed=feed[:, :5])
 
 
 def test_a_lost_arm_is_one_line() -> None:

@@ -1,0 +1,54 @@
+"""How the torque of the drives is measured: delayed, averaged, bent, shifted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.simulation.arm import VirtualArm
+from scara_ident.simulation.plant import PlantDraft
+
+
+def recorded_effort(
+    arm: VirtualArm, draft: PlantDraft, effort: Array, position: Array, period: float, window: int
+) -> Array:
+    """Return the drives' torque as its sensor gives it, without noise: the mean over some periods about each tick.
+
+    Parameters
+    ----------
+    arm : VirtualArm
+    draft : PlantDraft
+        With what its effects do to the measurement.
+    effort, position : ndarray, shape (n, N)
+        Torque held from each tick to the next, on the effort side, and positions, in the robot's order.
+    period : float
+        s.
+    window : int
+        Periods in the mean.
+
+    Returns
+    -------
+    ndarray, shape (n, N)
+    """
+    order = arm.robot.order
+    n, samples = effort.shape
+    ticks = np.arange(samples + 1.0)
+    recorded = np.empty((n, samples))
+    for i in range(n):
+        u = effort[i]
+        row = order[i]
+        # The torque is constant between ticks, so its integral is linear there and the mean is exact.
+        integral = np.concatenate([[0.0], np.cumsum(u)])
+        middle = ticks[:-1] - draft.delay[row] / period
+        ends = []
+        for edge in (middle - 0.5 * window, middle + 0.5 * window):
+            inside = np.interp(edge, ticks, integral)
+            inside += np.minimum(edge, 0.0) * u[0] + np.maximum(edge - samples, 0.0) * u[-1]
+            ends.append(inside)
+        u = (ends[1] - ends[0]) / window
+        for joint, per_turn, amplitude, phase in draft.pickup:
+            if joint == row:
+                u = u + amplitude * np.sin(per_turn * position[i] + phase)
+        u = u + draft.cubic[row] * u**3
+        recorded[i] = draft.gain[row] * u + draft.shift[row] + draft.drift[row] * ticks[:-1] * period
+    return recorded
