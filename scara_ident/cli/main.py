@@ -20,6 +20,7 @@ from scara_ident.cli.identify import identify
 from scara_ident.cli.inspect import inspect
 from scara_ident.cli.paper import paper
 from scara_ident.cli.simulate import simulate
+from scara_ident.cli.use import use
 from scara_ident.errors import ScaraIdentError
 
 # Exit status after Ctrl-C, as shells have it; typer gives it back for a command that was interrupted.
@@ -59,6 +60,7 @@ _COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (compare, "Set every trajectory's parameters against every trajectory."),
     (excite, "Design a motion that tells much, within the arm's limits."),
     (simulate, "Record the virtual arm in closed loop."),
+    (use, "Say what the model wins as feed-forward and in simulation."),
     (inspect, "Show what is in a file, audit it, write a first robot.yaml."),
     (base, "Print the base parameters: what each is made of."),
     (paper, "Set the tables of Indri et al. beside what is computed."),

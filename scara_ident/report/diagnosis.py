@@ -87,6 +87,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
         "moved": moved(diagnosis),
         "parameters": [
             column.entry(value=diagnosis.after.value[k], std=diagnosis.after.std[k])
+            | ({"before": diagnosis.before.value[k]} if k < len(diagnosis.before.model.columns) else {})
             for k, column in enumerate(diagnosis.after.model.columns)
         ],
         "run_variation": diagnosis.after.variation.sizes(diagnosis.robot) if diagnosis.after.variation else {},

@@ -184,6 +184,8 @@ def track(
     x = make_state(n, len(plant.shaft_joint))
     for target, value in zip(x[:4], initial, strict=True):
         target[:] = value
+    # As if it had been moving so before: friction that builds up over a distance is there.
+    x.dahl[:n] = np.sign(x.omega)
     out = make_trace(samples, n)
     room = make_room(n)
     status = _track(

@@ -10,7 +10,7 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.registry import Registry
 from scara_ident.report.html.blocks import Block, listing
 
-Kind = Literal["identification", "diagnosis", "comparison", "excitation", "paper"]
+Kind = Literal["identification", "diagnosis", "comparison", "excitation", "paper", "use"]
 
 
 class Section(Protocol):
@@ -38,7 +38,8 @@ class Section(Protocol):
 
         Parameters
         ----------
-        context : IdentificationContext, DiagnosisContext, ComparisonContext, ExcitationContext or PaperReport
+        context : IdentificationContext, DiagnosisContext, ComparisonContext, ExcitationContext, PaperReport or
+            UseContext
             By the kind of report.
 
         Returns
@@ -119,7 +120,7 @@ def added_sections(kind: Kind) -> tuple[AddedSection, ...]:
     Parameters
     ----------
     kind : str
-        ``identification``, ``diagnosis``, ``comparison``, ``excitation`` or ``paper``.
+        ``identification``, ``diagnosis``, ``comparison``, ``excitation``, ``paper`` or ``use``.
 
     Raises
     ------

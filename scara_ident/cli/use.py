@@ -1,0 +1,63 @@
+"""``scara-ident use``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scara_ident.cli import options
+from scara_ident.cli.console import check_report, progress, result_console, table
+
+
+def use(
+    result: Annotated[
+        Path,
+        typer.Argument(metavar="RESULT", help="identification.json or diagnosis.json of `identify` or `diagnose`."),
+    ],
+    robot: options.Robot = None,
+    trajectory: Annotated[
+        str | None,
+        typer.Option(
+            "--trajectory", metavar="FILE", help="Motion to follow, a trajectory.csv; default: from pose to pose."
+        ),
+    ] = None,
+    recording: Annotated[
+        list[str] | None,
+        typer.Option("--recording", metavar="RECORDING", help="Recording to simulate beside; may be repeated."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the motion and the arms drawn.")] = 0,
+    output: options.Output = None,
+    json: options.Json = False,
+) -> None:
+    """Say what the model wins: fed forward on virtual arms, and in simulation beside recordings."""
+    from scara_ident.files import write_json, written_together
+    from scara_ident.recording.recording import read_usable
+    from scara_ident.report.html.use import use_report
+    from scara_ident.report.use import WORDS, use_dict
+    from scara_ident.robot.robot import load_robot
+    from scara_ident.simulation.named import named_motion
+    from scara_ident.use import use as run
+    from scara_ident.use.use import read_result, used_model
+
+    check_report(output, "use")
+    arm = load_robot(robot)
+    model = used_model(read_result(result), arm)
+    motion = None if trajectory is None else named_motion(trajectory, arm)
+    with progress() as work:
+        given, useless = read_usable(recording or (), arm, needed=False)
+        found = run(model, motion, given, seed=seed, progress=work)
+    content = use_dict(found)
+    console = result_console(content, json)
+    console.note(useless)
+    rows = table("rms tracking error", "feed-forward", *arm.joints, right=arm.joints)
+    for name, errors in content["tracking"].items():
+        rows.add_row(WORDS[name], *(f"{errors[joint]:.3g} {content['units'][joint]}" for joint in arm.joints))
+    console.print(rows)
+    console.say(content["summary"])
+    if output is not None:
+        with written_together(output) as place:
+            use_report(place / "report.html", found)
+            write_json(place / "use.json", content)
+        console.written(output, "use.json", "report.html")

@@ -1,0 +1,5 @@
+"""The identified model at work: fed forward, and in simulation."""
+
+from scara_ident.use.use import Use, UsedModel, use, used_model
+
+__all__ = ["Use", "UsedModel", "use", "used_model"]

@@ -1,0 +1,134 @@
+"""The virtual arm that has identified parameters, and found effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.errors import RobotError
+from scara_ident.model.model import build_model
+from scara_ident.robot.robot import Robot
+from scara_ident.simulation.arm import VirtualArm
+from scara_ident.simulation.defaults import placed_poles, virtual_arm
+from scara_ident.simulation.effects import EFFECTS, Effect
+from scara_ident.simulation.spatial import mass_and_bias
+
+# An effect as ``diagnosis.json`` has it.
+Entry = Mapping[str, Any]
+# Standard parameters of a body by kind: mass, first moments, moments of inertia.
+_KINDS = (slice(0, 1), slice(1, 4), slice(4, 10))
+# A kind of parameter that the URDF has none of counts as this share of the kind's largest one on the arm.
+_LEAST_SHARE = 1e-3
+# Random poses at which the inertia must be positive.
+_POSES = 64
+
+
+def arm_with(robot: Robot, parameters: Mapping[str, float]) -> VirtualArm:
+    """Return the virtual arm whose complete model has given parameters.
+
+    Torque tells base parameters only; of all bodies with these, those are taken that are nearest to the URDF's, each kind
+    of parameter in units of the arm's largest. Every motion then takes the same torque, whichever they are.
+
+    Parameters
+    ----------
+    robot : Robot
+    parameters : mapping of str to float
+        By the names of the complete model; those that it lacks are zero.
+
+    Returns
+    -------
+    VirtualArm
+
+    Raises
+    ------
+    RobotError
+        If no arm with these parameters can move: its inertia is not positive somewhere.
+    """
+    arm, model = virtual_arm(robot), build_model(robot, "complete")
+    value = np.array([float(parameters.get(name, 0.0)) for name in model.names])
+    body, n = model.rigid_body, robot.n
+    grouping = body.base.grouping[body.kept]
+    nominal = np.concatenate([arm.bodies.ravel(), arm.armature])
+    size = np.concatenate([np.tile(_sizes(arm.bodies), n), np.full(n, max(float(np.max(arm.armature)), _LEAST_SHARE))])
+    scaled = grouping * size
+    change = size * (np.linalg.pinv(scaled) @ (value[: len(grouping)] - grouping @ nominal))
+    standard = nominal + change
+    friction = value[len(grouping) : len(grouping) + 4 * n].reshape(n, 4)
+    made = replace(
+        arm,
+        bodies=standard[: 10 * n].reshape(n, 10),
+        rotor_inertia=np.maximum(standard[10 * n :], 0.0) / robot.reduction**2,
+        friction=friction,
+        torque_offset=value[len(grouping) + 4 * n :],
+    )
+    return replace(made, controller=placed_poles(_mean_inertia(made)))
+
+
+def simulated(found: Sequence[Entry]) -> tuple[tuple[tuple[Effect, Entry], ...], tuple[str, ...]]:
+    """Return the virtual arm's effects for those of a ``diagnosis.json``, and the names of those that it cannot have.
+
+    Parameters
+    ----------
+    found : sequence of mapping
+        With ``effect``, ``joint`` and ``parameters``.
+
+    Returns
+    -------
+    pairs : tuple of (Effect, mapping)
+        Each effect with what it was made of.
+    missing : tuple of str
+    """
+    made: list[tuple[Effect, Entry]] = []
+    missing: list[str] = []
+    for item in found:
+        kind = EFFECTS.get(item["effect"])
+        names = {} if kind is None else kind.parameter_names()
+        known: dict[str, Any] = {
+            names[key]: float(entry["value"])
+            for key, entry in item["parameters"].items()
+            if key in names and entry["value"] is not None
+        }
+        if kind is None or not known:
+            missing.append(item["effect"])
+            continue
+        effect = kind(joint=None if kind.whole_arm == "always" else item["joint"])
+        made.append((replace(effect, **known), item))
+    return tuple(made), tuple(missing)
+
+
+def _sizes(bodies: Array) -> Array:
+    """Return the largest of each kind of standard parameter of a body, shape (10,)."""
+    size = np.empty(10)
+    for kind in _KINDS:
+        size[kind] = np.max(np.abs(bodies[:, kind]))
+    return np.maximum(size, _LEAST_SHARE * np.max(size))
+
+
+def _mean_inertia(arm: VirtualArm) -> Array:
+    """Return the mean inertia about each joint over its range, rotors included, shape (n,).
+
+    Raises
+    ------
+    RobotError
+        If an inertia is not positive.
+    """
+    robot = arm.robot
+    back = np.argsort(robot.order)
+    lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
+    random, total = np.random.default_rng(0), np.zeros(robot.n)
+    for _ in range(_POSES):
+        pose = random.uniform(lower, upper)[back]
+        mass, _ = mass_and_bias(robot.model, arm.bodies[back], pose, np.zeros(robot.n))
+        mass = mass + np.diag(arm.armature[back])
+        if np.linalg.eigvalsh(mass)[0] <= 0.0:
+            raise RobotError(
+                f"{robot.name}: no arm with these parameters can move, its inertia is not positive; identify with "
+                "--method consistent, or from motion that tells more"
+            )
+        total += np.diag(mass)[robot.order] / _POSES
+    return total

@@ -1,0 +1,59 @@
+"""How far a simulated arm drifts from a recorded one that has the same torques."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.motion.prepared import PreparedStretch
+from scara_ident.simulation.arm import VirtualArm
+from scara_ident.simulation.effects import Effect
+from scara_ident.simulation.simulate import free_motion
+
+# Starts along a recording, at the most.
+STARTS = 40
+HORIZONS = (0.05, 0.1, 0.2, 0.5)
+
+
+def rollout_errors(
+    arm: VirtualArm, effects: Sequence[Effect], part: PreparedStretch, horizons: Sequence[float] = HORIZONS
+) -> Array:
+    """Return how far a simulated arm is from the recorded one some time after both were at the same state.
+
+    From many places of a recording where all joints move the arm goes on with the recorded torque alone, without a controller.
+
+    Parameters
+    ----------
+    arm : VirtualArm
+        With a model's parameters.
+    effects : sequence of Effect
+        That the model has. Those that depend on the time since the run began start anew with every rollout.
+    part : PreparedStretch
+        Of a recording with effort; its filtered motion gives the states.
+    horizons : sequence of float, optional
+        s.
+
+    Returns
+    -------
+    ndarray, shape (len(horizons), n)
+        Rms distance of positions, rad or m; NaN where the recording is shorter.
+    """
+    motion, rate = part.motion, part.rate
+    longest = round(max(horizons) * rate)
+    # At rest dry friction is anything that holds the joint, which no state tells.
+    moving = np.flatnonzero(np.all(part.used, axis=0))
+    moving = moving[moving < part.samples - part.trim - longest]
+    if not len(moving):
+        return np.full((len(horizons), arm.robot.n), np.nan)
+    places = moving[np.unique(np.linspace(0, len(moving) - 1, STARTS).astype(int))]
+    steps = np.array([round(horizon * rate) for horizon in horizons])
+    square = np.zeros((len(horizons), arm.robot.n))
+    for k in places:
+        torque = part.torque[:, k : k + longest + 1]
+        _, true = free_motion(
+            arm, motion.q[:, k], motion.v[:, k], longest / rate, torque=torque, effects=effects, rate=rate
+        )
+        square += ((true.position[:, steps] - motion.q[:, k + steps]) ** 2).T
+    return np.sqrt(square / len(places))

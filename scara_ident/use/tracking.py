@@ -1,0 +1,119 @@
+"""How well an arm follows a motion by its controller alone, and with torque fed forward from a model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.simulation.arm import VirtualArm, ideal
+from scara_ident.simulation.effects import Effect
+from scara_ident.simulation.inverse_dynamics import inverse_dynamics
+from scara_ident.simulation.reference import ReferenceMotion
+from scara_ident.simulation.simulate import simulate
+
+# Rounds in which the torque that effects ask for is found; each leaves a few per cent of what the last one missed.
+ROUNDS = 4
+# Samples per second of the controller.
+RATE = 1000.0
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """A motion followed with one feed-forward.
+
+    Attributes
+    ----------
+    name : str
+    time : ndarray, shape (N,)
+        s.
+    error : ndarray, shape (n, N)
+        Wanted less true position of the drives, rad or m.
+    """
+
+    name: str
+    time: Array
+    error: Array
+
+    @property
+    def rms(self) -> Array:
+        """Rms error of every joint, shape (n,)."""
+        return np.asarray(np.sqrt(np.mean(self.error**2, axis=1)))
+
+
+def at_ticks(motion: ReferenceMotion) -> ReferenceMotion:
+    """Return a motion at the ticks of the controller."""
+    count = int(np.floor(motion.duration * RATE * (1.0 + 1e-12) + 1e-9)) + 1
+    moved = motion.at(motion.time[0] + np.arange(count) / RATE)
+    return replace(moved, time=np.arange(count) / RATE)
+
+
+def urdf_torque(arm: VirtualArm, motion: ReferenceMotion) -> Array:
+    """Return the torque by the URDF alone, with the rotors that it states and without friction, shape (n, N).
+
+    On the effort side, at the samples of the motion.
+    """
+    robot = arm.robot
+    nominal = robot.standard_parameters()[: 10 * robot.n].reshape(-1, 10)
+    bare = replace(
+        arm, rotor_inertia=robot.rotor_inertia, friction=np.zeros((robot.n, 4)), torque_offset=np.zeros(robot.n)
+    )
+    torque = inverse_dynamics(bare, nominal, motion.position, motion.velocity, motion.acceleration)
+    return np.asarray(torque / arm.scale[:, None])
+
+
+def needed_torque(arm: VirtualArm, effects: Sequence[Effect], motion: ReferenceMotion) -> Array:
+    """Return the torque that lets an arm follow a motion, shape (n, N), on the effort side.
+
+    Without effects it is inverse dynamics. With them an ideal arm, without encoder steps, follows the motion in simulation
+    with the torque so far fed forward, and what the controller added is added to it (iterative learning control,
+    Arimoto, Kawamura and Miyazaki 1984); so elastic joints and states of friction are met as well.
+
+    Parameters
+    ----------
+    arm : VirtualArm
+    effects : sequence of Effect
+    motion : ReferenceMotion
+        At the ticks of the controller, see `at_ticks`.
+    """
+    torque = inverse_dynamics(arm, arm.bodies, motion.position, motion.velocity, motion.acceleration)
+    feed = torque / arm.scale[:, None]
+    for _ in range(ROUNDS if effects else 0):
+        feed = simulate(ideal(arm), motion, effects=effects, feed=feed, rate=RATE).true.effort
+    return np.asarray(feed)
+
+
+def tracked(
+    arm: VirtualArm,
+    effects: Sequence[Effect],
+    motion: ReferenceMotion,
+    feeds: Mapping[str, Array | None],
+    seed: int = 0,
+) -> tuple[Tracked, ...]:
+    """Let an arm follow a motion with each of several torques fed forward.
+
+    Parameters
+    ----------
+    arm : VirtualArm
+        As it is, unknown to what is fed forward.
+    effects : sequence of Effect
+        That it has.
+    motion : ReferenceMotion
+        At the ticks of the controller.
+    feeds : mapping of str to ndarray of shape (n, N), or None
+        Fed forward, on the effort side; None for the PID alone.
+    seed : int, optional
+        Of the encoders' zeros.
+
+    Raises
+    ------
+    ScaraIdentError
+        If the controller loses the arm.
+    """
+    found = []
+    for name, feed in feeds.items():
+        run = simulate(arm, motion, effects=effects, feed=feed, rate=RATE, seed=seed)
+        found.append(Tracked(name, run.motion.time, run.motion.position - run.true.position))
+    return tuple(found)

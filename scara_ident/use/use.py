@@ -1,0 +1,233 @@
+"""What a model wins: fed forward, and in simulation, before and after the effects that were found."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.errors import RecordingError, RobotError, ScaraIdentError, UsageError
+from scara_ident.motion.prepared import prepare
+from scara_ident.progress import Tell, silent
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import Robot
+from scara_ident.simulation.arm import VirtualArm
+from scara_ident.simulation.effects import Effect
+from scara_ident.simulation.reference import ReferenceMotion
+from scara_ident.use.identified_arm import Entry, arm_with, simulated
+from scara_ident.use.rollout import HORIZONS, rollout_errors
+from scara_ident.use.tracking import Tracked, at_ticks, needed_torque, tracked, urdf_torque
+from scara_ident.use.trial_motion import trial_motion
+
+# Arms that may be the true one, drawn about the model.
+DRAWS = 3
+# An arm drawn so far off that it cannot exist is drawn nearer, so many times by half.
+HALVINGS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class UsedModel:
+    """A model as its result file tells it.
+
+    Attributes
+    ----------
+    robot : Robot
+    before, after : mapping of str to float
+        Parameters of the complete model's names, without and with the effects found.
+    std : mapping of str to float
+        Their standard deviations; what is not determined is left out.
+    found : sequence of Entry
+        The effects, as in ``diagnosis.json``.
+    bands : tuple of float or None, one per joint
+        In which it was found, Hz.
+    """
+
+    robot: Robot
+    before: Mapping[str, float]
+    after: Mapping[str, float]
+    std: Mapping[str, float]
+    found: Sequence[Entry]
+    bands: tuple[float | None, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Use:
+    """What `use` found.
+
+    Attributes
+    ----------
+    model : UsedModel
+    motion : ReferenceMotion
+        That the arms followed.
+    runs : tuple of tuple of Tracked
+        For every drawn arm one per feed-forward: ``pid``, ``urdf``, ``identified``, ``effects``.
+    horizons : tuple of float
+        s.
+    rollouts : mapping of str to ndarray of shape (len(horizons), n)
+        ``identified`` and ``effects``: rms distance from recordings; empty without any.
+    effects, missing : tuple
+        Effects that the virtual arm had, and names of those found that it cannot have.
+    """
+
+    model: UsedModel
+    motion: ReferenceMotion
+    runs: tuple[tuple[Tracked, ...], ...]
+    horizons: tuple[float, ...]
+    rollouts: Mapping[str, Array]
+    effects: tuple[Effect, ...]
+    missing: tuple[str, ...]
+
+    def rms(self) -> dict[str, Array]:
+        """Return the rms tracking error of every joint over all drawn arms, by feed-forward."""
+        names = [item.name for item in self.runs[0]]
+        return {
+            name: np.sqrt(np.mean([run[place].rms ** 2 for run in self.runs], axis=0))
+            for place, name in enumerate(names)
+        }
+
+
+def read_result(path: Path) -> dict[str, Any]:
+    """Read an ``identification.json`` or a ``diagnosis.json``.
+
+    Raises
+    ------
+    ScaraIdentError
+        In one line, if it cannot be read or is none.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScaraIdentError(
+            f"{path}: cannot be read: {error.strerror or error}; give the result of identify"
+        ) from None
+    except ValueError:
+        content = None
+    if not isinstance(content, dict) or "parameters" not in content:
+        raise ScaraIdentError(
+            f"{path}: no parameters in it; give the identification.json or diagnosis.json that was written"
+        )
+    return content
+
+
+def used_model(content: Mapping[str, Any], robot: Robot) -> UsedModel:
+    """Take a model from the content of ``identification.json`` or ``diagnosis.json``.
+
+    Parameters
+    ----------
+    content : mapping
+    robot : Robot
+        That it was identified for.
+
+    Raises
+    ------
+    UsageError
+        If it is no such content, or of another robot or model.
+    """
+    try:
+        entries, name = list(content["parameters"]), str(content["robot"])
+        after = {item["name"]: float(item["value"]) for item in entries if item["value"] is not None}
+        std = {item["name"]: float(item["std"]) for item in entries if item.get("std") is not None}
+        before = after | {item["name"]: float(item["before"]) for item in entries if item.get("before") is not None}
+        found = list(content.get("effects", ()))
+        bands = {**dict.fromkeys(robot.joints), **(content.get("band_hz") or {})}
+    except (KeyError, TypeError, ValueError, AttributeError):
+        raise UsageError("no parameters are in it; expected an identification.json or a diagnosis.json") from None
+    if name != robot.name:
+        raise UsageError(f"it was identified for {name}, the robot given is {robot.name}; give that one by --robot")
+    if content.get("model") not in ("complete", "reduced", "basic"):
+        raise UsageError(f"its model {content.get('model')!r} is none that the virtual arm has")
+    return UsedModel(robot, before, after, std, found, tuple(bands[joint] for joint in robot.joints))
+
+
+def use(
+    model: UsedModel,
+    motion: ReferenceMotion | None = None,
+    recordings: Sequence[Recording] = (),
+    *,
+    seed: int = 0,
+    progress: Tell = silent,
+) -> Use:
+    """Say what a model wins as feed-forward and in simulation.
+
+    The arms that follow the motion are not the model: their parameters and effects are drawn about it by its standard
+    deviations, and their encoders have steps.
+
+    Parameters
+    ----------
+    model : UsedModel
+    motion : ReferenceMotion, optional
+        By default from pose to pose within the limits.
+    recordings : sequence of Recording, optional
+        With effort; simulated arms with the same torques are compared with them.
+    seed : int, optional
+    progress : callable, optional
+
+    Returns
+    -------
+    Use
+
+    Raises
+    ------
+    RobotError
+        If no arm with these parameters can move.
+    """
+    random = np.random.default_rng(seed)
+    pairs, missing = simulated(model.found)
+    progress("feed-forward torques", 0.0)
+    bare, whole = arm_with(model.robot, model.before), arm_with(model.robot, model.after)
+    pairs = tuple((effect.resolve(whole), item) for effect, item in pairs)
+    effects = tuple(effect for effect, _ in pairs)
+    wanted = at_ticks(trial_motion(whole, seed) if motion is None else motion)
+    feeds: dict[str, Array | None] = {"pid": None, "urdf": urdf_torque(whole, wanted)}
+    feeds["identified"] = needed_torque(bare, (), wanted)
+    if effects:
+        feeds["effects"] = needed_torque(whole, effects, wanted)
+    runs = []
+    for k in range(DRAWS):
+        progress("following the motion", 0.2 + 0.5 * k / DRAWS)
+        arm, own = _drawn(model, whole, random), tuple(_drawn_effect(*pair, whole, random) for pair in pairs)
+        runs.append(tracked(arm, own, wanted, feeds, seed + k))
+    rollouts = {}
+    if recordings:
+        progress("rolling out", 0.7)
+        parts = [part for part in prepare(recordings, model.bands).stretches if part.usable]
+        if not parts or any(part.stretch.torque is None for part in parts):
+            raise RecordingError(f"{recordings[0].name}: too short, or without effort, to roll out with; record longer")
+        variants: dict[str, tuple[VirtualArm, Sequence[Effect]]] = {"identified": (bare, ())}
+        if effects:
+            variants["effects"] = (whole, effects)
+        for name, (which, having) in variants.items():
+            each = np.array([rollout_errors(which, having, part) for part in parts])
+            rollouts[name] = np.sqrt(np.nanmean(each**2, axis=0))
+    return Use(model, wanted, tuple(runs), HORIZONS, rollouts, effects, missing)
+
+
+def _drawn(model: UsedModel, whole: VirtualArm, random: np.random.Generator) -> VirtualArm:
+    """Draw an arm about the model."""
+    step = {name: std * random.normal() for name, std in model.std.items() if name in model.after}
+    for share in 0.5 ** np.arange(HALVINGS):
+        try:
+            moved = {name: value + share * step.get(name, 0.0) for name, value in model.after.items()}
+            return replace(arm_with(model.robot, moved), controller=whole.controller)
+        except RobotError:
+            continue
+    return whole
+
+
+def _drawn_effect(effect: Effect, found: Entry, arm: VirtualArm, random: np.random.Generator) -> Effect:
+    """Draw an effect about what was found; where that is out of its bounds it is as found."""
+    names = effect.parameter_names()
+    moved = {
+        names[key]: getattr(effect, names[key]) + float(entry["std"]) * random.normal()
+        for key, entry in found["parameters"].items()
+        if key in names and entry.get("std") is not None and np.isfinite(entry["std"])
+    }
+    try:
+        return replace(effect, **moved).resolve(arm)
+    except UsageError:
+        return effect

@@ -1,0 +1,59 @@
+"""The virtual arm with given parameters takes the torque that the model predicts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scara_ident.errors import RobotError
+from scara_ident.model.model import build_model
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import Robot, load_robot
+from scara_ident.simulation import virtual_arm
+from scara_ident.simulation.inverse_dynamics import inverse_dynamics
+from scara_ident.simulation.truth import _complete_parameters
+from scara_ident.use.identified_arm import arm_with, simulated
+
+
+def moved_values(robot: Robot) -> dict[str, float]:
+    """Parameters of the virtual arm, each off by some per cent, with all powers of friction and an offset."""
+    model, random = build_model(robot, "complete"), np.random.default_rng(3)
+    value = np.array(_complete_parameters(virtual_arm(robot)))
+    value = value * (1.0 + 0.05 * random.normal(size=len(value)))
+    value[-robot.n :] = 0.1
+    return dict(zip(model.names, value, strict=True))
+
+
+@pytest.mark.parametrize("name", ["scara03", "ur5"])
+def test_its_torque_is_the_models_on_any_motion(name: str) -> None:
+    robot = load_robot() if name == "scara03" else load_robot(name)
+    model, wanted = build_model(robot, "complete"), moved_values(robot)
+    arm = arm_with(robot, wanted)
+    q, v, a = np.random.default_rng(1).normal(size=(3, robot.n, 40))
+    motion = Motion("", "", np.arange(40.0), q, v, a, None, 1.0)
+    predicted = np.einsum("npk,p->nk", model.regressor(motion), np.array(list(wanted.values())))
+    torque = inverse_dynamics(arm, arm.bodies, q, v, a) / arm.scale[:, None]
+    np.testing.assert_allclose(torque, predicted, rtol=1e-9, atol=1e-9 * np.abs(predicted).max())
+
+
+def test_parameters_of_no_arm_are_refused() -> None:
+    robot = load_robot()
+    wanted = moved_values(robot) | {"P_d4": -50.0}
+    with pytest.raises(RobotError, match="no arm with these parameters can move"):
+        arm_with(robot, wanted)
+
+
+def test_effects_of_a_diagnosis_become_those_of_the_virtual_arm() -> None:
+    told = {"value": 0.2, "std": 0.01, "unit": "1"}
+    found = [
+        {"effect": "transmission_loss", "joint": "joint2", "parameters": {"loss_coefficient": told}},
+        {"effect": "base_tilt", "joint": None, "parameters": {"tilt_x": told, "tilt_y": {"value": None, "std": None}}},
+        {"effect": "drive_coupling", "joint": "joint2", "parameters": {"share": told}},
+    ]
+    pairs, missing = simulated(found)
+    assert [(effect.name, effect.joint) for effect, _ in pairs] == [
+        ("transmission_loss", "joint2"),
+        ("base_tilt", None),
+    ]
+    assert [item for _, item in pairs] == found[:2]
+    assert missing == ("drive_coupling",)

@@ -1,0 +1,27 @@
+"""The same arm with the same torques goes where the recorded one went."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from scara_ident.motion.prepared import prepare
+from scara_ident.simulation import parse_effect, simulate
+from scara_ident.simulation.arm import ideal
+from scara_ident.use.rollout import rollout_errors
+from tests.simulation.made import scara, swing
+
+
+def test_only_the_arm_with_the_effect_stays_by_the_recording() -> None:
+    arm = ideal(scara())
+    spring = parse_effect("spring:joint1:stiffness=0.5").resolve(arm)
+    run = simulate(arm, swing(arm.robot, 4.0), effects=[spring])
+    (part,) = prepare([replace(run.recording, effort=run.true.effort)], (30.0, 30.0)).stretches
+    horizons = (0.05, 0.2)
+    own, other = (rollout_errors(arm, effects, part, horizons) for effects in ([spring], []))
+    assert own.shape == (2, 2)
+    # What is left is the low-pass on the states that it starts from.
+    assert np.all(own < 2e-4)
+    assert other[1, 0] > 10.0 * own[1, 0]
+    assert np.isnan(rollout_errors(arm, [], part, (10.0,))).all()
