@@ -32,7 +32,6 @@ from scara_ident.robot.examples import example_urdf
 from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation import (
     EFFECTS,
-    Controller,
     Effect,
     ReferenceMotion,
     RunState,
@@ -162,7 +161,7 @@ def random_arm(name: str, stated: bool, bits: int, folder: Path, rng: np.random.
         friction=friction,
         torque_offset=offset,
         torque_scale=scale,
-        controller=_faster(arm.controller, faster),
+        controller=arm.controller.faster(faster),
         encoder_steps=np.full(n, 2.0**bits if bits else 0.0) / np.abs(robot.reduction),
     )
     if stated and name != "scara03":
@@ -273,7 +272,7 @@ def simulate_set(
             break
         except ScaraIdentError as error:
             # An elastic joint may be more than a fast controller can hold, as on a real arm: then a slower one is taken.
-            lost, arm = error, replace(arm, controller=_faster(arm.controller, SLOWER))
+            lost, arm = error, replace(arm, controller=arm.controller.faster(SLOWER))
     else:
         raise lost
     count = sum(not run.held_out for run in conditions.runs)
@@ -304,16 +303,6 @@ def _recorded(
         recordings.append(replace(result.recording, name=name, trajectory=trajectory, repetition=repetition))
         events += [event_truth(arm, event, result, name) for event in own]
     return recordings, events
-
-
-def _faster(control: Controller, factor: float) -> Controller:
-    """Return a controller with its poles times a factor: gains by its powers."""
-    return replace(
-        control,
-        proportional=factor**2 * control.proportional,
-        integral=factor**3 * control.integral,
-        derivative=factor * control.derivative,
-    )
 
 
 def usual_torque(arm: VirtualArm, motions: Sequence[ReferenceMotion]) -> NDArray[np.float64]:

@@ -35,6 +35,15 @@ class Controller:
     cutoff: float = 100.0
     damping: float = 1.0
 
+    def faster(self, factor: float) -> Controller:
+        """Return a controller with its poles times a factor: gains by its powers."""
+        return replace(
+            self,
+            proportional=factor**2 * self.proportional,
+            integral=factor**3 * self.integral,
+            derivative=factor * self.derivative,
+        )
+
     def gains(self, rate: float, order: NDArray[np.intp]) -> Gains:
         """Return the loop's gains in Pinocchio's order, the filter for ``rate`` samples per second."""
         from scara_ident.simulation.loop import Gains, velocity_filter
