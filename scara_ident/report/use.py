@@ -64,6 +64,10 @@ def sentences(result: Use) -> list[str]:
     ]
     for name, rows in result.rollouts.items():
         place = int(np.argmin(np.abs(np.array(result.horizons) - 0.2)))
+        if not np.all(np.isfinite(rows[place])):
+            gone = np.any(np.isinf(rows))
+            said.append(f"Simulated {WORDS[name]} the arm {'gets lost' if gone else 'was recorded for too short'}.")
+            continue
         ends = ", ".join(
             f"{joint} {value:.2g} {result.model.robot.position_unit(j)}"
             for j, (joint, value) in enumerate(zip(result.model.robot.joints, rows[place], strict=True))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.errors import ScaraIdentError
 from scara_ident.motion.prepared import PreparedStretch
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
@@ -38,7 +39,8 @@ def rollout_errors(
     Returns
     -------
     ndarray, shape (len(horizons), n)
-        Rms distance of positions, rad or m; NaN where the recording is shorter.
+        Rms distance of positions, rad or m; NaN where the recording is shorter, infinite where friction drives the simulated
+        arm out of all bounds, as a polynomial can beyond the speeds that it was fitted to.
     """
     motion, rate = part.motion, part.rate
     longest = round(max(horizons) * rate)
@@ -52,8 +54,11 @@ def rollout_errors(
     square = np.zeros((len(horizons), arm.robot.n))
     for k in places:
         torque = part.torque[:, k : k + longest + 1]
-        _, true = free_motion(
-            arm, motion.q[:, k], motion.v[:, k], longest / rate, torque=torque, effects=effects, rate=rate
-        )
+        try:
+            _, true = free_motion(
+                arm, motion.q[:, k], motion.v[:, k], longest / rate, torque=torque, effects=effects, rate=rate
+            )
+        except ScaraIdentError:
+            return np.full(square.shape, np.inf)
         square += ((true.position[:, steps] - motion.q[:, k + steps]) ** 2).T
     return np.sqrt(square / len(places))

@@ -16,7 +16,7 @@ REACH = 1.5
 SPEED, SLIDE_SPEED = 2.0, 0.4
 # Peak speed of the quintic in lengths of the way per duration.
 QUINTIC_PEAK = 1.875
-POSES, PAUSE = 8, 0.2
+POSES, PAUSE = 5, 0.2
 SLOWER, ATTEMPTS = 0.8, 12
 RATE = 1000.0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,5 +47,7 @@ def test_the_words_give_shares_of_the_pids_error() -> None:
         "with the effects found 10%."
     )
     assert "off after 0.2 s by joint1 0.01 rad, joint2 0.02 rad" in others[1]
+    lost = replace(result(), rollouts={"identified": np.full((2, 2), np.inf)})
+    assert "gets lost" in sentences(lost)[1]
     assert others[-1] == "Not simulated: drive_coupling."
     assert total(np.array([3.0, 0.0]), np.array([3.0, 1.0])) == pytest.approx(np.sqrt(0.5))

@@ -25,3 +25,6 @@ def test_only_the_arm_with_the_effect_stays_by_the_recording() -> None:
     assert np.all(own < 2e-4)
     assert other[1, 0] > 10.0 * own[1, 0]
     assert np.isnan(rollout_errors(arm, [], part, (10.0,))).all()
+    # Friction that pushes takes the arm away.
+    pushing = replace(arm, friction=np.array([[0.0, -60.0, 0.0, -60.0]] * 2))
+    assert np.isinf(rollout_errors(pushing, [], part, horizons)).all()
