@@ -33,15 +33,16 @@ def path_fault(path: Path | str) -> str | None:
     Returns
     -------
     str or None
-        A few words, with what to do.
+        The path so that it can be printed, and what to do.
     """
     text = str(path)
+    shown = text.encode("utf-8", errors="replace").decode("utf-8").replace("\0", "?")
     if "\0" in text:
-        return "has a null byte in its name; correct the name"
+        return f"{shown}: has a null byte in its name; correct the name"
     try:
         text.encode("utf-8")
     except UnicodeEncodeError:
-        return "its name is not text in UTF-8; rename it"
+        return f"{shown}: its name is not text in UTF-8; rename it"
     return None
 
 
@@ -95,7 +96,7 @@ def check_output(folder: Path | None) -> None:
     if folder is None:
         return
     if (fault := path_fault(folder)) is not None:
-        raise UsageError(f"{folder}: {fault}")
+        raise UsageError(fault)
     made: list[Path] = []
     try:
         made = _make(folder)

@@ -169,7 +169,7 @@ def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int 
 
     scale = _parameter_scale(robot)
     # Lengths of columns and what they share are those of the triangular factor, which has p rows.
-    columns = np.linalg.qr(_random_columns(robot, seed) * scale, mode="r")
+    columns = np.asarray(np.linalg.qr(_random_columns(robot, seed) * scale, mode="r"))
     size = np.linalg.norm(columns, axis=0)
     largest = size.max(initial=0.0)
     absent = [k for k in range(p) if size[k] <= RANK_TOLERANCE * largest]

@@ -185,10 +185,11 @@ def read_description(path: Path) -> RobotDescription:
             try:
                 return super().construct_object(node, deep)
             except ValueError as error:
-                raise yaml.constructor.ConstructorError(None, None, str(error), node.start_mark) from None
+                said = f"{node.value[:20]!r} cannot be read ({str(error).partition(';')[0]}); correct it, or put it in quotes"
+                raise yaml.constructor.ConstructorError(None, None, said, node.start_mark) from None
 
     if (fault := path_fault(path)) is not None:
-        raise RobotError(f"{path}: {fault}")
+        raise RobotError(fault)
     try:
         text = path.read_text(encoding="utf-8")
         _refuse_twice(yaml.compose(text, Loader=yaml.SafeLoader), path)

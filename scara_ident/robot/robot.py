@@ -152,7 +152,7 @@ def load_robot(path: Path | str | None = None) -> Robot:
         return build_robot(RobotDescription(urdf=embedded_urdf(), effort_side="motor"), embedded_urdf())
     source = Path(path)
     if (fault := path_fault(source)) is not None:
-        raise RobotError(f"{source}: {fault}")
+        raise RobotError(fault)
     if is_name(source):
         source = example_urdf(source.name)
     if source.suffix.lower() == ".xacro":
@@ -246,7 +246,7 @@ def _positive_or_inf(limit: Array) -> Array:
 def _parse_xml(urdf: Path, source: Path) -> ElementTree.Element:
     """Read a URDF and check it: what the rest of the program takes from it has been seen to be there and usable."""
     if (fault := path_fault(urdf)) is not None:
-        raise RobotError(f"{source}: urdf: {urdf}: {fault}")
+        raise RobotError(f"{source}: urdf: {fault}")
     try:
         root = ElementTree.parse(urdf).getroot()
     except FileNotFoundError:
