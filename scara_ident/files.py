@@ -20,7 +20,7 @@ from scara_ident.errors import ScaraIdentError, UsageError
 # A small result file needs about so much; where this does not fit, no result does.
 PROBE = 4096
 # Bytes of a name out of a file; file systems take 255 with what is put before and behind it.
-LONGEST_SLUG = 100
+LONGEST_SLUG = 200
 
 
 def path_fault(path: Path | str) -> str | None:
