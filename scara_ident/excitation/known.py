@@ -35,7 +35,7 @@ def read_parameters(path: Path, model: TorqueModel) -> dict[str, float]:
         raise ScaraIdentError(
             f"{path}: cannot be read: {error.strerror or error}; give an identification.json"
         ) from None
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         raise ScaraIdentError(
             f"{path}: no parameters in it; give the identification.json that identify wrote"
         ) from None
