@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import sys
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
 
+from scara_ident.cli.main import main
 from scara_ident.robot.robot import embedded_urdf
 from tests.made_recordings import columns, save
 
@@ -130,6 +133,16 @@ def test_names_that_are_not_ascii_and_files_in_other_encodings_are_read(command,
         answer = command("base", "--robot", "arm.urdf")
         assert answer.status == 0
         assert "linké" in answer.out
+
+
+def test_a_name_that_the_terminal_cannot_show_is_written_in_escapes(here: Path, monkeypatch: pytest.MonkeyPatch):
+    (here / "arm.urdf").write_text(urdf().replace("link1", "linké"), encoding="utf-8")
+    monkeypatch.setattr("sys.stdout", TextIOWrapper(BytesIO(), encoding="ascii"))
+    with pytest.raises(SystemExit) as ended:
+        main(["base", "--robot", "arm.urdf"])
+    assert ended.value.code == 0
+    sys.stdout.flush()
+    assert b"link\\xe9" in sys.stdout.buffer.getvalue()
 
 
 @pytest.mark.parametrize("words", ["identify", "diagnose"])
