@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
@@ -14,10 +15,69 @@ from typing import Any
 
 import numpy as np
 
-from scara_ident.errors import ScaraIdentError
+from scara_ident.errors import ScaraIdentError, UsageError
 
 # A small result file needs about so much; where this does not fit, no result does.
 PROBE = 4096
+# Bytes of a name out of a file; file systems take 255 with what is put before and behind it.
+LONGEST_SLUG = 200
+
+
+def path_fault(path: Path | str) -> str | None:
+    """Say why a path can be no file's, or none that a result can name; None where it can.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    str or None
+        The path so that it can be printed, and what to do.
+    """
+    text = str(path)
+    shown = text.encode("utf-8", errors="replace").decode("utf-8").replace("\0", "?")
+    if "\0" in text:
+        return f"{shown}: has a null byte in its name; correct the name"
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        return f"{shown}: its name is not text in UTF-8; rename it"
+    return None
+
+
+def real_path(path: Path) -> Path:
+    """Return the path behind links, absolute; of links that go round in a ring, the path as it is."""
+    try:
+        return Path(os.path.realpath(path))
+    except ValueError:
+        return path
+
+
+def slug(name: str, default: str) -> str:
+    """Return a name out of a file as the name of a file: it leads into no folder, whatever it holds.
+
+    Parameters
+    ----------
+    name : str
+        Letters, digits, blanks and ``. _ + -`` inside it stay, anything else becomes ``-``.
+    default : str
+        Where nothing is left of it.
+
+    Returns
+    -------
+    str
+        At most `LONGEST_SLUG` bytes; it begins with no point.
+
+    Examples
+    --------
+    >>> slug("../../arm 1", "robot")
+    'arm 1'
+    >>> slug("/", "robot")
+    'robot'
+    """
+    kept = re.sub(r"[^\w .+-]+", "-", name).strip("-. ")
+    return kept.encode("utf-8")[:LONGEST_SLUG].decode("utf-8", errors="ignore").strip("-. ") or default
 
 
 def check_output(folder: Path | None) -> None:
@@ -35,6 +95,8 @@ def check_output(folder: Path | None) -> None:
     """
     if folder is None:
         return
+    if (fault := path_fault(folder)) is not None:
+        raise UsageError(fault)
     made: list[Path] = []
     try:
         made = _make(folder)

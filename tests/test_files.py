@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import ScaraIdentError
-from scara_ident.files import plain, write_json, write_text, write_whole
+from scara_ident.files import path_fault, plain, real_path, slug, write_json, write_text, write_whole
 
 
 def refuse(constant: str) -> None:
@@ -75,3 +75,37 @@ def test_a_file_where_a_folder_is_expected_is_one_line(tmp_path: Path):
     with pytest.raises(ScaraIdentError, match=r"b\.json: cannot be written"):
         write_json(tmp_path / "b.json", {})
     assert sorted(file.name for file in tmp_path.iterdir()) == ["b.json", "out"]
+
+
+@pytest.mark.parametrize(
+    ("name", "made"),
+    [
+        ("scara03", "scara03"),
+        ("my arm_2.1+b", "my arm_2.1+b"),
+        ("Ärmchen", "Ärmchen"),
+        ("../../../PWNED", "PWNED"),
+        ("/etc/passwd", "etc-passwd"),
+        ("C:\\arm", "C-arm"),
+        ("a\0b\nc\ud800", "a-b-c"),
+        (".hidden", "hidden"),
+        ("", "robot"),
+        (" .. ", "robot"),
+        ("\0", "robot"),
+        ("x" * 1000, "x" * 200),
+        ("é" * 150, "é" * 100),
+    ],
+)
+def test_a_name_out_of_a_file_names_a_file_and_no_folder(tmp_path: Path, name: str, made: str):
+    assert slug(name, "robot") == made
+    write_text(tmp_path / f"{slug(name, 'robot')}_identified.urdf", "text")
+    assert [path.parent for path in tmp_path.iterdir()] == [tmp_path]
+
+
+def test_paths_that_are_none_are_told_and_rings_of_links_have_no_end(tmp_path: Path):
+    assert path_fault(tmp_path / "é") is None
+    assert path_fault("a\0b") == "a?b: has a null byte in its name; correct the name"
+    assert path_fault("a\udcff") == "a?: its name is not text in UTF-8; rename it"
+    (tmp_path / "ring").symlink_to("ring")
+    (tmp_path / "way").symlink_to("end")
+    assert real_path(tmp_path / "ring").name == "ring"
+    assert real_path(tmp_path / "way").name == "end"

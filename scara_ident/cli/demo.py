@@ -12,6 +12,8 @@ from scara_ident.cli.console import output_console
 
 # What the arm has and the identifier is not told.
 HIDDEN = "transmission_loss:joint2:loss_coefficient=0.2"
+# Folders of the chapters' results.
+PARTS = ("base", "paper", "excite", "train", "test", "identify", "compare", "diagnose")
 
 
 def demo(
@@ -26,9 +28,13 @@ def demo(
     from scara_ident.cli.identify import identify
     from scara_ident.cli.paper import paper_in_short
     from scara_ident.cli.simulate import simulate
+    from scara_ident.errors import ScaraIdentError
     from scara_ident.files import check_output
 
     check_output(output)
+    for part in PARTS:
+        if (output / part).is_symlink():
+            raise ScaraIdentError(f"{output / part}: a link, and results stay in {output}; take it away")
     console = output_console()
 
     def chapter(text: str) -> None:

@@ -39,7 +39,7 @@ def identify(
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
     from scara_ident.estimation.consistent.options import ConsistentOptions
-    from scara_ident.files import write_json, written_together
+    from scara_ident.files import slug, write_json, written_together
     from scara_ident.identification.identify import identified_arm
     from scara_ident.identification.identify import identify as run
     from scara_ident.recording.recording import read_usable
@@ -99,7 +99,7 @@ def identify(
 
         arm_found = identified_arm(result)
         context = IdentificationContext(result)
-        urdf, mjcf = f"{arm.name}_identified.urdf", f"{arm.name}_identified.xml"
+        urdf, mjcf = (f"{slug(arm.name, 'robot')}_identified.{suffix}" for suffix in ("urdf", "xml"))
         with written_together(output) as place:
             if arm_found is not None:
                 notes = [export_urdf(arm_found, place / urdf), export_mjcf(arm_found, place / mjcf)]

@@ -43,7 +43,7 @@ def inspect(
     target = None if output is None else output / "robot.yaml"
     if target is not None and urdf is None:
         raise UsageError("--output: a first robot.yaml is made from a URDF; give --urdf")
-    if target is not None and target.exists():
+    if target is not None and (target.exists() or target.is_symlink()):
         raise ScaraIdentError(f"{target}: exists already and is not overwritten; move it away or give another --output")
     check_output(output)
     with progress() as work:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from io import TextIOWrapper
 from typing import Annotated, Any
 
 import typer
@@ -72,6 +73,10 @@ for _command, _line in _COMMANDS:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the program; every error is one line on stderr and an exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        # A name that the terminal's encoding has no sign for is no reason to fail.
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     sys.exit(run(sys.argv[1:] if arguments is None else arguments))
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
+
 from scara_ident.errors import ScaraIdentError
 from scara_ident.model.model import TorqueModel
 
@@ -31,11 +33,13 @@ def read_parameters(path: Path, model: TorqueModel) -> dict[str, float]:
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))["parameters"]
         found = {str(row["name"]): float(row["value"]) for row in rows if not _undetermined(row)}
+        if not np.isfinite(list(found.values())).all():
+            raise ValueError("a value is not finite")
     except OSError as error:
         raise ScaraIdentError(
             f"{path}: cannot be read: {error.strerror or error}; give an identification.json"
         ) from None
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         raise ScaraIdentError(
             f"{path}: no parameters in it; give the identification.json that identify wrote"
         ) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +99,7 @@ def joint_trajectory_yaml(trajectory: ExcitationTrajectory, rate: float | None =
         "header:",
         "  stamp: {sec: 0, nanosec: 0}",
         "  frame_id: ''",
-        f"joint_names: [{', '.join(repr(str(name)) for name in trajectory.joints)}]",
+        f"joint_names: [{', '.join(json.dumps(str(name)) for name in trajectory.joints)}]",
         "points:",
     ]
     for k, t in enumerate(time):

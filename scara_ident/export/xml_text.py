@@ -6,6 +6,7 @@ tells where elements stand, and the edits are made in the text.
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -82,14 +83,18 @@ def read_xml(path: Path) -> tuple[bytes, bool]:
         raise ScaraIdentError(f"{path}: cannot be read: {error.strerror}") from None
     declared = _ENCODING.match(content)
     encoding = declared.group(1).decode() if declared else "utf-8"
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        encoding = "utf-16"
     try:
         text = content.decode(encoding)
     except (UnicodeDecodeError, LookupError):
         raise ScaraIdentError(f"{path}: is not text in its encoding, {encoding}") from None
-    if declared is None or text.encode("utf-8") == content:
-        return content, False
+    new = text.encode("utf-8")
+    declared = _ENCODING.match(new)
+    if declared is None or new == content:
+        return new, new != content
     start, end = declared.span(1)
-    return (text[:start] + "utf-8" + text[end:]).encode("utf-8"), True
+    return new[:start] + b"utf-8" + new[end:], True
 
 
 def parse(content: bytes, path: Path) -> Element:

@@ -19,6 +19,7 @@ from scara_ident.estimation.estimate import paper_criteria
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import disagreement, robust_fit
+from scara_ident.files import real_path
 from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.channel_check import channel_faults
 from scara_ident.identification.events import Event, find_events, without_events
@@ -28,6 +29,7 @@ from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.progress import Tell, silent
 from scara_ident.recording.recording import Recording
+from scara_ident.recording.shared_samples import shared_samples
 from scara_ident.robot.robot import Robot
 
 
@@ -225,19 +227,24 @@ def estimate_by(
 
 
 def check_held_out(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:
-    """Refuse a recording that is both fitted and held out.
+    """Refuse a recording that is both fitted and held out, or has samples of one that is fitted.
 
     Raises
     ------
     UsageError
     """
-    fitted = {recording.path.resolve() for recording in recordings if recording.path is not None}
+    fitted = {real_path(recording.path) for recording in recordings if recording.path is not None}
     for recording in validation:
-        known = recording.path is not None and recording.path.resolve() in fitted
+        known = recording.path is not None and real_path(recording.path) in fitted
         if known or any(recording is other for other in recordings):
             raise UsageError(
                 f"{recording.path or recording.name}: given to fit and to validate; a validation recording must be held out"
             )
+    for other, first, share in shared_samples(recordings, validation):
+        raise UsageError(
+            f"{other.path or other.name}: {share:.0%} of its samples are those of {first.path or first.name}, given to fit and "
+            "to validate; a validation recording must be held out"
+        )
 
 
 def undetermined(identification: Identification) -> list[str]:

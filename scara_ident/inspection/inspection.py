@@ -13,6 +13,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, UsageError
+from scara_ident.files import path_fault
 from scara_ident.inspection.guess import Guess, guess
 from scara_ident.inspection.names import Meaning, meaning
 from scara_ident.inspection.text import description_text, mapping
@@ -115,6 +116,8 @@ def inspect_file(
     path = Path(path)
     if urdf is not None and robot is not None:
         raise UsageError("--urdf and --robot: give one; a robot description names its URDF")
+    if (fault := path_fault(path)) is not None:
+        raise UsageError(fault)
     if not path.exists():
         raise UsageError(f"{path}: no such file or folder")
     if path.is_dir() and not is_bag_folder(path):

@@ -35,7 +35,7 @@ def description_text(guess: Guess, robot: Robot, described: Mapping[str, Any], u
         The file that was inspected, named in a comment.
     """
     lines = [
-        f"# First description of {robot.name}, guessed by `scara-ident inspect` from {recording.name} and the URDF.",
+        f"# First description of {_line(robot.name)}, guessed by `scara-ident inspect` from {_line(recording.name)} and the URDF.",
         "# Check every line; what is marked STATE the program cannot know.",
         f"urdf: {_word(str(urdf))}",
         "",
@@ -53,8 +53,13 @@ def description_text(guess: Guess, robot: Robot, described: Mapping[str, Any], u
     lines += ["", *_recording(described)]
     lines += ["", "# gravity: [0, 0, -9.81]   # in the base frame; state it if the base is not upright"]
     for kind, said in (("missing", guess.problems), ("note", guess.notes)):
-        lines += [f"# {kind}: {' '.join(text.split())}" for text in said]
+        lines += [f"# {kind}: {_line(text)}" for text in said]
     return "\n".join(lines) + "\n"
+
+
+def _line(text: str) -> str:
+    """Return a text that stays in the comment that it stands in."""
+    return " ".join(text.split())
 
 
 def mapping(guess: Guess, robot: Robot) -> dict[str, Any]:

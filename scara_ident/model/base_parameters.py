@@ -30,6 +30,9 @@ BODY_PREFERENCE = (1, 2, 3, 4, 5, 7, 6, 8, 9, 0)
 RANK_TOLERANCE = 2e-5
 # Below this share a regrouping is exact to rounding; between the two it is reported as approximate.
 EXACT_TOLERANCE = 1e-9
+# Random states: four for each standard parameter, within these. A state gives a row for every joint, and a joint adds
+# eleven parameters, so that the largest number has tens of times the rows that a tree of any size needs.
+FEWEST_STATES, MOST_STATES = 40, 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +168,8 @@ def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int 
     units = list(BODY_UNITS) * n + [_armature_unit(robot, i) for i in range(n)]
 
     scale = _parameter_scale(robot)
-    columns = _random_columns(robot, seed, samples=max(40, 4 * p)) * scale
+    # Lengths of columns and what they share are those of the triangular factor, which has p rows.
+    columns = np.asarray(np.linalg.qr(_random_columns(robot, seed) * scale, mode="r"))
     size = np.linalg.norm(columns, axis=0)
     largest = size.max(initial=0.0)
     absent = [k for k in range(p) if size[k] <= RANK_TOLERANCE * largest]
@@ -242,10 +246,11 @@ def _parameter_scale(robot: Robot) -> Array:
     return np.concatenate([np.tile(body, robot.n), np.where(robot.prismatic, 1.0, length**2)])
 
 
-def _random_columns(robot: Robot, seed: int, samples: int) -> Array:
+def _random_columns(robot: Robot, seed: int) -> Array:
     """Stack the standard regressor of random states that move gravity, speed and acceleration alike."""
     rng = np.random.default_rng(seed)
     n, length = robot.n, _length_scale(robot)
+    samples = min(max(FEWEST_STATES, 44 * n), MOST_STATES)
     gravity = float(np.linalg.norm(robot.model.gravity.linear))
     rate = np.sqrt((gravity if gravity > 0.0 else 9.81) / length)
     stroke = np.where(robot.prismatic, length, np.pi)[:, None]
@@ -299,7 +304,7 @@ def check_base_parameters(robot: Robot, base: BaseParameters, *, seed: int = 1) 
     BaseCheck
     """
     rng = np.random.default_rng(seed)
-    columns = _random_columns(robot, seed + 1000, samples=max(40, 4 * base.grouping.shape[1]))
+    columns = _random_columns(robot, seed + 1000)
     # Every column that moves the torque, not only those that the reduction knows of.
     size = np.linalg.norm(columns, axis=0)
     entering = size * _parameter_scale(robot)
@@ -307,7 +312,7 @@ def check_base_parameters(robot: Robot, base: BaseParameters, *, seed: int = 1) 
     if not np.any(base.grouping[:, 10 * robot.n :]):
         used[10 * robot.n :] = False
     size = np.where(used, size, 1.0)
-    singular = np.linalg.svd(columns[:, used] / size[used], compute_uv=False)
+    singular = np.linalg.svd(np.linalg.qr(columns[:, used] / size[used], mode="r"), compute_uv=False)
     pi = rng.standard_normal(columns.shape[1]) / size * used
     torque = columns @ pi
     error = torque - columns[:, base.kept] @ (base.grouping @ pi)

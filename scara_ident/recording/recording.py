@@ -15,6 +15,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, UsageError
+from scara_ident.files import real_path
 from scara_ident.recording.audit import Finding, Samples, audit
 from scara_ident.recording.files import IMPORTERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
@@ -108,7 +109,7 @@ def split_name(stem: str) -> tuple[str, int]:
 
 def recording_name(path: Path) -> str:
     """Return the name of a recording: the stem of its file, or the name of its folder."""
-    return path.resolve().name if path.is_dir() else path.stem
+    return real_path(path).name if path.is_dir() else path.stem
 
 
 def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) -> Recording:
@@ -243,7 +244,7 @@ def recording_paths(words: Sequence[Path | str]) -> tuple[Path, ...]:
     stems: dict[str, Path] = {}
     for word in words:
         for path in _paths(str(word)):
-            real = path.resolve()
+            real = real_path(path)
             if real in found:
                 continue
             name = recording_name(path)
@@ -365,8 +366,8 @@ def _paths(word: str) -> list[Path]:
         return found
     if path.exists():
         return [path]
-    if not glob.has_magic(word):
-        raise UsageError(f"{word}: no such file or folder")
+    if not glob.has_magic(word) or path.is_symlink():
+        raise UsageError(f"{word}: {'a link that leads to no file' if path.is_symlink() else 'no such file or folder'}")
     matches = [Path(match) for match in sorted(glob.glob(word, recursive=True), key=_natural)]
     if not matches:
         raise UsageError(f"{word}: no file matches")

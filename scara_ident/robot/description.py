@@ -19,11 +19,17 @@ from pydantic import (
 )
 
 from scara_ident.errors import RobotError
+from scara_ident.files import path_fault, real_path
+
+# Sizes that a factor of a drive or a channel may have.
+SMALLEST, LARGEST_FACTOR = 1e-12, 1e12
 
 
 def _not_zero(value: float) -> float:
     if value == 0.0:
         raise ValueError("expected a number other than 0")
+    if not SMALLEST <= abs(value) <= LARGEST_FACTOR:
+        raise ValueError(f"expected a size between {SMALLEST:g} and {LARGEST_FACTOR:g}")
     return value
 
 
@@ -36,7 +42,7 @@ def _no_truth_value(value: Any) -> Any:
 def _number(value: Any) -> float:
     try:
         number = float(_no_truth_value(value))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError("expected a number") from None
     if not math.isfinite(number):
         raise ValueError("expected a finite number")
@@ -51,7 +57,7 @@ def _counts(value: Any) -> float:
     number = _number(value)
     if number <= 0.0:
         raise ValueError("expected a number above 0")
-    return number
+    return _not_zero(number)
 
 
 def _word(value: Any) -> str:
@@ -92,7 +98,7 @@ class JointDescription(BaseModel):
 
     reduction: NonZero | None = None
     effort_gain: NonZero = 1.0
-    rotor_inertia: Annotated[Finite, Field(ge=0.0)] | None = None
+    rotor_inertia: Annotated[Finite, Field(ge=0.0, le=LARGEST_FACTOR)] | None = None
 
 
 class TimeDescription(BaseModel):
@@ -172,10 +178,22 @@ def read_description(path: Path) -> RobotDescription:
     """
     import yaml
 
+    class Loader(yaml.SafeLoader):
+        """Says where a scalar stands that is none: a date without such a month, an integer of thousands of digits."""
+
+        def construct_object(self, node: Any, deep: bool = False) -> Any:
+            try:
+                return super().construct_object(node, deep)
+            except ValueError as error:
+                said = f"{node.value[:20]!r} cannot be read ({str(error).partition(';')[0]}); correct it, or put it in quotes"
+                raise yaml.constructor.ConstructorError(None, None, said, node.start_mark) from None
+
+    if (fault := path_fault(path)) is not None:
+        raise RobotError(fault)
     try:
         text = path.read_text(encoding="utf-8")
         _refuse_twice(yaml.compose(text, Loader=yaml.SafeLoader), path)
-        content: Any = yaml.safe_load(text)
+        content: Any = yaml.load(text, Loader=Loader)
     except FileNotFoundError:
         raise RobotError(f"{path}: no such robot description") from None
     except IsADirectoryError:
@@ -189,8 +207,10 @@ def read_description(path: Path) -> RobotDescription:
         where = f", line {mark.line + 1}" if mark else ""
         reason = " ".join(str(getattr(error, "problem", error)).split())
         raise RobotError(f"{path}{where}: not YAML: {reason}") from None
+    except RecursionError:
+        raise RobotError(f"{path}: nested too deeply; a robot.yaml has a few levels") from None
     description = check_description(content, path)
-    return description.model_copy(update={"urdf": (path.parent / description.urdf).resolve()})
+    return description.model_copy(update={"urdf": real_path(path.parent / description.urdf)})
 
 
 def _refuse_twice(node: Any, path: Path, above: str = "") -> None:
@@ -237,7 +257,16 @@ def _first_problem(error: ValidationError) -> str:
     if kind == "missing":
         return f"{key}: missing"
     message = problem["msg"].removeprefix("Value error, ")
-    return f"{key}: {message[0].lower()}{message[1:]}; found {problem['input']!r}"
+    return f"{key}: {message[0].lower()}{message[1:]}; found {_short(problem['input'])}"
+
+
+def _short(value: Any) -> str:
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):
+        # An integer of more digits than Python writes out.
+        return f"a long {type(value).__name__}"
+    return text if len(text) <= 80 else f"{text[:80]}..."
 
 
 def _owner(location: tuple[int | str, ...]) -> type[BaseModel]:

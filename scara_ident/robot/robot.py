@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
+from scara_ident.files import path_fault, real_path
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
 from scara_ident.robot.examples import example_urdf, is_name
 from scara_ident.robot.rotors import RotorGuess, guess_rotors
 from scara_ident.robot.signal_map import Channels, build_channels
 from scara_ident.robot.transmissions import reductions, rotor_inertias
-from scara_ident.robot.urdf_validation import urdf_fault
-
-MOVABLE = ("revolute", "continuous", "prismatic")
+from scara_ident.robot.urdf_validation import MOVABLE, XACRO, urdf_fault
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,10 +151,14 @@ def load_robot(path: Path | str | None = None) -> Robot:
     if path is None:
         return build_robot(RobotDescription(urdf=embedded_urdf(), effort_side="motor"), embedded_urdf())
     source = Path(path)
+    if (fault := path_fault(source)) is not None:
+        raise RobotError(fault)
     if is_name(source):
         source = example_urdf(source.name)
+    if source.suffix.lower() == ".xacro":
+        raise RobotError(f"{source}: is xacro's; {XACRO}")
     if source.suffix.lower() in (".urdf", ".xml"):
-        return build_robot(RobotDescription(urdf=source.resolve(), effort_side="joint"), source)
+        return build_robot(RobotDescription(urdf=real_path(source), effort_side="joint"), source)
     return build_robot(read_description(source), source)
 
 
@@ -241,6 +244,9 @@ def _positive_or_inf(limit: Array) -> Array:
 
 
 def _parse_xml(urdf: Path, source: Path) -> ElementTree.Element:
+    """Read a URDF and check it: what the rest of the program takes from it has been seen to be there and usable."""
+    if (fault := path_fault(urdf)) is not None:
+        raise RobotError(f"{source}: urdf: {fault}")
     try:
         root = ElementTree.parse(urdf).getroot()
     except FileNotFoundError:
@@ -248,9 +254,16 @@ def _parse_xml(urdf: Path, source: Path) -> ElementTree.Element:
     except OSError as error:
         raise RobotError(f"{source}: urdf: cannot read {urdf}: {error.strerror}") from None
     except ElementTree.ParseError as error:
-        raise RobotError(f"{urdf}: not well-formed XML: {error}") from None
+        hint = f"; if it is xacro's, {XACRO}" if "unbound prefix" in str(error) else ""
+        raise RobotError(f"{urdf}: not well-formed XML: {error}{hint}") from None
+    except (LookupError, ValueError) as error:
+        raise RobotError(
+            f"{urdf}: the encoding that its first line names cannot be read ({error}); save it in UTF-8"
+        ) from None
     if root.tag != "robot":
         raise RobotError(f"{urdf}: the root element is <{root.tag}>, a URDF has <robot>")
+    if (fault := urdf_fault(root)) is not None:
+        raise RobotError(f"{urdf}: not a usable URDF: {fault}")
     return root
 
 
@@ -273,10 +286,16 @@ def _quiet_stderr() -> Iterator[None]:
 
 def _pinocchio_model(urdf: Path, tree: ElementTree.Element) -> pin.Model:
     try:
+        # As text: Pinocchio takes the bytes of a file for UTF-8, whatever its first line says.
+        text = ElementTree.tostring(tree, encoding="unicode")
         with _quiet_stderr():
-            return pin.buildModelFromUrdf(str(urdf))
+            return pin.buildModelFromXML(text)
+    except RecursionError:
+        raise RobotError(
+            f"{urdf}: not a usable URDF: its elements are nested too deeply; remove what is no URDF"
+        ) from None
     except (ValueError, RuntimeError) as error:
-        reason = urdf_fault(tree) or " ".join(str(error).split()) or "Pinocchio refuses it"
+        reason = " ".join(str(error).split()) or "Pinocchio refuses it"
         raise RobotError(f"{urdf}: not a usable URDF: {reason}") from None
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.description import JointDescription
+from scara_ident.robot.urdf_validation import finite_number
 
 
 def reductions(
@@ -30,6 +31,9 @@ def rotor_inertias(
 ) -> Array:
     """Return the rotor inertia of each joint, kg m^2 at the motor, shape (n,): NaN where none is stated."""
     from_urdf = _actuator_numbers(tree, urdf, ("rotorInertia",))
+    for name, value in from_urdf.items():
+        if value < 0.0:
+            raise RobotError(f"{urdf}: transmission of {name}: rotorInertia is {value:g}; expected 0 or more, kg m^2")
     given = [joint.rotor_inertia for joint in joints]
     return np.array([_first(value, from_urdf.get(name), np.nan) for name, value in zip(names, given, strict=True)])
 
@@ -51,10 +55,8 @@ def _actuator_numbers(tree: ElementTree.Element, urdf: Path, tags: Sequence[str]
         if not texts:
             continue
         for name in names:
-            try:
-                found[name] = float(texts[0] or "")
-            except ValueError:
-                found[name] = np.nan
-            if not np.isfinite(found[name]):
+            value = finite_number(texts[0])
+            if value is None:
                 raise RobotError(f"{urdf}: transmission of {name}: {tags[0]} is {texts[0]!r}; expected a number")
+            found[name] = value
     return found

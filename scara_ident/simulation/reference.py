@@ -13,6 +13,11 @@ from scara_ident.errors import RecordingError
 from scara_ident.recording.files.parquet_csv import column_names, read_columns
 from scara_ident.robot.robot import Robot
 
+# Positions, velocities and accelerations in SI units beyond this are no motion of an arm.
+LARGEST = 1e9
+# Samples that a simulated run may have: most of three hours at 1 kHz.
+MOST_SAMPLES = 10_000_000
+
 
 @dataclass(frozen=True, eq=False)
 class ReferenceMotion:
@@ -32,7 +37,7 @@ class ReferenceMotion:
     Raises
     ------
     RecordingError
-        If shapes disagree, a value is not finite or time does not grow.
+        If shapes disagree, a value is not finite or beyond `LARGEST`, or time does not grow.
     """
 
     name: str
@@ -50,6 +55,10 @@ class ReferenceMotion:
                 raise RecordingError(f"{self.name}: {name} has shape {values.shape}; joints and time ask for {shape}")
             if not np.all(np.isfinite(values)):
                 raise RecordingError(f"{self.name}: {name} has a value that is not finite; give a complete motion")
+            if np.any(np.abs(values) > LARGEST):
+                raise RecordingError(
+                    f"{self.name}: {name} reaches {np.max(np.abs(values)):.3g}, which no arm does; give it in rad, m and s"
+                )
         if len(self.time) < 2 or not np.all(np.diff(self.time) > 0):
             raise RecordingError(f"{self.name}: time must have at least two samples and grow strictly")
 

@@ -16,7 +16,7 @@ from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.effects.structure import Payload
 from scara_ident.simulation.inverse_dynamics import torque_at_start
 from scara_ident.simulation.plant import PlantDraft
-from scara_ident.simulation.reference import ReferenceMotion
+from scara_ident.simulation.reference import MOST_SAMPLES, ReferenceMotion
 from scara_ident.simulation.runs import RunState, TorqueNoise
 from scara_ident.simulation.torque_sensor import recorded_effort
 
@@ -294,8 +294,9 @@ def _at_rate(arm: VirtualArm, motion: ReferenceMotion, rate: float) -> Reference
     if not rate > 0.0:
         raise UsageError(f"rate is {rate:g} Hz; expected a positive number")
     samples = int(np.floor(motion.duration * rate * (1.0 + 1e-12) + 1e-9)) + 1
-    if samples < 2:
-        raise RecordingError(f"{motion.name}: lasts {motion.duration:g} s, less than a sample at {rate:g} Hz")
+    if not 2 <= samples <= MOST_SAMPLES:
+        wrong = "less than a sample" if samples < 2 else f"more than {MOST_SAMPLES} samples"
+        raise RecordingError(f"{motion.name}: lasts {motion.duration:g} s, {wrong} at {rate:g} Hz; give time in s")
     moved = motion.at(motion.time[0] + np.arange(samples) / rate)
     return ReferenceMotion(
         motion.name, motion.joints, np.arange(samples) / rate, moved.position, moved.velocity, moved.acceleration

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.errors import RecordingError
+from scara_ident.files import slug
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import write_recording
 from scara_ident.simulation.arm import VirtualArm
@@ -82,7 +83,7 @@ def write_simulation(result: SimulationResult, folder: Path | str) -> Path:
         If the folder cannot be written to.
     """
     folder = Path(folder)
-    path = folder / f"{result.recording.name}.parquet"
+    path = folder / f"{slug(result.recording.trajectory, 'motion')}_{result.repetition}.parquet"
     content = truth(result.arm, result.effects) | {
         "recording": path.name,
         "seed": result.seed,

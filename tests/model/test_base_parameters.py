@@ -108,6 +108,14 @@ def test_the_check_passes(tmp_path: Path, name: str):
     assert check.rank == check.count
 
 
+def test_a_humanoid_has_as_many_base_parameters_as_its_regressor_has_rank():
+    robot = load_robot(example_urdf("talos_reduced.urdf"))
+    base = find_base_parameters(robot)
+    assert robot.n == 32
+    assert check_base_parameters(robot, base).passed
+    np.testing.assert_array_equal(find_base_parameters(robot, seed=5).kept, base.kept)
+
+
 def test_the_check_does_not_pass_a_wrong_reduction():
     robot = load_robot()
     base = find_base_parameters(robot)

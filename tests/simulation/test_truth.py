@@ -39,6 +39,13 @@ def test_written_recordings_are_read_back_and_the_truth_beside_is_not_one(tmp_pa
     assert content["effects"][0]["parameters"]["stiffness"] > 0.0
 
 
+def test_the_name_of_a_motion_leads_out_of_no_folder(tmp_path: Path) -> None:
+    arm = virtual_arm()
+    result = simulate(arm, replace(swing(arm.robot, 0.2), name="../../up"), repetition=3)
+    assert write_simulation(result, tmp_path / "a" / "b") == tmp_path / "a" / "b" / "up_3.parquet"
+    assert sorted(path.name for path in tmp_path.rglob("*.*")) == ["up_3.parquet", "up_3.truth.json"]
+
+
 def test_truth_of_the_default_arm_is_the_papers_table_5() -> None:
     values = {row["name"]: row["value"] for row in truth(virtual_arm())["parameters"]}
     printed = {"P_d1": 16.165, "P_d2": 2.415, "P_d4": 0.758, "P_d5": 4.014, "a01": 0.21, "a11": 0.093, "a21": -0.016}

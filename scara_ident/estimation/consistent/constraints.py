@@ -115,7 +115,9 @@ class Statement:
                 self.constraints.append(value >= 0.0)
             elif kind == "small":
                 first, product, second = value[0::3], value[1::3], value[2::3]
-                lengths = cp.vstack([first - second, np.sqrt(2.0) * product])
+                # A matrix: cvxpy 1.9 with SciPy 1.17 fails on some products of a number and what has parameters.
+                wide = np.sqrt(2.0) * np.eye(len(group)) @ product
+                lengths = cp.vstack([first - second, wide])
                 self.constraints.append(cp.SOC(first + second, lengths, axis=0))
             elif kind == "ball":
                 self.constraints.append(cp.SOC(value[0], value[1:]))

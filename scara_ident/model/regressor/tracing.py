@@ -135,7 +135,9 @@ def vanishing(trace: Trace, values: Sequence[Scalar], inputs: Array) -> list[boo
     """Tell which values are zero at all states although their expressions are not.
 
     Tracing does not know that cos^2 + sin^2 = 1. A sum that cancels at every one of a few random states, down to
-    the rounding of its terms, cancels always: analytic functions that are not zero are zero almost nowhere.
+    the rounding of its terms, cancels always: analytic functions that are not zero are zero almost nowhere. The
+    sizes of terms add as independent roundings do, in squares: a turn then leaves the size of a vector as it is.
+    Added as they are, they would grow by sqrt(3) with every joint, and hide what a chain of sixteen tells.
 
     Parameters
     ----------
@@ -146,21 +148,20 @@ def vanishing(trace: Trace, values: Sequence[Scalar], inputs: Array) -> list[boo
     """
     found: list[Array] = []
     sizes: list[Array] = []
-    one = np.ones(inputs.shape[1])
     for operation, first, second in trace.nodes:
         if operation == VAR:
             value = inputs[first]
             size = np.abs(value)
         elif operation in (SIN, COS):
             value = np.sin(found[first]) if operation == SIN else np.cos(found[first])
-            size = one
+            size = np.abs(value)
         else:
             x, size_x = found[first], sizes[first]
             y, size_y = (found[second], sizes[second]) if operation in _BINARY else (second, abs(second))
             if operation in (MUL, MUL_CONST):
                 value, size = x * y, size_x * size_y
             else:
-                value, size = (x - y if operation == SUB else x + y), size_x + size_y
+                value, size = (x - y if operation == SUB else x + y), np.hypot(size_x, size_y)
         found.append(value)
         sizes.append(size)
     return [

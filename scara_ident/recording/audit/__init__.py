@@ -6,13 +6,14 @@ on those before it: units are judged on finite numbers in order of time, spikes 
 
 from __future__ import annotations
 
-from scara_ident.recording.audit import clock, effort, position
+from scara_ident.recording.audit import clock, effort, position, sizes
 from scara_ident.recording.audit.samples import Finding, Samples
 
 CHECKS = (
     clock.enough,
     clock.missing_numbers,
     clock.enough,
+    sizes.impossible_sizes,
     clock.clock_unit,
     clock.time_order,
     clock.enough,

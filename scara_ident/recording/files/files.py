@@ -7,10 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from scara_ident.errors import RecordingError
+from scara_ident.files import path_fault
 
 
 def check_file(path: Path) -> None:
-    """Refuse a file that is missing, may not be read or is empty."""
+    """Refuse a file that is missing, may not be read or is empty, or whose name no result can hold."""
+    if (fault := path_fault(path)) is not None:
+        raise RecordingError(fault)
     try:
         with path.open("rb") as file:
             if not file.read(1):

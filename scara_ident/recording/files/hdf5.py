@@ -31,7 +31,7 @@ def column_names(path: Path, *, separator: str = "/") -> tuple[str, ...]:
         h5py is not installed, or the file is missing, empty, damaged or without numbers.
     """
     with _opened(path) as file:
-        names = [name for key, _, _, shape in _sets(file, separator) for name in arrays.channels(key, shape)]
+        names = [name for key, _, _, shape in _sets(path, file, separator) for name in arrays.channels(key, shape)]
     if not names:
         refuse_no_numbers(path, "save data sets of numbers")
     return tuple(names)
@@ -47,7 +47,7 @@ def read_columns(path: Path, names: Sequence[str], *, separator: str = "/") -> d
     """
     found: dict[str, Array] = {}
     with _opened(path) as file:
-        for key, data, field, shape in _sets(file, separator):
+        for key, data, field, shape in _sets(path, file, separator):
             wanted = [name for name in arrays.channels(key, shape) if name in names]
             if wanted:
                 values = data[()] if field is None else data[field]
@@ -71,10 +71,10 @@ def _opened(path: Path) -> Iterator[Any]:
         raise damaged(path, path.suffix.lower().lstrip("."), error) from error
 
 
-def _sets(file: Any, separator: str) -> Iterator[tuple[str, Any, str | None, tuple[int, ...]]]:
+def _sets(path: Path, file: Any, separator: str) -> Iterator[tuple[str, Any, str | None, tuple[int, ...]]]:
     """Yield the name, data set, field and shape of all that holds numbers."""
-    for path, data in _walk(file, ""):
-        name = path.strip("/").replace("/", separator)
+    for place, data in _walk(path, file, "", set()):
+        name = place.strip("/").replace("/", separator)
         if data.dtype.names:
             for field in data.dtype.names:
                 kind = data.dtype[field]
@@ -84,14 +84,35 @@ def _sets(file: Any, separator: str) -> Iterator[tuple[str, Any, str | None, tup
             yield name, data, None, data.shape
 
 
-def _walk(group: Any, path: str) -> Iterator[tuple[str, Any]]:
+def _walk(path: Path, group: Any, above: str, seen: set[Any]) -> Iterator[tuple[str, Any]]:
+    """Yield name and data set of all in a group, groups that hold each other once.
+
+    Raises
+    ------
+    RecordingError
+        Numbers that lie in another file, of which nobody can say what it is, or a name that is no text.
+    """
+    seen.add(group.id)
     for key in group:
+        if not isinstance(key, str):
+            raise RecordingError(f"{path}: the name {key!r} in it is not text in UTF-8; rename it")
+        name = f"{above}/{key}"
+        if hasattr(group.get(key, getlink=True), "filename"):
+            raise _outside(path, name)
         # A link may lead nowhere.
         item = group.get(key)
         if key.startswith(HIDDEN) or item is None:
             continue
-        if hasattr(item, "dtype"):
-            if hasattr(item, "shape") and item.shape is not None:
-                yield f"{path}/{key}", item
-        elif hasattr(item, "keys"):
-            yield from _walk(item, f"{path}/{key}")
+        if hasattr(item, "keys"):
+            if item.id not in seen:
+                yield from _walk(path, item, name, seen)
+        elif getattr(item, "shape", None) is not None:
+            if item.external or item.is_virtual:
+                raise _outside(path, name)
+            yield name, item
+
+
+def _outside(path: Path, name: str) -> RecordingError:
+    return RecordingError(
+        f"{path}: {name.strip('/')!r} leads to numbers in another file; save a recording that holds its own"
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,8 @@ SUFFIXES = (".parquet", ".csv")
 # What loggers and spreadsheets write where there is no number.
 MISSING = ["NA", "N/A", "n/a", "na", "null", "None", "-"]
 SEPARATORS = ",;\t"
+# Of a word that is no number, this much is shown.
+LONGEST_WORD = 60
 
 
 def column_names(path: Path) -> tuple[str, ...]:
@@ -51,6 +54,8 @@ def column_names(path: Path) -> tuple[str, ...]:
                 names = list(pl.read_parquet_schema(file))
     except UnicodeDecodeError as error:
         raise RecordingError(f"{path}: not a text file in UTF-8; save the CSV again in UTF-8") from error
+    except csv.Error as error:
+        raise RecordingError(f"{path}: its first line is no header ({error}); put the column names there") from error
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
         raise _damaged(path, error) from error
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -172,7 +177,7 @@ def _numbers(path: Path, series: pl.Series) -> Array:
         if len(bad):
             row = int(bad[0])
             raise RecordingError(
-                f"{path}: column {series.name!r}, row {row + 1}: {series[row]!r} is not a number"
+                f"{path}: column {series.name!r}, row {row + 1}: {_short(series[row])} is not a number"
                 f"{_and_more(len(bad))}; correct it or leave it empty"
             )
         series = numbers
@@ -214,11 +219,17 @@ def _refuse_long_rows(path: Path, separator: str) -> None:
     with path.open(encoding="utf-8-sig", newline="", errors="replace") as file:
         rows = (row for row in csv.reader(file, delimiter=separator) if row)
         width = len(next(rows, []))
-        for number, row in enumerate(rows, 1):
-            if len(row) > width:
-                raise RecordingError(
-                    f"{path}: row {number} has {len(row)} values for {width} columns; correct or remove it"
-                )
+        # A field longer than Python's parser takes is no number, and said to be none where it is wanted.
+        with suppress(csv.Error):
+            for number, row in enumerate(rows, 1):
+                if len(row) > width:
+                    raise RecordingError(
+                        f"{path}: row {number} has {len(row)} values for {width} columns; correct or remove it"
+                    )
+
+
+def _short(text: str) -> str:
+    return repr(text if len(text) <= LONGEST_WORD else f"{text[:LONGEST_WORD]}...")
 
 
 def _damaged(path: Path, error: BaseException) -> RecordingError:

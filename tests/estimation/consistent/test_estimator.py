@@ -21,7 +21,7 @@ from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import read_recording
 from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.threads import one_blas_thread
-from tests.arms import motion, sines
+from tests.arms import motion, sines, swing
 from tests.estimation.consistent.arms import (
     base_of,
     moving,
@@ -122,6 +122,13 @@ def test_the_reduced_model_holds_its_missing_parameter_at_zero():
     found = consistent(item)
     assert abs(found.standard[12]) < 1e-9
     np.testing.assert_allclose(base_of(found), found.value[:4], rtol=1e-8)
+
+
+def test_an_arm_with_continuous_joints_in_a_plane_is_estimated():
+    robot = load_robot("double_pendulum")
+    model = build_model(robot, "complete")
+    found = consistent(observe(model, prepare([swing(robot, seconds=3.0, rate=100.0)]).at((None, None))))
+    assert physical_consistency(found).possible
 
 
 def test_a_parameter_that_a_constraint_fixes_has_no_spread_of_its_own():

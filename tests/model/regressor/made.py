@@ -64,6 +64,20 @@ def random_model(seed: int, bodies: int) -> pin.Model:
     return model
 
 
+def random_chain(seed: int, joints: int) -> pin.Model:
+    """Build a serial chain of revolute and prismatic joints about axes and at angles anywhere."""
+    generator = np.random.default_rng(seed)
+    model = pin.Model()
+    model.name = "chain"
+    for body in range(joints):
+        axis = generator.normal(size=3)
+        kind = pin.JointModelPrismaticUnaligned if generator.random() < 0.25 else pin.JointModelRevoluteUnaligned
+        turn = pin.rpy.rpyToMatrix(*generator.uniform(-3.0, 3.0, 3))
+        placement = pin.SE3(turn, generator.uniform(-0.3, 0.3, 3))
+        model.addJoint(body, kind(axis / np.linalg.norm(axis)), placement, f"joint{body + 1}")
+    return model
+
+
 def configuration(model: pin.Model, q: np.ndarray) -> np.ndarray:
     """Integrate from neutral: Pinocchio's own way from angles to a configuration."""
     return pin.integrate(model, pin.neutral(model), q)

@@ -21,6 +21,7 @@ from tests.model.regressor.made import (
     configuration,
     consistent_inertia,
     fill_inertias,
+    random_chain,
     random_model,
     scara,
     states,
@@ -66,6 +67,11 @@ def test_kernel_agrees_with_pinocchio_and_knows_its_structural_zeros(name: str) 
 @given(seed=st.integers(0, 2**32 - 1), bodies=st.integers(1, 6))
 def test_kernel_agrees_with_pinocchio_on_random_trees(seed: int, bodies: int) -> None:
     assert_agrees(random_model(seed, bodies), samples=10)
+
+
+@pytest.mark.parametrize("joints", [12, 17, 23, 30, 40])
+def test_kernel_agrees_with_pinocchio_on_long_chains(joints: int) -> None:
+    assert_agrees(random_chain(joints, joints), samples=8)
 
 
 @settings(max_examples=40)

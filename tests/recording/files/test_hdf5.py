@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from scara_ident.errors import RecordingError
 from scara_ident.recording.files import column_names, read_columns
 from scara_ident.recording.recording import read_recording
 from scara_ident.robot.robot import load_robot
@@ -48,3 +50,58 @@ def test_a_damaged_hdf5_file_is_refused(tmp_path):
     whole = write_hdf5(path, {"t": MADE["time"]})
     whole.write_bytes(whole.read_bytes()[:900])
     assert "not a whole h5 file" in refusal(path, load_robot())
+
+
+def outside(path, file) -> None:
+    """Put a data set into a file that is kept by another, in each of three ways."""
+    import h5py
+
+    raw = path.with_name("raw.bin")
+    np.arange(8.0).tofile(raw)
+    with h5py.File(path.with_name("other.h5"), "w") as other:
+        other["x"] = np.arange(8.0)
+    layout = h5py.VirtualLayout(shape=(8,), dtype="f8")
+    layout[:] = h5py.VirtualSource(str(path.with_name("other.h5")), "x", shape=(8,))
+    kind = path.stem
+    if kind == "raw":
+        file.create_dataset("q", shape=(8,), dtype="f8", external=[(str(raw), 0, 64)])
+    elif kind == "link":
+        file["q"] = h5py.ExternalLink(str(path.with_name("other.h5")), "/x")
+    else:
+        file.create_virtual_dataset("q", layout)
+
+
+@pytest.mark.parametrize("kind", ["raw", "link", "virtual"])
+def test_numbers_of_another_file_are_refused(tmp_path, kind: str):
+    import h5py
+
+    path = tmp_path / f"{kind}.h5"
+    with h5py.File(path, "w") as file:
+        file["t"] = np.arange(8.0)
+        outside(path, file)
+    for read in (lambda: column_names(path), lambda: read_columns(path, ["t", "q"])):
+        with pytest.raises(RecordingError, match=f"{kind}.h5: 'q' leads to numbers in another file; save a recording"):
+            read()
+
+
+def test_links_within_a_file_are_followed_and_rings_of_groups_end(tmp_path):
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["t"] = np.arange(8.0)
+        file["soft"] = h5py.SoftLink("/t")
+        file["nowhere"] = h5py.SoftLink("/etc/hostname")
+        group = file.create_group("g")
+        group["q"] = np.arange(8.0)
+        group["me"] = group
+        group["up"] = h5py.SoftLink("/")
+    assert column_names(tmp_path / "a.h5") == ("g/q", "soft", "t")
+
+
+def test_a_name_that_is_no_text_is_refused(tmp_path):
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file[b"\xff"] = np.arange(8.0)
+    with pytest.raises(RecordingError, match=r"the name b'\\xff' in it is not text in UTF-8; rename it"):
+        column_names(tmp_path / "a.h5")

@@ -1,0 +1,101 @@
+"""Whether recordings hold the same samples, whatever their files, names, times and beginnings are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.recording.recording import Recording
+
+Hashes = NDArray[np.uint64]
+
+# Samples in a row that are compared as one. Two runs of one motion on coarse channels may agree in a sample or two.
+WINDOW = 32
+# At least this share of them differs from the sample before: at rest everything agrees.
+MOVING = 0.5
+# Of all windows of the recordings compared with, those with the smallest hashes are kept, so many; 16 bytes each.
+KEPT = 65536
+# A copy of this share of a recording is no accident, if it is at least so many windows.
+LEAST_SHARE, FEWEST = 0.02, 3
+# Samples at a time.
+CHUNK = 65536
+_MIX = np.uint64(0x9E3779B97F4A7C15)
+_ODD = np.uint64(0xBF58476D1CE4E5B9)
+
+
+def shared_samples(
+    known: Sequence[Recording], others: Sequence[Recording]
+) -> Iterator[tuple[Recording, Recording, float]]:
+    """Find recordings that hold samples of known ones: positions and efforts that are the same, bit by bit.
+
+    Each run of `WINDOW` samples is one hash; of those of the known recordings the smallest are kept (a bottom-k
+    sketch: Broder, "On the resemblance and containment of documents", 1997), so that time is proportional to the
+    samples and memory is constant. Times are not compared: a copy may begin anywhere and have another clock.
+
+    Parameters
+    ----------
+    known, others : sequence of Recording
+
+    Yields
+    ------
+    other, first, share : Recording, Recording, float
+        A recording, the known one that it shares most with, and the share of its samples that are in known ones.
+    """
+    values, owners = np.zeros(0, dtype=np.uint64), np.zeros(0, dtype=np.intp)
+    for place, recording in enumerate(known):
+        for hashes in _windows(recording):
+            values = np.concatenate([values, hashes])
+            owners = np.concatenate([owners, np.full(len(hashes), place, dtype=np.intp)])
+            values, first = np.unique(values, return_index=True)
+            values, owners = values[:KEPT], owners[first][:KEPT]
+    if not len(values):
+        return
+    # Below this bound every window of the known recordings is among those kept.
+    bound = values[-1] if len(values) == KEPT else np.iinfo(np.uint64).max
+    for other in others:
+        seen, hits = 0, np.zeros(len(known), dtype=np.intp)
+        for hashes in _windows(other):
+            asked = hashes[hashes <= bound]
+            places = np.minimum(np.searchsorted(values, asked), len(values) - 1)
+            same = values[places] == asked
+            seen += len(asked)
+            hits += np.bincount(owners[places[same]], minlength=len(known))
+        total = int(hits.sum())
+        if total >= FEWEST and total >= LEAST_SHARE * seen:
+            yield other, known[int(np.argmax(hits))], total / seen
+
+
+def _windows(recording: Recording) -> Iterator[Hashes]:
+    """Yield a hash for each run of samples in which the arm moves, some thousands at a time."""
+    signals = [recording.position] if recording.effort is None else [recording.position, recording.effort]
+    count = len(recording.time)
+    for start in range(0, count - WINDOW + 1, CHUNK):
+        rows = _samples([signal[:, start : min(start + CHUNK + WINDOW - 1, count)] for signal in signals])
+        fresh = np.concatenate([[True], rows[1:] != rows[:-1]])
+        moved = np.concatenate([[0], np.cumsum(fresh)])
+        hashes, size = rows, 1
+        while size < WINDOW:
+            # Two halves, of which the first is mixed so that their order counts.
+            hashes = _mixed(hashes[:-size]) + hashes[size:]
+            size *= 2
+        yield _mixed(hashes)[moved[WINDOW:] - moved[:-WINDOW] >= MOVING * WINDOW]
+
+
+def _samples(signals: Sequence[Array]) -> Hashes:
+    """Return a hash of the bits of every sample, shape (N,)."""
+    result = np.zeros(signals[0].shape[1], dtype=np.uint64)
+    for signal in signals:
+        for channel in signal:
+            # Zero has two signs.
+            bits = np.ascontiguousarray(channel + 0.0).view(np.uint64)
+            result = _mixed(result) + bits * _ODD
+    return _mixed(result)
+
+
+def _mixed(values: Hashes) -> Hashes:
+    """Spread what hashes hold over all their bits."""
+    mixed = (values ^ (values >> np.uint64(31))) * _MIX
+    return (mixed ^ (mixed >> np.uint64(29))) * _ODD
