@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 from scara_ident.errors import ScaraIdentError
+from scara_ident.files import not_a_file
 from scara_ident.model.model import TorqueModel
 
 
@@ -28,6 +29,9 @@ def read_parameters(path: Path, model: TorqueModel) -> dict[str, float]:
     ScaraIdentError
         If the file cannot be read, has no parameters, or is of another model or robot.
     """
+    fault = not_a_file(path)
+    if fault is not None:
+        raise ScaraIdentError(f"{path}: {fault}")
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))["parameters"]
         found = {str(row["name"]): float(row["value"]) for row in rows if not _undetermined(row)}

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
+from scara_ident.files import not_a_file
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
 from scara_ident.robot.examples import example_urdf, is_name
 from scara_ident.robot.rotors import RotorGuess, guess_rotors
@@ -25,6 +26,8 @@ from scara_ident.robot.signal_map import Channels, build_channels
 from scara_ident.robot.transmissions import reductions, rotor_inertias
 from scara_ident.robot.urdf_validation import urdf_fault
 
+# Bytes: those of a humanoid are a few hundred thousand.
+LARGEST_URDF = 30e6
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 
@@ -241,7 +244,12 @@ def _positive_or_inf(limit: Array) -> Array:
 
 
 def _parse_xml(urdf: Path, source: Path) -> ElementTree.Element:
+    fault = not_a_file(urdf)
+    if fault is not None:
+        raise RobotError(f"{urdf}: {fault}")
     try:
+        if urdf.stat().st_size > LARGEST_URDF:
+            raise RobotError(f"{urdf}: {urdf.stat().st_size:.2g} bytes, more than any URDF; give the robot's URDF")
         root = ElementTree.parse(urdf).getroot()
     except FileNotFoundError:
         raise RobotError(f"{source}: urdf: no such file: {urdf}") from None

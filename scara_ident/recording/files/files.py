@@ -7,10 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from scara_ident.errors import RecordingError
+from scara_ident.files import not_a_file
 
 
 def check_file(path: Path) -> None:
-    """Refuse a file that is missing, may not be read or is empty."""
+    """Refuse what is no file, is missing, may not be read or is empty."""
+    fault = not_a_file(path)
+    if fault is not None:
+        raise RecordingError(f"{path}: {fault}")
     try:
         with path.open("rb") as file:
             if not file.read(1):
