@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
-from scara_ident.errors import RecordingError, UsageError
+from scara_ident.errors import MemoryLimit, UsageError
 
 GIGA = 1e9
 # Of the machine's memory, where no limit is given: what is made of a recording has to have room beside it.
@@ -43,7 +43,7 @@ def check_memory(path: Path, needed: float) -> None:
 
     Raises
     ------
-    RecordingError
+    MemoryLimit
     """
     if needed > limit():
         raise _too_much(path, f"about {needed / GIGA:.2g} GB of memory, more than {limit() / GIGA:.2g} GB")
@@ -58,7 +58,7 @@ def within_limit(path: Path) -> Iterator[None]:
 
     Raises
     ------
-    RecordingError
+    MemoryLimit
         If it takes more.
     """
     before = _narrow()
@@ -73,8 +73,8 @@ def within_limit(path: Path) -> Iterator[None]:
             resource.setrlimit(resource.RLIMIT_AS, before)
 
 
-def _too_much(path: Path, what: str) -> RecordingError:
-    return RecordingError(f"{path}: reading it takes {what}; cut the file, or allow more with --max-memory")
+def _too_much(path: Path, what: str) -> MemoryLimit:
+    return MemoryLimit(f"{path}: reading it takes {what}; cut the file, or allow more with --max-memory")
 
 
 def _narrow() -> tuple[int, int] | None:

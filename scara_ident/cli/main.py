@@ -97,9 +97,10 @@ def run(arguments: list[str]) -> int:
     except typer.Exit as error:
         return error.exit_code
     except SystemExit as error:
-        if error.code == TERMINATED:
-            _complain("ended by a signal; no file is left half-written")
-        raise
+        if error.code != TERMINATED:
+            raise
+        _complain("ended by a signal; no file is left half-written")
+        return TERMINATED
     except (typer.Abort, KeyboardInterrupt):
         _complain("interrupted; no file is left half-written")
         return INTERRUPTED
@@ -108,7 +109,7 @@ def run(arguments: list[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except MemoryError:
-        _complain("out of memory; give fewer recordings at a time")
+        _complain("out of memory; give fewer recordings at a time, or shorter ones")
         return 1
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
