@@ -6,7 +6,7 @@ on those before it: units are judged on finite numbers in order of time, spikes 
 
 from __future__ import annotations
 
-from scara_ident.recording.audit import clock, effort, position
+from scara_ident.recording.audit import clock, effort, lost_samples, position
 from scara_ident.recording.audit.samples import Finding, Samples
 
 CHECKS = (
@@ -21,6 +21,7 @@ CHECKS = (
     clock.held_rows,
     position.whole_turns,
     position.spikes,
+    lost_samples.restamped,
     position.idle_joints,
     effort.dead_effort,
     effort.saturation,
