@@ -210,7 +210,7 @@ class Observations:
         used, rested = np.zeros(len(self.joints)), np.zeros(len(self.joints))
         for part, _ in self._stretches():
             used += np.count_nonzero(part.used, axis=1)
-            rest = part.rest & np.logical_not(part.left_out)
+            rest = part.rest & np.logical_not(part.left_out | part.stretch.clipped)
             rested += np.count_nonzero(rest[:, part.trim : part.samples - part.trim], axis=1)
         return tuple(float(share) for share in rested / np.maximum(used + rested, 1.0))
 

@@ -20,7 +20,7 @@ from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import disagreement, robust_fit
 from scara_ident.identification import ESTIMATORS
-from scara_ident.identification.channel_check import channel_faults
+from scara_ident.identification.channel_check import channel_faults, refuse_exchanged
 from scara_ident.identification.events import Event, find_events, without_events
 from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
@@ -126,8 +126,8 @@ def identify(
         If there are no recordings, the model or the method is unknown, a recording is both fitted and held out, or a band is no
         frequency that the slowest recording carries.
     RecordingError
-        If none of the recordings to fit can be used, or they have fewer rows than the model has parameters. One of several
-        that cannot be used, or one that is held out, is left out with a note.
+        If none of the recordings to fit can be used, or they have fewer rows than the model has parameters, or two joints are
+        exchanged (see `channel_faults`). One of several that cannot be used, or one that is held out, is left out with a note.
     """
     if not recordings:
         raise UsageError("no recordings to identify from")
@@ -143,6 +143,7 @@ def identify(
     training, validated = observe(equation, data), observe(equation, held_out)
     check_rows(training)
     faults = channel_faults(training)
+    refuse_exchanged(faults)
     notes += [str(fault) for fault in faults]
     progress("looking for events", 0.6)
     # With a wrong sign or exchanged joints nothing is explained anywhere.

@@ -24,6 +24,7 @@ CHECKS = (
     lost_samples.restamped,
     position.idle_joints,
     effort.dead_effort,
+    effort.copies,
     effort.saturation,
     position.limits,
     clock.enough,
