@@ -50,7 +50,7 @@ class ReferenceMotion:
                 raise RecordingError(f"{self.name}: {name} has shape {values.shape}; joints and time ask for {shape}")
             if not np.all(np.isfinite(values)):
                 raise RecordingError(f"{self.name}: {name} has a value that is not finite; give a complete motion")
-        if len(self.time) < 2 or not np.all(np.diff(self.time) > 0):
+        if len(self.time) < 2 or not np.isfinite(self.time[-1]) or not np.all(np.diff(self.time) > 0):
             raise RecordingError(f"{self.name}: time must have at least two samples and grow strictly")
 
     @property
@@ -151,7 +151,10 @@ def read_trajectory(path: Path | str, robot: Robot) -> ReferenceMotion:
             )
     columns = read_columns(path, ["time", *(name for group in wanted.values() for name in group)])
     time = np.asarray(columns["time"])
-    return ReferenceMotion(
-        path.stem, robot.joints, time - time[0],
-        *(np.array([columns[name] for name in group]) for group in wanted.values()),
-    )  # fmt: skip
+    try:
+        return ReferenceMotion(
+            path.stem, robot.joints, time - time[:1].sum(),
+            *(np.array([columns[name] for name in group]) for group in wanted.values()),
+        )  # fmt: skip
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from None
