@@ -10,6 +10,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.recording.audit.clock import HUGE
 from scara_ident.recording.files.parquet_csv import column_names, read_columns
 from scara_ident.robot.robot import Robot
 
@@ -48,9 +49,9 @@ class ReferenceMotion:
             values = getattr(self, name)
             if values.shape != shape:
                 raise RecordingError(f"{self.name}: {name} has shape {values.shape}; joints and time ask for {shape}")
-            if not np.all(np.isfinite(values)):
+            if not np.all(np.abs(values) < HUGE):
                 raise RecordingError(f"{self.name}: {name} has a value that is not finite; give a complete motion")
-        if len(self.time) < 2 or not np.isfinite(self.time[-1]) or not np.all(np.diff(self.time) > 0):
+        if len(self.time) < 2 or not np.abs(self.time[-1]) < HUGE or not np.all(np.diff(self.time) > 0):
             raise RecordingError(f"{self.name}: time must have at least two samples and grow strictly")
 
     @property

@@ -68,9 +68,10 @@ def _missing(samples: Samples) -> Array:
     window = sliding_window_view(samples.position, 2 * SIDE, axis=1)
     way, jump = window @ fit[1], window @ fit[3]
     moving = np.abs(way) > MOVING * np.sqrt(np.mean(way**2, axis=1, keepdims=True))
-    weight = np.zeros_like(way)
+    weight, idle = np.zeros_like(way), samples.idle()
     for j, inside in enumerate(moving):
-        if np.count_nonzero(inside) >= ENOUGH:
+        # Of a joint that stands still all is rounding.
+        if np.count_nonzero(inside) >= ENOUGH and not idle[j]:
             usual = float(np.median(np.abs(jump[j, inside]))) / NORMAL_MEDIAN
             floor = ROUNDING * float(np.max(np.abs(way[j])))
             weight[j, inside] = 1.0 / max(usual, floor) ** 2

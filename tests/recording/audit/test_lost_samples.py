@@ -57,6 +57,12 @@ def test_whole_recordings_are_passed(bits: int, jolts: int):
         assert restamped(moved(seed, step=2 * np.pi / 2**bits, jolts=jolts))[1] == []
 
 
+def test_joints_that_stand_still_say_nothing():
+    whole = moved()
+    position = np.array([np.full(whole.count, 0.7), 1e29 * whole.position[1]])
+    assert restamped(Samples("a.csv", ROBOT, whole.time, position, None, whole.row))[1] == []
+
+
 def test_a_loss_that_the_clock_shows_is_none():
     whole = moved()
     kept = np.random.default_rng(1).random(whole.count) >= 0.05
