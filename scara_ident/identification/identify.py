@@ -21,6 +21,7 @@ from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import disagreement, robust_fit
 from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.channel_check import channel_faults, refuse_exchanged
+from scara_ident.identification.clock_check import clock_drift
 from scara_ident.identification.events import Event, find_events, without_events
 from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
@@ -155,7 +156,8 @@ def identify(
     estimate, history = estimate_by(method, training, options)
     differs = None if robust is None else disagreement(estimate, robust)
     events += () if faults else held_out_events(estimate.value, training, validated)
-    notes += [event.sentence(robot) for event in events] + ([] if differs is None else [differs])
+    drift = None if faults else clock_drift(estimate.value, training)
+    notes += [event.sentence(robot) for event in events] + [said for said in (differs, drift) if said is not None]
     if isinstance(estimate, ConsistentEstimate):
         notes += estimate.notes
     log_det, condition = paper_criteria(training)
