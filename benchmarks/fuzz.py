@@ -174,7 +174,9 @@ def unfinished(out: Path) -> str | None:
     return None
 
 
-def fuzz(inputs: int, seed: int, kinds: tuple[str, ...] = KINDS) -> Iterator[tuple[str, str, list[str], Outcome]]:
+def fuzz(
+    inputs: int, seed: int, kinds: tuple[str, ...] = KINDS, first: int = 0
+) -> Iterator[tuple[str, str, list[str], Outcome]]:
     """Run the program on mutations; yield for each its number and kind, what was done, the words, and the outcome."""
     with tempfile.TemporaryDirectory() as place:
         seeds = Path(place) / "seeds"
@@ -182,7 +184,7 @@ def fuzz(inputs: int, seed: int, kinds: tuple[str, ...] = KINDS) -> Iterator[tup
         # Polars starts threads where it is used, which a fork does not have: this process only imports it.
         program = f"import sys; sys.path[:0] = {sys.path!r}\nfrom pathlib import Path\nimport fuzz_inputs\n"
         subprocess.run([sys.executable, "-c", f"{program}fuzz_inputs.write_seeds(Path({str(seeds)!r}))"], check=True)
-        for number in range(inputs):
+        for number in range(first, first + inputs):
             name = kinds[number % len(kinds)]
             # Of its own, so that one input can be run again alone.
             random = Random(f"{seed} {number}")
@@ -272,6 +274,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--inputs", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="number of the first, to run one again")
     parser.add_argument("--kinds", nargs="*", default=KINDS)
     parser.add_argument("--kills", type=int, default=0)
     parser.add_argument("--show", action="store_true", help="also print what was said of every input")
@@ -282,7 +285,7 @@ def main() -> None:
         return
     import_program()
     counts: Counter[str] = Counter()
-    for name, done, words, outcome in fuzz(asked.inputs, asked.seed, tuple(asked.kinds)):
+    for name, done, words, outcome in fuzz(asked.inputs, asked.seed, tuple(asked.kinds), asked.first):
         counts[outcome.verdict] += 1
         if asked.show or outcome.verdict not in ("read", "refused"):
             said = outcome.said if len(outcome.said) < 600 else f"{outcome.said[:250]} ... {outcome.said[-250:]}"

@@ -31,6 +31,9 @@ def clock_drift(value: Array, observations: Observations) -> str | None:
     str or None
         None where the clocks agree.
     """
+    if any(rows.table.shape[1] != _kept(observations, j) for j, rows in enumerate(observations.joints)):
+        # Blocks without rows, or with an event, were taken out: which sample is whose is no more known.
+        return None
     noise = np.array([rows.rms(value) for rows in observations.joints])
     weight = np.where(noise > 0.0, 1.0 / np.where(noise > 0.0, noise, 1.0), 0.0)
     columns, others = [], []
@@ -61,6 +64,10 @@ def clock_drift(value: Array, observations: Observations) -> str | None:
         f"effort drifts against position, by {100 * abs(rate):.2g} % of the time, {1e3 * abs(rate) * longest:.2g} ms over a run "
         f"of {longest:.3g} s: they have two clocks, and parameters are off; record both by one clock"
     )
+
+
+def _kept(observations: Observations, joint: int) -> int:
+    return sum(len(part.kept[joint]) for part in observations.data.stretches if part.usable)
 
 
 def _delayed(value: Array, observations: Observations, joint: int) -> tuple[Array, Array]:
