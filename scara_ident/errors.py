@@ -21,6 +21,10 @@ class RecordingError(ScaraIdentError):
     """A recording that cannot be used."""
 
 
+class MemoryLimit(RecordingError):
+    """A recording that takes more memory than is allowed."""
+
+
 class RegressorMismatch(ScaraIdentError):
     """A batch kernel that does not reproduce Pinocchio's regressor."""
 

@@ -1,15 +1,20 @@
-"""Writing result files whole or not at all."""
+"""Results on disk, whole or not at all; and what is no file to read from."""
 
 from __future__ import annotations
 
 import errno
 import json
 import os
+import platform
 import re
+import secrets
 import shutil
+import stat
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
+from hashlib import blake2s
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +26,25 @@ from scara_ident.errors import ScaraIdentError, UsageError
 PROBE = 4096
 # Bytes of a name out of a file; file systems take 255 with what is put before and behind it.
 LONGEST_SLUG = 200
+# What is still being written: whose it is, so that what a killed run has left can be told from what another run writes.
+UNFINISHED = ".scara-ident"
+_KINDS = (
+    (stat.S_ISFIFO, "a named pipe"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+)
 
 
 def path_fault(path: Path | str) -> str | None:
     """Say why a path can be no file's, or none that a result can name; None where it can.
 
+    A pipe has no end, nor has a device.
+
     Parameters
     ----------
     path : path
+        Links are followed; what is missing or a folder is for the reader to say.
 
     Returns
     -------
@@ -43,6 +59,10 @@ def path_fault(path: Path | str) -> str | None:
         text.encode("utf-8")
     except UnicodeEncodeError:
         return f"{shown}: its name is not text in UTF-8; rename it"
+    with suppress(OSError, ValueError):
+        mode = Path(path).stat().st_mode
+        kind = next((name for is_it, name in _KINDS if is_it(mode)), None)
+        return None if kind is None else f"{shown}: is {kind}, not a file; save it as a file first"
     return None
 
 
@@ -100,6 +120,7 @@ def check_output(folder: Path | None) -> None:
     made: list[Path] = []
     try:
         made = _make(folder)
+        _sweep(folder)
         with tempfile.TemporaryFile(dir=folder) as probe:
             probe.write(bytes(PROBE))
     except OSError as error:
@@ -132,7 +153,9 @@ def written_together(folder: Path) -> Iterator[Path]:
     stage: Path | None = None
     try:
         made = _make(folder)
-        stage = Path(tempfile.mkdtemp(prefix=".scara-ident-", dir=folder))
+        # Its name is known before it is there, so that no signal comes between.
+        stage = _unfinished(folder)
+        stage.mkdir(mode=0o700)
         yield stage
         files = sorted(stage.iterdir())
         for file in files:
@@ -197,22 +220,65 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
         In one line, if it cannot be written; nothing is left behind.
     """
     made: list[Path] = []
-    temporary: Path | None = None
     try:
         made = _make(path.parent)
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-        os.close(handle)
-        temporary = Path(name)
-        write(temporary)
-        temporary.chmod(0o644)
-        os.replace(temporary, path)
-        temporary = None
+        with replacing(path) as temporary:
+            write(temporary)
     except OSError as error:
         raise ScaraIdentError(f"{path}: cannot be written: {error.strerror or error}") from None
     finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
         _unmake(made)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield a name of the same suffix beside a file; what is written there becomes the file when the block ends well."""
+    temporary = _unfinished(path.parent, path.suffix)
+    try:
+        temporary.touch(exist_ok=False)
+        yield temporary
+        temporary.chmod(0o644)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _unfinished(folder: Path, suffix: str = "") -> Path:
+    return folder / f"{UNFINISHED}-{_here()}-{os.getpid()}-{secrets.token_hex(4)}{suffix}"
+
+
+@cache
+def _here() -> str:
+    """Name where process numbers count: this machine, and its container."""
+    try:
+        space = os.stat("/proc/self/ns/pid").st_ino
+    except OSError:
+        space = 0
+    return blake2s(f"{platform.node()} {space}".encode(), digest_size=4).hexdigest()
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a killed run of this machine has left in a folder."""
+    ours = re.compile(rf"{re.escape(UNFINISHED)}-{_here()}-([0-9]{{1,10}})-[0-9a-f]{{8}}(\.\w+)?")
+    with suppress(OSError):
+        for left in folder.iterdir():
+            match = ours.fullmatch(left.name)
+            if match is None or _runs(int(match[1])):
+                continue
+            if left.is_dir() and not left.is_symlink():
+                shutil.rmtree(left, ignore_errors=True)
+            else:
+                left.unlink(missing_ok=True)
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:

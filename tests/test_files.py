@@ -3,14 +3,27 @@
 from __future__ import annotations
 
 import json
+import os
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from scara_ident.errors import ScaraIdentError
-from scara_ident.files import path_fault, plain, real_path, slug, write_json, write_text, write_whole
+from scara_ident.files import (
+    _unfinished,
+    check_output,
+    path_fault,
+    plain,
+    real_path,
+    slug,
+    write_json,
+    write_text,
+    write_whole,
+)
 
 
 def refuse(constant: str) -> None:
@@ -109,3 +122,62 @@ def test_paths_that_are_none_are_told_and_rings_of_links_have_no_end(tmp_path: P
     (tmp_path / "way").symlink_to("end")
     assert real_path(tmp_path / "ring").name == "ring"
     assert real_path(tmp_path / "way").name == "end"
+
+
+def test_what_a_dead_process_left_is_swept_and_nothing_else(tmp_path: Path):
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    own = _unfinished(tmp_path)
+    left = [tmp_path / own.name.replace(str(os.getpid()), str(dead.pid)), tmp_path / f"{own.name}.json"]
+    left[1] = left[1].with_name(left[1].name.replace(str(os.getpid()), str(dead.pid)))
+    kept = [own, tmp_path / ".scara-ident-0badbeef-1-00000000", tmp_path / ".scara-ident-x", tmp_path / "report.html"]
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "mine").touch()
+    left[0].mkdir()
+    (left[0] / "half").touch()
+    left[1].symlink_to(elsewhere)
+    for path in kept:
+        path.touch()
+    check_output(tmp_path)
+    assert sorted(tmp_path.iterdir()) == sorted([*kept, elsewhere])
+    assert (elsewhere / "mine").exists()
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_a_disk_that_is_full_leaves_nothing_half_written(tmp_path: Path, together: bool):
+    (tmp_path / "a.json").write_text("old")
+    program = """
+import resource, sys
+from pathlib import Path
+from scara_ident.errors import ScaraIdentError
+from scara_ident.files import written_together, write_text
+resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+folder = Path(sys.argv[1])
+try:
+    if sys.argv[2] == "True":
+        with written_together(folder) as place:
+            write_text(place / "b.json", "new")
+            write_text(place / "a.json", "x" * 30000)
+    else:
+        write_text(folder / "a.json", "x" * 30000)
+except ScaraIdentError as error:
+    print(error)
+"""
+    told = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path), str(together)], capture_output=True, text=True, check=True
+    )
+    assert "cannot be written" in told.stdout
+    assert len(told.stdout.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
+    assert (tmp_path / "a.json").read_text() == "old"
+
+
+def test_a_pipe_a_device_and_a_socket_are_no_files(tmp_path: Path):
+    pipe, link = tmp_path / "pipe", tmp_path / "link"
+    os.mkfifo(pipe)
+    link.symlink_to(os.devnull)
+    assert "pipe: is a named pipe, not a file" in str(path_fault(pipe))
+    assert "link: is a device" in str(path_fault(link))
+    (tmp_path / "file").touch()
+    assert [path_fault(tmp_path / name) for name in ("file", "missing", ".")] == [None] * 3

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from io import TextIOWrapper
-from typing import Annotated, Any
+from threading import current_thread, main_thread
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -26,6 +29,7 @@ from scara_ident.errors import ScaraIdentError
 
 # Exit status after Ctrl-C, as shells have it; typer gives it back for a command that was interrupted.
 INTERRUPTED = 130
+TERMINATED = 143
 
 app = typer.Typer(
     name="scara-ident",
@@ -68,7 +72,7 @@ _COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (demo, "Run the whole story on the embedded arm."),
 )
 for _command, _line in _COMMANDS:
-    app.command(short_help=_line, cls=options.Command)(_command)
+    app.command(short_help=_line, cls=options.Command)(options.limited(_command))
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -83,7 +87,7 @@ def main(arguments: list[str] | None = None) -> None:
 def run(arguments: list[str]) -> int:
     """Run the program and return its exit status: 0 done, 1 cannot be given, 2 bad usage."""
     try:
-        with plugin_notices():
+        with plugin_notices(), _ended_tidily():
             result = app(args=arguments, prog_name="scara-ident", standalone_mode=False)
         status = int(result) if isinstance(result, int) else 0
         if status == INTERRUPTED:
@@ -99,6 +103,11 @@ def run(arguments: list[str]) -> int:
         return 2
     except typer.Exit as error:
         return error.exit_code
+    except SystemExit as error:
+        if error.code != TERMINATED:
+            raise
+        _complain("ended by a signal; no file is left half-written")
+        return TERMINATED
     except (typer.Abort, KeyboardInterrupt):
         _complain("interrupted; no file is left half-written")
         return INTERRUPTED
@@ -107,7 +116,7 @@ def run(arguments: list[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except MemoryError:
-        _complain("out of memory; give fewer recordings at a time")
+        _complain("out of memory; give fewer recordings at a time, or shorter ones")
         return 1
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
@@ -122,6 +131,25 @@ def run(arguments: list[str]) -> int:
             "SCARA_IDENT_TRACEBACK=1 prints"
         )
         return 1
+
+
+@contextmanager
+def _ended_tidily() -> Iterator[None]:
+    """Have the signal to end undo what is unfinished, as Ctrl-C does; a handler that is already there stays."""
+    if signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL or current_thread() is not main_thread():
+        yield
+        return
+
+    def end(*_: object) -> NoReturn:
+        # Once: what is undone then shall be undone to its end.
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        raise SystemExit(TERMINATED)
+
+    signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def _with_help(error: typer.TyperException, text: str) -> str:

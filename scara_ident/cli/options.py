@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperOption
 
 from scara_ident.identification import ESTIMATORS
+from scara_ident.memory import set_limit
 from scara_ident.model import MODELS
 
 Recordings = Annotated[
@@ -58,6 +62,30 @@ Output = Annotated[Path | None, typer.Option("--output", metavar="DIR", help="Fo
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, and nothing else there.")]
 Verbose = Annotated[bool, typer.Option("--verbose", help="Also list what every file holds and what its audit found.")]
 Folder = Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")]
+
+MaxMemory = Annotated[
+    float | None,
+    typer.Option(
+        "--max-memory", metavar="GB", help="Most memory that reading a file may take; default: half of the machine's."
+    ),
+]
+
+
+def limited(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a command with the option ``--max-memory`` beside its own."""
+
+    @wraps(command)
+    def run(*arguments: Any, max_memory: float | None = None, **more: Any) -> Any:
+        set_limit(max_memory)
+        return command(*arguments, **more)
+
+    # As typer finds no names of the command's module here.
+    types = get_type_hints(command, include_extras=True)
+    own = [each.replace(annotation=types[each.name]) for each in signature(command).parameters.values()]
+    extra = Parameter("max_memory", Parameter.KEYWORD_ONLY, default=None, annotation=MaxMemory)
+    run.__signature__ = Signature([*own, extra])  # type: ignore[attr-defined]
+    run.__annotations__ = {**types, "max_memory": MaxMemory}
+    return run
 
 
 class Command(TyperCommand):

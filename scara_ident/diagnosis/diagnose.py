@@ -29,6 +29,7 @@ from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import robust_fit
 from scara_ident.identification.channel_check import channel_faults
+from scara_ident.identification.clock_check import clock_drift
 from scara_ident.identification.events import Event, find_events, same_events, without_events
 from scara_ident.identification.identify import check_bands, check_held_out
 from scara_ident.identification.recording_check import held_out_events, without_stretches
@@ -221,6 +222,8 @@ def diagnose(
     parameters = physical_parameters(step) if found.chosen else PhysicalParameters((), ())
     effects = _effects(found, step, parameters)
     notes += [f"{item.label} is not counted: {item.why}" for item in outcome.demoted]
+    drift = clock_drift(after.value, outcome.training)
+    notes += [] if drift is None else [drift]
     if after.variation is not None:
         notes += after.variation.sentences(robot)
     negligible = _negligible(found)

@@ -20,6 +20,7 @@ from scara_ident.errors import RecordingError
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel
+from scara_ident.motion.position_noise import coarse_positions
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
 from scara_ident.threads import THREADS, side_by_side
 
@@ -210,7 +211,7 @@ class Observations:
         used, rested = np.zeros(len(self.joints)), np.zeros(len(self.joints))
         for part, _ in self._stretches():
             used += np.count_nonzero(part.used, axis=1)
-            rest = part.rest & np.logical_not(part.left_out)
+            rest = part.rest & np.logical_not(part.left_out | part.stretch.clipped)
             rested += np.count_nonzero(rest[:, part.trim : part.samples - part.trim], axis=1)
         return tuple(float(share) for share in rested / np.maximum(used + rested, 1.0))
 
@@ -363,7 +364,7 @@ def _recording_rows(item: PreparedRecording, parts: Sequence[tuple[PreparedStret
         samples = sum(part.samples for part in item.stretches)
         raise RecordingError(
             f"{item.recording.path or item.name}: nothing is left of {samples} samples once the ends and the times "
-            "at rest are left out; record longer or moving data"
+            f"at rest are left out; {coarse_positions(item) or 'record longer or moving data'}"
         )
     found = []
     for j in range(len(item.bands)):

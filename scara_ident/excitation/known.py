@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from scara_ident.errors import ScaraIdentError
+from scara_ident.files import path_fault
 from scara_ident.model.model import TorqueModel
 
 
@@ -30,6 +31,8 @@ def read_parameters(path: Path, model: TorqueModel) -> dict[str, float]:
     ScaraIdentError
         If the file cannot be read, has no parameters, or is of another model or robot.
     """
+    if (fault := path_fault(path)) is not None:
+        raise ScaraIdentError(fault)
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))["parameters"]
         found = {str(row["name"]): float(row["value"]) for row in rows if not _undetermined(row)}

@@ -45,7 +45,14 @@ def map_in_order(
         return
     context = multiprocessing.get_context("fork")
     with ProcessPoolExecutor(count, mp_context=context, initializer=_adopt, initargs=(work,)) as pool:
-        yield from pool.map(_apply, wanted)
+        try:
+            yield from pool.map(_apply, wanted)
+        except BaseException:
+            # Leaving the pool waits for its work, which nobody wants any more.
+            pool.shutdown(wait=False, cancel_futures=True)
+            for worker in multiprocessing.active_children():
+                worker.kill()
+            raise
 
 
 def _adopt(work: Callable[[Any], Any]) -> None:

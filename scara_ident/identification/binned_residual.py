@@ -117,7 +117,7 @@ def binned(recording: int, part: PreparedStretch, left: Array, noise: Array) -> 
     count = part.samples // size
     used = part.used
     if np.any(part.left_out):
-        used = ~standstill(part.stretch, part.motion, part.bands)
+        used = ~(standstill(part.stretch, part.motion, part.bands) | part.stretch.clipped)
         used[:, : part.trim] = used[:, max(part.trim, part.samples - part.trim) :] = False
     motion, middle = part.motion, slice(size // 2, count * size, size)
     speed = np.abs(motion.v)

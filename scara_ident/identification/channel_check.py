@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.errors import RecordingError
 from scara_ident.estimation.least_squares import weighted_value, wls
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.model.terms.friction import Friction
@@ -135,6 +136,17 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
             faults.append(ChannelFault("effort", tuple(joints), False, score, score))
         break
     return tuple(faults)
+
+
+def refuse_exchanged(faults: Sequence[ChannelFault]) -> None:
+    """Refuse joints that are exchanged: whatever is fitted to them is of no joint.
+
+    Raises
+    ------
+    RecordingError
+    """
+    if any(fault.exchanged for fault in faults):
+        raise RecordingError("; ".join(str(fault) for fault in faults))
 
 
 def _suspects(errors: Array, pushing: NDArray[np.bool_]) -> list[tuple[Signal, tuple[int, ...], bool]]:

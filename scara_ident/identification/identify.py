@@ -21,7 +21,8 @@ from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import disagreement, robust_fit
 from scara_ident.files import real_path
 from scara_ident.identification import ESTIMATORS
-from scara_ident.identification.channel_check import channel_faults
+from scara_ident.identification.channel_check import channel_faults, refuse_exchanged
+from scara_ident.identification.clock_check import clock_drift
 from scara_ident.identification.events import Event, find_events, without_events
 from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
@@ -128,8 +129,8 @@ def identify(
         If there are no recordings, the model or the method is unknown, a recording is both fitted and held out, or a band is no
         frequency that the slowest recording carries.
     RecordingError
-        If none of the recordings to fit can be used, or they have fewer rows than the model has parameters. One of several
-        that cannot be used, or one that is held out, is left out with a note.
+        If none of the recordings to fit can be used, or they have fewer rows than the model has parameters, or two joints are
+        exchanged (see `channel_faults`). One of several that cannot be used, or one that is held out, is left out with a note.
     """
     if not recordings:
         raise UsageError("no recordings to identify from")
@@ -145,6 +146,7 @@ def identify(
     training, validated = observe(equation, data), observe(equation, held_out)
     check_rows(training)
     faults = channel_faults(training)
+    refuse_exchanged(faults)
     notes += [str(fault) for fault in faults]
     progress("looking for events", 0.6)
     # With a wrong sign or exchanged joints nothing is explained anywhere.
@@ -156,7 +158,8 @@ def identify(
     estimate, history = estimate_by(method, training, options)
     differs = None if robust is None else disagreement(estimate, robust)
     events += () if faults else held_out_events(estimate.value, training, validated)
-    notes += [event.sentence(robot) for event in events] + ([] if differs is None else [differs])
+    drift = None if faults else clock_drift(estimate.value, training)
+    notes += [event.sentence(robot) for event in events] + [said for said in (differs, drift) if said is not None]
     if isinstance(estimate, ConsistentEstimate):
         notes += estimate.notes
     log_det, condition = paper_criteria(training)

@@ -12,7 +12,8 @@ from scara_ident.estimation.bands import BandChoice, choose_bands
 from scara_ident.estimation.observations import Observations, kept_rows
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import torque_of
-from scara_ident.motion.prepared import PreparedData, prepare
+from scara_ident.motion.position_noise import coarse_positions
+from scara_ident.motion.prepared import PreparedData, PreparedRecording, prepare
 from scara_ident.motion.velocity_audit import audit_velocity
 from scara_ident.recording.recording import Recording
 from scara_ident.threads import side_by_side
@@ -128,11 +129,16 @@ def with_rows(data: PreparedData, *, needed: bool) -> tuple[PreparedData, list[s
         return data, []
     notes = [
         f"{item.recording.path or item.name}: {count} independent rows are left once the ends and the times at rest are left "
-        "out; left out"
+        f"out{_because(item)}; left out"
         for item, count in zip(data.recordings, rows, strict=True)
         if count < LEAST_ROWS
     ]
     return data.of(kept), notes
+
+
+def _because(item: PreparedRecording) -> str:
+    coarse = coarse_positions(item)
+    return "" if coarse is None else f" ({coarse})"
 
 
 def check_rows(observations: Observations) -> None:
@@ -150,7 +156,7 @@ def check_rows(observations: Observations) -> None:
         first = observations.data.sources[0]
         raise RecordingError(
             f"{first.path or first.name}: {rows} independent rows within the bands for {np.count_nonzero(told)} parameters; "
-            "record longer, or give a wider band"
+            f"{coarse_positions(observations.data.recordings[0]) or 'record longer, or give a wider band'}"
         )
 
 

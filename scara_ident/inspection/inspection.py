@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RecordingError, UsageError
+from scara_ident.errors import MemoryLimit, RecordingError, UsageError
 from scara_ident.files import path_fault
 from scara_ident.inspection.guess import Guess, guess
 from scara_ident.inspection.names import Meaning, meaning
@@ -205,6 +205,8 @@ def _numbers(path: Path, names: tuple[str, ...], topic: str | None) -> dict[str,
     """Read the columns that hold numbers."""
     try:
         return read_columns(path, names, topic)
+    except MemoryLimit:
+        raise
     except RecordingError:
         # One of them is a text, or they differ in length: one by one.
         found: dict[str, Array] = {}

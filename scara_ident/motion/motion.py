@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
@@ -84,6 +85,8 @@ class Stretch:
         Samples per second.
     source : slice
         Samples of the recording that it was made of.
+    clipped : ndarray of bool, shape (n, N), or False
+        Where a torque is at the value at which the recording is clipped.
     """
 
     name: str
@@ -93,6 +96,7 @@ class Stretch:
     torque: Array | None
     rate: float
     source: slice
+    clipped: NDArray[np.bool_] | bool = False
     _filtered: dict[tuple[int, float | None], tuple[Array, Array, Array]] = field(default_factory=dict, repr=False)
     _thinned: dict[int, Stretch] = field(default_factory=dict, repr=False)
 
@@ -168,7 +172,20 @@ def _uniform(recording: Recording, start: int, stop: int, median: float) -> Stre
         position = cubic_spline(time, position, ideal)
     rate = (len(ideal) - 1) / (ideal[-1] - ideal[0])
     torque = _torque_at(recording, source, ideal, median)
-    return Stretch(recording.name, recording.trajectory, ideal, position, torque, float(rate), source)
+    clipped = _clipped_at(recording, source, ideal)
+    return Stretch(recording.name, recording.trajectory, ideal, position, torque, float(rate), source, clipped)
+
+
+def _clipped_at(recording: Recording, source: slice, grid: Array) -> NDArray[np.bool_] | bool:
+    """Tell where a grid has torques of clipped samples, from the values that the audit found to be clipped."""
+    bounds = [finding.clipped for finding in recording.findings if finding.clipped is not None]
+    if recording.effort is None or not bounds:
+        return False
+    clipped = np.zeros((len(recording.joints), len(grid)), dtype=bool)
+    for joint, torque in bounds:
+        at = (recording.effort[joint, source] == torque).astype(float)
+        clipped[joint] |= np.interp(grid, recording.time[source], at) > 0.0
+    return clipped
 
 
 def _torque_at(recording: Recording, source: slice, grid: Array, median: float) -> Array | None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.motion.motion import Stretch
-from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch, position_cuts
+from scara_ident.motion.prepared import REST_NOISE, PreparedData, PreparedRecording, PreparedStretch, position_cuts
 
 # Positions have steps where their changes are whole multiples of the least one, but for this much of it in the mean:
 # numbers of random size leave a quarter.
@@ -27,6 +27,8 @@ STEPLESS = 0.02
 UNLIKE = 0.5 - np.sqrt(1.0 / 12.0)
 # Median of a normal variable's size.
 NORMAL_MEDIAN = 0.6745
+# Time over which a joint's speed is taken, s, in which the steps of its encoder hardly count.
+SPEED_OVER = 0.1
 
 
 def encoder_step(position: Array) -> float | None:
@@ -50,6 +52,42 @@ def encoder_step(position: Array) -> float | None:
     if len(near) < 4 or float(np.mean(np.abs(near - np.round(near)))) > WHOLE:
         return None
     return step
+
+
+def coarse_positions(item: PreparedRecording) -> str | None:
+    """Name the joints whose encoders are too coarse for their bands: what counts as at rest is as fast as they move.
+
+    Parameters
+    ----------
+    item : PreparedRecording
+
+    Returns
+    -------
+    str or None
+        Which, by which step, and what to do; None where all are fine enough.
+    """
+    part = item.longest
+    nyquist = 0.5 * part.rate
+    apart = min(part.samples - 1, max(1, round(SPEED_OVER * part.rate)))
+    found = []
+    for joint, position in enumerate(part.stretch.position):
+        step = encoder_step(item.recording.position[joint])
+        if step is None:
+            continue
+        cut = position_cuts(part.rate, part.bands)[joint] or nyquist
+        # White noise of a step's rounding, differentiated, up to the filter's frequency.
+        noise = step / np.sqrt(12.0) * 2.0 * np.pi * np.sqrt(cut**3 / (3.0 * nyquist))
+        speed = np.sqrt(np.mean((position[apart:] - position[:-apart]) ** 2)) * part.rate / apart
+        if REST_NOISE * noise > speed > 0.0:
+            found.append((item.recording.joints[joint], step, part.bands[joint]))
+    if not found:
+        return None
+    joints, (_, step, band) = ", ".join(name for name, _, _ in found), found[0]
+    within = "without a low-pass" if band is None else f"in a band of {band:.3g} Hz"
+    return (
+        f"positions of {joints} go in steps of {step:.2g} (rad or m), so coarse that {within} rest and motion cannot be told "
+        "apart; record with a finer encoder, faster motion, or give a narrower band"
+    )
 
 
 def noise_level(part: PreparedStretch, joint: int) -> float:

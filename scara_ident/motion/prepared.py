@@ -102,8 +102,8 @@ class PreparedStretch:
 
     @made_once
     def rest(self) -> NDArray[np.bool_]:
-        """Where each joint stands still, shape (n, N), widened by the memory of the position's filter."""
-        return standstill(self.stretch, self.motion, self.bands) | self.left_out
+        """Where each joint stands still, shape (n, N), widened by the memory of the position's filter, or is left out."""
+        return standstill(self.stretch, self.motion, self.bands) | self.left_out | self.stretch.clipped
 
     @made_once
     def fade(self) -> Array:

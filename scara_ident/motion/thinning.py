@@ -27,6 +27,7 @@ def thinned(stretch: Stretch, step: int) -> Stretch:
             None,
             stretch.rate / step,
             stretch.source,
+            stretch.clipped if isinstance(stretch.clipped, bool) else _means(stretch.clipped.astype(float), step) > 0.0,
         )
     torque = None if stretch.torque is None else _means(stretch.torque, step)
     return replace(stretch._thinned[step], torque=torque)

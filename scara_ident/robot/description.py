@@ -23,6 +23,8 @@ from scara_ident.files import path_fault, real_path
 
 # Sizes that a factor of a drive or a channel may have.
 SMALLEST, LARGEST_FACTOR = 1e-12, 1e12
+# Characters of a robot.yaml, and nodes of it with its aliases written out.
+LARGEST = 1_000_000
 
 
 def _not_zero(value: float) -> float:
@@ -191,8 +193,14 @@ def read_description(path: Path) -> RobotDescription:
     if (fault := path_fault(path)) is not None:
         raise RobotError(fault)
     try:
-        text = path.read_text(encoding="utf-8")
-        _refuse_twice(yaml.compose(text, Loader=yaml.SafeLoader), path)
+        with path.open(encoding="utf-8") as file:
+            text = file.read(LARGEST + 1)
+        if len(text) > LARGEST:
+            raise RobotError(f"{path}: more than {LARGEST} characters; a robot.yaml has a few lines for each joint")
+        tree = yaml.compose(text, Loader=yaml.SafeLoader)
+        if _size(tree, {}) > LARGEST:
+            raise RobotError(f"{path}: aliases (*name) of aliases, which unfold without end; write the values out")
+        _refuse_twice(tree, path)
         content: Any = yaml.load(text, Loader=Loader)
     except FileNotFoundError:
         raise RobotError(f"{path}: no such robot description") from None
@@ -211,6 +219,16 @@ def read_description(path: Path) -> RobotDescription:
         raise RobotError(f"{path}: nested too deeply; a robot.yaml has a few levels") from None
     description = check_description(content, path)
     return description.model_copy(update={"urdf": real_path(path.parent / description.urdf)})
+
+
+def _size(node: Any, known: dict[int, float]) -> float:
+    """Return how many nodes a YAML tree has once its aliases are written out; infinite where one holds itself."""
+    if id(node) not in known:
+        known[id(node)] = math.inf
+        parts = node.value if isinstance(getattr(node, "value", None), list) else []
+        inner = [part for item in parts for part in (item if isinstance(item, tuple) else (item,))]
+        known[id(node)] = 1.0 + sum(_size(part, known) for part in inner)
+    return known[id(node)]
 
 
 def _refuse_twice(node: Any, path: Path, above: str = "") -> None:

@@ -26,6 +26,9 @@ from scara_ident.robot.signal_map import Channels, build_channels
 from scara_ident.robot.transmissions import reductions, rotor_inertias
 from scara_ident.robot.urdf_validation import MOVABLE, XACRO, urdf_fault
 
+# Bytes: those of a humanoid are a few hundred thousand.
+LARGEST_URDF = 30e6
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:
@@ -248,6 +251,8 @@ def _parse_xml(urdf: Path, source: Path) -> ElementTree.Element:
     if (fault := path_fault(urdf)) is not None:
         raise RobotError(f"{source}: urdf: {fault}")
     try:
+        if urdf.stat().st_size > LARGEST_URDF:
+            raise RobotError(f"{urdf}: {urdf.stat().st_size:.2g} bytes, more than any URDF; give the robot's URDF")
         root = ElementTree.parse(urdf).getroot()
     except FileNotFoundError:
         raise RobotError(f"{source}: urdf: no such file: {urdf}") from None

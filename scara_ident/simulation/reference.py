@@ -10,6 +10,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.recording.audit.clock import HUGE
 from scara_ident.recording.files.parquet_csv import column_names, read_columns
 from scara_ident.robot.robot import Robot
 
@@ -53,13 +54,13 @@ class ReferenceMotion:
             values = getattr(self, name)
             if values.shape != shape:
                 raise RecordingError(f"{self.name}: {name} has shape {values.shape}; joints and time ask for {shape}")
-            if not np.all(np.isfinite(values)):
+            if not np.all(np.abs(values) < HUGE):
                 raise RecordingError(f"{self.name}: {name} has a value that is not finite; give a complete motion")
             if np.any(np.abs(values) > LARGEST):
                 raise RecordingError(
                     f"{self.name}: {name} reaches {np.max(np.abs(values)):.3g}, which no arm does; give it in rad, m and s"
                 )
-        if len(self.time) < 2 or not np.all(np.diff(self.time) > 0):
+        if len(self.time) < 2 or not np.abs(self.time[-1]) < HUGE or not np.all(np.diff(self.time) > 0):
             raise RecordingError(f"{self.name}: time must have at least two samples and grow strictly")
 
     @property
@@ -160,7 +161,10 @@ def read_trajectory(path: Path | str, robot: Robot) -> ReferenceMotion:
             )
     columns = read_columns(path, ["time", *(name for group in wanted.values() for name in group)])
     time = np.asarray(columns["time"])
-    return ReferenceMotion(
-        path.stem, robot.joints, time - time[0],
-        *(np.array([columns[name] for name in group]) for group in wanted.values()),
-    )  # fmt: skip
+    try:
+        return ReferenceMotion(
+            path.stem, robot.joints, time - time[:1].sum(),
+            *(np.array([columns[name] for name in group]) for group in wanted.values()),
+        )  # fmt: skip
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from None

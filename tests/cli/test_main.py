@@ -57,7 +57,7 @@ def test_no_word_at_all_is_the_help_and_bad_usage(capfd: pytest.CaptureFixture[s
         (ScaraIdentError("a [b] c\nd"), 1, "scara-ident: a [b] c d\n"),
         (UsageError("wrong"), 2, "scara-ident: wrong\n"),
         (KeyboardInterrupt(), 130, "scara-ident: interrupted; no file is left half-written\n"),
-        (MemoryError(), 1, "scara-ident: out of memory; give fewer recordings at a time\n"),
+        (MemoryError(), 1, "scara-ident: out of memory; give fewer recordings at a time, or shorter ones\n"),
         (PermissionError(13, "Permission denied", "/a/b"), 1, "scara-ident: /a/b: Permission denied\n"),
     ],
 )

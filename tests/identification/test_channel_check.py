@@ -97,6 +97,14 @@ def test_diagnose_refuses_and_identify_says_it(recordings: tuple[Recording, ...]
     assert any("opposite sign" in note for note in notes)
 
 
+@pytest.mark.parametrize("signals", [("effort",), ("position",), ("effort", "position")])
+def test_both_refuse_exchanged_joints(recordings: tuple[Recording, ...], signals: tuple[str, ...]) -> None:
+    wrong = [exchanged(item, *signals) for item in recordings]
+    for ask in (identify, diagnose):
+        with pytest.raises(RecordingError, match=r"joint1 and joint2 look exchanged.*; exchange their columns"):
+            ask(virtual_arm().robot, wrong)
+
+
 def wandering(recording: Recording, share: float, seed: int) -> Recording:
     """Six seconds with efforts that wander by a share of their scatter within a second or so."""
     assert recording.effort is not None

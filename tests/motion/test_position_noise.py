@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scara_ident.motion.position_noise import encoder_step, noise_level, noisier
+from scara_ident.errors import RecordingError
+from scara_ident.identification.identify import identify
+from scara_ident.motion.position_noise import coarse_positions, encoder_step, noise_level, noisier
 from scara_ident.motion.prepared import prepare
 from scara_ident.robot.robot import load_robot
 from tests.arms import recording
@@ -79,3 +81,18 @@ def test_steps_are_added_where_the_band_is_so_wide_that_positions_keep_them(band
     added = more.stretch.position - part.stretch.position
     assert np.std(added[0]) == pytest.approx(step / np.sqrt(12.0), rel=0.1)
     assert abs(np.corrcoef(added[0], part.stretch.position[0] - SMOOTH[0])[0, 1]) < 0.2
+
+
+@pytest.mark.parametrize(("bits", "band", "coarse"), [(10, 50.0, True), (10, 3.0, False), (16, 50.0, False)])
+def test_an_encoder_too_coarse_for_its_band_is_named(bits: int, band: float, coarse: bool):
+    step = 2.0 * np.pi / 2**bits
+    position = np.vstack([step * np.round(SMOOTH[0] / step), SMOOTH[1]])
+    item = recording(load_robot(), "M_1", TIME, position, np.sin(3.0 * position))
+    said = coarse_positions(prepare([item], (band, band)).recordings[0])
+    if not coarse:
+        assert said is None
+        return
+    assert said is not None
+    assert f"positions of joint1 go in steps of {step:.2g}" in said
+    with pytest.raises(RecordingError, match="finer encoder"):
+        identify(load_robot(), [replace(item, position=step * np.round(SMOOTH / step))], bands=[band, band])

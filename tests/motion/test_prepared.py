@@ -24,6 +24,7 @@ from scara_ident.motion.prepared import (
     prepare,
     row_step,
 )
+from scara_ident.recording.audit import Finding
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import PLANAR_2R, swing, write_urdf
@@ -258,3 +259,21 @@ def test_signals_of_several_joints_pass_the_filter_together_as_alone(run: Record
     for joint, signal, rows in zip(joints, signals, found, strict=True):
         assert_allclose(rows, part.rows(joint, signal[None])[0], rtol=0, atol=1e-13)
     assert part.rows_of([]) == []
+
+
+def test_clipped_torque_is_left_out_of_its_joint_and_nothing_else(robot: Robot) -> None:
+    whole = swing(robot)
+    assert whole.effort is not None
+    bound = float(np.percentile(whole.effort[0], 90.0))
+    effort = whole.effort.copy()
+    effort[0] = np.minimum(effort[0], bound)
+    clipped = replace(whole, effort=effort, findings=(Finding("saturation", "clipped", 1, (0, bound)),))
+    (part,) = prepare([clipped], BANDS).stretches
+    (free,) = prepare([whole], BANDS).stretches
+    at = effort[0] == bound
+    assert 20 < np.count_nonzero(at) < 0.5 * len(at)
+    assert_array_equal(part.used[0], free.used[0] & ~at)
+    assert_array_equal(part.used[1], free.used[1])
+    # Nothing of the clipped torque passes the filter to rows that are kept.
+    estimates = [identify(robot, [item], bands=BANDS).estimate for item in (whole, clipped)]
+    assert_allclose(estimates[1].value, estimates[0].value, atol=4.0 * np.max(estimates[1].std))

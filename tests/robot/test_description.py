@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from scara_ident.errors import RobotError
 from scara_ident.robot.description import read_description
+from scara_ident.robot.robot import load_robot
 
 
 def described(folder: Path, text: str) -> Path:
@@ -113,3 +116,28 @@ def test_files_that_are_no_text_are_refused(tmp_path: Path):
 def test_a_folder_and_a_missing_file_are_refused(tmp_path: Path):
     assert "is a folder" in refusal(tmp_path)
     assert "no such robot description" in refusal(tmp_path / "robot.yaml")
+
+
+@pytest.mark.parametrize("laughs", [True, False])
+def test_aliases_that_unfold_without_end_are_refused_before(tmp_path, laughs):
+    letters = "abcdefghijkl"
+    lines = [f"{b}: &{b} [{', '.join([f'*{a}'] * 9)}]" for a, b in pairwise(letters)]
+    path = tmp_path / "robot.yaml"
+    path.write_text("\n".join(["urdf: x.urdf", "a: &a [x, x, x]", *lines]) if laughs else "urdf: &a [*a]")
+    with pytest.raises(RobotError, match=r"robot\.yaml: aliases \(\*name\) of aliases"):
+        read_description(path)
+
+
+def test_one_alias_is_a_value_like_any_other(tmp_path):
+    path = tmp_path / "robot.yaml"
+    path.write_text("urdf: x.urdf\njoints:\n  a: &gear {reduction: 100}\n  b: *gear\n")
+    joints = read_description(path).joints
+    assert joints is not None
+    assert joints["b"] == joints["a"]
+
+
+@pytest.mark.parametrize("name", ["robot.yaml", "robot.urdf"])
+def test_a_pipe_is_no_robot(tmp_path, name):
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(RobotError, match="is a named pipe, not a file"):
+        load_robot(tmp_path / name)

@@ -6,7 +6,7 @@ on those before it: units are judged on finite numbers in order of time, spikes 
 
 from __future__ import annotations
 
-from scara_ident.recording.audit import clock, effort, position, sizes
+from scara_ident.recording.audit import clock, effort, lost_samples, position, sizes
 from scara_ident.recording.audit.samples import Finding, Samples
 
 CHECKS = (
@@ -22,8 +22,10 @@ CHECKS = (
     clock.held_rows,
     position.whole_turns,
     position.spikes,
+    lost_samples.restamped,
     position.idle_joints,
     effort.dead_effort,
+    effort.copies,
     effort.saturation,
     position.limits,
     clock.enough,

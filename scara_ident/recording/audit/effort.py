@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,8 +62,24 @@ def dead_effort(samples: Samples) -> Checked:
     return samples.kept(keep), found
 
 
+def copies(samples: Samples) -> Checked:
+    """Refuse an effort that holds another joint's numbers: one of the two was never recorded."""
+    if samples.effort is None:
+        return samples, []
+    moving = np.flatnonzero(~samples.idle()).tolist()
+    for one, other in combinations(moving, 2):
+        alike = np.array_equal(samples.position[one], samples.position[other])
+        if not alike and np.array_equal(np.abs(samples.effort[one]), np.abs(samples.effort[other])):
+            first, second = samples.robot.joints[one], samples.robot.joints[other]
+            samples.refuse(
+                f"{second}.effort has the numbers of {first}.effort in every row: one of them was written, or mapped, "
+                "twice; correct the log, or recording: in robot.yaml"
+            )
+    return samples, []
+
+
 def saturation(samples: Samples) -> Checked:
-    """Say where efforts pile up at their extremes."""
+    """Say where efforts pile up at their extremes: what they were there is not known."""
     if samples.effort is None:
         return samples, []
     found = []
@@ -78,9 +96,9 @@ def saturation(samples: Samples) -> Checked:
             said = (
                 f"{name}.effort stays at its extreme {extreme:.4g} ({torque:.4g} {samples.robot.torque_unit(joint)}) "
                 f"for {100 * count / samples.count:.2g} % of the rows, first in {samples.where(int(start[0]))}: "
-                "the amplifier saturates or the log is clipped; used as it is"
+                "the amplifier saturates or the log is clipped; left out of the fit"
             )
-            found.append(Finding("saturation", said, count))
+            found.append(Finding("saturation", said, count, (joint, float(torque))))
     return samples, found
 
 

@@ -35,11 +35,14 @@ class Finding:
         One line for a person: what, where, what was done.
     count : int
         How many samples (gaps, joints) it concerns.
+    clipped : (int, float) or None
+        A joint by its place and the torque at which its effort is clipped, N m or N.
     """
 
     kind: str
     message: str
     count: int = 1
+    clipped: tuple[int, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from scara_ident.files import path_fault
 
 
 def check_file(path: Path) -> None:
-    """Refuse a file that is missing, may not be read or is empty, or whose name no result can hold."""
+    """Refuse what is no file, is missing, may not be read or is empty, or whose name no result can hold."""
     if (fault := path_fault(path)) is not None:
         raise RecordingError(fault)
     try:

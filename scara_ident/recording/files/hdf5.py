@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from math import prod
 from pathlib import Path
 from typing import Any
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.memory import check_memory, within_limit
 from scara_ident.recording.files import arrays
 from scara_ident.recording.files.files import absent, check_file, damaged, optional_module, refuse_no_numbers
 
 # MATLAB keeps what cells and objects point to in groups of this kind of name.
 HIDDEN = "#"
+# A number as it is stored, and as float64.
+BYTES = 16
 
 
 def column_names(path: Path, *, separator: str = "/") -> tuple[str, ...]:
@@ -46,10 +50,14 @@ def read_columns(path: Path, names: Sequence[str], *, separator: str = "/") -> d
         The file is damaged or lacks a column.
     """
     found: dict[str, Array] = {}
+    total = 0
     with _opened(path) as file:
         for key, data, field, shape in _sets(path, file, separator):
             wanted = [name for name in arrays.channels(key, shape) if name in names]
             if wanted:
+                # Whatever the file holds of it: what was never written is read as zeros.
+                total += prod(shape) * BYTES
+                check_memory(path, total)
                 values = data[()] if field is None else data[field]
                 found |= {name: arrays.column(values, key, name) for name in wanted}
     for name in names:
@@ -63,7 +71,7 @@ def _opened(path: Path) -> Iterator[Any]:
     check_file(path)
     h5py = optional_module("h5py", "hdf5", path)
     try:
-        with h5py.File(path, "r") as file:
+        with within_limit(path), h5py.File(path, "r") as file:
             yield file
     except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
         if isinstance(error, RecordingError):

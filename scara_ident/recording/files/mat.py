@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,13 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.memory import check_memory, within_limit
 from scara_ident.recording.files import arrays, hdf5
 from scara_ident.recording.files.files import absent, check_file, damaged, refuse_no_numbers
 
 HDF5_VERSION = b"MATLAB 7.3"
+# A number of the largest kind.
+BYTES = 8
 
 
 def column_names(path: Path) -> tuple[str, ...]:
@@ -61,11 +65,13 @@ def _is_hdf5(path: Path) -> bool:
 
 
 def _arrays(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
 
     try:
-        content = loadmat(path, simplify_cells=True)
-    except MemoryError:
+        with within_limit(path):
+            check_memory(path, sum(BYTES * prod(shape) for _, shape, _ in whosmat(path)))
+            content = loadmat(path, simplify_cells=True)
+    except RecordingError:
         raise
     except Exception as error:
         # SciPy's parser fails in whatever way the damage makes it fail.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -11,6 +10,8 @@ from typing import TYPE_CHECKING
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.files import replacing
+from scara_ident.memory import check_memory
 from scara_ident.recording.files.files import check_file
 
 if TYPE_CHECKING:
@@ -22,6 +23,12 @@ MISSING = ["NA", "N/A", "n/a", "na", "null", "None", "-"]
 SEPARATORS = ",;\t"
 # Of a word that is no number, this much is shown.
 LONGEST_WORD = 60
+# No header is as long, nor the row of a table.
+LONGEST_LINE = 1_000_000
+# Bytes of a number on its way into an array; of a word, where it is read as such.
+PER_VALUE = 24
+# A number takes two characters at least, and eight bytes; the file itself is in memory beside it.
+CSV_FACTOR = 5
 
 
 def column_names(path: Path) -> tuple[str, ...]:
@@ -90,6 +97,7 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
         if path.suffix.lower() == ".csv":
             frame = _read_csv(path, names)
         else:
+            _check_parquet(path, names)
             frame = pl.read_parquet(path, columns=list(names), glob=False, hive_partitioning=False)
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
         raise _damaged(path, error) from error
@@ -115,18 +123,12 @@ def write_columns(path: Path, columns: Mapping[str, Array]) -> None:
 
     check_suffix(path)
     frame = pl.DataFrame(dict(columns))
-    # In the same folder, so that the replacement is one step of the file system.
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        try:
-            with partial.open("wb") as file:
-                if path.suffix.lower() == ".csv":
-                    frame.write_csv(file)
-                else:
-                    frame.write_parquet(file)
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+        with replacing(path) as temporary, temporary.open("wb") as file:
+            if path.suffix.lower() == ".csv":
+                frame.write_csv(file)
+            else:
+                frame.write_parquet(file)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
     except pl.exceptions.PolarsError as error:
@@ -143,6 +145,7 @@ def check_suffix(path: Path) -> None:
 def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
     import polars as pl
 
+    check_memory(path, CSV_FACTOR * path.stat().st_size)
     raw = {name.strip(): name for name in _csv_header(path) if name.strip() in names}
     separator = _separator(path)
     decimal_comma = separator == ";" and _has_decimal_comma(path)
@@ -167,10 +170,29 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
     return frame.rename({file_name: name for name, file_name in raw.items()})
 
 
+def _check_parquet(path: Path, names: Sequence[str]) -> None:
+    """Refuse, before it is unpacked, a file of too many rows or of columns that are no numbers nor words."""
+    import polars as pl
+
+    with path.open("rb") as file:
+        schema = pl.read_parquet_schema(file)
+    for name in names:
+        if name in schema and not (schema[name].is_numeric() or schema[name] == pl.String):
+            raise _no_number(path, name, schema[name])
+    rows = pl.scan_parquet(path, glob=False, hive_partitioning=False).select(pl.len()).collect().item()
+    check_memory(path, PER_VALUE * rows * len(names))
+
+
+def _no_number(path: Path, name: str, kind: pl.DataType) -> RecordingError:
+    hint = "time in seconds" if name == "time" else "numbers"
+    return RecordingError(f"{path}: column {name!r} holds {kind}; it must hold {hint}")
+
+
 def _numbers(path: Path, series: pl.Series) -> Array:
     import polars as pl
 
     if series.dtype == pl.String:
+        check_memory(path, float(series.str.len_bytes().sum() or 0))
         words = series.str.strip_chars()
         numbers = words.cast(pl.Float64, strict=False)
         bad = (numbers.is_null() & words.is_not_null() & (words != "")).arg_true()
@@ -182,24 +204,31 @@ def _numbers(path: Path, series: pl.Series) -> Array:
             )
         series = numbers
     elif not series.dtype.is_numeric():
-        hint = "time in seconds" if series.name == "time" else "numbers"
-        raise RecordingError(f"{path}: column {series.name!r} holds {series.dtype}; it must hold {hint}")
+        raise _no_number(path, series.name, series.dtype)
     values: Array = series.cast(pl.Float64).to_numpy()
     return values
 
 
 def _csv_header(path: Path) -> list[str]:
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        for line in file:
-            if line.strip():
-                return next(csv.reader([line.strip()], delimiter=_sign_between(line)))
-    return []
+    line = _first_lines(path, 1)[0]
+    return next(csv.reader([line.strip()], delimiter=_sign_between(line))) if line else []
 
 
 def _separator(path: Path) -> str:
+    return _sign_between(_first_lines(path, 1)[0])
+
+
+def _first_lines(path: Path, count: int) -> list[str]:
+    """Return the first lines that are not empty, fewer than wanted filled up with empty ones."""
+    found: list[str] = []
     with path.open(encoding="utf-8-sig", newline="") as file:
-        header = next((line for line in file if line.strip()), "")
-    return _sign_between(header)
+        while len(found) < count and (line := file.readline(LONGEST_LINE)):
+            if len(line) == LONGEST_LINE:
+                raise RecordingError(
+                    f"{path}: a line of more than {LONGEST_LINE} characters: not a table; save it again"
+                )
+            found += [line] if line.strip() else []
+    return [*found, *[""] * (count - len(found))]
 
 
 def _sign_between(header: str) -> str:
@@ -209,10 +238,7 @@ def _sign_between(header: str) -> str:
 
 
 def _has_decimal_comma(path: Path) -> bool:
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        lines = (line for line in file if line.strip())
-        next(lines, "")
-        return "," in next(lines, "")
+    return "," in _first_lines(path, 2)[1]
 
 
 def _refuse_long_rows(path: Path, separator: str) -> None:

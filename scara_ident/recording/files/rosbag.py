@@ -12,6 +12,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.memory import within_limit
 from scara_ident.recording.files.files import absent, check_file, damaged, optional_module
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -131,8 +132,9 @@ def _files(path: Path) -> list[Path]:
 
 
 def _check(path: Path) -> None:
-    if not path.is_dir():
-        check_file(path)
+    for file in path.iterdir() if path.is_dir() else (path,):
+        if not file.is_dir():
+            check_file(file)
 
 
 @contextmanager
@@ -143,9 +145,9 @@ def _opened(path: Path) -> Iterator[Any]:
     # Files of older recorders do not say what their messages are made of.
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     try:
-        with highlevel.AnyReader([path], default_typestore=store) as bag:
+        with within_limit(path), highlevel.AnyReader([path], default_typestore=store) as bag:
             yield bag
-    except (RecordingError, MemoryError):
+    except RecordingError:
         raise
     except Exception as error:
         # The parsers of the storage formats fail in whatever way the damage makes them fail.

@@ -40,6 +40,15 @@ def test_an_effort_that_dies_is_left_out_or_refused_with_its_place(read):
     assert "row 1501" in refusal(read, made)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_effort_that_stands_twice_is_refused(read, sign):
+    made = columns()
+    made["joint2.effort"] = sign * made["joint1.effort"]
+    assert "joint2.effort has the numbers of joint1.effort in every row" in refusal(read, made)
+    made["joint2.effort"][7] += 0.1
+    assert read(made).findings == ()
+
+
 def test_saturation_is_said_with_share_and_level(read, robot):
     made = columns()
     made["joint1.effort"] = np.clip(made["joint1.effort"], -10.0, 0.3)
@@ -48,6 +57,7 @@ def test_saturation_is_said_with_share_and_level(read, robot):
     finding = only(recording, "saturation")
     assert finding.count == np.count_nonzero(made["joint1.effort"] == 0.3)
     assert "extreme 0.3 (0.6 N m)" in finding.message
+    assert finding.clipped == (0, 0.6)
     assert f"{100 * share:.2g} %" in finding.message
     made["joint1.effort"] = np.clip(made["joint1.effort"], -0.35, 0.3)
     assert kinds(read(made)) == ["saturation", "saturation"]

@@ -1,0 +1,300 @@
+"""Thousands of wrong inputs: each is read right or refused in one line, in time, within memory, with nothing left behind.
+
+    PYTHONPATH=. python benchmarks/fuzz.py --inputs 5000 --seed 1
+    PYTHONPATH=. python benchmarks/fuzz.py --kills 100
+
+Each input runs the program in a process of its own, forked from one that has imported it, with limits of time, processor
+and memory. Counted are: a trace, an internal error, an end by a signal, no end, more memory than allowed, a refusal of
+other than one line, files beside ``--output``, and results that are not whole. `--kills` ends runs by SIGTERM or SIGKILL at
+random moments and looks for results that are not whole and for what is left behind.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+from fuzz_inputs import KINDS, mutate, write_seeds
+
+LONGEST = 10.0  # s of the processor
+PATIENCE = 30.0  # s by the clock, on a machine that does other things too
+MOST_MEMORY = 3e9
+ALLOWED = 1.0  # GB, as --max-memory; the program itself and what is made of a recording come on top
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one input came to."""
+
+    verdict: str
+    seconds: float
+    peak: float
+    said: str
+
+
+def words_for(name: str, work: Path, seeds: Path, random: Random) -> list[str]:
+    """Return the command that reads a file; results take longer than all else, and are not always written."""
+    file, out = str(work / name), ["--output", str(work / "out")]
+    written = out if random.random() < 0.3 else []
+    if name in ("robot.yaml", "scara.urdf"):
+        robot = file
+        if name == "scara.urdf" and random.random() < 0.5:
+            shutil.copyfile(seeds / "robot.yaml", work / "robot.yaml")
+            robot = str(work / "robot.yaml")
+        elif name == "robot.yaml":
+            shutil.copyfile(seeds / "scara.urdf", work / "scara.urdf")
+        if random.random() < 0.5 or robot.endswith(".urdf"):
+            return ["base", "--robot", robot, *out]
+        return ["identify", str(seeds / "run.parquet"), "--robot", robot, "--model", "basic", *written]
+    if name == "trajectory.csv":
+        return ["simulate", file, *out]
+    if name == "identification.json":
+        return ["parameters", file]
+    if random.random() < 0.4:
+        return ["inspect", file]
+    return ["identify", file, "--model", "basic", *written]
+
+
+def run_one(words: list[str], work: Path) -> Outcome:
+    """Run the program in a fork of this process and judge it."""
+    before = {path for path in work.rglob("*") if path.is_file()}
+    told = work.parent / "told"
+    begin = time.monotonic()
+    child = os.fork()
+    if child == 0:
+        _be_the_program(words, told, work)
+    usage, status, verdict = _waited(child, begin)
+    seconds = time.monotonic() - begin
+    said = told.read_text(encoding="utf-8", errors="replace")
+    lines = [line for line in said.splitlines() if "scara-ident: note:" not in line]
+    left = [p for p in work.parent.rglob("*") if p.is_file() and p not in before and p != told]
+    beside = [path for path in left if work / "out" not in path.parents and "seeds" not in path.parts]
+    if verdict is None and usage.ru_maxrss * 1024 > MOST_MEMORY:
+        verdict = "over memory"
+    if verdict is None and os.WIFSIGNALED(status):
+        number = os.WTERMSIG(status)
+        verdict = "hang" if number == signal.SIGXCPU else f"signal {number}"
+    code = os.waitstatus_to_exitcode(status)
+    for word, name in (("Traceback", "trace"), ("internal error", "internal error"), ("out of memory", "over memory")):
+        if verdict is None and word in said:
+            verdict = name
+    if verdict is None and beside:
+        verdict = f"beside output: {beside[0].name}"
+    if verdict is None and (fault := unfinished(work / "out")):
+        verdict = fault
+    if verdict is None and code not in (0, 1, 2):
+        verdict = f"status {code}"
+    if verdict is None and code and len(lines) != 1:
+        verdict = f"{len(lines)} lines"
+    if verdict is None and code and any((work / "out").rglob("*")):
+        verdict = "results of a refused input"
+    return Outcome(verdict or ("read" if code == 0 else "refused"), seconds, usage.ru_maxrss * 1024, said.strip())
+
+
+def _be_the_program(words: list[str], told: Path, work: Path) -> None:
+    """Run the program with its output in a file, and end this process."""
+    status = 70
+    try:
+        resource.setrlimit(resource.RLIMIT_CPU, (int(LONGEST), int(LONGEST) + 1))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        sink, source = os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), os.open(os.devnull, os.O_RDWR)
+        os.dup2(source, 0)
+        os.dup2(source, 1)
+        os.dup2(sink, 2)
+        os.chdir(work)
+        if words[0] == "parameters":
+            # What excite reads first; designing with them takes longer than is allowed here.
+            status = _read_parameters(Path(words[1]))
+        else:
+            from scara_ident.cli.main import run
+
+            status = run([*words, "--max-memory", str(ALLOWED)])
+    except BaseException:
+        import traceback
+
+        traceback.print_exc()
+    finally:
+        sys.stderr.flush()
+        os._exit(status)
+
+
+def _read_parameters(path: Path) -> int:
+    from scara_ident.errors import ScaraIdentError
+    from scara_ident.excitation.known import read_parameters
+    from scara_ident.model.model import build_model
+    from scara_ident.robot.robot import load_robot
+
+    try:
+        read_parameters(path, build_model(load_robot(), "complete"))
+    except ScaraIdentError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+def _waited(child: int, begin: float) -> tuple[resource.struct_rusage, int, str | None]:
+    while True:
+        done, status, usage = os.wait4(child, os.WNOHANG)
+        if done:
+            return usage, status, None
+        if time.monotonic() - begin > PATIENCE:
+            os.kill(child, signal.SIGKILL)
+            _, status, usage = os.wait4(child, 0)
+            return usage, status, "hang"
+        time.sleep(0.002)
+
+
+def unfinished(out: Path) -> str | None:
+    """Say what of the results is not whole."""
+    for path in out.rglob("*"):
+        if path.name.startswith("."):
+            return f"left behind: {path.name}"
+        if path.suffix == ".json":
+            try:
+                json.loads(path.read_text(encoding="utf-8"))
+            except ValueError:
+                return f"half a file: {path.name}"
+        if path.suffix == ".html" and not path.read_text(encoding="utf-8").rstrip().endswith("</html>"):
+            return f"half a file: {path.name}"
+        if path.suffix in (".urdf", ".xml") and not path.read_text(encoding="utf-8").rstrip().endswith(">"):
+            return f"half a file: {path.name}"
+    return None
+
+
+def fuzz(
+    inputs: int, seed: int, kinds: tuple[str, ...] = KINDS, first: int = 0
+) -> Iterator[tuple[str, str, list[str], Outcome]]:
+    """Run the program on mutations; yield for each its number and kind, what was done, the words, and the outcome."""
+    with tempfile.TemporaryDirectory() as place:
+        seeds = Path(place) / "seeds"
+        seeds.mkdir()
+        # Polars starts threads where it is used, which a fork does not have: this process only imports it.
+        program = f"import sys; sys.path[:0] = {sys.path!r}\nfrom pathlib import Path\nimport fuzz_inputs\n"
+        subprocess.run([sys.executable, "-c", f"{program}fuzz_inputs.write_seeds(Path({str(seeds)!r}))"], check=True)
+        for number in range(first, first + inputs):
+            name = kinds[number % len(kinds)]
+            # Of its own, so that one input can be run again alone.
+            random = Random(f"{seed} {number}")
+            work = Path(place) / "work"
+            work.mkdir()
+            # In a process of its own for the same reason.
+            done = _forked(lambda name=name, work=work, random=random: mutate(work / name, seeds, random))
+            words = words_for(name, work, seeds, Random(f"{seed} {number} words"))
+            yield f"{number} {name}", done, words, run_one(words, work)
+            shutil.rmtree(work)
+            for stray in Path(place).iterdir():
+                if stray.name not in ("seeds", "told"):
+                    stray.unlink() if stray.is_file() else shutil.rmtree(stray)
+
+
+def _forked(make: object) -> str:
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            os.write(writer, make().encode())  # type: ignore[operator]
+        except BaseException as error:
+            os.write(writer, f"NOT MADE: {type(error).__name__}: {error}".encode())
+        finally:
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as pipe:
+        said = pipe.read().decode()
+    os.waitpid(child, 0)
+    if said.startswith("NOT MADE"):
+        raise RuntimeError(said)
+    return said
+
+
+def import_program() -> None:
+    """Import what the commands import while they run, once for all inputs."""
+    import h5py  # noqa: F401
+    import polars  # noqa: F401
+    import rosbags.highlevel  # noqa: F401
+    import scipy.io
+    import scipy.stats  # noqa: F401
+
+    import scara_ident.cli.main
+    import scara_ident.excitation.known
+    import scara_ident.export.robots
+    import scara_ident.identification.identify
+    import scara_ident.inspection.inspection
+    import scara_ident.report.html
+    import scara_ident.report.pictures
+    import scara_ident.simulation  # noqa: F401
+
+
+def kills(count: int, seed: int) -> Counter[str]:
+    """End runs at random moments; count what they leave."""
+    random = Random(seed)
+    found: Counter[str] = Counter()
+    with tempfile.TemporaryDirectory() as place:
+        seeds, out = Path(place) / "seeds", Path(place) / "out"
+        seeds.mkdir()
+        write_seeds(seeds)
+        words = [sys.executable, "-m", "scara_ident", "identify", str(seeds / "run.parquet"), "--model", "basic"]
+        begin = time.monotonic()
+        subprocess.run([*words, "--output", str(out)], check=True, capture_output=True)
+        usual = time.monotonic() - begin
+        for _ in range(count):
+            number = random.choice((signal.SIGTERM, signal.SIGKILL))
+            process = subprocess.Popen(
+                [*words, "--output", str(out)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+            )
+            # Mostly while it writes, which is at the end.
+            time.sleep(usual * random.choice((random.random(), random.uniform(0.7, 1.05))))
+            process.send_signal(number)
+            _, said = process.communicate(timeout=60)
+            fault = unfinished(out)
+            if number == signal.SIGKILL and fault is not None and fault.startswith("left behind"):
+                found["left behind by SIGKILL, to be swept"] += 1
+                fault = None
+            found[f"{signal.Signals(number).name}: {fault or 'whole'}"] += 1
+            if "Traceback" in said:
+                found["trace"] += 1
+        subprocess.run([*words, "--output", str(out)], check=True, capture_output=True)
+        found[f"after the next run: {unfinished(out) or 'whole'}"] += 1
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--inputs", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="number of the first, to run one again")
+    parser.add_argument("--kinds", nargs="*", default=KINDS)
+    parser.add_argument("--kills", type=int, default=0)
+    parser.add_argument("--show", action="store_true", help="also print what was said of every input")
+    asked = parser.parse_args()
+    if asked.kills:
+        for what, count in sorted(kills(asked.kills, asked.seed).items()):
+            print(f"{count:6} {what}")
+        return
+    import_program()
+    counts: Counter[str] = Counter()
+    for name, done, words, outcome in fuzz(asked.inputs, asked.seed, tuple(asked.kinds), asked.first):
+        counts[outcome.verdict] += 1
+        if asked.show or outcome.verdict not in ("read", "refused"):
+            said = outcome.said if len(outcome.said) < 600 else f"{outcome.said[:250]} ... {outcome.said[-250:]}"
+            print(
+                f"{outcome.verdict}: {name} ({done}) {' '.join(words[:2])} {outcome.seconds:.1f} s: {said}", flush=True
+            )
+    for verdict, count in counts.most_common():
+        print(f"{count:6} {verdict}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+"""Does the effort's clock run as fast as the position's? Where it does not, the delay between them grows over a run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.estimation.observations import Observations
+
+# A drift is said where it is this many standard deviations from none, ...
+CERTAIN = 5.0
+# ... and explains this share of what the model leaves: less moves no parameter by more than its uncertainty.
+SHARE = 2e-3
+
+
+def clock_drift(value: Array, observations: Observations) -> str | None:
+    """Say how fast effort drifts against position, if it does.
+
+    To first order a torque u that lags by d + r t differs from u by -(d + r t) du/dt. The rate r is the same in all
+    recordings, the delay d of each its own. The standard deviation is of the scores of blocks of time, which may be
+    correlated within (White 1980, "A heteroskedasticity-consistent covariance matrix estimator").
+
+    Parameters
+    ----------
+    value : ndarray, shape (p,)
+    observations : Observations
+        With the columns at every sample.
+
+    Returns
+    -------
+    str or None
+        None where the clocks agree.
+    """
+    if any(rows.table.shape[1] != _kept(observations, j) for j, rows in enumerate(observations.joints)):
+        # Blocks without rows, or with an event, were taken out: which sample is whose is no more known.
+        return None
+    noise = np.array([rows.rms(value) for rows in observations.joints])
+    weight = np.where(noise > 0.0, 1.0 / np.where(noise > 0.0, noise, 1.0), 0.0)
+    columns, others = [], []
+    for j, rows in enumerate(observations.joints):
+        own = np.zeros((observations.parameters, rows.table.shape[1]))
+        own[rows.columns] = rows.table[:-1]
+        left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
+        delays, growing = _delayed(value, observations, j)
+        columns.append(weight[j] * np.vstack([own, delays]))
+        others.append(weight[j] * np.vstack([growing, left]))
+    # What parameters and one delay for each recording explain is none of the drift's.
+    matrix, right = np.hstack(columns).T, np.hstack(others).T
+    size = np.linalg.norm(matrix, axis=0)
+    matrix = matrix / np.where(size > 0.0, size, 1.0)
+    growing, left = (right - matrix @ np.linalg.lstsq(matrix, right)[0]).T
+    block = np.concatenate(
+        [np.repeat(np.arange(len(rows.starts) - 1), np.diff(rows.starts)) for rows in observations.joints]
+    )
+    score, information = np.bincount(block, growing * left), np.bincount(block, growing**2)
+    if not np.sum(information) * np.sum(left**2) > 0.0:
+        return None
+    rate = float(np.sum(score) / np.sum(information))
+    std = float(np.sqrt(np.sum((score - information * rate) ** 2)) / np.sum(information))
+    if abs(rate) < CERTAIN * std or rate * np.sum(score) < SHARE * np.sum(left**2):
+        return None
+    longest = max(item.time[-1] - item.time[0] for item in observations.data.sources)
+    return (
+        f"effort drifts against position, by {100 * abs(rate):.2g} % of the time, {1e3 * abs(rate) * longest:.2g} ms over a run "
+        f"of {longest:.3g} s: they have two clocks, and parameters are off; record both by one clock"
+    )
+
+
+def _kept(observations: Observations, joint: int) -> int:
+    return sum(len(part.kept[joint]) for part in observations.data.stretches if part.usable)
+
+
+def _delayed(value: Array, observations: Observations, joint: int) -> tuple[Array, Array]:
+    """Return what a joint's torque changes by when each recording is late, (recordings, K), and where all grow later, (K,)."""
+    rows, each, growing = observations.joints[joint], [], []
+    for item, raws in zip(observations.data.recordings, observations.raw, strict=True):
+        parts = []
+        start = item.stretches[0].stretch.time[0]
+        for part, raw in zip(item.stretches, raws, strict=True):
+            if part.usable:
+                slope = -np.gradient(value[rows.columns] @ raw[joint]) * part.rate
+                parts.append(part.rows(joint, np.array([slope, slope * (part.stretch.time - start)])))
+        late = np.concatenate(parts, axis=1) if parts else np.zeros((2, 0))
+        each.append(late[0])
+        growing.append(late[1])
+    delays = np.zeros((len(each), rows.table.shape[1]))
+    ends = np.cumsum([0, *map(len, each)])
+    for k, late in enumerate(each):
+        delays[k, ends[k] : ends[k + 1]] = late
+    return delays, np.concatenate(growing)

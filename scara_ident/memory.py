@@ -1,0 +1,109 @@
+"""How much memory reading a file may take, in one place: a small file can unpack to more than the machine has."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+
+from scara_ident.errors import MemoryLimit, UsageError
+
+GIGA = 1e9
+# Of the machine's memory, where no limit is given: what is made of a recording has to have room beside it.
+SHARE = 0.5
+# Where the system does not say how much it has.
+USUAL = 8e9
+LEAST = 0.05
+
+_given: list[float] = []
+
+
+def set_limit(gigabytes: float | None) -> None:
+    """Set the most memory that reading a file may take, GB; None is the machine's.
+
+    Raises
+    ------
+    UsageError
+        If it is less than what reading any file takes.
+    """
+    if gigabytes is not None and not gigabytes >= LEAST:
+        raise UsageError(f"--max-memory {gigabytes:g}: expected at least {LEAST:g} GB")
+    _given[:] = [] if gigabytes is None else [gigabytes * GIGA]
+
+
+def limit() -> float:
+    """Return the most memory that reading a file may take, bytes: as set, else half of the machine's."""
+    return _given[0] if _given else SHARE * _of_machine()
+
+
+def check_memory(path: Path, needed: float) -> None:
+    """Refuse a file before it is read, by the bytes that it will take.
+
+    Raises
+    ------
+    MemoryLimit
+    """
+    if needed > limit():
+        raise _too_much(path, f"about {needed / GIGA:.2g} GB of memory, more than {limit() / GIGA:.2g} GB")
+
+
+@contextmanager
+def within_limit(path: Path) -> Iterator[None]:
+    """Hold what is allocated while a file is read to the limit, for formats that do not say what they unpack to.
+
+    By the limit of the process's address space, where the system has one. A library that ends the process where it gets no
+    memory is to be asked by `check_memory` instead.
+
+    Raises
+    ------
+    MemoryLimit
+        If it takes more.
+    """
+    before = _narrow()
+    try:
+        yield
+    except MemoryError:
+        raise _too_much(path, f"more than {limit() / GIGA:.2g} GB of memory") from None
+    finally:
+        if before is not None:
+            import resource
+
+            resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+def _too_much(path: Path, what: str) -> MemoryLimit:
+    return MemoryLimit(f"{path}: reading it takes {what}; cut the file, or allow more with --max-memory")
+
+
+def _narrow() -> tuple[int, int] | None:
+    """Narrow the address space to what is used and the limit; return what it was, None where that cannot be done."""
+    try:
+        import resource
+
+        used = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+        before = resource.getrlimit(resource.RLIMIT_AS)
+        wanted = used + int(limit())
+        if before[0] != resource.RLIM_INFINITY and before[0] <= wanted:
+            return None
+        resource.setrlimit(resource.RLIMIT_AS, (wanted, before[1]))
+    except (ImportError, OSError, ValueError):
+        return None
+    return before
+
+
+@cache
+def _of_machine() -> float:
+    """Memory of the machine, or of the container that this runs in, bytes."""
+    found = []
+    with suppress(AttributeError, OSError, ValueError):
+        found.append(float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")))
+    with suppress(OSError, ValueError):
+        found.append(float(Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii")))
+    with suppress(ImportError, OSError):
+        import resource
+
+        own = resource.getrlimit(resource.RLIMIT_AS)[0]
+        found += [] if own == resource.RLIM_INFINITY else [float(own)]
+    return min(found, default=USUAL)

@@ -1,0 +1,77 @@
+"""Samples lost under an even clock are seen by the motion; noise, coarse encoders and real jerks are not taken for it."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from scara_ident.errors import RecordingError
+from scara_ident.recording.audit import Samples
+from scara_ident.recording.audit.lost_samples import restamped
+from scara_ident.robot.robot import load_robot
+
+ROBOT = load_robot()
+INTERVAL = 2e-3
+
+
+def moved(seed: int = 0, count: int = 6000, lost: float = 0.0, step: float = 1e-5, jolts: int = 0) -> Samples:
+    """Two joints on sines and noise, of which a share of samples is lost; the clock is even."""
+    random = np.random.default_rng(seed)
+    time = INTERVAL * np.arange(count)
+    position = np.array([np.sin(2.1 * time + 0.3), 0.8 * np.sin(3.3 * time) + 0.2 * np.cos(5.1 * time)])
+    # The speed changes at once, as at a stop or with a push.
+    for at in random.uniform(0.0, time[-1], jolts):
+        position += random.normal(0.0, 0.5, (2, 1)) * np.maximum(time - at, 0.0)
+    if step:
+        position = step * np.rint((position + 0.3 * step * random.standard_normal(position.shape)) / step)
+    kept = random.random(count) >= lost
+    rows = np.arange(1, np.count_nonzero(kept) + 1)
+    return Samples("a.csv", ROBOT, INTERVAL * rows, position[:, kept], None, rows)
+
+
+@pytest.mark.parametrize("lost", [0.02, 0.05, 0.1])
+@pytest.mark.parametrize("step", [0.0, 1e-5, 1e-4])
+def test_many_lost_samples_are_refused_with_their_share(lost: float, step: float):
+    with pytest.raises(RecordingError, match="samples are lost and the clock was made even") as caught:
+        restamped(moved(lost=lost, step=step))
+    share = re.search(r"in ([0-9.]+) % of the steps", str(caught.value))
+    assert share is not None
+    # Two losses close to each other are taken for none or one.
+    assert 60 * lost < float(share[1]) < 110 * lost
+    assert "\n" not in str(caught.value)
+
+
+def test_few_lost_samples_are_said():
+    samples, (finding,) = restamped(moved(lost=0.005))
+    assert finding.kind == "restamped"
+    assert 15 <= finding.count <= 40
+    assert samples.count > 5900
+
+
+@pytest.mark.parametrize("bits", range(10, 21, 2))
+@pytest.mark.parametrize("jolts", [0, 40])
+def test_whole_recordings_are_passed(bits: int, jolts: int):
+    for seed in range(3):
+        assert restamped(moved(seed, step=2 * np.pi / 2**bits, jolts=jolts))[1] == []
+
+
+def test_joints_that_stand_still_say_nothing():
+    whole = moved()
+    position = np.array([np.full(whole.count, 0.7), 1e29 * whole.position[1]])
+    assert restamped(Samples("a.csv", ROBOT, whole.time, position, None, whole.row))[1] == []
+
+
+def test_a_loss_that_the_clock_shows_is_none():
+    whole = moved()
+    kept = np.random.default_rng(1).random(whole.count) >= 0.05
+    assert restamped(whole.kept(kept))[1] == []
+
+
+def test_a_source_that_is_late_now_and_then_has_lost_nothing():
+    whole = moved(step=0.0)
+    late = np.random.default_rng(2).random(whole.count) < 0.05
+    position = whole.position.copy()
+    position[:, 1:][:, late[1:]] = whole.position[:, :-1][:, late[1:]]
+    assert restamped(Samples("a.csv", ROBOT, whole.time, position, None, whole.row))[1] == []
