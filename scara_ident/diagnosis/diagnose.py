@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.confounding import Confounder, confounders
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
@@ -21,7 +23,7 @@ from scara_ident.diagnosis.search import Search, SearchTask, corrected
 from scara_ident.diagnosis.selection_step import SelectionStep, observed_at_every_sample
 from scara_ident.diagnosis.tentative import TentativeEffect, tentative_effects
 from scara_ident.diagnosis.work import first, searching
-from scara_ident.effects import Effect, Parameter
+from scara_ident.effects import Effect, EffectTerm, Parameter
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.errors import RecordingError, UsageError
@@ -33,6 +35,7 @@ from scara_ident.identification.events import Event, find_events, same_events, w
 from scara_ident.identification.identify import check_bands, check_held_out
 from scara_ident.identification.recording_check import held_out_events, without_stretches
 from scara_ident.identification.usable import check_rows, usable_in_bands, with_rows
+from scara_ident.manners import Reported
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.progress import Tell, Work, silent
 from scara_ident.recording.recording import Recording
@@ -78,8 +81,8 @@ class FoundEffect:
     after: Mapping[str, float | None]
 
 
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Reported):
     """What `diagnose` found.
 
     Attributes
@@ -111,6 +114,8 @@ class Diagnosis:
         What is local in time: left out of every fit, or in recordings that were held out.
     """
 
+    _told_by: ClassVar[str] = "diagnosis"
+
     verdict: Verdict
     search: Search
     before: Estimate
@@ -135,6 +140,38 @@ class Diagnosis:
     def robot(self) -> Robot:
         """The robot."""
         return self.before.model.robot
+
+    def predict(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Predict the recorded torque with the effects found that follow from the state, see `not_predicted`.
+
+        Parameters
+        ----------
+        q, v, a : array_like, shape (n,) or (N, n)
+            Position, velocity and acceleration in rad or m, per s and s^2; joints in the robot's order.
+
+        Returns
+        -------
+        ndarray, shape (n,) or (N, n)
+            N m (N), on the side of the gear where effort is recorded.
+
+        Raises
+        ------
+        UsageError
+            If the shapes are not these.
+        """
+        return self.after.predict(q, v, a)
+
+    @property
+    def not_predicted(self) -> tuple[str, ...]:
+        """Effects found that `predict` leaves out: they take more than a state, or were taken out of the recordings."""
+        within = {(term.name, term.joint) for term in self.after.model.terms if isinstance(term, EffectTerm)}
+        corrected = [item for item in self.effects if (item.effect, item.joint) not in within]
+        labels = [item.effect if item.joint is None else f"{item.effect} of {item.joint}" for item in corrected]
+        return (*self.after.prediction.left_out, *labels)
+
+    def _in_short(self) -> str:
+        found = [item.effect if item.joint is None else f"{item.effect} of {item.joint}" for item in self.effects]
+        return f"{self.robot.name}: {self.verdict}{', with ' + ', '.join(found) if found else ''}"
 
 
 # Matrices are small throughout: a second BLAS thread waits more than it works.

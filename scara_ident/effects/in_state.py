@@ -14,12 +14,13 @@ from scara_ident.arrays import Array
 from scara_ident.effects.signals import Scene
 from scara_ident.motion.motion import Motion
 
-# Samples of the motion that is tried, its slowest sine's periods, and the largest difference that is rounding.
-SAMPLES = 600
-PERIODS = 3.0
+# Samples of the motion that is tried, and the least periods of its sines.
+SAMPLES, PERIODS = 600, 3.0
+# A larger difference, relative to the largest column, is not rounding.
 ROUNDING = 1e-9
 # Times the recordings' speed: the faster ones reverse every load, also one that gravity holds.
 HASTES = (1.0, 10.0)
+# The other order is no recording's.
 STRANGER = "a recording of another name"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from scara_ident.excitation.problem import NARROWEST, Task
 from scara_ident.excitation.search import Effort, Progress, search
 from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.verification import Reached, reached
+from scara_ident.manners import Reported
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 
@@ -33,8 +35,8 @@ LEAST_PER_PERIOD = 4
 MOST_TRAJECTORIES = 26
 
 
-@dataclass(frozen=True, eq=False)
-class Design:
+@dataclass(frozen=True, eq=False, repr=False)
+class Design(Reported):
     """Trajectories with what they promise.
 
     Attributes
@@ -64,6 +66,8 @@ class Design:
         What the search took.
     """
 
+    _told_by: ClassVar[str] = "design"
+
     model: TorqueModel
     criterion: Criterion
     trajectories: tuple[ExcitationTrajectory, ...]
@@ -78,6 +82,10 @@ class Design:
     costs: tuple[float, ...]
     effort: Effort
     seconds: float
+
+    def _in_short(self) -> str:
+        names = ", ".join(each.name for each in self.trajectories)
+        return f"{self.model.robot.name}: {names} of {self.trajectories[0].duration:g} s, ln det {self.log_det:.2f}"
 
     @property
     def total(self) -> Information:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from scara_ident.estimation.estimate import paper_criteria
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.identify import check_bands, estimate_by
 from scara_ident.identification.usable import check_rows, usable_in_bands
+from scara_ident.manners import Reported
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.progress import Tell, silent
@@ -52,8 +54,8 @@ class TrajectorySummary:
     estimate: Estimate
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Reported):
     """Every trajectory's parameters against every trajectory.
 
     Attributes
@@ -70,6 +72,8 @@ class Comparison:
     notes : tuple of str
     """
 
+    _told_by: ClassVar[str] = "comparison"
+
     model: TorqueModel
     method: str
     bands: tuple[float | None, ...]
@@ -77,6 +81,10 @@ class Comparison:
     errors: Array
     expected: Array
     notes: tuple[str, ...]
+
+    def _in_short(self) -> str:
+        names = ", ".join(item.name for item in self.trajectories)
+        return f"{self.model.robot.name}, {self.model.name} by {self.method}: {names}"
 
 
 def compare(

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
@@ -24,6 +25,7 @@ from scara_ident.identification.channel_check import channel_faults
 from scara_ident.identification.events import Event, find_events, without_events
 from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
+from scara_ident.manners import Reported
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.progress import Tell, silent
@@ -31,8 +33,8 @@ from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Reported):
     """Everything that one identification found.
 
     Attributes
@@ -54,6 +56,8 @@ class Identification:
         What is local in time: left out of the fit, or in recordings that were held out.
     """
 
+    _told_by: ClassVar[str] = "identification"
+
     estimate: Estimate
     history: History | None
     bands: tuple[float | None, ...]
@@ -69,6 +73,30 @@ class Identification:
     def model(self) -> TorqueModel:
         """The model that was fitted."""
         return self.estimate.model
+
+    def predict(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Predict the recorded torque, friction and offset included, of one state or of many.
+
+        Parameters
+        ----------
+        q, v, a : array_like, shape (n,) or (N, n)
+            Position, velocity and acceleration in rad or m, per s and s^2; joints in the robot's order.
+
+        Returns
+        -------
+        ndarray, shape (n,) or (N, n)
+            N m (N), on the side of the gear where effort is recorded.
+
+        Raises
+        ------
+        UsageError
+            If the shapes are not these.
+        """
+        return self.estimate.predict(q, v, a)
+
+    def _in_short(self) -> str:
+        count = len(self.training.data.recordings)
+        return f"{self.estimate._in_short()} from {count} recording{'' if count == 1 else 's'}"
 
     @cached_property
     def physical_consistency(self) -> PhysicalConsistency:

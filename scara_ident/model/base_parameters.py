@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
+from scara_ident.manners import Frozen
 from scara_ident.model.regressor.kernel import pinocchio_regressor
 from scara_ident.robot.robot import Robot
 
@@ -32,8 +33,8 @@ RANK_TOLERANCE = 2e-5
 EXACT_TOLERANCE = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class BaseParameters:
+@dataclass(frozen=True, eq=False, repr=False)
+class BaseParameters(Frozen):
     """The reduction of standard parameters to base parameters.
 
     With ``p = 11 n`` standard parameters pi (see `Robot.standard_parameters`) and b base parameters beta,

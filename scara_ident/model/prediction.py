@@ -10,14 +10,15 @@ from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
+from scara_ident.manners import Frozen
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.rigid_body import CHUNK
 from scara_ident.model.terms.term import OfState, StateTorque, Term
 from scara_ident.motion.motion import Motion
 
 
-@dataclass(frozen=True, eq=False)
-class Prediction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction(Frozen):
     """The torque of a model with its parameters, as a function of position, velocity and acceleration.
 
     Attributes
@@ -94,9 +95,7 @@ class Prediction:
         for start in range(0, q.shape[1], CHUNK):
             own = slice(start, start + CHUNK)
             rows = self.model.joint_columns(states(q[:, own], v[:, own], a[:, own]))
-            torque[:, own] = [
-                self._kept[columns] @ row for columns, row in zip(self.model.active, rows, strict=True)
-            ]
+            torque[:, own] = [self._kept[columns] @ row for columns, row in zip(self.model.active, rows, strict=True)]
         return torque
 
 

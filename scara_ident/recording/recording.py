@@ -9,13 +9,15 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, UsageError
+from scara_ident.manners import Reported
 from scara_ident.recording.audit import Finding, Samples, audit
+from scara_ident.recording.columns import recording_columns
 from scara_ident.recording.files import IMPORTERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
 from scara_ident.robot.signal_map import SIGNALS, Channel, Channels, contract_channels
@@ -26,8 +28,8 @@ if TYPE_CHECKING:
 OPTIONAL = ("velocity", "acceleration", "temperature")
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Reported):
     """One run of one trajectory.
 
     Attributes
@@ -63,6 +65,8 @@ class Recording:
         If shapes disagree or time does not grow.
     """
 
+    _told_by: ClassVar[str] = "recording"
+
     name: str
     trajectory: str
     repetition: int
@@ -78,6 +82,7 @@ class Recording:
     path: Path | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         source = self.path or self.name
         shape = (len(self.joints), len(self.time))
         for name in SIGNALS:
@@ -90,6 +95,9 @@ class Recording:
     def rate(self) -> float:
         """Median sample rate, Hz."""
         return 1.0 / float(np.median(np.diff(self.time)))
+
+    def _in_short(self) -> str:
+        return f"{self.name}: {len(self.joints)} joints, {len(self.time)} samples at {self.rate:.4g} Hz"
 
 
 def split_name(stem: str) -> tuple[str, int]:
@@ -271,15 +279,7 @@ def write_recording(recording: Recording, path: Path | str, *, effort_gain: Arra
     RecordingError
         Another suffix, or a place that cannot be written to.
     """
-    columns = {"time": recording.time}
-    for signal in SIGNALS:
-        if (values := getattr(recording, signal)) is None:
-            continue
-        if signal == "effort" and effort_gain is not None:
-            values = values / np.asarray(effort_gain, dtype=float)[:, None]
-        there = zip(recording.joints, values, strict=True)
-        columns |= {f"{joint}.{signal}": row for joint, row in there if not np.isnan(row).all()}
-    write_columns(Path(path), columns)
+    write_columns(Path(path), recording_columns(recording, effort_gain))
 
 
 def _rows_of_the_arm(columns: dict[str, Array], wanted: Sequence[str]) -> dict[str, Array]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
+from scara_ident.manners import Frozen
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
 from scara_ident.robot.examples import example_urdf, is_name
 from scara_ident.robot.rotors import RotorGuess, guess_rotors
@@ -28,8 +29,8 @@ from scara_ident.robot.urdf_validation import urdf_fault
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 
-@dataclass(frozen=True, eq=False)
-class Robot:
+@dataclass(frozen=True, eq=False, repr=False)
+class Robot(Frozen):
     """An arm whose joints are to be identified.
 
     Attributes
@@ -92,6 +93,9 @@ class Robot:
     def n(self) -> int:
         """Number of identified joints."""
         return len(self.joints)
+
+    def _in_short(self) -> str:
+        return f"{self.name}: {self.n} joint{'' if self.n == 1 else 's'}, effort at the {self.effort_side}"
 
     @cached_property
     def rotor_guess(self) -> RotorGuess:

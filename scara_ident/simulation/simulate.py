@@ -5,11 +5,13 @@ from __future__ import annotations
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import ClassVar
 
 import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
+from scara_ident.manners import Reported
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
@@ -63,8 +65,8 @@ class TrueMotion:
         return TrueMotion(*(np.ascontiguousarray(getattr(self, field.name)[:, ::ticks]) for field in fields(self)))
 
 
-@dataclass(frozen=True, eq=False)
-class SimulationResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulationResult(Reported):
     """A recording and what was behind it.
 
     Attributes
@@ -85,6 +87,8 @@ class SimulationResult:
         How often a joint came to a stop between the steps.
     """
 
+    _told_by: ClassVar[str] = "simulation"
+
     arm: VirtualArm
     effects: tuple[Effect, ...]
     motion: ReferenceMotion
@@ -95,6 +99,9 @@ class SimulationResult:
     rate: float
     substeps: int
     stops: int
+
+    def _in_short(self) -> str:
+        return f"{self.recording._in_short()}, {len(self.effects)} effects, seed {self.seed}"
 
 
 def simulate(

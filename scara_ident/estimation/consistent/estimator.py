@@ -43,7 +43,7 @@ __all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "ph
 DIGITS = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ConsistentEstimate(Estimate):
     """An estimate that belongs to an arm that can exist, and that arm.
 

@@ -104,7 +104,6 @@ class RigidBody(Filled):
                 result[joint, start : start + CHUNK] = value[own] @ rows[joint]
         return result
 
-
     def state_torque(self, value: Array) -> StateTorque:
         """Return the torque in one state: Pinocchio's regressor times the parameters that lead the columns.
 
