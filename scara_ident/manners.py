@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, cast
 import numpy as np
 
 from scara_ident.errors import UsageError
+from scara_ident.files import write_json
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,6 +56,10 @@ class Reports(Protocol):
         """Return the result in words and tables, as a terminal has it."""
         ...
 
+    def content(self, result: Any) -> dict[str, Any]:
+        """Return the content of the result's file."""
+        ...
+
     def columns(self, result: Any) -> dict[str, Any]:
         """Return the table of the result, column by column."""
         ...
@@ -69,6 +74,10 @@ class Reported(Frozen):
 
     # The module of the room `report` that tells of it. That room knows the results, so it is loaded when it is asked.
     _told_by: ClassVar[str]
+
+    def __init_subclass__(cls, told_by: str | None = None) -> None:
+        if told_by is not None:
+            cls._told_by = told_by
 
     @property
     def _reports(self) -> Reports:
@@ -124,6 +133,25 @@ class Reported(Frozen):
         more = f"<p>{count - MOST_ROWS} more rows</p>" if count > MOST_ROWS else ""
         body = "".join(f"<tr>{row}</tr>" for row in rows)
         return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>{more}"
+
+
+class Saved(Reported):
+    """A result that is written to a file."""
+
+    def save(self, path: Path | str) -> None:
+        """Write the result as JSON, whole or not at all, as the command does.
+
+        Parameters
+        ----------
+        path : path
+            An existing file is replaced.
+
+        Raises
+        ------
+        ScaraIdentError
+            In one line, if it cannot be written.
+        """
+        write_json(Path(path), self._reports.content(self))
 
 
 def _protected(value: Any) -> Any:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,14 +36,15 @@ from scara_ident.identification.events import Event, find_events, same_events, w
 from scara_ident.identification.identify import check_bands, check_held_out
 from scara_ident.identification.recording_check import held_out_events, without_stretches
 from scara_ident.identification.usable import check_rows, usable_in_bands, with_rows
-from scara_ident.manners import Reported
+from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel, build_model
-from scara_ident.progress import Tell, Work, silent
+from scara_ident.progress import Tell, Work, log_notes, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 from scara_ident.threads import one_blas_thread
 
 Verdict = Literal["complete", "explained", "unexplained", "undecided"]
+_LOG = logging.getLogger(__name__)
 # Dependences that are handed on: further ones are pairs that only repeat the first.
 NAMED_DEPENDENCES = 12
 
@@ -80,9 +82,14 @@ class FoundEffect:
     before: Mapping[str, float | None]
     after: Mapping[str, float | None]
 
+    @property
+    def label(self) -> str:
+        """The effect and its joint."""
+        return self.effect if self.joint is None else f"{self.effect} of {self.joint}"
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(Reported):
+class Diagnosis(Saved, told_by="diagnosis"):
     """What `diagnose` found.
 
     Attributes
@@ -113,8 +120,6 @@ class Diagnosis(Reported):
     events : tuple of Event
         What is local in time: left out of every fit, or in recordings that were held out.
     """
-
-    _told_by: ClassVar[str] = "diagnosis"
 
     verdict: Verdict
     search: Search
@@ -166,12 +171,10 @@ class Diagnosis(Reported):
         """Effects found that `predict` leaves out: they take more than a state, or were taken out of the recordings."""
         within = {(term.name, term.joint) for term in self.after.model.terms if isinstance(term, EffectTerm)}
         corrected = [item for item in self.effects if (item.effect, item.joint) not in within]
-        labels = [item.effect if item.joint is None else f"{item.effect} of {item.joint}" for item in corrected]
-        return (*self.after.prediction.left_out, *labels)
+        return (*self.after.prediction.left_out, *(item.label for item in corrected))
 
     def _in_short(self) -> str:
-        found = [item.effect if item.joint is None else f"{item.effect} of {item.joint}" for item in self.effects]
-        return f"{self.robot.name}: {self.verdict}{', with ' + ', '.join(found) if found else ''}"
+        return f"{self.robot.name}: {', '.join((self.verdict, *(item.label for item in self.effects)))}"
 
 
 # Matrices are small throughout: a second BLAS thread waits more than it works.
@@ -223,6 +226,19 @@ def diagnose(
     RecordingError
         If none of the recordings can be used, or they have fewer rows than the model has parameters (one of several that
         cannot be used is left out with a note), or channels are not what the mapping says (see `channel_faults`).
+
+    Examples
+    --------
+    >>> from scara_ident import diagnose, effects_named, load_robot, named_motion, parse_effect, simulate, virtual_arm
+    >>> robot = load_robot()
+    >>> arm, motion = virtual_arm(robot), named_motion("OJD", robot)
+    >>> hidden = [parse_effect("spring:joint1:stiffness=0.2")]
+    >>> runs = [simulate(arm, motion, effects=hidden, rate=250.0, repetition=k).recording for k in (1, 2)]
+    >>> found = diagnose(robot, runs, bands=[20.0, 20.0], catalogue=effects_named("spring"))
+    >>> found
+    Diagnosis(scara03: explained, spring of joint1)
+    >>> found.not_predicted
+    ()
     """
     work = Work(progress)
     check_held_out(recordings, validation)
@@ -272,6 +288,7 @@ def diagnose(
     )
     events += in_held_out
     notes += [event.sentence(robot) for event in events]
+    log_notes(_LOG, notes)
     shown = held_out_evidence(
         evidence(found, outcome.residuals, outcome.fit_after, criteria),
         rms_of(after.value, outcome.training),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +12,7 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import RunVariation
-from scara_ident.manners import Reported
+from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.prediction import Prediction
 
@@ -44,7 +43,7 @@ class JointError:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Estimate(Reported):
+class Estimate(Saved, told_by="estimate"):
     """Parameters of a model and how sure they are.
 
     Attributes
@@ -68,8 +67,6 @@ class Estimate(Reported):
         By how much the noise of positions moves the parameters, which is part of the covariance; None where negligible
         or not looked for.
     """
-
-    _told_by: ClassVar[str] = "estimate"
 
     model: TorqueModel
     method: str

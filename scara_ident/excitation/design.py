@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from scara_ident.excitation.problem import NARROWEST, Task
 from scara_ident.excitation.search import Effort, Progress, search
 from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.verification import Reached, reached
-from scara_ident.manners import Reported
+from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 
@@ -36,7 +35,7 @@ MOST_TRAJECTORIES = 26
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Design(Reported):
+class Design(Saved, told_by="design"):
     """Trajectories with what they promise.
 
     Attributes
@@ -65,8 +64,6 @@ class Design(Reported):
     seconds : float
         What the search took.
     """
-
-    _told_by: ClassVar[str] = "design"
 
     model: TorqueModel
     criterion: Criterion
@@ -195,6 +192,15 @@ def design_excitation(
     J. Swevers et al., "Optimal robot excitation and identification", IEEE Transactions on Robotics and Automation
     13(5), 1997. G. Calafiore, M. Indri, B. Bona, "Robot dynamic calibration: optimal excitation trajectories and
     experimental parameter estimation", Journal of Robotic Systems 18(2), 2001.
+
+    Examples
+    --------
+    >>> from scara_ident import Effort, build_model, design_excitation, load_robot, write_trajectory
+    >>> quick = Effort(starts=1, rounds=1)
+    >>> design = design_excitation(build_model(load_robot()), duration=5.0, harmonics=3, effort=quick)
+    >>> design.to_frame().shape
+    (5001, 7)
+    >>> write_trajectory(design.trajectories[0], "trajectory.csv")
     """
     begun = time.perf_counter()
     robot, count = model.robot, len(model.names)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,16 +26,18 @@ from scara_ident.identification.channel_check import channel_faults
 from scara_ident.identification.events import Event, find_events, without_events
 from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
-from scara_ident.manners import Reported
+from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.repeatability import repeatability
-from scara_ident.progress import Tell, silent
+from scara_ident.progress import Tell, log_notes, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 
+_LOG = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Reported):
+class Identification(Saved, told_by="identification"):
     """Everything that one identification found.
 
     Attributes
@@ -55,8 +58,6 @@ class Identification(Reported):
     events : tuple of Event
         What is local in time: left out of the fit, or in recordings that were held out.
     """
-
-    _told_by: ClassVar[str] = "identification"
 
     estimate: Estimate
     history: History | None
@@ -156,6 +157,19 @@ def identify(
     RecordingError
         If none of the recordings to fit can be used, or they have fewer rows than the model has parameters. One of several
         that cannot be used, or one that is held out, is left out with a note.
+
+    Examples
+    --------
+    >>> from scara_ident import identify, load_robot, named_motion, simulate, virtual_arm
+    >>> robot = load_robot()
+    >>> run = simulate(virtual_arm(robot), named_motion("OJK", robot), rate=250.0)
+    >>> result = identify(robot, [run.recording])
+    >>> result
+    Identification(scara03, complete by wls: 15 parameters from 1 recording)
+    >>> result.predict([0.1, 0.2], [0.5, -0.5], [1.0, 2.0]).shape
+    (2,)
+    >>> result.to_frame().columns[:4]
+    ['name', 'joint', 'value', 'std']
     """
     if not recordings:
         raise UsageError("no recordings to identify from")
@@ -185,6 +199,7 @@ def identify(
     notes += [event.sentence(robot) for event in events] + ([] if differs is None else [differs])
     if isinstance(estimate, ConsistentEstimate):
         notes += estimate.notes
+    log_notes(_LOG, notes)
     log_det, condition = paper_criteria(training)
     return Identification(
         estimate, history, data.bands, training, validated, noise, log_det, condition, tuple(notes), events

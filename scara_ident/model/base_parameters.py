@@ -158,6 +158,12 @@ def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int 
     ----------
     M. Gautier, W. Khalil, "Direct calculation of minimum set of inertial parameters of serial robots",
     IEEE Transactions on Robotics and Automation 6(3), 1990.
+
+    Examples
+    --------
+    >>> from scara_ident import find_base_parameters, load_robot
+    >>> find_base_parameters(load_robot()).names
+    ('I1zz', 'mx2', 'my2', 'I2zz', 'Ia2')
     """
     n = robot.n
     p = 11 * n

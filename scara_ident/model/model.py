@@ -110,6 +110,12 @@ def build_model(robot: Robot, name: str = "complete") -> TorqueModel:
     ------
     UsageError
         If there is no model of this name; the message lists the names.
+
+    Examples
+    --------
+    >>> from scara_ident import build_model, load_robot
+    >>> build_model(load_robot(), "basic")
+    TorqueModel(scara03, basic: 11 parameters of rigid_body, friction, offset)
     """
     return MODELS.get(name)(robot)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.manners import Reported
 from scara_ident.recording.audit import Finding, Samples, audit
-from scara_ident.recording.columns import recording_columns
+from scara_ident.recording.columns import recording_columns, rows_of_the_arm
 from scara_ident.recording.files import IMPORTERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
 from scara_ident.robot.signal_map import SIGNALS, Channel, Channels, contract_channels
@@ -29,7 +29,7 @@ OPTIONAL = ("velocity", "acceleration", "temperature")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording(Reported):
+class Recording(Reported, told_by="recording"):
     """One run of one trajectory.
 
     Attributes
@@ -64,8 +64,6 @@ class Recording(Reported):
     RecordingError
         If shapes disagree or time does not grow.
     """
-
-    _told_by: ClassVar[str] = "recording"
 
     name: str
     trajectory: str
@@ -151,7 +149,7 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
     wanted = [channel.column for channel in (*needed, *chain.from_iterable(optional.values()), *second.values())]
     columns = read_columns(path, wanted, channels.topic)
     if shares_clock(path, channels.time.column):
-        columns = _rows_of_the_arm(columns, [channel.column for channel in needed[1:]])
+        columns = rows_of_the_arm(columns, [channel.column for channel in needed[1:]])
 
     def rows(wanted: Sequence[Channel]) -> Array:
         return np.array([channel.si(columns.pop(channel.column)) for channel in wanted])
@@ -219,6 +217,15 @@ def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: b
         A word that is no file, folder or matching glob.
     RecordingError
         A folder or glob without recordings, two files of one stem, or a recording that cannot be used.
+
+    Examples
+    --------
+    >>> from scara_ident import load_robot, named_motion, read_recordings, simulate, virtual_arm, write_recording
+    >>> robot = load_robot()
+    >>> run = simulate(virtual_arm(robot), named_motion("OJK", robot), rate=250.0)
+    >>> write_recording(run.recording, "OJK_1.parquet")
+    >>> read_recordings(["OJK_*.parquet"], robot)
+    (Recording(OJK_1: 2 joints, 5001 samples at 250 Hz),)
     """
     return tuple(read_recording(path, robot, need_effort=need_effort) for path in recording_paths(words))
 
@@ -280,15 +287,6 @@ def write_recording(recording: Recording, path: Path | str, *, effort_gain: Arra
         Another suffix, or a place that cannot be written to.
     """
     write_columns(Path(path), recording_columns(recording, effort_gain))
-
-
-def _rows_of_the_arm(columns: dict[str, Array], wanted: Sequence[str]) -> dict[str, Array]:
-    """Leave out the samples of other signals, in which all that is wanted of the arm is empty.
-
-    The rows that are left count from 1, as if the others were not in the file.
-    """
-    keep = np.isfinite([columns[name] for name in wanted]).any(axis=0)
-    return columns if keep.all() else {name: values[keep] for name, values in columns.items()}
 
 
 def _refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str], channels: Channels) -> None:

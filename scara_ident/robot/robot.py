@@ -152,6 +152,14 @@ def load_robot(path: Path | str | None = None) -> Robot:
     ------
     RobotError
         In one line: file, key and what was expected.
+
+    Examples
+    --------
+    >>> from scara_ident import load_robot
+    >>> load_robot()
+    Robot(scara03: 2 joints, effort at the motor)
+    >>> load_robot("ur5").joints[0]
+    'shoulder_pan_joint'
     """
     if path is None:
         return build_robot(RobotDescription(urdf=embedded_urdf(), effort_side="motor"), embedded_urdf())

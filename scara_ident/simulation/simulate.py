@@ -5,7 +5,6 @@ from __future__ import annotations
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import ClassVar
 
 import numpy as np
 
@@ -66,7 +65,7 @@ class TrueMotion:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SimulationResult(Reported):
+class SimulationResult(Reported, told_by="simulation"):
     """A recording and what was behind it.
 
     Attributes
@@ -87,8 +86,6 @@ class SimulationResult(Reported):
         How often a joint came to a stop between the steps.
     """
 
-    _told_by: ClassVar[str] = "simulation"
-
     arm: VirtualArm
     effects: tuple[Effect, ...]
     motion: ReferenceMotion
@@ -99,9 +96,6 @@ class SimulationResult(Reported):
     rate: float
     substeps: int
     stops: int
-
-    def _in_short(self) -> str:
-        return f"{self.recording._in_short()}, {len(self.effects)} effects, seed {self.seed}"
 
 
 def simulate(

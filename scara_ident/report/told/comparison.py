@@ -18,9 +18,14 @@ if TYPE_CHECKING:
 
 def summary(comparison: Comparison) -> str:
     """Return the trajectories and the errors as tables, and the result in sentences."""
-    content = comparison_dict(comparison)
+    held = comparison_dict(comparison)
     notes = [f"note: {note}" for note in comparison.notes]
-    return text_of(*notes, *tables(content), *content["summary"])
+    return text_of(*notes, *tables(held), *held["summary"])
+
+
+def content(comparison: Comparison) -> dict[str, Any]:
+    """Return the content of ``comparison.json``."""
+    return comparison_dict(comparison)
 
 
 def columns(comparison: Comparison) -> dict[str, Any]:
@@ -70,27 +75,27 @@ def figure(comparison: Comparison) -> Figure:
     return canvas(f"{robot.name}: {comparison.model.name} model by {comparison.method}", rows)
 
 
-def tables(content: dict[str, Any]) -> list[Table]:
+def tables(held: dict[str, Any]) -> list[Table]:
     """Return the trajectories and, joint by joint, the errors, of the content of ``comparison.json``."""
-    names = content["trajectories"]
+    names = held["trajectories"]
     what = table("trajectories", "trajectory", "J_d", "J_k", "runs", right=("J_d", "J_k", "runs"))
     for name in names:
-        row = content["characteristics"][name]
+        row = held["characteristics"][name]
         what.add_row(name, f"{row['log_det']:.2f}", f"{row['condition']:.3g}", str(len(row["recordings"])))
     found = [what]
-    for joint in content["joints"]:
+    for joint in held["joints"]:
         rows = table(
             f"{joint}: rms error (what noise explains), parameters from", "predicted", "torque", *names, "average",
             right=("torque", *names, "average"),
         )  # fmt: skip
         for name in names:
             cells = [
-                f"{content['errors'][name][other][joint]:.3g} ({content['predicted_by_covariance'][name][other][joint]:.2g})"
+                f"{held['errors'][name][other][joint]:.3g} ({held['predicted_by_covariance'][name][other][joint]:.2g})"
                 for other in names
             ]
-            average = content["average_of_predicted"][name][joint]
-            rows.add_row(name, f"{content['torque_rms'][name][joint]:.3g}", *cells, f"{average:.3g}")
-        averages = [f"{content['average_of_estimated'][other][joint]:.3g}" for other in names]
+            average = held["average_of_predicted"][name][joint]
+            rows.add_row(name, f"{held['torque_rms'][name][joint]:.3g}", *cells, f"{average:.3g}")
+        averages = [f"{held['average_of_estimated'][other][joint]:.3g}" for other in names]
         rows.add_row("average", "", *averages, "")
         found.append(rows)
     return found

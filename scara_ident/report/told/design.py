@@ -15,8 +15,13 @@ if TYPE_CHECKING:
 
 def summary(design: Design) -> str:
     """Return the result in sentences, and every limit with what is used of it."""
-    content = excitation_dict(design)
-    return text_of(*content["summary"], limit_table(design), *(f"note: {note}" for note in content["notes"]))
+    held = excitation_dict(design)
+    return text_of(*held["summary"], limit_table(design), *(f"note: {note}" for note in held["notes"]))
+
+
+def content(design: Design) -> dict[str, Any]:
+    """Return the content of ``excitation.json``."""
+    return excitation_dict(design)
 
 
 def columns(design: Design) -> dict[str, Any]:

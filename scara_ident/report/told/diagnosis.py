@@ -18,11 +18,16 @@ MOST_CANDIDATES = 8
 
 def summary(diagnosis: Diagnosis) -> str:
     """Return the verdict, the result in sentences, errors before and after, and what `Diagnosis.predict` leaves out."""
-    content = diagnosis_dict(diagnosis)
+    held = diagnosis_dict(diagnosis)
     notes = [f"note: {note}" for note in diagnosis.notes]
     heading = f"{diagnosis.robot.name}: {diagnosis.verdict}"
     left = [f"predict leaves out {name}." for name in diagnosis.not_predicted]
-    return text_of(*notes, heading, *content["summary"], *tables(content), *left)
+    return text_of(*notes, heading, *held["summary"], *tables(held), *left)
+
+
+def content(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the content of ``diagnosis.json``."""
+    return diagnosis_dict(diagnosis)
 
 
 def columns(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -51,14 +56,14 @@ def figure(diagnosis: Diagnosis) -> Figure:
     return canvas(title, rows)
 
 
-def tables(content: dict[str, Any], *, all_candidates: bool = False) -> list[Table]:
+def tables(held: dict[str, Any], *, all_candidates: bool = False) -> list[Table]:
     """Return errors before and after by joint, and the candidates, of the content of ``diagnosis.json``."""
     errors = table("rms error within the band", "recordings", "joint", "before", "after", right=("before", "after"))
     for kind in ("training", "validation"):
-        for joint, before in content[kind]["before"].items():
-            errors.add_row(kind, joint, _number(before), _number(content[kind]["after"][joint]))
+        for joint, before in held[kind]["before"].items():
+            errors.add_row(kind, joint, _number(before), _number(held[kind]["after"][joint]))
     rows = table("candidates", "candidate", "gain", "p", "why", right=("gain", "p"))
-    for row in content["candidates"] if all_candidates else content["candidates"][:MOST_CANDIDATES]:
+    for row in held["candidates"] if all_candidates else held["candidates"][:MOST_CANDIDATES]:
         rows.add_row(row["label"], f"{row['gain']:.1%}", f"{row['p_value']:.0e}", row["why"])
     return [errors, rows]
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scara_ident.estimation.estimate import Estimate
+from scara_ident.estimation.saved import estimate_dict
 from scara_ident.report.plot import Dots, Panel, Plot, single
 from scara_ident.report.told.words import number, table, text_of
 
@@ -18,6 +19,11 @@ if TYPE_CHECKING:
 def summary(estimate: Estimate) -> str:
     """Return the parameters as a table."""
     return text_of(parameter_table(estimate))
+
+
+def content(estimate: Estimate) -> dict[str, Any]:
+    """Return what `load_estimate` reads."""
+    return {"estimate": estimate_dict(estimate)}
 
 
 def columns(estimate: Estimate) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from scara_ident.identification.identify import Identification
-from scara_ident.report.identification import sentences
+from scara_ident.report.identification import identification_dict, sentences
 from scara_ident.report.told import estimate
 from scara_ident.report.told.words import table, text_of
 
@@ -18,6 +18,11 @@ def summary(identification: Identification) -> str:
     """Return parameters, errors and bands as tables, and the result in sentences."""
     notes = [f"note: {note}" for note in identification.notes]
     return text_of(*notes, *tables(identification), bands_said(identification), *sentences(identification))
+
+
+def content(identification: Identification) -> dict[str, Any]:
+    """Return the content of ``identification.json``, with the estimate that `load_estimate` reads."""
+    return identification_dict(identification) | estimate.content(identification.estimate)
 
 
 def columns(identification: Identification) -> dict[str, Any]:
