@@ -1,6 +1,6 @@
 """How long the torque of one state takes: the first call, and each after it.
 
-    python benchmarks/predict.py [--robot panda]
+python benchmarks/predict.py [--robot panda]
 """
 
 from __future__ import annotations

@@ -68,7 +68,7 @@ def check(python: str, wheel: Path, extras: list[str], folder: Path) -> None:
     said = run([place / "bin" / "scara-ident", "--version"], work)
     if run([own, "-m", "scara_ident", "--version"], work) != said:
         sys.exit(f"{version}: the command and the module are of different versions")
-    run([place / "bin" / "scara-ident", "simulate", "OJK", "--rate", "250", "--output", "logs"], work)
+    run([place / "bin" / "scara-ident", "simulate", "OJK", "--output", "logs"], work)
     run([place / "bin" / "scara-ident", "identify", "logs", "--output", "out"], work)
     if not (work / "out" / "report.html").is_file():
         sys.exit(f"{version}: identify wrote no report")
