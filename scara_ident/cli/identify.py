@@ -31,7 +31,7 @@ def identify(
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
     from scara_ident.estimation.consistent.options import ConsistentOptions
-    from scara_ident.files import written_together
+    from scara_ident.files import write_json, written_together
     from scara_ident.identification.identify import identified_arm
     from scara_ident.identification.identify import identify as run
     from scara_ident.recording.recording import read_usable
@@ -78,6 +78,6 @@ def identify(
                 console.note(dict.fromkeys(chain.from_iterable(notes)))
             torque_picture(place / "torque.png", context)
             identification_report(place / "report.html", context)
-            result.save(place / "identification.json")
+            write_json(place / "identification.json", content)
         models = (urdf, mjcf) if arm_found is not None else ()
         console.written(output, "identification.json", "report.html", "torque.png", *models)

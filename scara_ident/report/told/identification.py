@@ -22,7 +22,7 @@ def summary(identification: Identification) -> str:
 
 def content(identification: Identification) -> dict[str, Any]:
     """Return the content of ``identification.json``, with the estimate that `load_estimate` reads."""
-    return identification_dict(identification) | estimate.content(identification.estimate)
+    return identification_dict(identification)
 
 
 def columns(identification: Identification) -> dict[str, Any]:
