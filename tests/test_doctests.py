@@ -14,7 +14,7 @@ import scara_ident
 # The main jobs, which have an example each.
 SHOWN = {
     "build_model", "compare", "consistent", "design_excitation", "diagnose", "export_urdf",
-    "find_base_parameters", "identify", "load_estimate", "load_robot", "read_recordings",
+    "find_base_parameters", "identify", "load_estimate", "load_robot", "read_recordings", "simulate",
 }  # fmt: skip
 # Some stand beside functions that are no public names themselves.
 MODULES = sorted({f"scara_ident.{module}" for module in scara_ident._HOMES.values()} | {"scara_ident.registry"})

@@ -162,6 +162,13 @@ def simulate(
         too long.
     ScaraIdentError
         If the controller loses the arm.
+
+    Examples
+    --------
+    >>> from scara_ident import load_robot, named_motion, simulate, virtual_arm
+    >>> robot = load_robot()
+    >>> simulate(virtual_arm(robot), named_motion("OJK", robot), rate=250.0).recording
+    Recording(OJK_1: 2 joints, 5001 samples at 250 Hz)
     """
     if ticks < 1:
         raise UsageError(f"ticks is {ticks}; expected 1 or more periods of the controller per sample")
