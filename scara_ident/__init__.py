@@ -13,11 +13,13 @@ The public names, loaded when they are used::
 
 from __future__ import annotations
 
+import logging
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
+    from scara_ident.effects.catalogue import available_effects, effects_named
     from scara_ident.effects.effect import Effect
     from scara_ident.errors import EstimationError, RecordingError, RobotError, ScaraIdentError, UsageError
     from scara_ident.estimation.consistent.estimator import ConsistentEstimate, consistent
@@ -27,8 +29,11 @@ if TYPE_CHECKING:
     from scara_ident.estimation.least_squares import ols, wls
     from scara_ident.estimation.observations import Observations, observe
     from scara_ident.estimation.recursive import rls
+    from scara_ident.estimation.residuals import Residuals
+    from scara_ident.estimation.saved import load_estimate
     from scara_ident.excitation.design import Design, design_excitation
     from scara_ident.excitation.output import write_trajectory
+    from scara_ident.excitation.search import Effort
     from scara_ident.export.robots import export_mjcf, export_urdf
     from scara_ident.identification.compare import Comparison, compare
     from scara_ident.identification.identify import Identification, identified_arm, identify
@@ -47,6 +52,9 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 
+# What a library has to say goes to the user's handlers, if there are any; the command prints it itself.
+logging.getLogger("scara_ident").addHandler(logging.NullHandler())
+
 _NAMES = {
     "errors": ("ScaraIdentError", "RecordingError", "RobotError", "UsageError", "EstimationError"),
     "robot.robot": ("Robot", "load_robot"),
@@ -60,15 +68,19 @@ _NAMES = {
     "estimation.observations": ("Observations", "observe"),
     "estimation.estimate": ("Estimate",),
     "estimation.least_squares": ("ols", "wls"),
+    "estimation.residuals": ("Residuals",),
+    "estimation.saved": ("load_estimate",),
     "estimation.recursive": ("rls",),
     "estimation.consistent.estimator": ("ConsistentEstimate", "consistent"),
     "estimation.consistent.options": ("ConsistentOptions",),
     "identification.identify": ("Identification", "identified_arm", "identify"),
     "identification.compare": ("Comparison", "compare"),
+    "effects.catalogue": ("available_effects", "effects_named"),
     "effects.effect": ("Effect",),
     "diagnosis.diagnose": ("Diagnosis", "diagnose"),
     "excitation.design": ("Design", "design_excitation"),
     "excitation.output": ("write_trajectory",),
+    "excitation.search": ("Effort",),
     "export.robots": ("export_mjcf", "export_urdf"),
     "simulation.defaults": ("virtual_arm",),
     "simulation.arm": ("VirtualArm",),

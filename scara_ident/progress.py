@@ -1,9 +1,10 @@
-"""How far long work is: the step that runs and the share that is done, told to whoever asked."""
+"""What is said while work goes on: the step that runs, the share that is done, and what was found on the way."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from logging import Logger
 
 Tell = Callable[[str, float], None]
 """Takes the step that begins and the share of all work that is done before it, from 0 to 1."""
@@ -11,6 +12,12 @@ Tell = Callable[[str, float], None]
 
 def silent(step: str, done: float) -> None:
     """Tell nobody."""
+
+
+def log_notes(logger: Logger, notes: Iterable[str]) -> None:
+    """Log what there is to know of the data or the result; the result holds it too, and the command prints it."""
+    for note in notes:
+        logger.warning("%s", note)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ PACKAGE = ROOT / "scara_ident"
 # weighs efforts by the URDF's masses, so it comes after the model; `export` writes what `identification` found.
 ROOMS = (
     "errors", "arrays", "threads", "progress", "registry", "files", "memory",
+    "manners",
     "robot", "paper", "recording", "motion", "model", "estimation", "inspection", "identification",
     "effects", "diagnosis", "excitation", "export", "simulation", "use", "report", "cli", "__main__",
 )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scara_ident.cli import options
-from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings, table
+from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings
 
 
 def compare(
@@ -20,6 +20,7 @@ def compare(
     from scara_ident.identification.compare import compare as run
     from scara_ident.recording.recording import read_usable
     from scara_ident.report.comparison import comparison_dict
+    from scara_ident.report.told.comparison import tables
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "comparison")
@@ -33,27 +34,8 @@ def compare(
     if verbose:
         show_recordings(console, given)
     console.note([*useless, *result.notes])
-    names = content["trajectories"]
-    what = table("trajectories", "trajectory", "J_d", "J_k", "runs", right=("J_d", "J_k", "runs"))
-    for name in names:
-        row = content["characteristics"][name]
-        what.add_row(name, f"{row['log_det']:.2f}", f"{row['condition']:.3g}", str(len(row["recordings"])))
-    console.print(what)
-    for joint in arm.joints:
-        rows = table(
-            f"{joint}: rms error (what noise explains), parameters from", "predicted", "torque", *names, "average",
-            right=("torque", *names, "average"),
-        )  # fmt: skip
-        for name in names:
-            cells = [
-                f"{content['errors'][name][other][joint]:.3g} ({content['predicted_by_covariance'][name][other][joint]:.2g})"
-                for other in names
-            ]
-            average = content["average_of_predicted"][name][joint]
-            rows.add_row(name, f"{content['torque_rms'][name][joint]:.3g}", *cells, f"{average:.3g}")
-        averages = [f"{content['average_of_estimated'][other][joint]:.3g}" for other in names]
-        rows.add_row("average", "", *averages, "")
-        console.print(rows)
+    for each in tables(content):
+        console.print(each)
     console.say(content["summary"])
     if output is not None:
         from scara_ident.report.html import comparison_report

@@ -13,9 +13,9 @@ from warnings import catch_warnings, simplefilter
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from scara_ident.errors import PluginWarning
+from scara_ident.report.told.words import table as table
 
 if TYPE_CHECKING:
     from scara_ident.progress import Work
@@ -108,14 +108,6 @@ def check_report(output: Path | None, kind: Kind) -> None:
         added_sections(kind)
 
 
-def table(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
-    """Return an empty table; the columns in ``right`` are aligned to the right."""
-    result = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
-    for column in columns:
-        result.add_column(column, justify="right" if column in right else "left", overflow="fold")
-    return result
-
-
 def result_console(content: dict[str, Any], json: bool) -> PlainConsole:
     """Print a result as JSON where that is wanted; return the console for words, which is silent then."""
     if json:
@@ -142,23 +134,9 @@ def _drain(stream: TextIO) -> None:
 
 def show_recordings(console: Console, recordings: Sequence[Recording]) -> None:
     """Print what every recording holds and what its audit found."""
-    columns = ("samples", "s", "Hz", "findings")
-    rows = table("recordings", "recording", *columns, right=columns)
-    for item in recordings:
-        seconds = item.time[-1] - item.time[0]
-        rows.add_row(item.name, str(len(item.time)), f"{seconds:.4g}", f"{item.rate:.4g}", str(len(item.findings)))
-    console.print(rows)
+    from scara_ident.report.told.recording import recordings_table
+
+    console.print(recordings_table(recordings))
     for item in recordings:
         for finding in item.findings:
             console.print(f"{item.name}: {finding.message}")
-
-
-def number(value: float, std: float | None = None) -> str:
-    """Write a number with four digits, or with as many as its standard deviation allows."""
-    if std is not None and 0.0 < std < float("inf"):
-        from math import floor, log10
-
-        places = max(0, 1 - floor(log10(std)))
-        if places <= 9 and abs(value) < 1e7:
-            return f"{value:.{places}f}"
-    return f"{value:.4g}"

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from scara_ident.cli import options
-from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings, table
+from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings
 
 
 def _known(names: str | None) -> str | None:
@@ -53,6 +53,7 @@ def diagnose(
     from scara_ident.files import write_json, write_text, written_together
     from scara_ident.recording.recording import read_usable
     from scara_ident.report.diagnosis import diagnosis_dict, diagnosis_markdown
+    from scara_ident.report.told.diagnosis import tables
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "diagnosis")
@@ -79,16 +80,8 @@ def diagnose(
     console.note([*useless, *more, *result.notes])
     console.print(f"{arm.name}: {result.verdict}", style="bold")
     console.say(content["summary"])
-    errors = table("rms error within the band", "recordings", "joint", "before", "after", right=("before", "after"))
-    for kind in ("training", "validation"):
-        for joint in arm.joints if content[kind]["before"] else ():
-            before, after = content[kind]["before"][joint], content[kind]["after"][joint]
-            errors.add_row(kind, joint, _number(before), _number(after))
-    console.print(errors)
-    rows = table("candidates", "candidate", "gain", "p", "why", right=("gain", "p"))
-    for row in content["candidates"] if verbose else content["candidates"][:8]:
-        rows.add_row(row["label"], f"{row['gain']:.1%}", f"{row['p_value']:.0e}", row["why"])
-    console.print(rows)
+    for each in tables(content, all_candidates=verbose):
+        console.print(each)
     if output is not None:
         from scara_ident.report.html import DiagnosisContext, diagnosis_report
         from scara_ident.report.pictures import diagnosis_pictures, remove_stale
@@ -101,7 +94,3 @@ def diagnose(
             write_json(place / "diagnosis.json", content)
         remove_stale(output, [name for _, name in pictures])
         console.written(output, "diagnosis.json", "diagnosis.md", *(name for _, name in pictures), "report.html")
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"

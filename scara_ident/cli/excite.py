@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from scara_ident.cli import options
-from scara_ident.cli.console import check_report, progress, result_console, table
+from scara_ident.cli.console import check_report, progress, result_console
 
 # Share of a design that its searches take; the rest is the verification of limits.
 SEARCHES_SHARE = 0.97
@@ -87,6 +87,7 @@ def excite(
     from scara_ident.recording.recording import read_usable
     from scara_ident.report.html import excitation_report
     from scara_ident.report.pictures import design_picture
+    from scara_ident.report.told.design import limit_table
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "excitation")
@@ -135,10 +136,7 @@ def excite(
     content = excitation_dict(design)
     console = result_console(content, json)
     console.say(content["summary"])
-    reached = table("limits", "limit", "bound", "reached", right=("bound", "reached"))
-    for each in design.reached:
-        reached.add_row(each.name, f"{each.bound:.4g} {each.unit}", f"{each.reached:.4g} {each.unit}")
-    console.print(reached)
+    console.print(limit_table(design))
     console.note([*useless, *content["notes"]])
     with written_together(output) as folder:
         for trajectory, csv, yaml in zip(

@@ -8,15 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from scara_ident.cli import options
-from scara_ident.cli.console import (
-    READING_SHARE,
-    check_report,
-    number,
-    progress,
-    result_console,
-    show_recordings,
-    table,
-)
+from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings
 
 
 def identify(
@@ -44,6 +36,7 @@ def identify(
     from scara_ident.identification.identify import identify as run
     from scara_ident.recording.recording import read_usable
     from scara_ident.report.identification import identification_dict, sentences
+    from scara_ident.report.told.identification import bands_said, tables
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "identification")
@@ -67,30 +60,9 @@ def identify(
     if verbose:
         show_recordings(console, (*training, *held_out))
     console.note([*useless, *more, *result.notes])
-    parameters = table(
-        f"{arm.name}: {model} model by {method}", "name", "value", "std", "unit", "meaning", right=("value", "std")
-    )
-    for row, value, std in zip(content["parameters"], result.estimate.value, result.estimate.std, strict=True):
-        parameters.add_row(row["name"], number(value, std), f"{std:.2g}", row["unit"], row["meaning"])
-    console.print(parameters)
-    for title, found in (("fitted", result.training_errors()), ("held out", result.validation_errors())):
-        if not found:
-            continue
-        columns = ("rms", "of torque", "unfiltered")
-        errors = table(f"rms error within the band, recordings {title}", "recording", "joint", *columns, right=columns)
-        for name, joints in found.items():
-            for joint, error in zip(arm.joints, joints, strict=True):
-                if error is None:
-                    errors.add_row(name, joint, "-", "at rest", "-")
-                    continue
-                share = "-" if error.relative is None else f"{error.relative:.1%}"
-                errors.add_row(name, joint, f"{error.rms:.3g}", share, f"{error.rms_unfiltered:.3g}")
-        console.print(errors)
-    bands = ", ".join(
-        f"{joint} {'none' if cut is None else f'{cut:.3g} Hz'}"
-        for joint, cut in zip(arm.joints, result.bands, strict=True)
-    )
-    console.print(f"band: {bands}; J_d {result.log_det:.2f}, J_k {result.condition:.3g}")
+    for each in tables(result):
+        console.print(each)
+    console.print(bands_said(result))
     console.say(sentences(result))
     if output is not None:
         from scara_ident.export.robots import export_mjcf, export_urdf

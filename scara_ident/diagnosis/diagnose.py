@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
-from scara_ident.diagnosis.confounding import Confounder, confounders
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
 from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
+from scara_ident.diagnosis.found_effect import FoundEffect, found_effects, negligible_correction
 from scara_ident.diagnosis.held_out_states import HeldOut, held_out_states
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.model_selection import Outcome, Unexplained, rms_of, select_model
 from scara_ident.diagnosis.screening import Dependence
 from scara_ident.diagnosis.search import Search, SearchTask, corrected
-from scara_ident.diagnosis.selection_step import SelectionStep, observed_at_every_sample
+from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.diagnosis.tentative import TentativeEffect, tentative_effects
 from scara_ident.diagnosis.work import first, searching
-from scara_ident.effects import Effect, Parameter
+from scara_ident.effects import Effect, EffectTerm
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.errors import RecordingError, UsageError
@@ -34,53 +37,21 @@ from scara_ident.identification.events import Event, find_events, same_events, w
 from scara_ident.identification.identify import check_bands, check_held_out
 from scara_ident.identification.recording_check import held_out_events, without_stretches
 from scara_ident.identification.usable import check_rows, usable_in_bands, with_rows
+from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel, build_model
-from scara_ident.progress import Tell, Work, silent
+from scara_ident.progress import Tell, Work, log_notes, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 from scara_ident.threads import one_blas_thread
 
 Verdict = Literal["complete", "explained", "unexplained", "undecided"]
+_LOG = logging.getLogger(__name__)
 # Dependences that are handed on: further ones are pairs that only repeat the first.
 NAMED_DEPENDENCES = 12
 
 
-@dataclass(frozen=True, eq=False)
-class FoundEffect:
-    """One effect that the data show.
-
-    Attributes
-    ----------
-    effect : str
-    joint : str or None
-    description : str
-    parameters : mapping of str to Parameter
-    confounded_with : tuple of Confounder
-        Effects that these recordings cannot tell from it.
-    p_value : float
-        Corrected for the candidates tried.
-    gain : float
-        What it removes on data that it was not fitted to, as a share of that and what it leaves on its joint.
-    votes : tuple of (int, int)
-        Trajectories in which it helps, of those that excite it.
-    before, after : mapping of str to float or None
-        Rms of each joint over the training recordings when it came in.
-    """
-
-    effect: str
-    joint: str | None
-    description: str
-    parameters: Mapping[str, Parameter]
-    confounded_with: tuple[Confounder, ...]
-    p_value: float
-    gain: float
-    votes: tuple[int, int]
-    before: Mapping[str, float | None]
-    after: Mapping[str, float | None]
-
-
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Saved, told_by="diagnosis"):
     """What `diagnose` found.
 
     Attributes
@@ -137,6 +108,36 @@ class Diagnosis:
         """The robot."""
         return self.before.model.robot
 
+    def predict(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Predict the recorded torque with the effects found that follow from the state, see `not_predicted`.
+
+        Parameters
+        ----------
+        q, v, a : array_like, shape (n,) or (N, n)
+            Position, velocity and acceleration in rad or m, per s and s^2; joints in the robot's order.
+
+        Returns
+        -------
+        ndarray, shape (n,) or (N, n)
+            N m (N), on the side of the gear where effort is recorded.
+
+        Raises
+        ------
+        UsageError
+            If the shapes are not these.
+        """
+        return self.after.predict(q, v, a)
+
+    @property
+    def not_predicted(self) -> tuple[str, ...]:
+        """Effects found that `predict` leaves out: they take more than a state, or were taken out of the recordings."""
+        within = {(term.name, term.joint) for term in self.after.model.terms if isinstance(term, EffectTerm)}
+        corrected = [item for item in self.effects if (item.effect, item.joint) not in within]
+        return (*self.after.prediction.left_out, *(item.label for item in corrected))
+
+    def _in_short(self) -> str:
+        return f"{self.robot.name}: {', '.join((self.verdict, *(item.label for item in self.effects)))}"
+
 
 # Matrices are small throughout: a second BLAS thread waits more than it works.
 @one_blas_thread()
@@ -187,6 +188,19 @@ def diagnose(
     RecordingError
         If none of the recordings can be used, or they have fewer rows than the model has parameters (one of several that
         cannot be used is left out with a note), or channels are not what the mapping says (see `channel_faults`).
+
+    Examples
+    --------
+    >>> from scara_ident import diagnose, effects_named, load_robot, named_motion, parse_effect, simulate, virtual_arm
+    >>> robot = load_robot()
+    >>> arm, motion = virtual_arm(robot), named_motion("OJD", robot)
+    >>> hidden = [parse_effect("spring:joint1:stiffness=0.2")]
+    >>> runs = [simulate(arm, motion, effects=hidden, rate=250.0, repetition=k).recording for k in (1, 2)]
+    >>> found = diagnose(robot, runs, bands=[20.0, 20.0], catalogue=effects_named("spring"))
+    >>> found
+    Diagnosis(scara03: explained, spring of joint1)
+    >>> found.not_predicted
+    ()
     """
     work = Work(progress)
     check_held_out(recordings, validation)
@@ -220,13 +234,13 @@ def diagnose(
     notes += held.notes
     validation_before = observe(base, held.data)
     parameters = physical_parameters(step) if found.chosen else PhysicalParameters((), ())
-    effects = _effects(found, step, parameters)
+    effects = found_effects(found, step, parameters)
     notes += [f"{item.label} is not counted: {item.why}" for item in outcome.demoted]
     drift = clock_drift(after.value, outcome.training)
     notes += [] if drift is None else [drift]
     if after.variation is not None:
         notes += after.variation.sentences(robot)
-    negligible = _negligible(found)
+    negligible = negligible_correction(found)
     if negligible is not None:
         notes.append(f"{negligible}; corrected in the data, not counted as an effect")
     validation_after = _with_effects(found, held, validation_before)
@@ -238,6 +252,7 @@ def diagnose(
     )
     events += in_held_out
     notes += [event.sentence(robot) for event in events]
+    log_notes(_LOG, notes)
     shown = held_out_evidence(
         evidence(found, outcome.residuals, outcome.fit_after, criteria),
         rms_of(after.value, outcome.training),
@@ -298,52 +313,3 @@ def _with_effects(found: Search, held: HeldOut, before: Observations) -> Observa
     scene = replace(held.scene, columns=columns_at_hand(before))
     step = replace(found.step, scene=scene, columns=CandidateColumns(before), chosen=held.chosen)
     return observed_at_every_sample(step)
-
-
-def _effects(found: Search, step: SelectionStep, parameters: PhysicalParameters) -> list[FoundEffect]:
-    scene = found.scene
-    groups = confounders(step, found.decisions) if found.chosen else []
-    labels = [item.label(scene) for item in found.chosen]
-    results = []
-    before = rms_of(found.start.value, found.uncorrected)
-    for item in found.steps:
-        decision = item.decision
-        candidate = decision.candidate
-        now = item.rms
-        if candidate.corrects_data and found.correction is not None:
-            if _negligible(found) is not None:
-                before = now
-                continue
-            covariance = np.diag(found.correction.std**2)
-            values: Mapping[str, Parameter] = candidate.effect.parameters(
-                scene, candidate.member, found.correction.value, covariance
-            )
-            confounded: tuple[Confounder, ...] = ()
-        else:
-            place = labels.index(decision.label)
-            candidate = found.chosen[place]
-            values, confounded = parameters.effects[place], groups[place]
-        results.append(
-            FoundEffect(
-                candidate.effect.name,
-                candidate.joint(scene),
-                candidate.effect.description(scene, candidate.member),
-                values,
-                confounded,
-                min(1.0, decision.examination.p_value * found.tried),
-                decision.gain,
-                decision.examination.votes,
-                dict(zip(scene.robot.joints, before, strict=True)),
-                dict(zip(scene.robot.joints, now, strict=True)),
-            )
-        )
-        before = now
-    return results
-
-
-def _negligible(found: Search) -> str | None:
-    """Say why what was corrected in the data is no effect to speak of."""
-    if found.correction is None:
-        return None
-    candidate = found.correction.candidate
-    return candidate.effect.negligible(found.scene, candidate.member, found.correction.value)

@@ -17,9 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.effects.in_state import follows_state
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, deviation
 from scara_ident.effects.signals import Scene, Signals
+from scara_ident.model.prediction import states
 from scara_ident.model.terms import Column
+from scara_ident.model.terms.term import StateTorque
 from scara_ident.motion.motion import Motion
 from scara_ident.recording.recording import Recording
 
@@ -313,3 +316,14 @@ class EffectTerm:
     def fill(self, motion: Motion, rows: Sequence[Array]) -> None:
         """Write the columns into those of each joint: (k, N) where they act, (0, N) where they do not."""
         self.effect.fill(Signals(self.scene, motion), self.member, rows)
+
+    def state_torque(self, value: Array) -> StateTorque | None:
+        """Return the torque of the coefficients (k,) in one state; None where it takes more than the state."""
+        if not follows_state(self.regressor, self.scene):
+            return None
+
+        def torque(q: Array, v: Array, a: Array) -> Array:
+            columns = self.regressor(states(q[:, None], v[:, None], a[:, None]))
+            return np.asarray(columns[:, :, 0] @ value)
+
+        return torque

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import RunVariation
+from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import Motion
+from scara_ident.model.prediction import Prediction
 
 # The paper takes its criteria over this many samples, whatever the recording's length.
 PAPER_SAMPLES = 2500
@@ -40,8 +42,8 @@ class JointError:
     relative_unfiltered: float | None
 
 
-@dataclass(frozen=True, eq=False)
-class Estimate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Estimate(Saved, told_by="estimate"):
     """Parameters of a model and how sure they are.
 
     Attributes
@@ -82,9 +84,18 @@ class Estimate:
         """Standard deviation of each parameter, shape (p,)."""
         return np.sqrt(np.clip(np.diag(self.covariance), 0.0, None))
 
-    def predict(self, motion: Motion) -> Array:
-        """Predict the recorded torque along a motion, shape (n, N)."""
-        return np.asarray(np.einsum("jpn,p->jn", self.model.regressor(motion), self.value))
+    @cached_property
+    def prediction(self) -> Prediction:
+        """The torque as a function of position, velocity and acceleration, and what of the model it leaves out."""
+        return Prediction(self.model, self.value)
+
+    def predict(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Predict the recorded torque of one state or of many, see `scara_ident.model.prediction.Prediction`."""
+        return self.prediction(q, v, a)
+
+    def _in_short(self) -> str:
+        model = self.model
+        return f"{model.robot.name}, {model.name} by {self.method}: {len(self.value)} parameters"
 
     def errors(self, observations: Observations) -> tuple[JointError | None, ...]:
         """Return the error on recordings, joint by joint; None where no sample of a joint was used."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.manners import Frozen
 
 # Rounds in which joints are weighted by what they leave, and the least that one may leave, as a share of its torque.
 WEIGHTING_ROUNDS = 3
@@ -28,8 +29,8 @@ PANEL_ROWS = 512
 UNDETERMINED = 1e-10
 
 
-@dataclass(frozen=True, eq=False)
-class Information:
+@dataclass(frozen=True, eq=False, repr=False)
+class Information(Frozen):
     """Triangular factor of ``[W | u]`` with its number of rows.
 
     Attributes

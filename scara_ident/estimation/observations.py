@@ -19,6 +19,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.residuals import Residuals
+from scara_ident.manners import Frozen
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.position_noise import coarse_positions
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
@@ -84,8 +85,8 @@ class JointRows:
         return JointRows(self.columns, self.table * size, self.starts, self.counts * shares)
 
 
-@dataclass(frozen=True, eq=False)
-class Observations:
+@dataclass(frozen=True, eq=False, repr=False)
+class Observations(Frozen):
     """What recordings say of a model.
 
     Attributes

@@ -13,10 +13,11 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.least_squares import least_squares
 from scara_ident.estimation.observations import Observations
+from scara_ident.manners import Frozen
 
 
-@dataclass(frozen=True, eq=False)
-class History:
+@dataclass(frozen=True, eq=False, repr=False)
+class History(Frozen):
     """How a recursive estimate came about, block of time by block of time.
 
     Attributes

@@ -8,11 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.manners import Frozen
 from scara_ident.motion.prepared import PreparedData
 
 
-@dataclass(frozen=True, eq=False)
-class Residuals:
+@dataclass(frozen=True, eq=False, repr=False)
+class Residuals(Frozen):
     """The residual of a model on prepared data.
 
     Attributes

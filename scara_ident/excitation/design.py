@@ -18,6 +18,7 @@ from scara_ident.excitation.problem import NARROWEST, Task
 from scara_ident.excitation.search import Effort, Progress, search
 from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.verification import Reached, reached
+from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 
@@ -33,8 +34,8 @@ LEAST_PER_PERIOD = 4
 MOST_TRAJECTORIES = 26
 
 
-@dataclass(frozen=True, eq=False)
-class Design:
+@dataclass(frozen=True, eq=False, repr=False)
+class Design(Saved, told_by="design"):
     """Trajectories with what they promise.
 
     Attributes
@@ -78,6 +79,10 @@ class Design:
     costs: tuple[float, ...]
     effort: Effort
     seconds: float
+
+    def _in_short(self) -> str:
+        names = ", ".join(each.name for each in self.trajectories)
+        return f"{self.model.robot.name}: {names} of {self.trajectories[0].duration:g} s, ln det {self.log_det:.2f}"
 
     @property
     def total(self) -> Information:
@@ -187,6 +192,15 @@ def design_excitation(
     J. Swevers et al., "Optimal robot excitation and identification", IEEE Transactions on Robotics and Automation
     13(5), 1997. G. Calafiore, M. Indri, B. Bona, "Robot dynamic calibration: optimal excitation trajectories and
     experimental parameter estimation", Journal of Robotic Systems 18(2), 2001.
+
+    Examples
+    --------
+    >>> from scara_ident import Effort, build_model, design_excitation, load_robot, write_trajectory
+    >>> quick = Effort(starts=1, rounds=1)
+    >>> design = design_excitation(build_model(load_robot()), duration=5.0, harmonics=3, effort=quick)
+    >>> design.to_frame().shape
+    (5001, 7)
+    >>> write_trajectory(design.trajectories[0], "trajectory.csv")
     """
     begun = time.perf_counter()
     robot, count = model.robot, len(model.names)

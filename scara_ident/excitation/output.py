@@ -54,14 +54,20 @@ def write_trajectory(trajectory: ExcitationTrajectory, path: Path | str, rate: f
     RecordingError
         If the file cannot be written.
     """
+    columns = trajectory_columns(trajectory, rate)
+    path = Path(path)
+    _make_folder(path)
+    write_columns(path, columns)
+
+
+def trajectory_columns(trajectory: ExcitationTrajectory, rate: float) -> dict[str, Array]:
+    """Return ``time`` and position, velocity and acceleration of every joint at about a rate, each of shape (N,)."""
     time = sample_times(trajectory, rate)
     columns = {"time": time}
     for name, *signals in zip(trajectory.joints, *trajectory.at(time), strict=True):
         for kind, signal in zip(("position", "velocity", "acceleration"), signals, strict=True):
             columns[f"{name}.{kind}"] = signal
-    path = Path(path)
-    _make_folder(path)
-    write_columns(path, columns)
+    return columns
 
 
 def sample_times(trajectory: ExcitationTrajectory, rate: float) -> Array:

@@ -35,6 +35,14 @@ def export_urdf(found: Identification | ConsistentEstimate, path: Path | str) ->
         If no arm can have the identified parameters.
     ScaraIdentError
         If a link cannot exist, or a file cannot be read or written.
+
+    Examples
+    --------
+    >>> from scara_ident import export_mjcf, export_urdf, identify, load_robot, named_motion, simulate, virtual_arm
+    >>> robot = load_robot()
+    >>> run = simulate(virtual_arm(robot), named_motion("OJK", robot), rate=250.0)
+    >>> result = identify(robot, [run.recording], method="consistent")
+    >>> notes = export_urdf(result, "identified.urdf"), export_mjcf(result, "identified.xml")
     """
     return _export(urdf_text, found, path)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,11 +15,14 @@ from scara_ident.estimation.estimate import paper_criteria
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.identify import check_bands, estimate_by
 from scara_ident.identification.usable import check_rows, usable_in_bands
+from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.repeatability import repeatability
-from scara_ident.progress import Tell, silent
+from scara_ident.progress import Tell, log_notes, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +56,8 @@ class TrajectorySummary:
     estimate: Estimate
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Saved, told_by="comparison"):
     """Every trajectory's parameters against every trajectory.
 
     Attributes
@@ -77,6 +81,10 @@ class Comparison:
     errors: Array
     expected: Array
     notes: tuple[str, ...]
+
+    def _in_short(self) -> str:
+        names = ", ".join(item.name for item in self.trajectories)
+        return f"{self.model.robot.name}, {self.model.name} by {self.method}: {names}"
 
 
 def compare(
@@ -109,6 +117,14 @@ def compare(
     RecordingError
         If none of the recordings can be used; one of several that cannot, or a trajectory with fewer rows than the model has
         parameters, is left out with a note.
+
+    Examples
+    --------
+    >>> from scara_ident import compare, load_robot, named_motion, simulate, virtual_arm
+    >>> robot = load_robot()
+    >>> motions = [named_motion(name, robot) for name in ("OJK", "OJD")]
+    >>> compare(robot, [simulate(virtual_arm(robot), motion, rate=250.0).recording for motion in motions])
+    Comparison(scara03, complete by wls: OJK, OJD)
     """
     equation = build_model(robot, model) if isinstance(model, str) else model
     if bands is not None:
@@ -150,6 +166,7 @@ def compare(
                 expected[i, k, j] = np.sqrt(
                     information.rms(summaries[i].estimate.value) ** 2 + max(spread, 0.0) / information.rows
                 )
+    log_notes(_LOG, (*notes, *useless))
     return Comparison(equation, method, data.bands, tuple(summaries), errors, expected, (*notes, *useless))
 
 

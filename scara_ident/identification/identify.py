@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
@@ -26,16 +28,19 @@ from scara_ident.identification.clock_check import clock_drift
 from scara_ident.identification.events import Event, find_events, without_events
 from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
+from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.repeatability import repeatability
-from scara_ident.progress import Tell, silent
+from scara_ident.progress import Tell, log_notes, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.recording.shared_samples import shared_samples
 from scara_ident.robot.robot import Robot
 
+_LOG = logging.getLogger(__name__)
 
-@dataclass(frozen=True, eq=False)
-class Identification:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Saved, told_by="identification"):
     """Everything that one identification found.
 
     Attributes
@@ -72,6 +77,30 @@ class Identification:
     def model(self) -> TorqueModel:
         """The model that was fitted."""
         return self.estimate.model
+
+    def predict(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Predict the recorded torque, friction and offset included, of one state or of many.
+
+        Parameters
+        ----------
+        q, v, a : array_like, shape (n,) or (N, n)
+            Position, velocity and acceleration in rad or m, per s and s^2; joints in the robot's order.
+
+        Returns
+        -------
+        ndarray, shape (n,) or (N, n)
+            N m (N), on the side of the gear where effort is recorded.
+
+        Raises
+        ------
+        UsageError
+            If the shapes are not these.
+        """
+        return self.estimate.predict(q, v, a)
+
+    def _in_short(self) -> str:
+        count = len(self.training.data.recordings)
+        return f"{self.estimate._in_short()} from {count} recording{'' if count == 1 else 's'}"
 
     @cached_property
     def physical_consistency(self) -> PhysicalConsistency:
@@ -131,6 +160,19 @@ def identify(
     RecordingError
         If none of the recordings to fit can be used, or they have fewer rows than the model has parameters, or two joints are
         exchanged (see `channel_faults`). One of several that cannot be used, or one that is held out, is left out with a note.
+
+    Examples
+    --------
+    >>> from scara_ident import identify, load_robot, named_motion, simulate, virtual_arm
+    >>> robot = load_robot()
+    >>> run = simulate(virtual_arm(robot), named_motion("OJK", robot), rate=250.0)
+    >>> result = identify(robot, [run.recording])
+    >>> result
+    Identification(scara03, complete by wls: 15 parameters from 1 recording)
+    >>> result.predict([0.1, 0.2], [0.5, -0.5], [1.0, 2.0]).shape
+    (2,)
+    >>> result.to_frame().columns[:4]
+    ['name', 'joint', 'value', 'std']
     """
     if not recordings:
         raise UsageError("no recordings to identify from")
@@ -162,6 +204,7 @@ def identify(
     notes += [event.sentence(robot) for event in events] + [said for said in (differs, drift) if said is not None]
     if isinstance(estimate, ConsistentEstimate):
         notes += estimate.notes
+    log_notes(_LOG, notes)
     log_det, condition = paper_criteria(training)
     return Identification(
         estimate, history, data.bands, training, validated, noise, log_det, condition, tuple(notes), events

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
+from scara_ident.manners import Frozen
 from scara_ident.model.regressor.kernel import pinocchio_regressor
 from scara_ident.robot.robot import Robot
 
@@ -35,8 +36,8 @@ EXACT_TOLERANCE = 1e-9
 FEWEST_STATES, MOST_STATES = 40, 400
 
 
-@dataclass(frozen=True, eq=False)
-class BaseParameters:
+@dataclass(frozen=True, eq=False, repr=False)
+class BaseParameters(Frozen):
     """The reduction of standard parameters to base parameters.
 
     With ``p = 11 n`` standard parameters pi (see `Robot.standard_parameters`) and b base parameters beta,
@@ -160,6 +161,12 @@ def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int 
     ----------
     M. Gautier, W. Khalil, "Direct calculation of minimum set of inertial parameters of serial robots",
     IEEE Transactions on Robotics and Automation 6(3), 1990.
+
+    Examples
+    --------
+    >>> from scara_ident import find_base_parameters, load_robot
+    >>> find_base_parameters(load_robot()).names
+    ('I1zz', 'mx2', 'my2', 'I2zz', 'Ia2')
     """
     n = robot.n
     p = 11 * n

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.manners import Frozen
 from scara_ident.model import MODELS
 from scara_ident.model.terms import Column, Friction, Offset, RigidBody, Term
 from scara_ident.model.terms.rigid_body import rigid_body
@@ -17,8 +18,8 @@ from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
 
-@dataclass(frozen=True, eq=False)
-class TorqueModel:
+@dataclass(frozen=True, eq=False, repr=False)
+class TorqueModel(Frozen):
     """A torque equation linear in its p parameters: ``u = regressor @ parameters``.
 
     Attributes
@@ -41,6 +42,10 @@ class TorqueModel:
     def names(self) -> tuple[str, ...]:
         """Names of the p parameters."""
         return tuple(column.name for column in self.columns)
+
+    def _in_short(self) -> str:
+        terms = ", ".join(term.name for term in self.terms)
+        return f"{self.robot.name}, {self.name}: {len(self.columns)} parameters of {terms}"
 
     @property
     def pattern(self) -> NDArray[np.bool_]:
@@ -105,6 +110,12 @@ def build_model(robot: Robot, name: str = "complete") -> TorqueModel:
     ------
     UsageError
         If there is no model of this name; the message lists the names.
+
+    Examples
+    --------
+    >>> from scara_ident import build_model, load_robot
+    >>> build_model(load_robot(), "basic")
+    TorqueModel(scara03, basic: 11 parameters of rigid_body, friction, offset)
     """
     return MODELS.get(name)(robot)
 

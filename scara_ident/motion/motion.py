@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.manners import Frozen
 from scara_ident.motion.low_pass import differentiate
 from scara_ident.motion.spline import cubic_spline
 from scara_ident.recording.audit.samples import GAP_STEPS
@@ -22,8 +23,8 @@ MOST_SAMPLES = 60_000
 UNIFORM_TOLERANCE = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
+@dataclass(frozen=True, eq=False, repr=False)
+class Motion(Frozen):
     """A stretch of motion without gaps, at uniform time steps.
 
     Attributes

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.manners import Frozen
 from scara_ident.motion.low_pass import HIGHEST_CUT, ROWS_AT_ONCE, low_pass, low_pass_every
 from scara_ident.motion.motion import Motion, Stretch, motion_of, stretches, torque_of, with_effort_of
 from scara_ident.motion.trajectories import Trajectories, trajectories_of
@@ -225,8 +226,8 @@ class PreparedRecording:
         return PreparedRecording(recording, tuple(parts))
 
 
-@dataclass(frozen=True, eq=False)
-class PreparedData:
+@dataclass(frozen=True, eq=False, repr=False)
+class PreparedData(Frozen):
     """Recordings made ready for one choice of bands.
 
     Attributes

@@ -16,7 +16,9 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.files import real_path
+from scara_ident.manners import Reported
 from scara_ident.recording.audit import Finding, Samples, audit
+from scara_ident.recording.columns import recording_columns, rows_of_the_arm
 from scara_ident.recording.files import IMPORTERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
 from scara_ident.robot.signal_map import SIGNALS, Channel, Channels, contract_channels
@@ -27,8 +29,8 @@ if TYPE_CHECKING:
 OPTIONAL = ("velocity", "acceleration", "temperature")
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Reported, told_by="recording"):
     """One run of one trajectory.
 
     Attributes
@@ -79,6 +81,7 @@ class Recording:
     path: Path | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         source = self.path or self.name
         shape = (len(self.joints), len(self.time))
         for name in SIGNALS:
@@ -91,6 +94,9 @@ class Recording:
     def rate(self) -> float:
         """Median sample rate, Hz."""
         return 1.0 / float(np.median(np.diff(self.time)))
+
+    def _in_short(self) -> str:
+        return f"{self.name}: {len(self.joints)} joints, {len(self.time)} samples at {self.rate:.4g} Hz"
 
 
 def split_name(stem: str) -> tuple[str, int]:
@@ -144,7 +150,7 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
     wanted = [channel.column for channel in (*needed, *chain.from_iterable(optional.values()), *second.values())]
     columns = read_columns(path, wanted, channels.topic)
     if shares_clock(path, channels.time.column):
-        columns = _rows_of_the_arm(columns, [channel.column for channel in needed[1:]])
+        columns = rows_of_the_arm(columns, [channel.column for channel in needed[1:]])
 
     def rows(wanted: Sequence[Channel]) -> Array:
         return np.array([channel.si(columns.pop(channel.column)) for channel in wanted])
@@ -212,6 +218,15 @@ def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: b
         A word that is no file, folder or matching glob.
     RecordingError
         A folder or glob without recordings, two files of one stem, or a recording that cannot be used.
+
+    Examples
+    --------
+    >>> from scara_ident import load_robot, named_motion, read_recordings, simulate, virtual_arm, write_recording
+    >>> robot = load_robot()
+    >>> run = simulate(virtual_arm(robot), named_motion("OJK", robot), rate=250.0)
+    >>> write_recording(run.recording, "OJK_1.parquet")
+    >>> read_recordings(["OJK_*.parquet"], robot)
+    (Recording(OJK_1: 2 joints, 5001 samples at 250 Hz),)
     """
     return tuple(read_recording(path, robot, need_effort=need_effort) for path in recording_paths(words))
 
@@ -272,24 +287,7 @@ def write_recording(recording: Recording, path: Path | str, *, effort_gain: Arra
     RecordingError
         Another suffix, or a place that cannot be written to.
     """
-    columns = {"time": recording.time}
-    for signal in SIGNALS:
-        if (values := getattr(recording, signal)) is None:
-            continue
-        if signal == "effort" and effort_gain is not None:
-            values = values / np.asarray(effort_gain, dtype=float)[:, None]
-        there = zip(recording.joints, values, strict=True)
-        columns |= {f"{joint}.{signal}": row for joint, row in there if not np.isnan(row).all()}
-    write_columns(Path(path), columns)
-
-
-def _rows_of_the_arm(columns: dict[str, Array], wanted: Sequence[str]) -> dict[str, Array]:
-    """Leave out the samples of other signals, in which all that is wanted of the arm is empty.
-
-    The rows that are left count from 1, as if the others were not in the file.
-    """
-    keep = np.isfinite([columns[name] for name in wanted]).any(axis=0)
-    return columns if keep.all() else {name: values[keep] for name, values in columns.items()}
+    write_columns(Path(path), recording_columns(recording, effort_gain))
 
 
 def _refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str], channels: Channels) -> None:

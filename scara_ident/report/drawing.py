@@ -68,6 +68,19 @@ def draw(path: Path, title: str, rows: Sequence[Sequence[Figure]]) -> None:
     ScaraIdentError
         If the file cannot be written, or its suffix is of no picture.
     """
+    picture = canvas(title, rows)
+
+    def write(place: Path) -> None:
+        try:
+            picture.savefig(place, dpi=DPI)
+        except ValueError as error:
+            raise ScaraIdentError(f"{path}: cannot be written: {' '.join(str(error).split())}") from None
+
+    write_whole(path, write)
+
+
+def canvas(title: str, rows: Sequence[Sequence[Figure]]) -> Canvas:
+    """Return figures in rows as one picture, see `draw`."""
     from matplotlib.figure import Figure as Canvas
 
     rows = [row for row in rows if row]
@@ -81,29 +94,23 @@ def draw(path: Path, title: str, rows: Sequence[Sequence[Figure]]) -> None:
     heights = [
         max(_height(figure) for figure in row) + LEGEND * bool(names) for row, names in zip(rows, legends, strict=True)
     ]
-    canvas = Canvas(figsize=(width, sum(heights) + TOP))
-    canvas.text(0.5, 1.0 - 0.5 * TOP / (sum(heights) + TOP), title, fontsize=11, ha="center", va="center")
+    picture = Canvas(figsize=(width, sum(heights) + TOP))
+    picture.text(0.5, 1.0 - 0.5 * TOP / (sum(heights) + TOP), title, fontsize=11, ha="center", va="center")
     top = sum(heights)
     for row, names, height in zip(rows, legends, heights, strict=True):
         handles: dict[str, Any] = {}
         for k, figure in enumerate(row):
             corner = (k * width / len(row), top - LEGEND * bool(names))
-            handles |= _draw_figure(canvas, figure, corner, width / len(row))
+            handles |= _draw_figure(picture, figure, corner, width / len(row))
         if names:
             shown = [name for name in names if name in handles]
-            canvas.legend(
+            picture.legend(
                 [handles[name] for name in shown], shown, loc="center", ncols=len(shown), fontsize=8, frameon=False,
                 bbox_to_anchor=(0.5, (top - 0.5 * LEGEND) / (sum(heights) + TOP)),
             )  # fmt: skip
         top -= height
 
-    def write(place: Path) -> None:
-        try:
-            canvas.savefig(place, dpi=DPI)
-        except ValueError as error:
-            raise ScaraIdentError(f"{path}: cannot be written: {' '.join(str(error).split())}") from None
-
-    write_whole(path, write)
+    return picture
 
 
 def _only(figure: Figure) -> Drawing:

@@ -19,6 +19,8 @@ from scara_ident.report.html.remainder import remainder_group
 from scara_ident.report.html.story import chapter_group, moment_group
 from scara_ident.report.html.torque import torque_plot
 from scara_ident.report.plot import DASHES, Dots, Figure, Layer, Line, Panel, Plot, single, style
+from scara_ident.report.traces import FittedContext
+from scara_ident.robot.robot import Robot
 from scara_ident.threads import one_blas_thread
 
 # Recordings shown, at the most; the first held-out ones before the fitted ones.
@@ -44,16 +46,22 @@ def torque_picture(path: Path, context: IdentificationContext) -> None:
         If the file cannot be written.
     """
     found = context.identification
-    robot = found.model.robot
+    draw(path, *torque_figures(context, found.model.robot, found.bands))
+
+
+def torque_figures(
+    context: FittedContext, robot: Robot, bands: Sequence[float | None]
+) -> tuple[str, list[list[Figure]]]:
+    """Return title and rows of the picture of torque over time, see `torque_picture`."""
     rows: list[list[Figure]] = []
     for j, joint in enumerate(robot.joints):
         rows.append([])
         for name, traces in context.parts[:MOST_RECORDINGS]:
-            plot = torque_plot(robot, traces, j, found.bands[j])
+            plot = torque_plot(robot, traces, j, bands[j])
             # Residual and torque over one axis: axes are what takes the time.
             panel = Panel(plot.panels[0].label, [layer for each in plot.panels for layer in each.layers], HEIGHT)
             rows[-1].append(single("torque", f"{name}, {joint}", "", replace(plot, panels=(panel,))))
-    draw(path, "Measured and predicted torque", rows)
+    return "Measured and predicted torque", rows
 
 
 def diagnosis_pictures(folder: Path, context: DiagnosisContext) -> tuple[tuple[str, str], ...]:
@@ -75,30 +83,36 @@ def diagnosis_pictures(folder: Path, context: DiagnosisContext) -> tuple[tuple[s
     ScaraIdentError
         If a file cannot be written.
     """
-    robot, remainder = context.diagnosis.robot, context.diagnosis.unexplained
-    found: list[tuple[str, str]] = []
-    figures: list[list[Sequence[Figure]]] = []
-    with one_blas_thread():
-        for effect, chapter in context.chapters:
-            title = effect.effect if effect.joint is None else f"{effect.effect} on {effect.joint}"
-            found.append((title, f"effect_{chapter.number}.png"))
-            figures.append([chapter_group(robot, chapter).figures, moment_group(robot, chapter).figures])
-        group = None if remainder is None else remainder_group(robot, remainder, context.sets["training"])
-        if remainder is not None and group is not None:
-            found.append((f"what no effect accounts for on {remainder.joint}", "unexplained.png"))
-            figures.append([group.figures])
+    parts = effect_figures(context)
+    found = tuple((title, name) for title, name, _ in parts)
     if len(found) > 1:
         # Loaded once, for all processes.
         import_module("matplotlib.figure")
 
     def draw_one(k: int) -> None:
-        title, name = found[k]
-        draw(folder / name, title, figures[k])
+        title, name, figures = parts[k]
+        draw(folder / name, title, figures)
 
     # Matplotlib holds the interpreter's lock, so that threads would not help.
     for _ in map_in_order(draw_one, range(len(found))):
         pass
-    return tuple(found)
+    return found
+
+
+def effect_figures(context: DiagnosisContext) -> list[tuple[str, str, list[Sequence[Figure]]]]:
+    """Return title, file name and rows of the picture of every effect found, and of what no effect accounts for."""
+    robot, remainder = context.diagnosis.robot, context.diagnosis.unexplained
+    found: list[tuple[str, str, list[Sequence[Figure]]]] = []
+    with one_blas_thread():
+        for effect, chapter in context.chapters:
+            title = effect.effect if effect.joint is None else f"{effect.effect} on {effect.joint}"
+            rows: list[Sequence[Figure]] = [chapter_group(robot, chapter).figures, moment_group(robot, chapter).figures]
+            found.append((title, f"effect_{chapter.number}.png", rows))
+        group = None if remainder is None else remainder_group(robot, remainder, context.sets["training"])
+        if remainder is not None and group is not None:
+            title = f"what no effect accounts for on {remainder.joint}"
+            found.append((title, "unexplained.png", [group.figures]))
+    return found
 
 
 def remove_stale(folder: Path, written: Sequence[str]) -> None:
@@ -133,12 +147,17 @@ def design_picture(path: Path, design: Design) -> None:
     ScaraIdentError
         If the file cannot be written or the suffix is of no picture.
     """
+    draw(path, *design_figures(design))
+
+
+def design_figures(design: Design) -> tuple[str, list[list[Figure]]]:
+    """Return title and rows of the picture of a design, see `design_picture`."""
     names = ", ".join(each.name for each in design.trajectories)
     title = (
         f"{design.model.robot.name}: {names} - ln det {design.log_det:.2f}, "
         f"cond of the regressor {np.sqrt(design.condition):.3g} ({design.model.name} model)"
     )
-    draw(path, title, [[_motion(design), _phases(design)], [_path(design)], [_parameters(design)]])
+    return title, [[_motion(design), _phases(design)], [_path(design)], [_parameters(design)]]
 
 
 def _motion(design: Design) -> Figure:

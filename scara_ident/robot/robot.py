@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
@@ -19,19 +17,18 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.files import path_fault, real_path
+from scara_ident.manners import Frozen
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
 from scara_ident.robot.examples import example_urdf, is_name
 from scara_ident.robot.rotors import RotorGuess, guess_rotors
 from scara_ident.robot.signal_map import Channels, build_channels
 from scara_ident.robot.transmissions import reductions, rotor_inertias
-from scara_ident.robot.urdf_validation import MOVABLE, XACRO, urdf_fault
-
-# Bytes: those of a humanoid are a few hundred thousand.
-LARGEST_URDF = 30e6
+from scara_ident.robot.urdf_file import pinocchio_model, read_urdf
+from scara_ident.robot.urdf_validation import MOVABLE, XACRO
 
 
-@dataclass(frozen=True, eq=False)
-class Robot:
+@dataclass(frozen=True, eq=False, repr=False)
+class Robot(Frozen):
     """An arm whose joints are to be identified.
 
     Attributes
@@ -95,6 +92,9 @@ class Robot:
         """Number of identified joints."""
         return len(self.joints)
 
+    def _in_short(self) -> str:
+        return f"{self.name}: {self.n} joint{'' if self.n == 1 else 's'}, effort at the {self.effort_side}"
+
     @cached_property
     def rotor_guess(self) -> RotorGuess:
         """Armatures that the size of the motors suggests, stated or not."""
@@ -150,6 +150,14 @@ def load_robot(path: Path | str | None = None) -> Robot:
     ------
     RobotError
         In one line: file, key and what was expected.
+
+    Examples
+    --------
+    >>> from scara_ident import load_robot
+    >>> load_robot()
+    Robot(scara03: 2 joints, effort at the motor)
+    >>> load_robot("ur5").joints[0]
+    'shoulder_pan_joint'
     """
     if path is None:
         return build_robot(RobotDescription(urdf=embedded_urdf(), effort_side="motor"), embedded_urdf())
@@ -175,8 +183,8 @@ def embedded_urdf() -> Path:
 def build_robot(description: RobotDescription, source: Path) -> Robot:
     """Build a robot from a checked description; ``source`` is named in errors."""
     urdf = description.urdf
-    tree = _parse_xml(urdf, source)
-    full = _pinocchio_model(urdf, tree)
+    tree = read_urdf(urdf, source)
+    full = pinocchio_model(urdf, tree)
     names = _identified_joints(description, full, tree, source)
     described = description.joints or {}
     joints = [described.get(name) or JointDescription() for name in names]
@@ -244,64 +252,6 @@ def _given(limit: Array) -> Array:
 def _positive_or_inf(limit: Array) -> Array:
     limit = _given(np.array(limit, dtype=float))
     return np.where(limit > 0.0, limit, np.inf)
-
-
-def _parse_xml(urdf: Path, source: Path) -> ElementTree.Element:
-    """Read a URDF and check it: what the rest of the program takes from it has been seen to be there and usable."""
-    if (fault := path_fault(urdf)) is not None:
-        raise RobotError(f"{source}: urdf: {fault}")
-    try:
-        if urdf.stat().st_size > LARGEST_URDF:
-            raise RobotError(f"{urdf}: {urdf.stat().st_size:.2g} bytes, more than any URDF; give the robot's URDF")
-        root = ElementTree.parse(urdf).getroot()
-    except FileNotFoundError:
-        raise RobotError(f"{source}: urdf: no such file: {urdf}") from None
-    except OSError as error:
-        raise RobotError(f"{source}: urdf: cannot read {urdf}: {error.strerror}") from None
-    except ElementTree.ParseError as error:
-        hint = f"; if it is xacro's, {XACRO}" if "unbound prefix" in str(error) else ""
-        raise RobotError(f"{urdf}: not well-formed XML: {error}{hint}") from None
-    except (LookupError, ValueError) as error:
-        raise RobotError(
-            f"{urdf}: the encoding that its first line names cannot be read ({error}); save it in UTF-8"
-        ) from None
-    if root.tag != "robot":
-        raise RobotError(f"{urdf}: the root element is <{root.tag}>, a URDF has <robot>")
-    if (fault := urdf_fault(root)) is not None:
-        raise RobotError(f"{urdf}: not a usable URDF: {fault}")
-    return root
-
-
-@contextmanager
-def _quiet_stderr() -> Iterator[None]:
-    # The URDF parser writes its own lines to the C stream; the user gets ours instead.
-    try:
-        saved = os.dup(2)
-    except OSError:
-        yield
-        return
-    try:
-        with open(os.devnull, "wb") as sink:
-            os.dup2(sink.fileno(), 2)
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-
-
-def _pinocchio_model(urdf: Path, tree: ElementTree.Element) -> pin.Model:
-    try:
-        # As text: Pinocchio takes the bytes of a file for UTF-8, whatever its first line says.
-        text = ElementTree.tostring(tree, encoding="unicode")
-        with _quiet_stderr():
-            return pin.buildModelFromXML(text)
-    except RecursionError:
-        raise RobotError(
-            f"{urdf}: not a usable URDF: its elements are nested too deeply; remove what is no URDF"
-        ) from None
-    except (ValueError, RuntimeError) as error:
-        reason = " ".join(str(error).split()) or "Pinocchio refuses it"
-        raise RobotError(f"{urdf}: not a usable URDF: {reason}") from None
 
 
 def _movable(tree: ElementTree.Element) -> list[str]:

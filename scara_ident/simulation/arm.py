@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, UsageError
+from scara_ident.manners import Frozen
 from scara_ident.robot.robot import Robot
 from scara_ident.simulation.plant import PlantDraft, empty_draft
 
@@ -59,8 +60,8 @@ class Controller:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class VirtualArm:
+@dataclass(frozen=True, eq=False, repr=False)
+class VirtualArm(Frozen):
     """An arm with known parameters, to rehearse on.
 
     Rows are in the robot's order of joints. Torques are on the robot's effort side; friction is a polynomial of the
@@ -116,6 +117,9 @@ class VirtualArm:
         for name in ("rotor_inertia", "encoder_steps", "torque_noise"):
             if np.any(getattr(self, name) < 0.0):
                 raise RobotError(f"{self.robot.name}: {name} must not be negative")
+
+    def _in_short(self) -> str:
+        return f"{self.robot.name}: {self.robot.n} joint{'' if self.robot.n == 1 else 's'}"
 
     @property
     def scale(self) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
+from scara_ident.manners import Reported
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
@@ -63,8 +64,8 @@ class TrueMotion:
         return TrueMotion(*(np.ascontiguousarray(getattr(self, field.name)[:, ::ticks]) for field in fields(self)))
 
 
-@dataclass(frozen=True, eq=False)
-class SimulationResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulationResult(Reported, told_by="simulation"):
     """A recording and what was behind it.
 
     Attributes
@@ -161,6 +162,13 @@ def simulate(
         too long.
     ScaraIdentError
         If the controller loses the arm.
+
+    Examples
+    --------
+    >>> from scara_ident import load_robot, named_motion, simulate, virtual_arm
+    >>> robot = load_robot()
+    >>> simulate(virtual_arm(robot), named_motion("OJK", robot), rate=250.0).recording
+    Recording(OJK_1: 2 joints, 5001 samples at 250 Hz)
     """
     if ticks < 1:
         raise UsageError(f"ticks is {ticks}; expected 1 or more periods of the controller per sample")

@@ -55,7 +55,9 @@ def test_a_prediction_is_the_models_torque_along_a_motion(model: TorqueModel):
     w = rows(np.random.default_rng(2), model, 400)
     found = ols(linear(model, "a_1", w, w.sum(axis=2), 100))
     moved = motion(*sines(np.random.default_rng(3), np.arange(200) / 1000.0, 2))
-    assert_allclose(found.predict(moved), model.regressor(moved).sum(axis=1), rtol=1e-7, atol=1e-9)
+    assert_allclose(
+        found.predict(moved.q.T, moved.v.T, moved.a.T).T, model.regressor(moved).sum(axis=1), rtol=1e-7, atol=1e-9
+    )
 
 
 def test_the_papers_criteria_count_2500_samples_whatever_the_length(model: TorqueModel):

@@ -236,7 +236,7 @@ def several(model: TorqueModel) -> Observations:
     runs[3] = replace(
         runs[3], time=runs[3].time[keep], position=runs[3].position[:, keep], effort=runs[3].effort[:, keep]
     )
-    runs[1].position[1] = 0.2
+    runs[1] = replace(runs[1], position=np.stack([runs[1].position[0], np.full_like(runs[1].time, 0.2)]))
     return seen(model, *runs)
 
 

@@ -122,7 +122,7 @@ def test_single_precision_and_whole_numbers_become_double(robot, tmp_path):
     for values in (recording.time, recording.position, recording.effort, recording.temperature):
         assert values.dtype == np.float64
         assert values.flags.c_contiguous
-        assert values.flags.writeable
+        assert not values.flags.writeable
 
 
 def test_a_missing_joint_is_refused_with_those_there_are_and_a_near_name(robot, tmp_path):

@@ -43,7 +43,7 @@ __all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "ph
 DIGITS = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ConsistentEstimate(Estimate):
     """An estimate that belongs to an arm that can exist, and that arm.
 
@@ -100,6 +100,15 @@ def consistent(observations: Observations, *, options: ConsistentOptions | None 
         If there is nothing to estimate from or the problem cannot be solved.
     UsageError
         If an option names what the robot or the model does not have.
+
+    Examples
+    --------
+    >>> from scara_ident import build_model, consistent, load_robot, named_motion, observe, prepare, simulate, virtual_arm
+    >>> robot = load_robot()
+    >>> run = simulate(virtual_arm(robot), named_motion("OJK", robot), rate=250.0)
+    >>> observations = observe(build_model(robot), prepare([run.recording], bands=[20.0, 20.0]))
+    >>> consistent(observations)
+    ConsistentEstimate(scara03, complete by consistent: 15 parameters)
     """
     model = observations.model
     options = options or ConsistentOptions()

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
+from scara_ident.manners import Frozen
 
 FrictionShape = Literal["free", "dissipative", "lubricated"]
 FrictionOption = Literal["auto", "free", "dissipative", "lubricated"]
@@ -29,8 +30,8 @@ class Ellipsoid:
     radii: tuple[float, float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class ConsistentOptions:
+@dataclass(frozen=True, eq=False, repr=False)
+class ConsistentOptions(Frozen):
     """Options of the physically consistent estimate.
 
     Attributes
@@ -71,6 +72,7 @@ class ConsistentOptions:
     prior_weight: float = 0.01
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         given = (self.friction,) if isinstance(self.friction, str) else tuple(self.friction.values())
         for shape in given:
             if shape not in get_args(FrictionOption):

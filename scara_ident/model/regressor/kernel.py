@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RegressorMismatch
+from scara_ident.manners import Frozen
 from scara_ident.model.regressor.recursion import JointGeometry, joint_geometry, trace_regressor
 from scara_ident.model.regressor.tracing import Program, compile_program
 
@@ -35,8 +36,8 @@ _NOTHING = 1e-9
 _STATES = 48
 
 
-@dataclass(frozen=True, eq=False)
-class RegressorKernel:
+@dataclass(frozen=True, eq=False, repr=False)
+class RegressorKernel(Frozen):
     """The joint-torque regressor of one model, evaluated over vectors of samples.
 
     It is on the joint side, without rotor inertia and reductions, in Pinocchio's velocity order.

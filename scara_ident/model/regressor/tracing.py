@@ -8,9 +8,10 @@ operations share one node, and signs are kept beside the nodes, so that ``a - b`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 
@@ -176,23 +177,46 @@ def vanishing(trace: Trace, values: Sequence[Scalar], inputs: Array) -> list[boo
 class Program:
     """Straight-line code that evaluates traced expressions over vectors of samples.
 
+    ``evaluate(inputs, outputs, buffers)``: rows are vectors over the samples. It writes row k of `outputs` for every
+    target k that the program was made for, and uses `buffers` as scratch space.
+
     Attributes
     ----------
-    evaluate : callable
-        ``evaluate(inputs, outputs, buffers)``: rows are vectors over the samples. Writes row k of `outputs` for
-        every target k that the program was compiled for, and uses `buffers` as scratch space.
     buffers : int
         Number of scratch vectors that it needs.
     operations : int
         Number of vector operations.
     source : str
         The code itself.
+    constants : mapping of str to float
+        Numbers that it names.
     """
 
-    evaluate: Callable[[Array, Any, Array], None]
     buffers: int
     operations: int
     source: str
+    constants: Mapping[str, float]
+
+    @cached_property
+    def evaluate(self) -> Callable[[Array, Any, Array], None]:
+        """The code, compiled when it is first asked for."""
+        namespace: dict[str, Any] = {
+            "add": np.add,
+            "sub": np.subtract,
+            "mul": np.multiply,
+            "neg": np.negative,
+            "sin": np.sin,
+            "cos": np.cos,
+            "copy": np.copyto,
+        }
+        # As arrays without dimension: a Python float would be converted in every operation.
+        namespace.update({name: np.array(value) for name, value in self.constants.items()})
+        exec(compile(self.source, "<traced program>", "exec"), namespace)
+        return cast(Callable[[Array, Any, Array], None], namespace["evaluate"])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the compiled code out of a copy: it cannot be sent."""
+        return {name: value for name, value in vars(self).items() if name != "evaluate"}
 
 
 def compile_program(trace: Trace, outputs: Sequence[tuple[int, Scalar]]) -> Program:
@@ -343,16 +367,5 @@ class _Emitter:
         head += [f"b{k} = buffers[{k}]" for k in range(self.buffers)]
         body = "\n    ".join([*head, *self.lines, "return"])
         source = f"def evaluate(inputs, outputs, buffers):\n    {body}\n"
-        namespace: dict[str, Any] = {
-            "add": np.add,
-            "sub": np.subtract,
-            "mul": np.multiply,
-            "neg": np.negative,
-            "sin": np.sin,
-            "cos": np.cos,
-            "copy": np.copyto,
-        }
-        # As arrays without dimension: a Python float would be converted in every operation.
-        namespace.update({name: np.array(value) for value, name in self.constants.items()})
-        exec(compile(source, "<traced program>", "exec"), namespace)
-        return Program(namespace["evaluate"], self.buffers, len(self.lines), source)
+        constants = {name: value for value, name in self.constants.items()}
+        return Program(self.buffers, len(self.lines), source, constants)

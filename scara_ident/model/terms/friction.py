@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.model.terms.constraints import BrakingPolynomial, Constraint
-from scara_ident.model.terms.term import Column, Filled, per_speed
+from scara_ident.model.terms.term import Column, Filled, StateTorque, per_speed
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
@@ -85,6 +85,24 @@ class Friction(Filled):
                 for _ in range(power // 2):
                     column *= square
 
+    def state_torque(self, value: Array) -> StateTorque:
+        """Return the torque in one state, summed in Python: arrays of a few joints cost more than their numbers."""
+        laws = np.zeros((self.robot.n, len(_WORDS)))
+        laws[:, list(self.powers)] = value.reshape(self.robot.n, -1)
+        # Columns are powers of the drive's speed, which is the joint's but for its direction.
+        joints = [(*law, sign) for law, sign in zip(laws.tolist(), self.robot.drive_sign.tolist(), strict=True)]
+
+        def torque(q: Array, v: Array, a: Array) -> Array:
+            found = []
+            for (a0, a1, a2, a3, sign), speed in zip(joints, v.tolist(), strict=True):
+                w = sign * speed
+                square = w * w
+                dry = a0 + a2 * square
+                found.append((dry if w > 0.0 else -dry if w < 0.0 else 0.0) + w * (a1 + a3 * square))
+            return np.array(found)
+
+        return torque
+
 
 @dataclass(frozen=True, eq=False)
 class Offset(Filled):
@@ -114,3 +132,8 @@ class Offset(Filled):
         """Write ones."""
         for row in rows:
             row.fill(1.0)
+
+    def state_torque(self, value: Array) -> StateTorque:
+        """Return the constant."""
+        constant = np.array(value)
+        return lambda q, v, a: constant

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.model.base_parameters import BaseParameters, find_base_parameters
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
 from scara_ident.model.terms.constraints import Constraint, RealBodies
-from scara_ident.model.terms.term import Column, Filled
+from scara_ident.model.terms.term import Column, Filled, StateTorque
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
@@ -101,6 +103,44 @@ class RigidBody(Filled):
             for joint, own in enumerate(active):
                 result[joint, start : start + CHUNK] = value[own] @ rows[joint]
         return result
+
+    def state_torque(self, value: Array) -> StateTorque:
+        """Return the torque in one state: Pinocchio's regressor times the parameters that lead the columns.
+
+        Those that do not lead are zero, as `find_base_parameters` has it: no torque depends on which they are.
+        """
+        robot, model, order = self.robot, self.robot.model, self.robot.order
+        standard = np.zeros(11 * robot.n)
+        standard[self.base.kept[self.kept]] = value
+        bodies = standard[: 10 * robot.n].reshape(-1, 10)[np.argsort(order)].ravel()
+        armature = standard[10 * robot.n :] * robot.row_scale
+        back, same_side = np.argsort(order), bool(np.all(robot.row_scale == 1.0))
+        scale = robot.row_scale
+        plain = bool(np.all(order == np.arange(robot.n)))
+        turning = [(joint.idx_q, joint.idx_v) for joint in list(model.joints)[1:] if joint.nq == 2]
+        own = threading.local()  # Pinocchio writes into its data, which two threads cannot share.
+
+        def torque(q: Array, v: Array, a: Array) -> Array:
+            data = getattr(own, "data", None)
+            if data is None:
+                data = own.data = model.createData()
+            p, w, z = (q, v, a) if plain else (q[back], v[back], a[back])
+            full = _configuration(model, p, turning) if turning else p
+            found = pin.computeJointTorqueRegressor(model, data, full, w, z).dot(bodies)
+            if not plain:
+                found = found[order]
+            return np.asarray((found if same_side else scale * found) + armature * a)
+
+        return torque
+
+
+def _configuration(model: pin.Model, q: Array, turning: Sequence[tuple[int, int]]) -> Array:
+    """Return Pinocchio's configuration: cosine and sine of the angle of a continuous joint."""
+    full = np.empty(model.nq)
+    full[[joint.idx_q for joint in list(model.joints)[1:]]] = q
+    for place, joint in turning:
+        full[place], full[place + 1] = np.cos(q[joint]), np.sin(q[joint])
+    return full
 
 
 @lru_cache(maxsize=16)

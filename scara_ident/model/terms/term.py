@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,19 @@ class Term(Protocol):
 
     def regressor(self, motion: Motion) -> Array:
         """Return the columns on a stretch of motion, shape (n, p, N), on the side of the recorded torque."""
+        ...
+
+
+StateTorque = Callable[[Array, Array, Array], Array]
+"""Torque (n,) on the recorded side of one position, velocity and acceleration, (n,) each."""
+
+
+@runtime_checkable
+class OfState(Protocol):
+    """A term that says what it is in one state, or that it is no function of it."""
+
+    def state_torque(self, value: Array) -> StateTorque | None:
+        """Return the torque of the term's parameters (k,) in one state; None where it takes more than the state."""
         ...
 
 

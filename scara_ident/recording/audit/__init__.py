@@ -6,8 +6,12 @@ on those before it: units are judged on finite numbers in order of time, spikes 
 
 from __future__ import annotations
 
+import logging
+
 from scara_ident.recording.audit import clock, effort, lost_samples, position, sizes
 from scara_ident.recording.audit.samples import Finding, Samples
+
+_LOG = logging.getLogger(__name__)
 
 CHECKS = (
     clock.enough,
@@ -56,6 +60,9 @@ def audit(samples: Samples) -> tuple[Samples, tuple[Finding, ...]]:
     for check in CHECKS:
         samples, found = check(samples)
         findings += found
+    # Whoever fits the recording is warned of them again.
+    for finding in findings:
+        _LOG.info("%s: %s", samples.source, finding.message)
     return samples, tuple(findings)
 
 

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from scara_ident.diagnosis.diagnose import Diagnosis, FoundEffect
+from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.html.blocks import (

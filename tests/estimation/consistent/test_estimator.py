@@ -81,7 +81,7 @@ def test_the_arm_that_is_given_predicts_the_torque():
     rest = found.value.copy()
     rest[model.place(model.rigid_body)] = 0.0
     torque += np.einsum("jpn,p->jn", model.regressor(test), rest)
-    np.testing.assert_allclose(found.predict(test), torque, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.predict(test.q.T, test.v.T, test.a.T).T, torque, rtol=1e-9, atol=1e-12)
     assert [link.name for link in links(found)] == ["link1", "link2"]
 
 

@@ -1,0 +1,104 @@
+"""An effect that the data show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from scara_ident.diagnosis.confounding import Confounder, confounders
+from scara_ident.diagnosis.effect_parameters import PhysicalParameters
+from scara_ident.diagnosis.model_selection import rms_of
+from scara_ident.diagnosis.search import Search
+from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.effects import Parameter
+
+
+@dataclass(frozen=True, eq=False)
+class FoundEffect:
+    """One effect that the data show.
+
+    Attributes
+    ----------
+    effect : str
+    joint : str or None
+    description : str
+    parameters : mapping of str to Parameter
+    confounded_with : tuple of Confounder
+        Effects that these recordings cannot tell from it.
+    p_value : float
+        Corrected for the candidates tried.
+    gain : float
+        What it removes on data that it was not fitted to, as a share of that and what it leaves on its joint.
+    votes : tuple of (int, int)
+        Trajectories in which it helps, of those that excite it.
+    before, after : mapping of str to float or None
+        Rms of each joint over the training recordings when it came in.
+    """
+
+    effect: str
+    joint: str | None
+    description: str
+    parameters: Mapping[str, Parameter]
+    confounded_with: tuple[Confounder, ...]
+    p_value: float
+    gain: float
+    votes: tuple[int, int]
+    before: Mapping[str, float | None]
+    after: Mapping[str, float | None]
+
+    @property
+    def label(self) -> str:
+        """The effect and its joint."""
+        return self.effect if self.joint is None else f"{self.effect} of {self.joint}"
+
+
+def found_effects(found: Search, step: SelectionStep, parameters: PhysicalParameters) -> list[FoundEffect]:
+    """Return the effects that came in, in that order, with their parameters and what cannot be told from them."""
+    scene = found.scene
+    groups = confounders(step, found.decisions) if found.chosen else []
+    labels = [item.label(scene) for item in found.chosen]
+    results = []
+    before = rms_of(found.start.value, found.uncorrected)
+    for item in found.steps:
+        decision = item.decision
+        candidate = decision.candidate
+        now = item.rms
+        if candidate.corrects_data and found.correction is not None:
+            if negligible_correction(found) is not None:
+                before = now
+                continue
+            covariance = np.diag(found.correction.std**2)
+            values: Mapping[str, Parameter] = candidate.effect.parameters(
+                scene, candidate.member, found.correction.value, covariance
+            )
+            confounded: tuple[Confounder, ...] = ()
+        else:
+            place = labels.index(decision.label)
+            candidate = found.chosen[place]
+            values, confounded = parameters.effects[place], groups[place]
+        results.append(
+            FoundEffect(
+                candidate.effect.name,
+                candidate.joint(scene),
+                candidate.effect.description(scene, candidate.member),
+                values,
+                confounded,
+                min(1.0, decision.examination.p_value * found.tried),
+                decision.gain,
+                decision.examination.votes,
+                dict(zip(scene.robot.joints, before, strict=True)),
+                dict(zip(scene.robot.joints, now, strict=True)),
+            )
+        )
+        before = now
+    return results
+
+
+def negligible_correction(found: Search) -> str | None:
+    """Say why what was corrected in the data is no effect to speak of."""
+    if found.correction is None:
+        return None
+    candidate = found.correction.candidate
+    return candidate.effect.negligible(found.scene, candidate.member, found.correction.value)

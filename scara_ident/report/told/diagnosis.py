@@ -1,0 +1,72 @@
+"""What a diagnosis tells: the verdict, the effects found, errors before and after, and what else was tried."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.told.words import table, text_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from rich.table import Table
+
+# Candidates shown where not all are wanted.
+MOST_CANDIDATES = 8
+
+
+def summary(diagnosis: Diagnosis) -> str:
+    """Return the verdict, the result in sentences, errors before and after, and what `Diagnosis.predict` leaves out."""
+    held = diagnosis_dict(diagnosis)
+    notes = [f"note: {note}" for note in diagnosis.notes]
+    heading = f"{diagnosis.robot.name}: {diagnosis.verdict}"
+    left = [f"predict leaves out {name}." for name in diagnosis.not_predicted]
+    return text_of(*notes, heading, *held["summary"], *tables(held), *left)
+
+
+def content(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the content of ``diagnosis.json``."""
+    return diagnosis_dict(diagnosis)
+
+
+def columns(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return a row for each parameter of each effect found."""
+    rows = [
+        (found.effect, found.joint, name, parameter.value, parameter.std, parameter.unit, found.p_value, found.gain)
+        for found in diagnosis.effects
+        for name, parameter in found.parameters.items()
+    ]
+    names = ("effect", "joint", "parameter", "value", "std", "unit", "p_value", "gain")
+    return {name: [row[k] for row in rows] for k, name in enumerate(names)}
+
+
+def figure(diagnosis: Diagnosis) -> Figure:
+    """Draw the residual before and after, effect by effect; without one, the torque of the base model's fit."""
+    from scara_ident.report.drawing import canvas
+    from scara_ident.report.html.diagnosis import DiagnosisContext
+    from scara_ident.report.pictures import effect_figures, torque_figures
+
+    context = DiagnosisContext(diagnosis)
+    title, rows = f"{diagnosis.robot.name}: {diagnosis.verdict}", []
+    for _, _, own in effect_figures(context):
+        rows += own
+    if not rows:
+        rows += torque_figures(context, diagnosis.robot, diagnosis.search.bands)[1]
+    return canvas(title, rows)
+
+
+def tables(held: dict[str, Any], *, all_candidates: bool = False) -> list[Table]:
+    """Return errors before and after by joint, and the candidates, of the content of ``diagnosis.json``."""
+    errors = table("rms error within the band", "recordings", "joint", "before", "after", right=("before", "after"))
+    for kind in ("training", "validation"):
+        for joint, before in held[kind]["before"].items():
+            errors.add_row(kind, joint, _number(before), _number(held[kind]["after"][joint]))
+    rows = table("candidates", "candidate", "gain", "p", "why", right=("gain", "p"))
+    for row in held["candidates"] if all_candidates else held["candidates"][:MOST_CANDIDATES]:
+        rows.add_row(row["label"], f"{row['gain']:.1%}", f"{row['p_value']:.0e}", row["why"])
+    return [errors, rows]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"

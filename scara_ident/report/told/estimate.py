@@ -1,0 +1,66 @@
+"""What an estimate tells: its parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from scara_ident.estimation.estimate import Estimate
+from scara_ident.estimation.saved import estimate_dict
+from scara_ident.report.plot import Dots, Panel, Plot, single
+from scara_ident.report.told.words import number, table, text_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from rich.table import Table
+
+
+def summary(estimate: Estimate) -> str:
+    """Return the parameters as a table."""
+    return text_of(parameter_table(estimate))
+
+
+def content(estimate: Estimate) -> dict[str, Any]:
+    """Return what `load_estimate` reads."""
+    return {"estimate": estimate_dict(estimate)}
+
+
+def columns(estimate: Estimate) -> dict[str, Any]:
+    """Return a row for each parameter; a standard deviation is infinite where the data leave the parameter open."""
+    described = estimate.model.columns
+    return {
+        "name": [column.name for column in described],
+        "joint": [column.joint for column in described],
+        "value": estimate.value.tolist(),
+        "std": estimate.std.tolist(),
+        "unit": [column.unit for column in described],
+        "undetermined": estimate.undetermined.tolist(),
+        "meaning": [column.meaning for column in described],
+    }
+
+
+def figure(estimate: Estimate) -> Figure:
+    """Draw the size of every parameter and its standard deviation."""
+    from scara_ident.report.drawing import canvas
+
+    places = np.arange(float(len(estimate.value)))
+    size = np.where(estimate.value != 0.0, np.abs(estimate.value), np.nan)
+    spread = np.where(np.isfinite(estimate.std) & (estimate.std > 0.0), estimate.std, np.nan)
+    layers = [Dots(places, size, "blue", "size", radius=4.0), Dots(places, spread, "vermillion", "std", radius=4.0)]
+    panel = Panel("in the parameter's unit", layers, 260, log=True)
+    plot = Plot("", (panel,), names=estimate.model.names)
+    return canvas(title(estimate), [[single("parameters", "Parameters", "", plot)]])
+
+
+def title(estimate: Estimate) -> str:
+    """Return what was estimated, and how."""
+    return f"{estimate.model.robot.name}: {estimate.model.name} model by {estimate.method}"
+
+
+def parameter_table(estimate: Estimate) -> Table:
+    """Return name, value, standard deviation, unit and meaning of every parameter."""
+    rows = table(title(estimate), "name", "value", "std", "unit", "meaning", right=("value", "std"))
+    for column, value, std in zip(estimate.model.columns, estimate.value, estimate.std, strict=True):
+        rows.add_row(column.name, number(value, std), f"{std:.2g}", column.unit, column.meaning)
+    return rows

@@ -1,0 +1,72 @@
+"""What an identification tells: parameters, errors on every recording, and sentences."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from scara_ident.identification.identify import Identification
+from scara_ident.report.identification import identification_dict, sentences
+from scara_ident.report.told import estimate
+from scara_ident.report.told.words import table, text_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from rich.table import Table
+
+
+def summary(identification: Identification) -> str:
+    """Return parameters, errors and bands as tables, and the result in sentences."""
+    notes = [f"note: {note}" for note in identification.notes]
+    return text_of(*notes, *tables(identification), bands_said(identification), *sentences(identification))
+
+
+def content(identification: Identification) -> dict[str, Any]:
+    """Return the content of ``identification.json``, with the estimate that `load_estimate` reads."""
+    return identification_dict(identification)
+
+
+def columns(identification: Identification) -> dict[str, Any]:
+    """Return a row for each parameter."""
+    return estimate.columns(identification.estimate)
+
+
+def figure(identification: Identification) -> Figure:
+    """Draw measured, predicted and residual torque over time."""
+    from scara_ident.report.drawing import canvas
+    from scara_ident.report.html.identification import IdentificationContext
+    from scara_ident.report.pictures import torque_figures
+
+    context = IdentificationContext(identification)
+    return canvas(*torque_figures(context, identification.model.robot, identification.bands))
+
+
+def tables(identification: Identification) -> list[Table]:
+    """Return the parameters, and the errors on the recordings that were fitted and on those that were not."""
+    found = [estimate.parameter_table(identification.estimate)]
+    joints = identification.model.robot.joints
+    for kind, errors in (
+        ("fitted", identification.training_errors()),
+        ("held out", identification.validation_errors()),
+    ):
+        if not errors:
+            continue
+        numbers = ("rms", "of torque", "unfiltered")
+        rows = table(f"rms error within the band, recordings {kind}", "recording", "joint", *numbers, right=numbers)
+        for name, own in errors.items():
+            for joint, error in zip(joints, own, strict=True):
+                if error is None:
+                    rows.add_row(name, joint, "-", "at rest", "-")
+                    continue
+                share = "-" if error.relative is None else f"{error.relative:.1%}"
+                rows.add_row(name, joint, f"{error.rms:.3g}", share, f"{error.rms_unfiltered:.3g}")
+        found.append(rows)
+    return found
+
+
+def bands_said(identification: Identification) -> str:
+    """Say the band of every joint, and the paper's criteria."""
+    bands = ", ".join(
+        f"{joint} {'none' if cut is None else f'{cut:.3g} Hz'}"
+        for joint, cut in zip(identification.model.robot.joints, identification.bands, strict=True)
+    )
+    return f"band: {bands}; J_d {identification.log_det:.2f}, J_k {identification.condition:.3g}"

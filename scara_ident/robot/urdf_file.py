@@ -1,0 +1,95 @@
+"""A URDF from its file: as XML, checked, and as Pinocchio's model."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pinocchio as pin
+
+from scara_ident.errors import RobotError
+from scara_ident.files import path_fault
+from scara_ident.robot.urdf_validation import XACRO, urdf_fault
+
+# Bytes: those of a humanoid are a few hundred thousand.
+LARGEST_URDF = 30e6
+
+
+def read_urdf(urdf: Path, source: Path) -> ElementTree.Element:
+    """Read a URDF and check it: what the rest of the program takes from it has been seen to be there and usable.
+
+    Parameters
+    ----------
+    urdf : Path
+    source : Path
+        What named it, for messages.
+
+    Raises
+    ------
+    RobotError
+        In one line, if it cannot be read or used.
+    """
+    if (fault := path_fault(urdf)) is not None:
+        raise RobotError(f"{source}: urdf: {fault}")
+    try:
+        if urdf.stat().st_size > LARGEST_URDF:
+            raise RobotError(f"{urdf}: {urdf.stat().st_size:.2g} bytes, more than any URDF; give the robot's URDF")
+        root = ElementTree.parse(urdf).getroot()
+    except FileNotFoundError:
+        raise RobotError(f"{source}: urdf: no such file: {urdf}") from None
+    except OSError as error:
+        raise RobotError(f"{source}: urdf: cannot read {urdf}: {error.strerror}") from None
+    except ElementTree.ParseError as error:
+        hint = f"; if it is xacro's, {XACRO}" if "unbound prefix" in str(error) else ""
+        raise RobotError(f"{urdf}: not well-formed XML: {error}{hint}") from None
+    except (LookupError, ValueError) as error:
+        raise RobotError(
+            f"{urdf}: the encoding that its first line names cannot be read ({error}); save it in UTF-8"
+        ) from None
+    if root.tag != "robot":
+        raise RobotError(f"{urdf}: the root element is <{root.tag}>, a URDF has <robot>")
+    if (fault := urdf_fault(root)) is not None:
+        raise RobotError(f"{urdf}: not a usable URDF: {fault}")
+    return root
+
+
+@contextmanager
+def _quiet_stderr() -> Iterator[None]:
+    # The URDF parser writes its own lines to the C stream; the user gets ours instead.
+    try:
+        saved = os.dup(2)
+    except OSError:
+        yield
+        return
+    try:
+        with open(os.devnull, "wb") as sink:
+            os.dup2(sink.fileno(), 2)
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+
+
+def pinocchio_model(urdf: Path, tree: ElementTree.Element) -> pin.Model:
+    """Return Pinocchio's model of a URDF that was read.
+
+    Raises
+    ------
+    RobotError
+        In one line, if Pinocchio refuses it.
+    """
+    try:
+        # As text: Pinocchio takes the bytes of a file for UTF-8, whatever its first line says.
+        text = ElementTree.tostring(tree, encoding="unicode")
+        with _quiet_stderr():
+            return pin.buildModelFromXML(text)
+    except RecursionError:
+        raise RobotError(
+            f"{urdf}: not a usable URDF: its elements are nested too deeply; remove what is no URDF"
+        ) from None
+    except (ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).split()) or "Pinocchio refuses it"
+        raise RobotError(f"{urdf}: not a usable URDF: {reason}") from None

@@ -1,0 +1,11 @@
+"""What words, numbers and tables look like as text."""
+
+from __future__ import annotations
+
+from scara_ident.report.told.words import number, table, text_of
+
+
+def test_text_is_plain_and_keeps_brackets():
+    rows = table("title [x]", "name", "value", right=("value",))
+    rows.add_row("a", number(1.23456, 0.01))
+    assert text_of("a sentence [b]", rows) == "a sentence [b]\ntitle [x]\nname  value\na     1.235\n"

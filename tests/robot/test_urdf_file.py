@@ -1,0 +1,33 @@
+"""A URDF is read and checked once, and in one line where it cannot be used."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scara_ident.errors import RobotError
+from scara_ident.robot.robot import embedded_urdf
+from scara_ident.robot.urdf_file import pinocchio_model, read_urdf
+
+
+def test_the_embedded_urdf_is_read_and_made_a_model() -> None:
+    tree = read_urdf(embedded_urdf(), Path("robot.yaml"))
+    assert pinocchio_model(embedded_urdf(), tree).nv == len([j for j in tree.iter("joint") if j.get("type") != "fixed"])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<robot", "not well-formed XML"),
+        ("<arm/>", "the root element is <arm>, a URDF has <robot>"),
+        ('<?xml version="1.0" encoding="utf-99"?><robot/>', "save it in UTF-8"),
+    ],
+)
+def test_what_is_none_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(text, encoding="utf-8")
+    with pytest.raises(RobotError, match=said):
+        read_urdf(urdf, tmp_path / "robot.yaml")
+    with pytest.raises(RobotError, match=r"robot\.yaml: urdf: no such file"):
+        read_urdf(tmp_path / "none.urdf", tmp_path / "robot.yaml")
