@@ -13,6 +13,7 @@ from scara_ident.estimation.consistent.shape import ShapeChoice
 from scara_ident.estimation.estimate import PAPER_SAMPLES
 from scara_ident.estimation.noise_bias import bias_sentence
 from scara_ident.estimation.observations import Observations
+from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
 from scara_ident.robot.robot import Robot
 
@@ -65,6 +66,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         "events": [event.entry for event in identification.events],
         "summary": list(sentences(identification)),
         "notes": list(identification.notes),
+        KEY: rebuild_entry(estimate, identification.training, identification.validation),
     }
     if isinstance(estimate, ConsistentEstimate):
         content["links"] = [

@@ -63,7 +63,7 @@ class RegressorKernel:
         ----------
         q, v, a : array_like (nv, samples)
             Joint positions (the angle itself for a continuous joint), velocities and accelerations;
-            rad or m, and per s and s^2.
+            rad or m, and per s and s^2. Arrays of recorded expressions are evaluated too, into expressions.
         out : ndarray (nv, p, samples), optional
             Where to write; also the first samples of a longer array in C order, ``buffer[:, :, :samples]``.
 
@@ -82,12 +82,12 @@ class RegressorKernel:
         shape = (self.nv, len(self.columns), samples)
         zeros: list[slice] = []
         if out is None:
-            out = np.zeros(shape)
+            out = np.zeros(shape, dtype=states.dtype)
         else:
             zeros = list(_runs(~self.pattern.ravel()))
         rows = _flat(out, shape)
         program = self._program
-        buffers = np.empty((program.buffers, min(_CHUNK, samples)))
+        buffers = np.empty((program.buffers, min(_CHUNK, samples)), dtype=states.dtype)
         for start in range(0, samples, _CHUNK):
             stop = min(start + _CHUNK, samples)
             target = rows[:, start:stop]
@@ -116,7 +116,8 @@ class RegressorKernel:
 
     def _states(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
         """Return the three inputs as one array (3 nv, samples)."""
-        parts = [np.asarray(values, dtype=np.float64) for values in (q, v, a)]
+        traced = any(np.asarray(values).dtype == object for values in (q, v, a))
+        parts = [np.asarray(values, dtype=object if traced else np.float64) for values in (q, v, a)]
         for name, part in zip("qva", parts, strict=True):
             if part.ndim != 2 or part.shape[0] != self.nv or part.shape != parts[0].shape:
                 shapes = ", ".join(str(part.shape) for part in parts)
@@ -248,7 +249,7 @@ def _runs(mask: NDArray[np.bool_]) -> Iterator[slice]:
 
 def _flat(out: Array, shape: tuple[int, int, int]) -> Array:
     """Return a view (nv p, samples) of an array (nv, p, samples)."""
-    if out.shape != shape or out.dtype != np.float64:
+    if out.shape != shape or out.dtype not in (np.float64, np.object_):
         raise ValueError(f"out: expected {shape} of float64, given {out.shape} of {out.dtype}")
     rows = out.reshape(shape[0] * shape[1], shape[2])
     if out.size and not np.may_share_memory(rows, out):
