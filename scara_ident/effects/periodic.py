@@ -94,6 +94,7 @@ class EncoderEccentricity(PerMotorTurn):
     )
     all_joints = True
     follows_estimate = True
+    of_state = True
     experiment = "run at two constant speeds: an error of the encoder grows with the square of speed, ripple does not"
     orders = ENCODER_ORDERS
 

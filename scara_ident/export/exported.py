@@ -125,13 +125,13 @@ def _number(value: float | None) -> str:
 Parts = tuple[dict[str, str], Said | None, tuple[str, ...]]
 
 
-def _urdf(found: IdentifiedModel, standard: Array, alone: Said) -> Parts:
-    text, notes = urdf_text(found.robot, standard, friction_said(found, alone.value))
+def _urdf(found: IdentifiedModel, standard: Array, alone: Said, *, rotors_told: bool = False) -> Parts:
+    text, notes = urdf_text(found.robot, standard, friction_said(found, alone.value), rotors_told=rotors_told)
     return {f"{found.robot.name}_identified.urdf": text}, None, notes
 
 
 def _ros2(found: IdentifiedModel, standard: Array, alone: Said) -> Parts:
-    text, notes = urdf_text(found.robot, standard)
+    text, notes = urdf_text(found.robot, standard, rotors_told=True)
     urdf = f"{found.robot.name}_identified.urdf"
     armature = standard[10 * found.robot.n :]
     name = f"{c_name(found.robot.name)}_ros2.yaml"
@@ -140,7 +140,7 @@ def _ros2(found: IdentifiedModel, standard: Array, alone: Said) -> Parts:
 
 
 def _pinocchio(found: IdentifiedModel, standard: Array, alone: Said) -> Parts:
-    files, _, notes = _urdf(found, standard, alone)
+    files, _, notes = _urdf(found, standard, alone, rotors_told=True)
     beside = said_by(with_code(FORMS["pinocchio"]), found, standard)
     friction, further = _divided(found, beside.value, offset=True)
     module = pinocchio_module(
@@ -178,7 +178,8 @@ def _divided(found: IdentifiedModel, value: Array, *, offset: bool) -> tuple[Joi
     ``offset`` says whether the constant torque is in the code.
     """
     said = friction_said(found, value)
-    friction = JointFriction(*(np.maximum(np.nan_to_num(part), 0.0) for part in (said.coulomb, said.viscous)))
+    coulomb, viscous = (np.maximum(np.nan_to_num(part), 0.0) for part in (said.coulomb, said.viscous))
+    friction = JointFriction(coulomb, viscous)
     rest = value.copy()
     for term in found.model.terms:
         place = found.model.place(term)
@@ -195,4 +196,3 @@ def _divided(found: IdentifiedModel, value: Array, *, offset: bool) -> tuple[Joi
 def _known(friction: JointSideFriction) -> JointSideFriction:
     """Return friction with none where it is not known."""
     return JointSideFriction(np.nan_to_num(friction.coulomb), np.nan_to_num(friction.viscous), friction.notes)
-

@@ -56,7 +56,7 @@ def uninstall():
 
 def sign(x):
     """Return -1, 0 or 1."""
-    return (x > 0.0) - (x < 0.0)
+    return float(x > 0.0) - float(x < 0.0)
 
 
 {further}
@@ -86,7 +86,9 @@ def mujoco_module(further: TracedModel, friction: JointSideFriction, offset: Arr
     }
     said = "Return the torque lost beyond frictionloss, damping and offset, as recorded."
     return _TEXT.format(
-        doc=docstring(f"What MuJoCo lacks of {robot.name}, as passive forces, by scara-ident: `install(model)`.", about),
+        doc=docstring(
+            f"What MuJoCo lacks of {robot.name}, as passive forces, by scara-ident: `install(model)`.", about
+        ),
         constants=constants(values),
         further=function("further", said, further.trace, further.friction, robot.n),
     )

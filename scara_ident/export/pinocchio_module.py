@@ -91,7 +91,7 @@ def _model(friction, damping):
 
 def sign(x):
     """Return -1, 0 or 1."""
-    return (x > 0.0) - (x < 0.0)
+    return float(x > 0.0) - float(x < 0.0)
 
 
 {further}

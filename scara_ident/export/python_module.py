@@ -27,5 +27,10 @@ def numbers(values: Any) -> tuple[float, ...]:
 
 def function(name: str, about: str, trace: Trace, outputs: Sequence[Scalar], joints: int) -> str:
     """Return a function of q, v and a that gives a list."""
-    lines = [f'"""{about}"""', f"out = [0.0] * {len(outputs)}", *code_lines(trace, outputs, PYTHON, joints), "return out"]
+    lines = [
+        f'"""{about}"""',
+        f"out = [0.0] * {len(outputs)}",
+        *code_lines(trace, outputs, PYTHON, joints),
+        "return out",
+    ]
     return "\n    ".join([f"def {name}(q, v, a):", *lines])

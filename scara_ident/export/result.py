@@ -121,7 +121,9 @@ def read_identified(path: Path | str, robot: Path | str | None = None) -> Identi
     parameters = content["parameters"]
     told = [(item["name"], item["joint"], item["meaning"]) for item in parameters]
     if told != [(column.name, column.joint, column.meaning) for column in model.columns]:
-        raise ScaraIdentError(f"{path}: its parameters are not those of {arm.urdf}; give --robot of the arm it was found on")
+        raise ScaraIdentError(
+            f"{path}: its parameters are not those of {arm.urdf}; give --robot of the arm it was found on"
+        )
     observations = {
         kind: tuple(_unpacked(item, own, len(parameters)) for item, own in zip(rows, model.active, strict=True))
         for kind, rows in known["observations"].items()

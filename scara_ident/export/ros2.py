@@ -99,7 +99,8 @@ def _mean_inertia(found: IdentifiedModel, value: Array) -> Array:
         pushed = still.copy()
         pushed[j] = 1.0
         both = (
-            term.torque(Motion("", "", np.arange(float(POSES)), q, still, a, None, 1.0), own)[j] for a in (pushed, still)
+            term.torque(Motion("", "", np.arange(float(POSES)), q, still, a, None, 1.0), own)[j]
+            for a in (pushed, still)
         )
         moved, rest = both
         result[j] = float(np.mean(np.abs(moved - rest)))

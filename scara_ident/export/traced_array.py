@@ -10,7 +10,8 @@ import numpy as np
 from scara_ident.model.regressor.tracing import Expr, Scalar
 
 
-class TracedArray(np.ndarray[Any, np.dtype[np.object_]]):
+# For the type checker an array of numbers, in whose place it stands.
+class TracedArray(np.ndarray[Any, np.dtype[np.float64]]):
     """An array of expressions and numbers that also knows the functions which numpy has for numbers only."""
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, out: Any = None, **more: Any) -> Any:
@@ -26,12 +27,13 @@ class TracedArray(np.ndarray[Any, np.dtype[np.object_]]):
                 np.copyto(targets[0], result)
         if out is not None:
             return out[0]
-        return traced(result) if isinstance(result, np.ndarray) and result.dtype == object else result
+        return traced(result) if isinstance(result, np.ndarray) and result.dtype.hasobject else result
 
 
 def traced(values: Iterable[Any]) -> TracedArray:
     """Return expressions and numbers, or an array of them, as an array that records."""
-    return np.asarray(values, dtype=object).view(TracedArray)
+    found: TracedArray = np.asarray(values, dtype=object).view(TracedArray)
+    return found
 
 
 def _sign(value: Scalar) -> Scalar:

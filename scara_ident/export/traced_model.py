@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.effects import EffectTerm, Scene, Signals
-from scara_ident.export.traced_array import TracedArray, traced
+from scara_ident.export.traced_array import traced
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.regressor.recursion import joint_geometry
 from scara_ident.model.regressor.torque import trace_torque
@@ -71,7 +71,7 @@ def trace_model(model: TorqueModel, value: Array) -> TracedModel:
     unit = np.eye(n)
     columns = [_rigid(rigid, own, q, zero, traced(unit[k].tolist()), still) for k in range(n)]
     motion = Motion("", "", np.zeros(1), q[:, None], v[:, None], a[:, None], None, np.inf)
-    rest = traced(np.zeros(n).tolist())
+    rest: Array = traced(np.zeros(n).tolist())
     signals: dict[int, Signals] = {}
     for term in model.terms:
         part = value[model.place(term)]
@@ -96,13 +96,13 @@ def trace_model(model: TorqueModel, value: Array) -> TracedModel:
     )
 
 
-def _symmetric(robot: Robot, columns: Sequence[TracedArray]) -> tuple[tuple[Scalar, ...], ...]:
+def _symmetric(robot: Robot, columns: Sequence[Array]) -> tuple[tuple[Scalar, ...], ...]:
     """Return the rows of the mass matrix, each pair of joints from the acceleration of the one nearer to the tool."""
 
     def entry(j: int, k: int) -> Scalar:
-        if robot.order[j] <= robot.order[k]:
-            return columns[k][j]  # type: ignore[no-any-return]
-        return columns[j][k] * float(robot.row_scale[j] / robot.row_scale[k])  # type: ignore[no-any-return]
+        nearer = robot.order[j] <= robot.order[k]
+        found: Scalar = columns[k][j] if nearer else columns[j][k] * float(robot.row_scale[j] / robot.row_scale[k])
+        return found
 
     return tuple(tuple(entry(j, k) for k in range(robot.n)) for j in range(robot.n))
 
@@ -122,12 +122,14 @@ def body_parameters_of(term: RigidBody, value: Array) -> tuple[Array, Array]:
     return standard[: 10 * n].reshape(n, 10), standard[10 * n :]
 
 
-def _rigid(term: RigidBody, value: Array, q: TracedArray, v: TracedArray, a: TracedArray, gravity: pin.Motion) -> TracedArray:
+def _rigid(term: RigidBody, value: Array, q: Array, v: Array, a: Array, gravity: pin.Motion) -> Array:
     """Return the torque of links and rotors, recorded side, shape (n,)."""
     robot: Robot = term.robot
     bodies, armature = body_parameters_of(term, value)
     back = np.argsort(robot.order)
-    torque = trace_torque(joint_geometry(robot.model), gravity, bodies[back], list(q[back]), list(v[back]), list(a[back]))
+    torque = trace_torque(
+        joint_geometry(robot.model), gravity, bodies[back], list(q[back]), list(v[back]), list(a[back])
+    )
     return robot.row_scale * (traced(torque)[robot.order] + armature * a)
 
 
@@ -136,7 +138,8 @@ def _signals(scene: Scene, motion: Motion) -> Signals:
     signals = Signals(scene, motion)
     rigid = scene.model.rigid_body
     own = scene.value[scene.model.place(rigid)]
-    torque = _rigid(rigid, own, *(part[:, 0] for part in (motion.q, motion.v, motion.a)), scene.robot.model.gravity)
+    q, v, a = (part[:, 0] for part in (motion.q, motion.v, motion.a))
+    torque = _rigid(rigid, own, q, v, a, scene.robot.model.gravity)
     others = (
         _torque(term, scene.value[scene.model.place(term)], motion) for term in scene.model.terms if term is not rigid
     )
@@ -145,17 +148,17 @@ def _signals(scene: Scene, motion: Motion) -> Signals:
     return signals
 
 
-def _rows(term: Term) -> list[TracedArray]:
+def _rows(term: Term) -> list[Array]:
     return [traced(np.zeros((int(np.count_nonzero(row)), 1))) for row in term.pattern]
 
 
-def _torque(term: Term, value: Array, motion: Motion) -> TracedArray:
+def _torque(term: Term, value: Array, motion: Motion) -> Array:
     rows = _rows(term)
     term.fill(motion, rows)
     return _summed(term, rows, value)
 
 
-def _summed(term: Term, rows: Sequence[TracedArray], value: Array) -> TracedArray:
+def _summed(term: Term, rows: Sequence[Array], value: Array) -> Array:
     """Return the torque of a term's columns, shape (n,)."""
     total = [
         sum((float(x) * entry for x, entry in zip(value[own], row[:, 0], strict=True)), 0.0)
