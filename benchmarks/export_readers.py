@@ -35,7 +35,7 @@ def module(path: Path) -> Any:
 
 
 def compiled(header: Path, robot: Robot, command: Sequence[str] = ("gcc", "-std=c99"), real: str = "double") -> Any:
-    """Compile a header into a library, every warning an error; its functions take pointers."""
+    """Compile a header into a library, quickly, every warning an error; its functions take pointers."""
     low = c_name(robot.name)
     source = header.with_name("library.c" if "gcc" in command[0] else "library.cpp")
     linkage = "" if "gcc" in command[0] else 'extern "C" '
@@ -48,7 +48,7 @@ def compiled(header: Path, robot: Robot, command: Sequence[str] = ("gcc", "-std=
         text += f"{{ {low}_{name}({', '.join(letters)}, out); }}\n"
     source.write_text(text)
     library = source.with_suffix(f".{real}.so")
-    subprocess.run([*command, "-O2", *WARNINGS, "-shared", "-fPIC", source, "-o", library, "-lm"], check=True)
+    subprocess.run([*command, "-O0", *WARNINGS, "-shared", "-fPIC", source, "-o", library, "-lm"], check=True)
     return ctypes.CDLL(str(library))
 
 

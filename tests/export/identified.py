@@ -36,12 +36,12 @@ def states(robot: Robot, seed: int, samples: int) -> Motion:
 def with_effects(base: TorqueModel, value: Array, names: tuple[str, ...]) -> TorqueModel:
     """A model with a member of every named effect that it can have."""
     n = base.robot.n
-    scene = Scene(base, value, 10.0, 1e3, 50.0, np.full(n, 3.0), np.full(n, 20.0), {"states": 0.0})
+    scene = Scene(base, value, 10.0, 1e3, 50.0, np.full(n, 3.0), np.full(n, 3.0), {"states": 0.0})
     terms = []
     for effect in available_effects():
         members = effect.members(scene) if effect.name in names else ()
         if members and not any(term.name == effect.name for term in terms):
-            terms.append(EffectTerm(effect, members[len(members) // 2], scene))
+            terms.append(EffectTerm(effect, members[-1], scene))
     return TorqueModel(base.name, base.robot, (*base.terms, *terms))
 
 

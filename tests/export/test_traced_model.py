@@ -50,7 +50,9 @@ def test_mass_bias_and_friction_make_the_torque(models) -> None:
         mass = evaluated(model, flat, motion).reshape(robot.n, robot.n, -1)
         parts = np.einsum("jkn,kn->jn", mass, motion.a) + evaluated(model, model.bias, motion)
         torque = evaluated(model, model.torque, motion)
-        assert np.max(np.abs(parts + evaluated(model, model.friction, motion) - torque)) < 1e-13 * np.max(np.abs(torque))
+        assert np.max(np.abs(parts + evaluated(model, model.friction, motion) - torque)) < 1e-13 * np.max(
+            np.abs(torque)
+        )
         at_joint = mass / robot.row_scale[:, None, None]
         np.testing.assert_allclose(at_joint, at_joint.transpose(1, 0, 2), rtol=1e-12, atol=1e-12)
         assert np.all(np.linalg.eigvalsh(np.moveaxis(at_joint, 2, 0)) > 0.0)
