@@ -20,6 +20,7 @@ from scara_ident.export.traced_model import NOT_OF_STATE
 from scara_ident.model.terms import Friction, Offset, RigidBody, Term
 
 NO_PLACE = "the format has no place for it"
+NOT_READ = "programs that read it leave rotors out"
 # Torques of rigid bodies that differ by less, relative, are the same but for rounding.
 SAME = 1e-9
 
@@ -121,7 +122,7 @@ def said_by(form: Form, found: IdentifiedModel, standard: Array | None = None) -
         value[fitted] = _fitted(found.information, value, fitted, lower)
         refitted = tuple(model.names[k] for k in fitted)
     if standard is not None and not form.armature and np.any(standard[10 * found.robot.n :]):
-        missing_names = (("armature", NO_PLACE), *_told(found, missing))
+        missing_names = (("armature", NOT_READ), *_told(found, missing))
     else:
         missing_names = tuple(_told(found, missing))
     return Said(value, missing_names, refitted)

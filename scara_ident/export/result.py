@@ -25,6 +25,8 @@ from scara_ident.robot.description import check_description
 from scara_ident.robot.robot import Robot, build_robot, load_robot
 
 KEY = "rebuild"
+# Values of an effect's options that a file can hold.
+PLAIN = (bool, int, float, str, tuple, frozenset)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,10 +191,11 @@ def _scene_entry(scene: Scene) -> dict[str, Any]:
 
 def _effect_entry(term: EffectTerm) -> dict[str, Any]:
     options = {field.name: getattr(term.effect, field.name) for field in fields(term.effect)}
+    plain = all(isinstance(value, PLAIN) for value in options.values())
     return {
         "effect": term.name,
         "family": type(term.effect).__name__,
-        "options": {key: sorted(value) if isinstance(value, frozenset) else value for key, value in options.items()},
+        "options": {key: sorted(x) if isinstance(x, frozenset) else x for key, x in options.items()} if plain else None,
         "joint": term.member.joint,
         "nonlinear": list(term.member.nonlinear),
         "partner": term.member.partner,
@@ -218,10 +221,15 @@ def _with_effects(base: TorqueModel, known: Mapping[str, Any], path: Path) -> To
 
 def _family(entry: Mapping[str, Any], path: Path) -> Effect:
     for family in EFFECTS.get(entry["effect"]):
-        if type(family).__name__ == entry["family"]:
-            options = {key: frozenset(x) if isinstance(x, list) else x for key, x in entry["options"].items()}
-            return type(family)(**options)
-    raise ScaraIdentError(f"{path}: no effect {entry['effect']} of the kind {entry['family']} is installed")
+        if type(family).__name__ == entry["family"] and entry["options"] is not None:
+            given = entry["options"].items()
+            return type(family)(
+                **{key: type(getattr(family, key))(x) if isinstance(x, list) else x for key, x in given}
+            )
+    raise ScaraIdentError(
+        f"{path}: the effect {entry['effect']} cannot be made again: no kind {entry['family']} of it is installed, or it has "
+        "options that are no plain values"
+    )
 
 
 def _packed(information: Information, active: NDArray[np.intp]) -> dict[str, Any]:

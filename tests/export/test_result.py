@@ -128,5 +128,5 @@ def test_an_effect_that_is_not_installed_is_named(content, read):
     wider[KEY]["effects"] = [
         {"effect": "spring", "family": "Coil", "options": {}, "joint": 0, "nonlinear": [], "partner": None}
     ]
-    with pytest.raises(ScaraIdentError, match="no effect spring of the kind Coil is installed"):
+    with pytest.raises(ScaraIdentError, match="spring cannot be made again: no kind Coil"):
         read(wider)
