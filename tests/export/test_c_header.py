@@ -11,11 +11,11 @@ from scara_ident.export.c_header import c_header, c_name
 from scara_ident.export.traced_model import trace_model
 from tests.export.identified import model_torque, states
 
-COMPILERS = (("gcc", "-std=c99"), ("g++", "-std=c++17"))
+# Each compiler and each kind of number once.
+COMPILERS = ((("gcc", "-std=c99"), "double"), (("g++", "-std=c++17"), "float"))
 
 
-@pytest.mark.parametrize("real", ["double", "float"])
-@pytest.mark.parametrize("command", COMPILERS, ids=lambda command: command[0])
+@pytest.mark.parametrize(("command", "real"), COMPILERS, ids=["C99, double", "C++17, float"])
 def test_it_compiles_without_a_warning_and_gives_the_model_s_torque(models, readers, tmp_path, command, real):
     if shutil.which(command[0]) is None:
         pytest.skip(f"needs the compiler {command[0]}")
