@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 
 from scara_ident.effects import EffectTerm, Scene, available_effects
@@ -78,6 +75,3 @@ def identified(
 def model_torque(found: IdentifiedModel, value: Array, motion: Motion) -> Array:
     """Torque of a model with parameters, recorded side."""
     return np.asarray(np.einsum("jpn,p->jn", found.model.regressor(motion), value))
-
-
-Make = Callable[[Path], Robot]
