@@ -20,6 +20,7 @@ from scara_ident.cli.console import errors_console, plugin_notices
 from scara_ident.cli.demo import demo
 from scara_ident.cli.diagnose import diagnose
 from scara_ident.cli.excite import excite
+from scara_ident.cli.export import export
 from scara_ident.cli.identify import identify
 from scara_ident.cli.inspect import inspect
 from scara_ident.cli.paper import paper
@@ -64,6 +65,7 @@ _COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (diagnose, "Find what the model lacks, trace it to an effect, add that."),
     (compare, "Set every trajectory's parameters against every trajectory."),
     (excite, "Design a motion that tells much, within the arm's limits."),
+    (export, "Write the identified arm for other programs."),
     (simulate, "Record the virtual arm in closed loop."),
     (use, "Say what the model wins as feed-forward and in simulation."),
     (inspect, "Show what is in a file, audit it, write a first robot.yaml."),

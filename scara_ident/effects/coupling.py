@@ -30,6 +30,7 @@ class InertiaCoupling(Effect):
     name = "inertia_coupling"
     summary = "inertia that the drive shares with {partner}"
     coefficients = (Coefficient("inertia", "{inertia}", "inertia that {joint} shares with {partner}"),)
+    of_state = True
     not_simulated = "the virtual arm's rotors turn with one joint each"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
@@ -68,6 +69,7 @@ class DriveCoupling(Effect):
         ),
     )  # fmt: skip
     follows_estimate = True
+    of_state = True
     not_simulated = "the virtual arm's motors drive one joint each"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:

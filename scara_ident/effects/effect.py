@@ -93,6 +93,9 @@ class Effect(ABC):
         Whether it is judged at the estimate fitted with it only: its columns at the estimate without it are poor ones.
     by_recording : bool
         Whether it acts in some recordings and not in others; see `in_recordings`.
+    of_state : bool
+        Whether the columns at a sample follow from position, velocity and acceleration there, by numpy's arithmetic, sin,
+        cos, exp, abs and sign alone, so that code for a controller can have them.
     seeded_by : {"order", "frequency"} or None
         The lines of a residual's spectrum that suggest a member; see `seeds`.
     view : View
@@ -112,6 +115,7 @@ class Effect(ABC):
     follows_estimate: ClassVar[bool] = False
     fitted_first: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
+    of_state: ClassVar[bool] = False
     seeded_by: ClassVar[Literal["order", "frequency"] | None] = None
     view: ClassVar[View] = OWN
     experiment: ClassVar[str] = "record the same path at two speeds, in both directions, with and without a payload"

@@ -69,6 +69,7 @@ class Stribeck(Effect):
         ),
     )
     nonlinear = (NonlinearParameter("velocity", "{position}/s", 1e-4, 5.0),)
+    of_state = True
     view = View("velocity")
     experiment = "run at eight or more constant speeds, spaced by a constant factor down to creeping"
 
@@ -80,7 +81,7 @@ class Stribeck(Effect):
         """Return ``sign(v) exp(-(v/velocity)^2)``."""
         j = member.place
         ratio = signals.motion.v[j] / member.nonlinear[0]
-        return [signals.sign[j] * np.exp(-np.minimum(ratio * ratio, 700.0))]
+        return [signals.sign[j] * np.exp(-(ratio * ratio))]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where friction does not fall with speed, by a share of what there is."""
@@ -109,6 +110,7 @@ class AsymmetricFriction(Effect):
             "viscous friction of {joint} in the drive's positive direction less that in the negative",
         ),
     )  # fmt: skip
+    of_state = True
     view = View("velocity")
     experiment = "run the same path in both directions at several constant speeds"
 
@@ -137,6 +139,7 @@ class PositionDependentFriction(Sinusoid):
     coefficients = sine_and_cosine(
         "dry_{part}", "Coulomb friction of {joint} that varies with the {part} of its position"
     )
+    of_state = True
     view = View("position", along=True)
     experiment = "run over the whole stroke at constant speed in both directions: half the difference is friction"
 
@@ -184,6 +187,7 @@ class FrictionCoupling(Effect):
         Coefficient("viscous", "{torque} s/{length}", "friction of {joint} by {source}"),
         Coefficient("coulomb", "{torque}", "dry friction of {joint} by {source}", "friction would push"),
     )
+    of_state = True
     experiment = "move the other joint alone while this one holds still"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:

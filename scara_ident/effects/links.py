@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.signals import Scene, Signals
+from scara_ident.model.regressor.derivative import derivative
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
 from scara_ident.model.terms import RigidBody
 from scara_ident.motion.motion import Motion
@@ -142,6 +144,8 @@ def rigid_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
     Kept for the last estimate of the base model's parameters: they take more time than what is made of them.
     """
     scene, motion = signals.scene, signals.motion
+    if motion.q.dtype == object:
+        return _traced_slopes(signals, joint)
     held = _SLOPES.setdefault(motion, {})
     if joint not in held or held[joint][0] is not scene.value:
         state = (motion.q, motion.v, motion.a)
@@ -158,6 +162,18 @@ def rigid_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
         by_a = rigid_torque(scene, motion, motion.q, motion.v, pushed) - signals.rigid
         held[joint] = scene.value, (found[0], found[1], by_a)
     return held[joint][1]
+
+
+def _traced_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
+    """Return the same where signals are recorded expressions, exactly."""
+    motion, found = signals.motion, []
+    rigid: list[Any] = signals.rigid[:, 0].tolist()
+    for part in (motion.q, motion.v, motion.a):
+        variable: Any = part.item(joint)
+        slope: Any = signals.rigid.copy()
+        slope[:, 0] = derivative(rigid, variable)
+        found.append(slope)
+    return found[0], found[1], found[2]
 
 
 def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Array:

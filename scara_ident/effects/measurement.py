@@ -47,6 +47,7 @@ class TorqueSensorNonlinearity(Effect):
     at_rest = True
     follows_estimate = True
     fitted_first = True
+    of_state = True
     view = View("torque")
     experiment = "hold a known load at several torques, or repeat with a payload at the same speed"
 
@@ -84,6 +85,7 @@ class TorqueGainMismatch(Effect):
         ),
     )  # fmt: skip
     follows_estimate = True
+    of_state = True
     view = View("torque")
     experiment = "repeat with a known payload: it gives both joints the same scale"
 

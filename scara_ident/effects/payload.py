@@ -223,6 +223,7 @@ class GravityCounterbalance(Sinusoid):
         Coefficient("balance_cos", "{torque}", "torque of a counterbalance of {joint} per cosine of its position"),
     )
     amplitude_name = "torque"
+    of_state = True
     not_simulated = "the virtual arm's springs are straight in the angle"
 
     def joints(self, scene: Scene) -> list[int]:

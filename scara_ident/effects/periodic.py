@@ -60,6 +60,7 @@ class TorqueRipple(PerMotorTurn):
     name = "torque_ripple"
     summary = "a torque ripple of {order:.4g} periods per motor turn"
     coefficients = sine_and_cosine("ripple_{part}", "{part} of {order:g} times the motor's angle of {joint}")
+    of_state = True
     experiment = "move slowly at constant speed over several motor turns and record at a high rate"
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
@@ -93,6 +94,7 @@ class EncoderEccentricity(PerMotorTurn):
     )
     all_joints = True
     follows_estimate = True
+    of_state = True
     experiment = "run at two constant speeds: an error of the encoder grows with the square of speed, ripple does not"
     orders = ENCODER_ORDERS
 

@@ -38,6 +38,7 @@ class CoupledShaft(Effect):
         Coefficient("viscous", "{effort} s/{length}", "viscous friction of {source}", "friction would push"),
         Coefficient("coulomb", "{effort}", "dry friction of {source}", "friction would push"),
     )
+    of_state = True
     experiment = "move each of the two joints alone while the other holds still, then both together"
 
     @property

@@ -136,7 +136,8 @@ class Signals:
         """Torque that the gear of a joint transmits, recorded side, shape (N,): rigid torque without the own rotor's."""
         if joint not in self._loads:
             own = self.scene.robot.row_scale[joint] * self.scene.armature(joint) * self.motion.a[joint]
-            self._loads[joint] = np.asarray(self.rigid[joint] - own)
+            left: Array = self.rigid[joint] - own
+            self._loads[joint] = left
         return self._loads[joint]
 
     @cached_property

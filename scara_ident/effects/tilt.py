@@ -110,7 +110,7 @@ def _parts(signals: Signals) -> Array:
         term = scene.model.rigid_body
         gravity = _gravity(term)
         known = gravity.known @ scene.value[scene.model.place(term)]
-        result = np.zeros((scene.robot.n, 4 + len(gravity.entering_axes), motion.samples))
+        result = np.zeros((scene.robot.n, 4 + len(gravity.entering_axes), motion.samples), dtype=motion.q.dtype)
         for axis in range(2):
             entering = [place for place, of in enumerate(gravity.entering_axes) if of == axis]
             moments = np.vstack([known, gravity.nominal, gravity.entering[:, entering].T])
@@ -130,6 +130,7 @@ class _Tilt(Effect):
     name = "base_tilt"
     summary = "a base that is not level"
     follows_estimate = True
+    of_state = True
     view = View("position")
     experiment = "hold still, or creep, at positions over more than half a turn: a tilt follows the angle's sine, a spring the angle"
 

@@ -23,12 +23,15 @@ SMALLEST_INERTIA = 1e-14
 DRAWN_RADIUS = 0.06
 
 
-def mjcf_text(robot: Robot, standard: Array, friction: JointFriction | None = None) -> tuple[str, tuple[str, ...]]:
+def mjcf_text(
+    robot: Robot, standard: Array, friction: JointFriction | None = None, offset: Array | None = None
+) -> tuple[str, tuple[str, ...]]:
     """Write the identified arm as MJCF.
 
     Bodies have the frames and names of the links, so generalised coordinates are those of the URDF; locked
     joints are welded where they were locked, and a link that is carried by another is a body without mass in
-    it. Armature, frictionloss and damping are at the joint.
+    it. Armature, frictionloss and damping are at the joint. An actuator per joint takes the recorded torque: its gear is
+    the reduction where that is the motor's, and its bias takes off the offset.
 
     Parameters
     ----------
@@ -37,6 +40,8 @@ def mjcf_text(robot: Robot, standard: Array, friction: JointFriction | None = No
         Standard parameters, see `Robot.standard_parameters`.
     friction : JointFriction, optional
         Without it, and where it has NaN, joints are free of friction.
+    offset : ndarray, shape (n,), optional
+        Constant part of the recorded torque, which moves nothing, N m (N).
 
     Returns
     -------
@@ -78,6 +83,7 @@ def mjcf_text(robot: Robot, standard: Array, friction: JointFriction | None = No
     root.append(drawn)
     world = ElementTree.SubElement(root, "worldbody")
     _grow(robot, world, 0, bodies, armature, known)
+    root.append(_actuators(robot, np.zeros(robot.n) if offset is None else offset))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n", tuple(notes)
 
@@ -139,6 +145,20 @@ def _joint(robot: Robot, j: int, armature: float, coulomb: float, viscous: float
         if value > 0.0:  # not NaN either
             element.set(key, format_numbers([value]))
     return element
+
+
+def _actuators(robot: Robot, offset: Array) -> ElementTree.Element:
+    result = _element("actuator")
+    for j, name in enumerate(robot.joints):
+        element = _element("general", name=name, joint=name, gear=format_numbers([1.0 / robot.row_scale[j]]))
+        if offset[j] != 0.0:
+            element.set("biastype", "affine")
+            element.set("biasprm", format_numbers([-offset[j], 0.0, 0.0]))
+        limit = float(robot.torque_limit[j])
+        if np.isfinite(limit):
+            element.set("ctrlrange", format_numbers([-limit, limit]))
+        result.append(element)
+    return result
 
 
 def _axis(robot: Robot, j: int) -> Array:

@@ -31,7 +31,9 @@ _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _ARMATURE_COMMENT = re.compile(rb"\s*armature [^ ]+ kg( m\^2)? at the joint\s*")
 
 
-def urdf_text(robot: Robot, standard: Array, friction: JointFriction | None = None) -> tuple[str, tuple[str, ...]]:
+def urdf_text(
+    robot: Robot, standard: Array, friction: JointFriction | None = None, *, rotors_told: bool = False
+) -> tuple[str, tuple[str, ...]]:
     """Write the identified arm as a URDF.
 
     The text is that of the robot's own file with other numbers in ``<inertial>``, ``<dynamics>`` and
@@ -45,6 +47,8 @@ def urdf_text(robot: Robot, standard: Array, friction: JointFriction | None = No
         Standard parameters, see `Robot.standard_parameters`.
     friction : JointFriction, optional
         Without it, and where it has NaN, ``<dynamics>`` stays as it is.
+    rotors_told : bool, optional
+        Whether a file beside it tells the rotors' inertias, so that their want of a place needs no note.
 
     Returns
     -------
@@ -69,7 +73,7 @@ def urdf_text(robot: Robot, standard: Array, friction: JointFriction | None = No
     for part in (
         _inertials(robot, bodies, links, content),
         _dynamics(robot, friction, root, content),
-        _rotors(robot, armature, root, content),
+        _rotors(robot, armature, root, content, rotors_told),
     ):
         for item in part:
             if isinstance(item, Edit):
@@ -170,7 +174,7 @@ def _joint(root: Element, name: str) -> Element:
     return next(element for element in root.find_all("joint") if element.attributes.get("name") == name)
 
 
-def _rotors(robot: Robot, armature: Array, root: Element, content: bytes) -> Iterator[Edit | str]:
+def _rotors(robot: Robot, armature: Array, root: Element, content: bytes, told: bool) -> Iterator[Edit | str]:
     """Set the rotors' inertias where the file has them; say so in a comment where it has no place for them."""
     homeless: list[str] = []
     for j, name in enumerate(robot.joints):
@@ -198,7 +202,7 @@ def _rotors(robot: Robot, armature: Array, root: Element, content: bytes) -> Ite
             yield from _armature_comment(robot, j, float(armature[j]), _joint(root, name), content)
             if armature[j] > 0.0:
                 homeless.append(f"{name}: {format_numbers([inertia])}")
-    if homeless:
+    if homeless and not told:
         yield (
             "a URDF has no place for rotor inertias, so a comment at the joint has the armature; to load them "
             f"again give rotor_inertia in robot.yaml ({', '.join(homeless)})"

@@ -16,6 +16,7 @@ from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import unit_of_kind
+from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.model.terms.friction import Friction
 from scara_ident.report.identification import bias_of, bias_said
 from scara_ident.robot.rotors import GUESS_FACTOR
@@ -100,6 +101,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
         "tried": diagnosis.search.tried,
         "unexplained": _unexplained(diagnosis),
         "notes": list(diagnosis.notes),
+        KEY: rebuild_entry(diagnosis.after, diagnosis.training_after, diagnosis.validation_after),
     }
 
 

@@ -14,6 +14,7 @@ from scara_ident.estimation.estimate import PAPER_SAMPLES
 from scara_ident.estimation.noise_bias import bias_sentence
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.saved import estimate_dict
+from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
 from scara_ident.robot.robot import Robot
 
@@ -67,6 +68,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         "summary": list(sentences(identification)),
         "notes": list(identification.notes),
         "estimate": estimate_dict(estimate),
+        KEY: rebuild_entry(estimate, identification.training, identification.validation),
     }
     if isinstance(estimate, ConsistentEstimate):
         content["links"] = [

@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from scara_ident.arrays import Array
 from scara_ident.errors import RegressorMismatch
 from scara_ident.manners import Frozen
+from scara_ident.model.regressor.program import Program
 from scara_ident.model.regressor.recursion import JointGeometry, joint_geometry, trace_regressor
-from scara_ident.model.regressor.tracing import Program, compile_program
+from scara_ident.model.regressor.tracing import compile_program
 
 PARAMETERS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """Standard parameters of a body in Pinocchio's order; the inertia is about the origin of the joint's frame."""
@@ -64,7 +65,7 @@ class RegressorKernel(Frozen):
         ----------
         q, v, a : array_like (nv, samples)
             Joint positions (the angle itself for a continuous joint), velocities and accelerations;
-            rad or m, and per s and s^2.
+            rad or m, and per s and s^2. Arrays of recorded expressions are evaluated too, into expressions.
         out : ndarray (nv, p, samples), optional
             Where to write; also the first samples of a longer array in C order, ``buffer[:, :, :samples]``.
 
@@ -83,12 +84,12 @@ class RegressorKernel(Frozen):
         shape = (self.nv, len(self.columns), samples)
         zeros: list[slice] = []
         if out is None:
-            out = np.zeros(shape)
+            out = np.zeros(shape, dtype=states.dtype)
         else:
             zeros = list(_runs(~self.pattern.ravel()))
         rows = _flat(out, shape)
         program = self._program
-        buffers = np.empty((program.buffers, min(_CHUNK, samples)))
+        buffers = np.empty((program.buffers, min(_CHUNK, samples)), dtype=states.dtype)
         for start in range(0, samples, _CHUNK):
             stop = min(start + _CHUNK, samples)
             target = rows[:, start:stop]
@@ -117,7 +118,8 @@ class RegressorKernel(Frozen):
 
     def _states(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
         """Return the three inputs as one array (3 nv, samples)."""
-        parts = [np.asarray(values, dtype=np.float64) for values in (q, v, a)]
+        traced = any(np.asarray(values).dtype == object for values in (q, v, a))
+        parts = [np.asarray(values, dtype=object if traced else np.float64) for values in (q, v, a)]
         for name, part in zip("qva", parts, strict=True):
             if part.ndim != 2 or part.shape[0] != self.nv or part.shape != parts[0].shape:
                 shapes = ", ".join(str(part.shape) for part in parts)
@@ -249,7 +251,7 @@ def _runs(mask: NDArray[np.bool_]) -> Iterator[slice]:
 
 def _flat(out: Array, shape: tuple[int, int, int]) -> Array:
     """Return a view (nv p, samples) of an array (nv, p, samples)."""
-    if out.shape != shape or out.dtype != np.float64:
+    if out.shape != shape or out.dtype not in (np.float64, np.object_):
         raise ValueError(f"out: expected {shape} of float64, given {out.shape} of {out.dtype}")
     rows = out.reshape(shape[0] * shape[1], shape[2])
     if out.size and not np.may_share_memory(rows, out):

@@ -14,7 +14,7 @@ B = S(dw) + S(w) S(w), by the principle of virtual power the torque of that join
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,11 +23,10 @@ import pinocchio as pin
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.model.regressor.tracing import Expr, Scalar, Trace, cos, sin, vanishing
+from scara_ident.model.regressor.vectors import ZERO, Vector, cross, dot, floats, plus, scaled, vector
 
-Vector = tuple[Scalar, Scalar, Scalar]
 Jacobian = dict[int, tuple[Vector, Vector]]
 
-_ZERO: Vector = (0.0, 0.0, 0.0)
 _ROUNDING = 4 * np.finfo(np.float64).eps
 """Constants this close to 0 or 1 (lengths: relative to the arm's longest offset) are those numbers, rounded."""
 _REVOLUTE = ("JointModelRX", "JointModelRY", "JointModelRZ", "JointModelRevoluteUnaligned")
@@ -127,12 +126,12 @@ def trace_regressor(
     wanted: dict[int, list[int]] = {}
     for column in columns:
         wanted.setdefault(column // 10, []).append(column % 10)
-    at_rest = _Body(_ZERO, _floats(-gravity.angular), _floats(-gravity.linear), {})
+    at_rest = Body(ZERO, floats(-gravity.angular), floats(-gravity.linear), {})
     bodies = [at_rest]
     entries: dict[tuple[int, int], Scalar] = {}
     for index, joint in enumerate(joints):
         q, v, a = (trace.variable(joint.velocity_index + k * nv) for k in range(3))
-        body, masses = _moved(bodies[joint.parent], joint, q, v, a)
+        body, masses = moved(bodies[joint.parent], joint, q, v, a)
         bodies.append(body)
         parameters = wanted.get(index, [])
         if not parameters:
@@ -147,7 +146,7 @@ def trace_regressor(
     return trace, {place: entry for (place, entry), none in zip(entries.items(), zero, strict=True) if not none}
 
 
-class _Body:
+class Body:
     """Motion of one body in the frame of its joint, and by row the axis z and the origin's velocity u."""
 
     def __init__(self, w: Vector, dw: Vector, a: Vector, jacobian: Jacobian) -> None:
@@ -171,59 +170,65 @@ class _Body:
         )
 
 
-def _moved(parent: _Body, joint: JointGeometry, q: Expr, v: Expr, a: Expr) -> tuple[_Body, dict[int, Scalar]]:
+def moved(parent: Body, joint: JointGeometry, q: Scalar, v: Scalar, a: Scalar) -> tuple[Body, dict[int, Scalar]]:
     """Return the body behind a joint, and its mass entries by row."""
-    axis, offset = _floats(joint.axis), _floats(joint.offset)
+    axis, offset = floats(joint.axis), floats(joint.offset)
     row = joint.velocity_index
-    turn = _turn(joint, None if joint.prismatic else q)
-    origin = _plus(parent.a, _vector(_dot(b, offset) for b in parent.b))
-    moving = {j: (z, _plus(u, _cross(z, offset))) for j, (z, u) in parent.jacobian.items()}
+    matrix = turn_matrix(joint, q)
+
+    def turn(x: Vector) -> Vector:
+        return vector(dot(row, x) for row in matrix)
+
+    origin = plus(parent.a, vector(dot(b, offset) for b in parent.b))
+    moving = {j: (z, plus(u, cross(z, offset))) for j, (z, u) in parent.jacobian.items()}
     jacobian = {j: (turn(z), turn(u)) for j, (z, u) in moving.items()}
     w, dw = turn(parent.w), turn(parent.dw)
     masses: dict[int, Scalar]
     if joint.prismatic:
-        along = _scaled(axis, q)
-        centripetal = (_dot(b, along) for b in _Body(w, dw, _ZERO, {}).b)
-        coriolis = _scaled(_cross(w, axis), 2.0 * v)
-        origin = _plus(_plus(_plus(turn(origin), _vector(centripetal)), coriolis), _scaled(axis, a))
-        jacobian = {j: (z, _plus(u, _cross(z, along))) for j, (z, u) in jacobian.items()}
-        jacobian[row] = (_ZERO, axis)
-        masses = {j: _dot(u, origin) for j, (_, u) in jacobian.items()}
-        return _Body(w, dw, origin, jacobian), masses
+        along = scaled(axis, q)
+        centripetal = (dot(b, along) for b in Body(w, dw, ZERO, {}).b)
+        coriolis = scaled(cross(w, axis), v * 2.0)
+        origin = plus(plus(plus(turn(origin), vector(centripetal)), coriolis), scaled(axis, a))
+        jacobian = {j: (z, plus(u, cross(z, along))) for j, (z, u) in jacobian.items()}
+        jacobian[row] = (ZERO, axis)
+        masses = {j: dot(u, origin) for j, (_, u) in jacobian.items()}
+        return Body(w, dw, origin, jacobian), masses
     # In the parent's orientation, where the joint's angle does not enter.
-    masses = {j: _dot(u, origin) for j, (_, u) in moving.items()}
+    masses = {j: dot(u, origin) for j, (_, u) in moving.items()}
     masses[row] = 0.0
-    dw = _plus(_plus(dw, _scaled(axis, a)), _scaled(_cross(w, axis), v))
-    jacobian[row] = (axis, _ZERO)
-    return _Body(_plus(w, _scaled(axis, v)), dw, turn(origin), jacobian), masses
+    dw = plus(plus(dw, scaled(axis, a)), scaled(cross(w, axis), v))
+    jacobian[row] = (axis, ZERO)
+    return Body(plus(w, scaled(axis, v)), dw, turn(origin), jacobian), masses
 
 
-def _entry(parameter: int, body: _Body, z: Vector, u: Vector) -> Scalar:
+def _entry(parameter: int, body: Body, z: Vector, u: Vector) -> Scalar:
     """First moment (1 to 3) or inertia (4 to 9) entry of one joint's row."""
     if parameter >= 4:
-        return _dot(z, body.moments[parameter - 4])
+        return dot(z, body.moments[parameter - 4])
     k = parameter - 1
     column = (body.b[0][k], body.b[1][k], body.b[2][k])
-    return _cross(body.a, z)[k] + _dot(column, u)
+    return cross(body.a, z)[k] + dot(column, u)
 
 
-def _turn(joint: JointGeometry, q: Expr | None) -> Callable[[Vector], Vector]:
-    """Return the map of vectors from the parent's orientation into that of a joint turned by q (None: not at all).
+def turn_matrix(joint: JointGeometry, q: Scalar) -> tuple[Vector, Vector, Vector]:
+    """Return the rows of the matrix that brings vectors from the parent's orientation into that of a joint.
 
     Rodrigues' formula with the placement multiplied in, so that an entry is a constant and multiples of cosine and
-    sine. That costs next to nothing over turns about coordinate axes with constant rotations between them, and a
-    placement written with a rounded pi/2 loses no zero by it.
+    sine of the angle q, which does not turn a prismatic joint. That costs next to nothing over turns about coordinate
+    axes with constant rotations between them, and a placement written with a rounded pi/2 loses no zero by it.
     """
     placement = joint.rotation.T
-    if q is None:
-        return lambda vector: _vector(_dot(_floats(row), vector) for row in placement)
+    if joint.prismatic:
+        return floats(placement[0]), floats(placement[1]), floats(placement[2])
     x, y, z = joint.axis
     along = np.outer(joint.axis, joint.axis)
     across = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
     fixed, even, odd = (_snap(part @ placement).tolist() for part in (along, np.eye(3) - along, across))
     c, s = cos(q), sin(q)
-    matrix = [_vector(fixed[k][m] + even[k][m] * c + odd[k][m] * s for m in range(3)) for k in range(3)]
-    return lambda vector: _vector(_dot(row, vector) for row in matrix)
+    first, second, third = (
+        vector(fixed[k][m] + even[k][m] * c + odd[k][m] * s for m in range(3)) for k in range(3)
+    )  # fmt: skip
+    return first, second, third
 
 
 def _snap(values: Array) -> Array:
@@ -232,28 +237,3 @@ def _snap(values: Array) -> Array:
     for number in (0.0, 1.0, -1.0):
         result[np.abs(result - number) <= _ROUNDING] = number
     return result
-
-
-def _vector(values: Iterable[Scalar]) -> Vector:
-    x, y, z = values
-    return x, y, z
-
-
-def _floats(values: Array) -> Vector:
-    return _vector(float(value) for value in values)
-
-
-def _dot(x: Vector, y: Vector) -> Scalar:
-    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
-
-
-def _plus(x: Vector, y: Vector) -> Vector:
-    return x[0] + y[0], x[1] + y[1], x[2] + y[2]
-
-
-def _scaled(x: Vector, factor: Scalar) -> Vector:
-    return x[0] * factor, x[1] * factor, x[2] * factor
-
-
-def _cross(x: Vector, y: Vector) -> Vector:
-    return x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]

@@ -8,16 +8,15 @@ operations share one node, and signs are kept beside the nodes, so that ``a - b`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, cast
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.model.regressor.program import Program
 
-VAR, SIN, COS, ADD, SUB, MUL, ADD_CONST, MUL_CONST = range(8)
+VAR, SIN, COS, ADD, SUB, MUL, ADD_CONST, MUL_CONST, SIGN, ABS, EXP = range(11)
 
 _BINARY = (ADD, SUB, MUL)
 """Operations on two nodes."""
@@ -32,7 +31,7 @@ class Trace:
     ----------
     nodes : list of tuple
         ``(operation, first operand, second operand)``; operands are indices of earlier nodes, the second one is a
-        float for operations with a constant. A variable's first operand is its index among the inputs.
+        float for operations with a constant, and for EXP the sign of its operand. A variable's first operand is its index among the inputs.
     """
 
     def __init__(self) -> None:
@@ -113,6 +112,35 @@ class Expr:
 
     __rmul__ = __mul__
 
+    def __truediv__(self, other: float) -> Scalar:
+        return self * (1.0 / other)
+
+    def __pow__(self, power: int) -> Scalar:
+        result: Scalar = 1.0
+        for _ in range(int(power)):
+            result = self * result
+        return result
+
+    def __abs__(self) -> Expr:
+        return Expr(self.trace, self.trace.node(ABS, self.node, 0), 1)
+
+    # Under these names numpy looks for them in arrays of objects.
+    def sin(self) -> Expr:
+        """Return the sine."""
+        return Expr(self.trace, self.trace.node(SIN, self.node, 0), self.sign)
+
+    def cos(self) -> Expr:
+        """Return the cosine."""
+        return Expr(self.trace, self.trace.node(COS, self.node, 0), 1)
+
+    def exp(self) -> Expr:
+        """Return the exponential."""
+        return Expr(self.trace, self.trace.node(EXP, self.node, self.sign), 1)
+
+    def direction(self) -> Expr:
+        """Return -1, 0 or 1, the sign that the value will have."""
+        return Expr(self.trace, self.trace.node(SIGN, self.node, 0), self.sign)
+
 
 Scalar = Expr | float
 """What a traced computation handles: a recorded expression or a number known while tracing."""
@@ -120,16 +148,39 @@ Scalar = Expr | float
 
 def sin(angle: Scalar) -> Scalar:
     """Sine of an expression or of a number."""
-    if isinstance(angle, Expr):
-        return Expr(angle.trace, angle.trace.node(SIN, angle.node, 0), angle.sign)
-    return float(np.sin(angle))
+    return angle.sin() if isinstance(angle, Expr) else float(np.sin(angle))
 
 
 def cos(angle: Scalar) -> Scalar:
     """Cosine of an expression or of a number."""
-    if isinstance(angle, Expr):
-        return Expr(angle.trace, angle.trace.node(COS, angle.node, 0), 1)
-    return float(np.cos(angle))
+    return angle.cos() if isinstance(angle, Expr) else float(np.cos(angle))
+
+
+def operands(trace: Trace, node: int) -> tuple[int, ...]:
+    """Return the nodes that an operation is done with."""
+    operation, first, second = trace.nodes[node]
+    if operation == VAR:
+        return ()
+    return (first, second) if operation in _BINARY else (first,)
+
+
+def needed(trace: Trace, values: Iterable[Scalar]) -> list[int]:
+    """Return the nodes that values need, each just before what first needs it."""
+    order: list[int] = []
+    done: set[int] = set()
+    for value in values:
+        stack = [value.node] if isinstance(value, Expr) else []
+        while stack:
+            node = stack[-1]
+            waiting = [x for x in operands(trace, node) if x not in done]
+            if node in done or not waiting:
+                stack.pop()
+                if node not in done:
+                    done.add(node)
+                    order.append(node)
+            else:
+                stack.extend(reversed(waiting))
+    return order
 
 
 def vanishing(trace: Trace, values: Sequence[Scalar], inputs: Array) -> list[bool]:
@@ -173,52 +224,6 @@ def vanishing(trace: Trace, values: Sequence[Scalar], inputs: Array) -> list[boo
     ]
 
 
-@dataclass(frozen=True, eq=False)
-class Program:
-    """Straight-line code that evaluates traced expressions over vectors of samples.
-
-    ``evaluate(inputs, outputs, buffers)``: rows are vectors over the samples. It writes row k of `outputs` for every
-    target k that the program was made for, and uses `buffers` as scratch space.
-
-    Attributes
-    ----------
-    buffers : int
-        Number of scratch vectors that it needs.
-    operations : int
-        Number of vector operations.
-    source : str
-        The code itself.
-    constants : mapping of str to float
-        Numbers that it names.
-    """
-
-    buffers: int
-    operations: int
-    source: str
-    constants: Mapping[str, float]
-
-    @cached_property
-    def evaluate(self) -> Callable[[Array, Any, Array], None]:
-        """The code, compiled when it is first asked for."""
-        namespace: dict[str, Any] = {
-            "add": np.add,
-            "sub": np.subtract,
-            "mul": np.multiply,
-            "neg": np.negative,
-            "sin": np.sin,
-            "cos": np.cos,
-            "copy": np.copyto,
-        }
-        # As arrays without dimension: a Python float would be converted in every operation.
-        namespace.update({name: np.array(value) for name, value in self.constants.items()})
-        exec(compile(self.source, "<traced program>", "exec"), namespace)
-        return cast(Callable[[Array, Any, Array], None], namespace["evaluate"])
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave the compiled code out of a copy: it cannot be sent."""
-        return {name: value for name, value in vars(self).items() if name != "evaluate"}
-
-
 def compile_program(trace: Trace, outputs: Sequence[tuple[int, Scalar]]) -> Program:
     """Emit the code of all `outputs` and nothing that they do not need.
 
@@ -236,13 +241,13 @@ class _Emitter:
     """One run of the emission: order of evaluation, stored signs, vectors reused after their last use."""
 
     def __init__(self, trace: Trace, outputs: Sequence[tuple[int, Scalar]]) -> None:
-        self.nodes = trace.nodes
+        self.trace, self.nodes = trace, trace.nodes
         self.outputs = outputs
         self.targets: dict[int, list[tuple[int, int]]] = {}
         for target, value in outputs:
             if isinstance(value, Expr):
                 self.targets.setdefault(value.node, []).append((target, value.sign))
-        self.order = self._order()
+        self.order = needed(trace, (value for _, value in outputs))
         self.wish = self._wishes()
         self.stored: dict[int, int] = {}
         self.place: dict[int, str] = {}
@@ -250,30 +255,6 @@ class _Emitter:
         self.lines: list[str] = []
         self.free: list[str] = []
         self.buffers = 0
-
-    def _operands(self, node: int) -> tuple[int, ...]:
-        operation, first, second = self.nodes[node]
-        if operation == VAR:
-            return ()
-        return (first, second) if operation in _BINARY else (first,)
-
-    def _order(self) -> list[int]:
-        """Return the needed nodes, each just before what first needs it."""
-        order: list[int] = []
-        done: set[int] = set()
-        for _, value in self.outputs:
-            stack = [value.node] if isinstance(value, Expr) else []
-            while stack:
-                node = stack[-1]
-                waiting = [x for x in self._operands(node) if x not in done]
-                if node in done or not waiting:
-                    stack.pop()
-                    if node not in done:
-                        done.add(node)
-                        order.append(node)
-                else:
-                    stack.extend(reversed(waiting))
-        return order
 
     def _wishes(self) -> dict[int, int]:
         """Choose the sign with which each node is best stored, so that hardly any negation is left.
@@ -312,8 +293,12 @@ class _Emitter:
         x, sign_x = self.place[first], self.stored[first]
         if operation == SIN:
             return f"sin({x}", sign_x
-        if operation == COS:
-            return f"cos({x}", 1
+        if operation in (COS, ABS):
+            return f"{'cos' if operation == COS else 'absolute'}({x}", 1
+        if operation == SIGN:
+            return f"sign({x}", sign_x
+        if operation == EXP:
+            return (f"exp({x}" if sign_x == second else f"exp(neg({x})"), 1
         if operation == MUL_CONST:
             return f"mul({x}, {self._constant(sign * sign_x * second)}", sign
         if operation == ADD_CONST:
@@ -331,14 +316,14 @@ class _Emitter:
         """Emit and compile."""
         last_use: dict[int, int] = {}
         for step, node in enumerate(self.order):
-            for operand in self._operands(node):
+            for operand in operands(self.trace, node):
                 last_use[operand] = step
         for step, node in enumerate(self.order):
             if self.nodes[node][0] == VAR:
                 self.place[node], self.stored[node] = f"x{self.nodes[node][1]}", 1
             else:
                 statement, self.stored[node] = self._statement(node, self.wish.get(node, 1))
-                for operand in set(self._operands(node)):
+                for operand in set(operands(self.trace, node)):
                     # Freed before the result is placed: an operation may write over its own operand.
                     if last_use[operand] == step and self.place[operand].startswith("b"):
                         self.free.append(self.place[operand])

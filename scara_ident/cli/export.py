@@ -1,0 +1,56 @@
+"""``scara-ident export``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from scara_ident.cli import options
+from scara_ident.cli.console import result_console, table
+
+
+def export(
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="identification.json or diagnosis.json.")],
+    to: Annotated[
+        Literal["urdf", "mjcf", "pinocchio", "c", "casadi", "ros2"],
+        typer.Option(
+            "--to",
+            help="urdf; mjcf, with a Python callback for what MuJoCo lacks; pinocchio: a URDF and its loader; c: one "
+            "header; casadi: a Python module; ros2: controllers' parameters.",
+        ),
+    ],
+    robot: Annotated[
+        Path | None,
+        typer.Option("--robot", metavar="FILE", help="Where the robot of the result is now, if its URDF has moved."),
+    ] = None,
+    output: options.Folder = Path("."),
+    json: options.Json = False,
+) -> None:
+    """Write the identified arm for other programs, with what its error becomes there."""
+    from scara_ident.export.exported import export_model, write_exported
+    from scara_ident.export.result import read_identified
+    from scara_ident.files import check_output
+
+    check_output(output)
+    found = read_identified(result, robot)
+    content = write_exported(found, export_model(found, to), output, str(result))
+    console = result_console(content, json)
+    console.note(content["notes"])
+    kinds = list(content["errors"])
+    words = {"model": "model", "exported": "exported", "with_code": "with its code"}
+    errors = table(
+        f"rms error, {content['errors_of']} recordings", "joint", *(words[kind] for kind in kinds), "unit",
+        right=tuple(words.values()),
+    )  # fmt: skip
+    for j, joint in enumerate(found.robot.joints):
+        values = (content["errors"][kind][joint] for kind in kinds)
+        errors.add_row(joint, *("-" if x is None else f"{x:.4g}" for x in values), found.robot.torque_unit(j))
+    console.print(errors)
+    for kind in kinds[1:]:
+        for item in content["missing"][kind]:
+            console.print(f"{words[kind]}: cannot say {item['what']}: {item['why']}")
+        if content["refitted"][kind]:
+            console.print(f"{words[kind]}: fitted again to the same recordings: {', '.join(content['refitted'][kind])}")
+    console.written(output, *content["files"], "export.json")

@@ -1,0 +1,106 @@
+"""Recorded arithmetic as straight-line code of a programming language."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from scara_ident.model.regressor.tracing import (
+    ABS,
+    ADD,
+    ADD_CONST,
+    COS,
+    EXP,
+    MUL,
+    MUL_CONST,
+    SIGN,
+    SIN,
+    SUB,
+    VAR,
+    Expr,
+    Scalar,
+    Trace,
+    needed,
+)
+
+
+@dataclass(frozen=True)
+class Language:
+    """How a language writes things.
+
+    Attributes
+    ----------
+    statement : str
+        An intermediate result, of ``{name}`` and ``{value}``.
+    output : str
+        Element ``{place}`` of ``out``, of ``{value}``.
+    functions : mapping of int to str
+        Sine, cosine, size, sign and exponential, of ``{x}``.
+    number : callable
+        Writes a number so that it reads back the same.
+    """
+
+    statement: str
+    output: str
+    functions: dict[int, str]
+    number: Callable[[float], str]
+
+
+PYTHON = Language(
+    "{name} = {value}",
+    "out[{place}] = {value}",
+    {SIN: "sin({x})", COS: "cos({x})", ABS: "fabs({x})", SIGN: "sign({x})", EXP: "exp({x})"},
+    repr,
+)
+"""Python, with numbers or whatever else its functions take."""
+
+
+def code_lines(trace: Trace, outputs: Sequence[Scalar], language: Language, joints: int) -> list[str]:
+    """Write what outputs need, then the outputs, so that they may stand where inputs did.
+
+    Parameters
+    ----------
+    trace : Trace
+        Inputs are q, v and a of ``joints`` joints, one after the other.
+    outputs : sequence of Expr or float
+        Elements of ``out``.
+    language : Language
+    joints : int
+    """
+    names: dict[int, str] = {}
+    lines: list[str] = []
+    for node in needed(trace, outputs):
+        operation, first, second = trace.nodes[node]
+        if operation == VAR:
+            names[node] = f"{'qva'[first // joints]}[{first % joints}]"
+            continue
+        x = names[first]
+        if operation in (ADD, SUB, MUL):
+            value = f"{x} {'+-*'[(ADD, SUB, MUL).index(operation)]} {names[second]}"
+        elif operation in (ADD_CONST, MUL_CONST):
+            value = f"{x} {'+' if operation == ADD_CONST else '*'} {_constant(second, language)}"
+        else:
+            value = language.functions[operation].replace("{x}", f"-{x}" if operation == EXP and second < 0 else x)
+        names[node] = f"t{len(lines)}"
+        lines.append(language.statement.replace("{name}", names[node]).replace("{value}", value))
+    for place, output in enumerate(outputs):
+        value = _output(output, names, language)
+        lines.append(language.output.replace("{place}", str(place)).replace("{value}", value))
+    return lines
+
+
+def inputs_of(trace: Trace, outputs: Iterable[Scalar], joints: int) -> str:
+    """Return which of the letters q, v and a outputs depend on."""
+    found = {trace.nodes[node][1] // joints for node in needed(trace, outputs) if trace.nodes[node][0] == VAR}
+    return "".join("qva"[k] for k in sorted(found))
+
+
+def _output(value: Scalar, names: dict[int, str], language: Language) -> str:
+    if isinstance(value, Expr):
+        return names[value.node] if value.sign > 0 else f"-{names[value.node]}"
+    return _constant(value, language)
+
+
+def _constant(value: float, language: Language) -> str:
+    text = language.number(float(value))
+    return f"({text})" if text.startswith("-") else text

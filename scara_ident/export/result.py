@@ -1,0 +1,254 @@
+"""An identified model as a result file holds it: what it was found on, and what rebuilds it without the recordings."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.effects import EFFECTS, Effect, EffectTerm, Member, Scene
+from scara_ident.errors import ScaraIdentError
+from scara_ident.estimation import Estimate
+from scara_ident.estimation.consistent.estimator import ConsistentEstimate
+from scara_ident.estimation.information import Information, weighted
+from scara_ident.estimation.observations import Observations
+from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.robot.description import check_description
+from scara_ident.robot.robot import Robot, build_robot, load_robot
+
+KEY = "rebuild"
+# Values of an effect's options that a file can hold.
+PLAIN = (bool, int, float, str, tuple, frozenset)
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedModel:
+    """A model with its parameters, and what its observations said.
+
+    Attributes
+    ----------
+    model : TorqueModel
+        With the effects that were found as further terms.
+    value : ndarray, shape (p,)
+    undetermined : ndarray of bool, shape (p,)
+    weights : ndarray, shape (n,)
+        Of each joint's rows in the estimate.
+    training, validation : tuple of Information
+        Per joint, within the band; validation has no rows where nothing was held out.
+    standard : ndarray, shape (11 n,), or None
+        Of the arm that the estimate belongs to, where it was estimated with one.
+    removed : tuple of str
+        Effects that were found and taken out of the recordings.
+    """
+
+    model: TorqueModel
+    value: Array
+    undetermined: NDArray[np.bool_]
+    weights: Array
+    training: tuple[Information, ...]
+    validation: tuple[Information, ...]
+    standard: Array | None
+    removed: tuple[str, ...] = ()
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.model.robot
+
+    @property
+    def information(self) -> Information:
+        """All training rows as the estimate weighted them."""
+        return weighted(self.training, self.weights)
+
+    @property
+    def held_out(self) -> tuple[str, tuple[Information, ...]]:
+        """What errors are of: ``validation``, or ``training`` where nothing was held out."""
+        if any(item.rows for item in self.validation):
+            return "validation", self.validation
+        return "training", self.training
+
+    def errors(self, value: Array) -> dict[str, float | None]:
+        """Return the rms of what parameters leave of the torque on each joint, held out where something was."""
+        rows = self.held_out[1]
+        return {
+            name: item.rms(value) if item.rows else None for name, item in zip(self.robot.joints, rows, strict=True)
+        }
+
+
+def rebuild_entry(estimate: Estimate, training: Observations, validation: Observations) -> dict[str, Any]:
+    """Return what a result file holds under ``rebuild``."""
+    robot, terms = estimate.model.robot, estimate.model.terms
+    effects = [term for term in terms if isinstance(term, EffectTerm)]
+    return {
+        "robot": _robot_entry(robot),
+        "weights": estimate.weights,
+        "standard": estimate.standard if isinstance(estimate, ConsistentEstimate) else None,
+        "scene": _scene_entry(effects[0].scene) if effects else None,
+        "effects": [_effect_entry(term) for term in effects],
+        "observations": {
+            kind: [_packed(item, own) for item, own in zip(rows.by_joint, rows.model.active, strict=True)]
+            for kind, rows in (("training", training), ("validation", validation))
+        },
+    }
+
+
+def read_identified(path: Path | str, robot: Path | str | None = None) -> IdentifiedModel:
+    """Read an ``identification.json`` or ``diagnosis.json``.
+
+    Parameters
+    ----------
+    path : path
+    robot : path, optional
+        A robot description to take instead of the one that the result was found with, where that has moved.
+
+    Raises
+    ------
+    ScaraIdentError
+        In one line: the file cannot be read or is none of these, or its robot is not to be had.
+    """
+    path = Path(path)
+    content = _read(path)
+    known = content[KEY]
+    arm = _robot(known["robot"], path) if robot is None else load_robot(robot)
+    base = build_model(arm, content["model"])
+    model = _with_effects(base, known, path)
+    parameters = content["parameters"]
+    told = [(item["name"], item["joint"], item["meaning"]) for item in parameters]
+    if told != [(column.name, column.joint, column.meaning) for column in model.columns]:
+        raise ScaraIdentError(
+            f"{path}: its parameters are not those of {arm.urdf}; give --robot of the arm it was found on"
+        )
+    observations = {
+        kind: tuple(_unpacked(item, own, len(parameters)) for item, own in zip(rows, model.active, strict=True))
+        for kind, rows in known["observations"].items()
+    }
+    in_model = {term.name for term in model.terms}
+    return IdentifiedModel(
+        model=model,
+        value=_array([item["value"] for item in parameters]),
+        undetermined=np.array([bool(item.get("undetermined", item["std"] is None)) for item in parameters]),
+        weights=_array(known["weights"]),
+        training=observations["training"],
+        validation=observations["validation"],
+        standard=None if known["standard"] is None else _array(known["standard"]),
+        removed=tuple(item["effect"] for item in content.get("effects", ()) if item["effect"] not in in_model),
+    )
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScaraIdentError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError:
+        raise ScaraIdentError(f"{path}: not JSON; give an identification.json or diagnosis.json") from None
+    if not isinstance(content, dict) or not {KEY, "model", "parameters"} <= set(content):
+        raise ScaraIdentError(
+            f"{path}: holds no model; give an identification.json or diagnosis.json, and make one of an earlier version again"
+        )
+    return content
+
+
+def _robot_entry(robot: Robot) -> dict[str, Any]:
+    joints = {
+        name: {"reduction": float(robot.reduction[j]), "effort_gain": float(robot.effort_gain[j])}
+        | ({"rotor_inertia": float(robot.rotor_inertia[j])} if robot.rotor_stated[j] else {})
+        for j, name in enumerate(robot.joints)
+    }
+    return {
+        "urdf": str(Path(robot.urdf).resolve()),
+        "sha256": sha256(Path(robot.urdf).read_bytes()).hexdigest(),
+        "description": {
+            "effort_side": robot.effort_side,
+            "joints": joints,
+            "locked": dict(robot.locked),
+            "gravity": robot.model.gravity.linear.tolist(),
+        },
+    }
+
+
+def _robot(entry: Mapping[str, Any], path: Path) -> Robot:
+    urdf = Path(entry["urdf"])
+    if not urdf.is_file():
+        raise ScaraIdentError(f"{path}: the URDF that it was found with, {urdf}, is not there; give --robot")
+    if sha256(urdf.read_bytes()).hexdigest() != entry["sha256"]:
+        raise ScaraIdentError(f"{path}: {urdf} has changed since; give the URDF that it was found with as --robot")
+    return build_robot(check_description({"urdf": str(urdf), **entry["description"]}, path), path)
+
+
+def _scene_entry(scene: Scene) -> dict[str, Any]:
+    numbers = {name: getattr(scene, name) for name in ("value", "duration", "rate", "band", "travel", "speed", "start")}
+    return numbers | {"armatures": {str(joint): value for joint, value in scene.armatures.items()}}
+
+
+def _effect_entry(term: EffectTerm) -> dict[str, Any]:
+    options = {field.name: getattr(term.effect, field.name) for field in fields(term.effect)}
+    plain = all(isinstance(value, PLAIN) for value in options.values())
+    return {
+        "effect": term.name,
+        "family": type(term.effect).__name__,
+        "options": {key: sorted(x) if isinstance(x, frozenset) else x for key, x in options.items()} if plain else None,
+        "joint": term.member.joint,
+        "nonlinear": list(term.member.nonlinear),
+        "partner": term.member.partner,
+    }
+
+
+def _with_effects(base: TorqueModel, known: Mapping[str, Any], path: Path) -> TorqueModel:
+    if not known["effects"]:
+        return base
+    entry = known["scene"]
+    scene = Scene(
+        base,
+        *(_array(entry["value"]), entry["duration"], entry["rate"], entry["band"]),
+        *(_array(entry["travel"]), _array(entry["speed"]), entry["start"]),
+        armatures={int(joint): value for joint, value in entry["armatures"].items()},
+    )
+    terms = [
+        EffectTerm(_family(item, path), Member(item["joint"], tuple(item["nonlinear"]), item["partner"]), scene)
+        for item in known["effects"]
+    ]
+    return TorqueModel(base.name, base.robot, (*base.terms, *terms))
+
+
+def _family(entry: Mapping[str, Any], path: Path) -> Effect:
+    for family in EFFECTS.get(entry["effect"]):
+        if type(family).__name__ == entry["family"] and entry["options"] is not None:
+            given = entry["options"].items()
+            return type(family)(
+                **{key: type(getattr(family, key))(x) if isinstance(x, list) else x for key, x in given}
+            )
+    raise ScaraIdentError(
+        f"{path}: the effect {entry['effect']} cannot be made again: no kind {entry['family']} of it is installed, or it has "
+        "options that are no plain values"
+    )
+
+
+def _packed(information: Information, active: NDArray[np.intp]) -> dict[str, Any]:
+    """Return the upper triangle of a joint's factor, row by row, as base64 of little-endian doubles."""
+    factor = information.select(active).factor
+    numbers = factor[np.triu_indices(*_shape(factor))]
+    text = base64.b64encode(numbers.astype("<f8").tobytes()).decode("ascii")
+    return {"samples": information.rows, "rows": len(factor), "factor": text}
+
+
+def _unpacked(entry: Mapping[str, Any], active: NDArray[np.intp], parameters: int) -> Information:
+    factor = np.zeros((entry["rows"], len(active) + 1))
+    factor[np.triu_indices(*_shape(factor))] = np.frombuffer(base64.b64decode(entry["factor"]), dtype="<f8")
+    return Information(factor, float(entry["samples"])).embed(active, parameters)
+
+
+def _shape(factor: Array) -> tuple[int, int, int]:
+    return factor.shape[0], 0, factor.shape[1]
+
+
+def _array(values: Sequence[Any]) -> Array:
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)

@@ -1,0 +1,167 @@
+"""An identified model as recorded arithmetic: torque by position, velocity and acceleration, and its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from scara_ident.arrays import Array
+from scara_ident.effects import EffectTerm, Scene, Signals
+from scara_ident.export.traced_array import traced
+from scara_ident.model.model import TorqueModel
+from scara_ident.model.regressor.recursion import joint_geometry
+from scara_ident.model.regressor.torque import trace_torque
+from scara_ident.model.regressor.tracing import Scalar, Trace
+from scara_ident.model.terms import RigidBody, Term
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import Robot
+
+NOT_OF_STATE = "it does not follow from position, velocity and acceleration at the moment"
+
+
+@dataclass(frozen=True, eq=False)
+class TracedModel:
+    """A model with its parameters as recorded arithmetic, all torques on the recorded side.
+
+    Attributes
+    ----------
+    robot : Robot
+    trace : Trace
+        Inputs are q (0 .. n-1), v (n .. 2n-1) and a (2n .. 3n-1) in the order of the robot's joints.
+    torque : tuple of Expr or float
+        Of each joint: ``mass @ a + bias + friction``.
+    mass : tuple of tuple of Expr or float
+        Links and rotors; a row per joint.
+    bias : tuple of Expr or float
+        Coriolis, centrifugal and gravity torque of the links.
+    friction : tuple of Expr or float
+        All other terms: friction, offset, effects.
+    """
+
+    robot: Robot
+    trace: Trace
+    torque: tuple[Scalar, ...]
+    mass: tuple[tuple[Scalar, ...], ...]
+    bias: tuple[Scalar, ...]
+    friction: tuple[Scalar, ...]
+
+
+def unsaid_terms(model: TorqueModel) -> tuple[EffectTerm, ...]:
+    """Return the effects of a model that no code of the state can have."""
+    return tuple(term for term in model.terms if isinstance(term, EffectTerm) and not term.effect.of_state)
+
+
+def trace_model(model: TorqueModel, value: Array) -> TracedModel:
+    """Trace a model with parameters ``value`` (p,); terms whose parameters are all zero are left out.
+
+    Raises
+    ------
+    ValueError
+        If a term with other parameters does not follow from the state, see `unsaid_terms`.
+    """
+    robot, n = model.robot, model.robot.n
+    trace = Trace()
+    q, v, a = (traced([trace.variable(k + part * n) for k in range(n)]) for part in range(3))
+    zero = traced(np.zeros(n).tolist())
+    still = pin.Motion.Zero()
+    rigid, own = model.rigid_body, value[model.place(model.rigid_body)]
+    unit = np.eye(n)
+    columns = [_rigid(rigid, own, q, zero, traced(unit[k].tolist()), still) for k in range(n)]
+    motion = Motion("", "", np.zeros(1), q[:, None], v[:, None], a[:, None], None, np.inf)
+    rest: Array = traced(np.zeros(n).tolist())
+    signals: dict[int, Signals] = {}
+    for term in model.terms:
+        part = value[model.place(term)]
+        if isinstance(term, RigidBody) or not np.any(part):
+            continue
+        if isinstance(term, EffectTerm):
+            if not term.effect.of_state:
+                raise ValueError(f"{term.name}: {NOT_OF_STATE}")
+            known = signals.setdefault(id(term.scene), _signals(term.scene, motion))
+            rows = _rows(term)
+            term.effect.fill(known, term.member, rows)
+            rest = rest + _summed(term, rows, part)
+        else:
+            rest = rest + _torque(term, part, motion)
+    return TracedModel(
+        robot,
+        trace,
+        tuple(_rigid(rigid, own, q, v, a, robot.model.gravity) + rest),
+        _symmetric(robot, columns),
+        tuple(_rigid(rigid, own, q, v, zero, robot.model.gravity)),
+        tuple(rest),
+    )
+
+
+def _symmetric(robot: Robot, columns: Sequence[Array]) -> tuple[tuple[Scalar, ...], ...]:
+    """Return the rows of the mass matrix, each pair of joints from the acceleration of the one nearer to the tool."""
+
+    def entry(j: int, k: int) -> Scalar:
+        nearer = robot.order[j] <= robot.order[k]
+        found: Scalar = columns[k][j] if nearer else columns[j][k] * float(robot.row_scale[j] / robot.row_scale[k])
+        return found
+
+    return tuple(tuple(entry(j, k) for k in range(robot.n)) for j in range(robot.n))
+
+
+def body_parameters_of(term: RigidBody, value: Array) -> tuple[Array, Array]:
+    """Return standard parameters that have the base parameters ``value``: each stands for the one that leads it.
+
+    Returns
+    -------
+    bodies : ndarray, shape (n, 10)
+        In the order of the robot's joints.
+    armature : ndarray, shape (n,)
+    """
+    n = term.robot.n
+    standard = np.zeros(11 * n)
+    standard[term.base.kept[term.kept]] = value
+    return standard[: 10 * n].reshape(n, 10), standard[10 * n :]
+
+
+def _rigid(term: RigidBody, value: Array, q: Array, v: Array, a: Array, gravity: pin.Motion) -> Array:
+    """Return the torque of links and rotors, recorded side, shape (n,)."""
+    robot: Robot = term.robot
+    bodies, armature = body_parameters_of(term, value)
+    back = np.argsort(robot.order)
+    torque = trace_torque(
+        joint_geometry(robot.model), gravity, bodies[back], list(q[back]), list(v[back]), list(a[back])
+    )
+    return robot.row_scale * (traced(torque)[robot.order] + armature * a)
+
+
+def _signals(scene: Scene, motion: Motion) -> Signals:
+    """Return signals whose predicted torques are recorded, as effects need them."""
+    signals = Signals(scene, motion)
+    rigid = scene.model.rigid_body
+    own = scene.value[scene.model.place(rigid)]
+    q, v, a = (part[:, 0] for part in (motion.q, motion.v, motion.a))
+    torque = _rigid(rigid, own, q, v, a, scene.robot.model.gravity)
+    others = (
+        _torque(term, scene.value[scene.model.place(term)], motion) for term in scene.model.terms if term is not rigid
+    )
+    signals.__dict__["rigid"] = torque[:, None]
+    signals.__dict__["predicted"] = sum(others, torque)[:, None]
+    return signals
+
+
+def _rows(term: Term) -> list[Array]:
+    return [traced(np.zeros((int(np.count_nonzero(row)), 1))) for row in term.pattern]
+
+
+def _torque(term: Term, value: Array, motion: Motion) -> Array:
+    rows = _rows(term)
+    term.fill(motion, rows)
+    return _summed(term, rows, value)
+
+
+def _summed(term: Term, rows: Sequence[Array], value: Array) -> Array:
+    """Return the torque of a term's columns, shape (n,)."""
+    total = [
+        sum((float(x) * entry for x, entry in zip(value[own], row[:, 0], strict=True)), 0.0)
+        for own, row in zip(term.pattern, rows, strict=True)
+    ]
+    return traced(total)

@@ -1,0 +1,51 @@
+"""Every form on three arms, with and without effects, read by the program that it is for."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from scara_ident.errors import ScaraIdentError
+from scara_ident.export import exported
+from scara_ident.export.exported import export_model, write_exported
+from scara_ident.export.forms import FORMS
+from tests.export.identified import NOISE, model_torque, states
+
+
+@pytest.mark.parametrize("effects", [False, True], ids=["plain", "effects"])
+@pytest.mark.parametrize("arm", ["scara", "ur5", "panda"])
+@pytest.mark.parametrize("to", FORMS)
+def test_every_form_gives_the_model_s_torque_in_what_it_can_say(models, readers, tmp_path, arm, effects, to):
+    found = models[arm, effects]
+    motion = states(found.robot, 7, 6)
+    done = export_model(found, to)
+    content = write_exported(found, done, tmp_path, "identification.json")
+    assert {path.name for path in tmp_path.iterdir()} == {*done.files, "export.json"}
+    for key, said in (("exported", done.alone), ("with_code", done.beside)):
+        if said is None:
+            continue
+        read = readers.READERS[to] if key == "exported" else partial(readers.READERS[to], effects=True)
+        torque = read(tmp_path, found.robot, motion.q, motion.v, motion.a)
+        expected = model_torque(found, said.value, motion)
+        np.testing.assert_allclose(torque, expected, rtol=0, atol=1e-12 * np.max(np.abs(expected)))
+        errors, model = content["errors"][key], content["errors"]["model"]
+        assert content["errors_of"] == "validation"
+        complete = key == "with_code" or to in ("c", "casadi") or (to == "ros2" and not effects)
+        assert bool(said.missing) == (not complete)
+        for joint in found.robot.joints:
+            assert model[joint] == pytest.approx(NOISE, rel=0.2)
+            assert errors[joint] == pytest.approx(model[joint], rel=1e-6) or not complete
+        assert (max(errors.values()) > 1.5 * max(model.values())) == (not complete)
+
+
+def test_nothing_is_written_where_a_file_fails(models, tmp_path, monkeypatch):
+    def refuse(*_: object) -> None:
+        raise ScaraIdentError("cannot be written")
+
+    done = export_model(models["scara", False], "mjcf")
+    monkeypatch.setattr(exported, "write_json", refuse)
+    with pytest.raises(ScaraIdentError, match="cannot be written"):
+        write_exported(models["scara", False], done, tmp_path / "out", "x.json")
+    assert not (tmp_path / "out").exists()

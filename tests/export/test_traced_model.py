@@ -1,0 +1,70 @@
+"""Models as recorded arithmetic, against the models themselves: every effect that follows from the state."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scara_ident.effects import available_effects
+from scara_ident.effects.effect import Effect
+from scara_ident.export.traced_model import trace_model, unsaid_terms
+from scara_ident.model.regressor.tracing import Scalar, compile_program
+from tests.export.arms import scara, ur5
+from tests.export.identified import identified, model_torque, states
+
+OF_STATE = [effect for effect in available_effects() if effect.of_state]
+
+
+def evaluated(model, values: tuple[Scalar, ...], motion) -> np.ndarray:
+    program = compile_program(model.trace, list(enumerate(values)))
+    inputs = np.concatenate([motion.q, motion.v, motion.a])
+    out = np.zeros((len(values), motion.samples))
+    program.evaluate(inputs, out, np.zeros((program.buffers, motion.samples)))
+    return out
+
+
+@pytest.mark.parametrize("effect", OF_STATE, ids=lambda effect: f"{type(effect).__name__} {getattr(effect, 'way', '')}")
+def test_every_effect_of_the_state_is_recorded_as_it_is(effect: Effect, tmp_path: Path) -> None:
+    tried = 0
+    for make in (scara, ur5):
+        robot = make(tmp_path)
+        found = identified(robot, (effect.name,), samples=60)
+        if not any(term.name == effect.name for term in found.model.terms):
+            continue
+        tried += 1
+        model, motion = trace_model(found.model, found.value), states(robot, 5, 20)
+        expected = model_torque(found, found.value, motion)
+        torque = evaluated(model, model.torque, motion)
+        # The model differentiates an encoder's error by differences.
+        np.testing.assert_allclose(torque, expected, rtol=0, atol=1e-12 * np.max(np.abs(expected)))
+    assert tried
+
+
+def test_mass_bias_and_friction_make_the_torque(models) -> None:
+    for arm in ("scara", "panda"):
+        found = models[arm, True]
+        robot = found.robot
+        model, motion = trace_model(found.model, found.value), states(robot, 6, 10)
+        flat = tuple(entry for row in model.mass for entry in row)
+        mass = evaluated(model, flat, motion).reshape(robot.n, robot.n, -1)
+        parts = np.einsum("jkn,kn->jn", mass, motion.a) + evaluated(model, model.bias, motion)
+        torque = evaluated(model, model.torque, motion)
+        assert np.max(np.abs(parts + evaluated(model, model.friction, motion) - torque)) < 1e-13 * np.max(
+            np.abs(torque)
+        )
+        at_joint = mass / robot.row_scale[:, None, None]
+        np.testing.assert_allclose(at_joint, at_joint.transpose(1, 0, 2), rtol=1e-12, atol=1e-12)
+        assert np.all(np.linalg.eigvalsh(np.moveaxis(at_joint, 2, 0)) > 0.0)
+
+
+def test_what_does_not_follow_from_the_state_is_refused_by_name(tmp_path: Path) -> None:
+    found = identified(scara(tmp_path), ("vibration", "warm_up", "spring"), samples=60)
+    assert {term.name for term in unsaid_terms(found.model)} == {"warm_up"}
+    with pytest.raises(ValueError, match="warm_up: it does not follow from position, velocity and acceleration"):
+        trace_model(found.model, found.value)
+    value = found.value.copy()
+    for term in unsaid_terms(found.model):
+        value[found.model.place(term)] = 0.0
+    trace_model(found.model, value)
