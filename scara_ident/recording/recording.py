@@ -18,6 +18,7 @@ from scara_ident.errors import RecordingError, UsageError
 from scara_ident.recording.audit import Finding, Samples, audit
 from scara_ident.recording.files import IMPORTERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
+from scara_ident.recording.one_clock import on_one_clock
 from scara_ident.robot.signal_map import SIGNALS, Channel, Channels, contract_channels
 
 if TYPE_CHECKING:
@@ -143,7 +144,8 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
     wanted = [channel.column for channel in (*needed, *chain.from_iterable(optional.values()), *second.values())]
     columns = read_columns(path, wanted, channels.topic)
     if shares_clock(path, channels.time.column):
-        columns = _rows_of_the_arm(columns, [channel.column for channel in needed[1:]])
+        columns, joined = on_one_clock(columns, channels.time.column, [channel.column for channel in needed[1:]])
+        findings += joined
 
     def rows(wanted: Sequence[Channel]) -> Array:
         return np.array([channel.si(columns.pop(channel.column)) for channel in wanted])
@@ -280,15 +282,6 @@ def write_recording(recording: Recording, path: Path | str, *, effort_gain: Arra
         there = zip(recording.joints, values, strict=True)
         columns |= {f"{joint}.{signal}": row for joint, row in there if not np.isnan(row).all()}
     write_columns(Path(path), columns)
-
-
-def _rows_of_the_arm(columns: dict[str, Array], wanted: Sequence[str]) -> dict[str, Array]:
-    """Leave out the samples of other signals, in which all that is wanted of the arm is empty.
-
-    The rows that are left count from 1, as if the others were not in the file.
-    """
-    keep = np.isfinite([columns[name] for name in wanted]).any(axis=0)
-    return columns if keep.all() else {name: values[keep] for name, values in columns.items()}
 
 
 def _refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str], channels: Channels) -> None:

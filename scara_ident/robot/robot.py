@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -20,6 +20,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
 from scara_ident.robot.examples import example_urdf, is_name
+from scara_ident.robot.mimic import Follower, coupled_ends, followers, lock_followers, refuse_coupled
 from scara_ident.robot.rotors import RotorGuess, guess_rotors
 from scara_ident.robot.signal_map import Channels, build_channels
 from scara_ident.robot.transmissions import reductions, rotor_inertias
@@ -67,6 +68,8 @@ class Robot:
         Locked joints and their positions.
     channels : Channels or None
         Columns and units of the recordings; None for the contract's.
+    notes : tuple of str
+        What was decided of joints that the description does not name.
     """
 
     name: str
@@ -87,6 +90,7 @@ class Robot:
     effort_limit: Array
     locked: tuple[tuple[str, float], ...]
     channels: Channels | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def n(self) -> int:
@@ -170,10 +174,12 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
     """Build a robot from a checked description; ``source`` is named in errors."""
     urdf = description.urdf
     tree = _parse_xml(urdf, source)
+    coupled = followers(tree, urdf)
     full = _pinocchio_model(urdf, tree)
-    names = _identified_joints(description, full, tree, source)
+    names, notes = _identified_joints(description, coupled, tree, source)
     described = description.joints or {}
     joints = [described.get(name) or JointDescription() for name in names]
+    description = description.model_copy(update={"locked": lock_followers(description.locked, coupled)})
     model, locked = _lock(full, names, description, source)
     if description.gravity is not None:
         model.gravity.linear = np.asarray(description.gravity, dtype=float)
@@ -221,6 +227,7 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
             reduction=[float(value) for value in reduction],
             has_gain=["effort_gain" in joint.model_fields_set for joint in joints],
         ),
+        notes=notes,
     )
 
 
@@ -285,11 +292,17 @@ def _movable(tree: ElementTree.Element) -> list[str]:
 
 
 def _identified_joints(
-    description: RobotDescription, model: pin.Model, tree: ElementTree.Element, source: Path
-) -> list[str]:
+    description: RobotDescription, coupled: Mapping[str, Follower], tree: ElementTree.Element, source: Path
+) -> tuple[list[str], tuple[str, ...]]:
     movable = _movable(tree)
+    notes = []
     if description.joints is None:
-        names = [name for name in movable if name not in description.locked]
+        gripper = [name for name in movable if name in {*coupled, *coupled_ends(tree, coupled, movable)}]
+        names = [name for name in movable if name not in {*description.locked, *gripper}]
+        if gripper:
+            more = f" and {len(gripper) - 4} more" if len(gripper) > 5 else ""
+            shown = gripper[:4] if more else gripper
+            notes.append(f"{', '.join(shown)}{more}: coupled (mimic) and carry no other joint: locked")
         if source.suffix.lower() != ".yaml" and source == embedded_urdf():
             names = ["joint1", "joint2"]
     else:
@@ -310,7 +323,8 @@ def _identified_joints(
                 f"{description.urdf}: joint {name} is of type {kind}; revolute, continuous, prismatic "
                 "and fixed joints are supported"
             )
-    return names
+    refuse_coupled(names, coupled, source)
+    return names, tuple(notes)
 
 
 def _unknown_joint(name: str, movable: Sequence[str], tree: ElementTree.Element) -> str:
