@@ -13,10 +13,11 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, UsageError
-from scara_ident.inspection.chain import arm_of
+from scara_ident.inspection.chain import arm_of, longest_chain
 from scara_ident.inspection.guess import Guess, guess
 from scara_ident.inspection.names import Meaning, meaning
 from scara_ident.inspection.text import description_text, mapping
+from scara_ident.inspection.unnamed import meanings_by_place
 from scara_ident.recording.files import column_names, is_bag_folder, read_columns
 from scara_ident.recording.recording import Recording, read_recording
 from scara_ident.robot.description import check_description
@@ -141,8 +142,13 @@ def inspect_file(
     if arm is None:
         columns = tuple(_column(name, numbers.get(name), *_by_name(name), False) for name in names)
         return Inspection(path, topics, topic, columns, {})
-    found = guess(meanings, numbers, arm, stated=bool(topics))
+    by_place = {}
+    if all(re.fullmatch("column_[0-9]+", name) for name in names):
+        by_place = meanings_by_place(numbers, (arm.n, len(longest_chain(arm))))
+    found = guess(meanings | by_place, numbers, arm, stated=bool(topics))
     found.notes[:0] = arm.notes
+    if by_place:
+        found.notes.append("no header: columns told by their places and slopes; check every one")
     described = mapping(found, arm)
     if len(topics) > 1 and topic is not None:
         described = {"topic": topic, **described}

@@ -288,9 +288,10 @@ def _refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str], cha
     missing = [name for name in wanted if name not in names]
     if not missing:
         return
-    if names and all(_is_number(name) for name in names):
+    if names and all(re.fullmatch("column_[0-9]+", name) for name in names):
         raise RecordingError(
-            f"{path}: the first line holds numbers; put the column names there (time, {wanted[1]}, ...)"
+            f"{path}: the first line holds numbers; put the column names there (time, {wanted[1]}, ...), or map "
+            f"column_1 to column_{len(names)} under recording: in the robot description"
         )
     name = missing[0]
     more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
@@ -382,11 +383,3 @@ def _in_folder(folder: Path) -> list[Path]:
 
 def _natural(text: str) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"([0-9]+)", text)]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

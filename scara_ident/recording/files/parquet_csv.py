@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.recording.files.dates import is_date, seconds
 from scara_ident.recording.files.files import check_file
 
 if TYPE_CHECKING:
@@ -32,7 +33,8 @@ def column_names(path: Path) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Names as they stand in the file, without surrounding blanks.
+        Names as they stand in the file, without surrounding blanks; ``column_1``, ``column_2``, ... of a CSV file whose
+        first line is data.
 
     Raises
     ------
@@ -45,7 +47,9 @@ def column_names(path: Path) -> tuple[str, ...]:
     check_file(path)
     try:
         if path.suffix.lower() == ".csv":
-            names = [name.strip() for name in _csv_header(path)]
+            header = _csv_header(path)
+            unnamed = _is_data(header)
+            names = [f"column_{k + 1}" if unnamed else name.strip() for k, name in enumerate(header)]
         else:
             with path.open("rb") as file:
                 names = list(pl.read_parquet_schema(file))
@@ -72,12 +76,12 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
     Returns
     -------
     dict of str to ndarray, shape (N,)
-        NaN where the file has no value.
+        NaN where the file has no value; dates and times of day in s since the first.
 
     Raises
     ------
     RecordingError
-        A text or a date where a number belongs (column, row, value), or a damaged file.
+        A text where a number belongs (column, row, value), or a damaged file.
     """
     import polars as pl
 
@@ -138,12 +142,16 @@ def check_suffix(path: Path) -> None:
 def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
     import polars as pl
 
-    raw = {name.strip(): name for name in _csv_header(path) if name.strip() in names}
+    header = _csv_header(path)
+    has_header = not _is_data(header)
+    # Polars gives columns without names those that `column_names` lists.
+    raw = {name: name for name in names} if not has_header else {n.strip(): n for n in header if n.strip() in names}
     separator = _separator(path)
     decimal_comma = separator == ";" and _has_decimal_comma(path)
     try:
         frame = pl.read_csv(
             path,
+            has_header=has_header,
             columns=list(raw.values()),
             schema_overrides={name: pl.Float64 for name in raw.values()},
             separator=separator,
@@ -155,7 +163,13 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
         # Something is not a number: read the words themselves, so that it can be named.
         _refuse_long_rows(path, separator)
         frame = pl.read_csv(
-            path, columns=list(raw.values()), infer_schema=False, separator=separator, null_values=MISSING, glob=False
+            path,
+            has_header=has_header,
+            columns=list(raw.values()),
+            infer_schema=False,
+            separator=separator,
+            null_values=MISSING,
+            glob=False,
         )
         if decimal_comma:
             frame = frame.with_columns(pl.all().str.replace(",", ".", literal=True))
@@ -170,12 +184,17 @@ def _numbers(path: Path, series: pl.Series) -> Array:
         numbers = words.cast(pl.Float64, strict=False)
         bad = (numbers.is_null() & words.is_not_null() & (words != "")).arg_true()
         if len(bad):
+            stamps = seconds(words)
+            if stamps is not None:
+                return stamps
             row = int(bad[0])
             raise RecordingError(
                 f"{path}: column {series.name!r}, row {row + 1}: {series[row]!r} is not a number"
                 f"{_and_more(len(bad))}; correct it or leave it empty"
             )
         series = numbers
+    elif (stamps := seconds(series)) is not None:
+        return stamps
     elif not series.dtype.is_numeric():
         hint = "time in seconds" if series.name == "time" else "numbers"
         raise RecordingError(f"{path}: column {series.name!r} holds {series.dtype}; it must hold {hint}")
@@ -189,6 +208,20 @@ def _csv_header(path: Path) -> list[str]:
             if line.strip():
                 return next(csv.reader([line.strip()], delimiter=_sign_between(line)))
     return []
+
+
+def _is_data(header: list[str]) -> bool:
+    """Tell whether the first line is numbers, and points in time, and so no header."""
+    words = [word for word in header if not _is_number(word)]
+    return len(words) < len(header) > 1 and all(is_date(word) for word in words)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word.replace(",", "."))
+    except ValueError:
+        return False
+    return True
 
 
 def _separator(path: Path) -> str:
