@@ -24,7 +24,7 @@ def test_two_blocks_are_positions_and_efforts():
 
 def test_of_three_the_second_has_to_be_the_slope_of_the_first():
     assert told(table("position", "velocity", "effort"))[3:5] == ["velocity 1", "velocity 2"]
-    assert told(table("velocity", "position", "effort")) == []
+    assert told(table("velocity", "position", "effort"), (2,)) == []
 
 
 def test_other_numbers_of_columns_say_nothing():
