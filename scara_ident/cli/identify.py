@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import chain
+from math import isnan
 from typing import Annotated, Literal
 
 import typer
@@ -68,10 +69,13 @@ def identify(
         show_recordings(console, (*training, *held_out))
     console.note([*useless, *more, *result.notes])
     parameters = table(
-        f"{arm.name}: {model} model by {method}", "name", "value", "std", "unit", "meaning", right=("value", "std")
+        f"{arm.name}: {model} model by {method}",
+        *("name", "value", "std", "URDF", "unit", "meaning"),
+        right=("value", "std", "URDF"),
     )
     for row, value, std in zip(content["parameters"], result.estimate.value, result.estimate.std, strict=True):
-        parameters.add_row(row["name"], number(value, std), f"{std:.2g}", row["unit"], row["meaning"])
+        stated = "-" if isnan(row["urdf"]) else f"{row['urdf']:.4g}"
+        parameters.add_row(row["name"], number(value, std), f"{std:.2g}", stated, row["unit"], row["meaning"])
     console.print(parameters)
     for title, found in (("fitted", result.training_errors()), ("held out", result.validation_errors())):
         if not found:

@@ -16,7 +16,9 @@ from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import unit_of_kind
+from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
 from scara_ident.model.terms.friction import Friction
+from scara_ident.model.urdf_values import urdf_values
 from scara_ident.report.identification import bias_of, bias_said
 from scara_ident.robot.rotors import GUESS_FACTOR
 
@@ -27,6 +29,7 @@ NEAR = 1.3
 def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the content of ``diagnosis.json``."""
     joints = diagnosis.robot.joints
+    nominal = urdf_values(diagnosis.after.model)
     return {
         "robot": diagnosis.robot.name,
         "model": diagnosis.before.model.name,
@@ -86,10 +89,11 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "moved": moved(diagnosis),
         "parameters": [
-            column.entry(value=diagnosis.after.value[k], std=diagnosis.after.std[k])
+            column.entry(value=diagnosis.after.value[k], urdf=nominal[k], std=diagnosis.after.std[k])
             | ({"before": diagnosis.before.value[k]} if k < len(diagnosis.before.model.columns) else {})
             for k, column in enumerate(diagnosis.after.model.columns)
         ],
+        "urdf_scale": urdf_scale(diagnosis.after, diagnosis.training_after),
         "run_variation": diagnosis.after.variation.sizes(diagnosis.robot) if diagnosis.after.variation else {},
         "noise_bias": bias_of(diagnosis.after),
         "not_identifiable": [
@@ -193,14 +197,14 @@ def _before_after(diagnosis: Diagnosis, old: Observations, new: Observations) ->
 
 def moved(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the parameters of the base model that moved by over three standard deviations."""
-    before, after = diagnosis.before, diagnosis.after
-    found = []
-    for k, column in enumerate(before.model.columns):
+    before, after, found = diagnosis.before, diagnosis.after, []
+    for k, (column, stated) in enumerate(zip(before.model.columns, urdf_values(before.model), strict=True)):
         change = float(after.value[k] - before.value[k])
         std = float(after.std[k])
         if diagnosis.effects and std > 0.0 and abs(change) > 3.0 * std:
             found.append(
-                {"name": column.name, "before": before.value[k], "after": after.value[k], "in_std": change / std}
+                {"name": column.name, "urdf": stated, "before": before.value[k], "after": after.value[k]}
+                | {"in_std": change / std}
             )
     return sorted(found, key=lambda item: -abs(item["in_std"]))
 
@@ -292,6 +296,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
             f"Unexplained: on {remainder.joint} a remainder of {remainder.rms:.3g} {unit} rms {on}; "
             f"no effect of the catalogue accounts for it{_curved(diagnosis, remainder)}."
         )
+    found.append(scale_sentence(urdf_scale(diagnosis.after, diagnosis.training_after), diagnosis.robot))
     return tuple(found)
 
 
@@ -326,10 +331,16 @@ def diagnosis_markdown(diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]]
         for title, name in pictures:
             lines += ["", f"### {title[:1].upper()}{title[1:]}", "", f"![{title}]({name})"]
     if content["moved"]:
-        lines += ["", "## Parameters that moved when the effects came in", "", "| name | before | after | in std |"]
-        lines += ["|---|---|---|---|"]
         lines += [
-            f"| {m['name']} | {m['before']:.4g} | {m['after']:.4g} | {m['in_std']:+.1f} |" for m in content["moved"]
+            "",
+            "## Parameters that moved when the effects came in",
+            "",
+            "| name | URDF | before | after | in std |",
+        ]
+        lines += ["|---|---|---|---|---|"]
+        lines += [
+            f"| {m['name']} | {_cell(m['urdf'], share=False)} | {m['before']:.4g} | {m['after']:.4g} | {m['in_std']:+.1f} |"
+            for m in content["moved"]
         ]
     lines += _certainty(content, diagnosis)
     lines += ["", "## Candidates", "", "| candidate | gain held out | p | decision | why |", "|---|---|---|---|---|"]
@@ -384,6 +395,6 @@ def _certainty(content: dict[str, Any], diagnosis: Diagnosis) -> list[str]:
 
 
 def _cell(value: float | None, share: bool) -> str:
-    if value is None:
+    if value is None or np.isnan(value):
         return "-"
     return f"{value:.1%}" if share else f"{value:.4g}"

@@ -22,7 +22,7 @@ from scara_ident.robot.description import JointDescription, RobotDescription, re
 from scara_ident.robot.examples import example_urdf, is_name
 from scara_ident.robot.mimic import Follower, coupled_ends, followers, lock_followers, refuse_coupled
 from scara_ident.robot.rotors import RotorGuess, guess_rotors
-from scara_ident.robot.signal_map import Channels, build_channels
+from scara_ident.robot.signal_map import Channels, build_channels, check_rated_torque
 from scara_ident.robot.transmissions import reductions, rotor_inertias
 from scara_ident.robot.urdf_validation import urdf_fault
 
@@ -199,6 +199,11 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
                 "measured at the motor or at the joint ('motor' or 'joint')"
             )
         side = "joint"
+    gain = np.array([joint.effort_gain for joint in joints])
+    effort_limit = _positive_or_inf(_upper(model, "Effort")[order])
+    at_drive = effort_limit / np.abs(reduction) if side == "motor" else effort_limit
+    recorded = None if description.recording is None else description.recording.effort
+    check_rated_torque(recorded, names, gain, at_drive, source)
     return Robot(
         name=full.name,
         urdf=urdf,
@@ -211,11 +216,11 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
         rotor_inertia=np.where(np.isnan(rotors), 0.0, rotors),
         rotor_stated=~np.isnan(rotors),
         effort_side=side,
-        effort_gain=np.array([joint.effort_gain for joint in joints]),
+        effort_gain=gain,
         lower=np.where(unbounded, -np.inf, _given(model.lowerPositionLimit[position])),
         upper=np.where(unbounded, np.inf, _given(model.upperPositionLimit[position])),
         velocity_limit=_positive_or_inf(_upper(model, "Velocity")[order]),
-        effort_limit=_positive_or_inf(_upper(model, "Effort")[order]),
+        effort_limit=effort_limit,
         locked=locked,
         channels=None
         if description.recording is None
