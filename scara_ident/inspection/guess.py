@@ -20,6 +20,9 @@ from scara_ident.robot.units import COUNT, DRIVE, TIME, Unit, find_unit, table_o
 CLOCKS = ("time", "__time", "timestamp", "t")
 """Names of clocks; where a file has several, the first of these is taken."""
 
+# Of a format in SI: when the state was measured, and when it was received.
+STATED_CLOCKS = ("time", "receive_time")
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -93,7 +96,11 @@ def guess(
         Whether the format is in SI by definition, so that no unit is to be guessed.
     """
     result = Guess()
-    _find_time(result, meanings, numbers)
+    if stated:
+        # By definition too; messages of several joints may share a stamp.
+        result.time = next((name for name in STATED_CLOCKS if name in numbers), None)
+    else:
+        _find_time(result, meanings, numbers)
     size = len(numbers[result.time]) if result.time else max((len(v) for v in numbers.values()), default=0)
     usable = {
         name: said for name, said in meanings.items() if name in numbers and len(numbers[name]) == size and size > 1
@@ -143,6 +150,14 @@ def _find_time(result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping[
         if name in others:
             result.notes.append(f"{name!r} is taken for the time because it grows evenly")
         return
+    for name in named:
+        step = np.diff(numbers[name][np.isfinite(numbers[name])])
+        if len(step) and np.all(step >= 0) and np.any(step > 0):
+            still = float(np.mean(step == 0))
+            result.problems.append(
+                f"{name!r} stands still in {still:.0%} of the rows: the clock is too coarse; record time with more digits"
+            )
+            return
     result.problems.append("no time found: name its column and unit under recording: time")
 
 
@@ -259,8 +274,8 @@ def _find_units(
         readings |= dict.fromkeys(group, reading)
         if reading.unit == COUNT:
             continue
-        factor = _factors(robot, group, "position", reading)
-        slope |= dict(zip(group, slopes(time, values * factor[:, None])[0], strict=True))
+        moved = values * _factors(robot, group, "position", reading)[:, None]
+        slope |= dict(zip(group, slopes(time, moved if linear else np.unwrap(moved, axis=1))[0], strict=True))
     sides = {reading.side for reading in readings.values()}
     if len(sides) > 1:
         result.problems.append("some positions fit the motor's side of the gear and some the joint's: state position")

@@ -143,15 +143,18 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
     import polars as pl
 
     header = _csv_header(path)
-    has_header = not _is_data(header)
-    # Polars gives columns without names those that `column_names` lists.
-    raw = {name: name for name in names} if not has_header else {n.strip(): n for n in header if n.strip() in names}
     separator = _separator(path)
     decimal_comma = separator == ";" and _has_decimal_comma(path)
+    if _is_data(header):
+        frame = pl.read_csv(
+            path, has_header=False, infer_schema=False, separator=separator, null_values=MISSING, glob=False
+        )
+        frame.columns = [f"column_{k + 1}" for k in range(frame.width)]
+        return _points(frame.select(names), decimal_comma=decimal_comma)
+    raw = {name.strip(): name for name in header if name.strip() in names}
     try:
         frame = pl.read_csv(
             path,
-            has_header=has_header,
             columns=list(raw.values()),
             schema_overrides={name: pl.Float64 for name in raw.values()},
             separator=separator,
@@ -163,17 +166,16 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
         # Something is not a number: read the words themselves, so that it can be named.
         _refuse_long_rows(path, separator)
         frame = pl.read_csv(
-            path,
-            has_header=has_header,
-            columns=list(raw.values()),
-            infer_schema=False,
-            separator=separator,
-            null_values=MISSING,
-            glob=False,
+            path, columns=list(raw.values()), infer_schema=False, separator=separator, null_values=MISSING, glob=False
         )
-        if decimal_comma:
-            frame = frame.with_columns(pl.all().str.replace(",", ".", literal=True))
+        frame = _points(frame, decimal_comma=decimal_comma)
     return frame.rename({file_name: name for name, file_name in raw.items()})
+
+
+def _points(frame: pl.DataFrame, *, decimal_comma: bool) -> pl.DataFrame:
+    import polars as pl
+
+    return frame.with_columns(pl.all().str.replace(",", ".", literal=True)) if decimal_comma else frame
 
 
 def _numbers(path: Path, series: pl.Series) -> Array:
