@@ -13,6 +13,9 @@ from scara_ident.errors import UsageError
 from scara_ident.robot.description import RobotDescription
 from scara_ident.robot.robot import Robot, build_robot
 
+# rad or m by which a joint that is to be locked may move before it is said.
+MOST_TRAVEL = 0.01
+
 
 def arm_of(urdf: Path, pattern: str | None = None) -> Robot:
     """Return the arm of a URDF: its joints but for coupled ends (see `scara_ident.robot.mimic`), or those of a pattern.
@@ -102,6 +105,11 @@ def with_locked(
             notes.append(f"{', '.join(robot.joints[k] for k in group)}: {why}: taken as locked")
     kept = [k for k in joints if k not in (*idle, *beside)]
     left = [robot.joints[k] for k in range(robot.n) if k not in kept]
+    for name, _ in robot.locked:
+        values = _positions(name, numbers)
+        travel = float(np.ptp(values)) if len(values) else 0.0
+        if travel > MOST_TRAVEL:
+            notes.append(f"{name}: moves by {travel:.2g} in the file, and is taken as locked")
     locked = {name: _place(name, numbers) for name in (*left, *(name for name, _ in robot.locked))}
     return kept, locked, notes
 
@@ -137,6 +145,10 @@ def _parents(robot: Robot) -> Sequence[int | None]:
 
 def _place(joint: str, numbers: Mapping[str, Array]) -> float | None:
     """Return where a locked joint stood, from a column that is in SI by its name."""
-    values = numbers.get(f"{joint}.position", np.zeros(0))
-    values = values[np.isfinite(values)]
+    values = _positions(joint, numbers)
     return float(np.median(values)) if len(values) else None
+
+
+def _positions(joint: str, numbers: Mapping[str, Array]) -> Array:
+    values = numbers.get(f"{joint}.position", np.zeros(0))
+    return np.asarray(values[np.isfinite(values)])

@@ -315,8 +315,8 @@ LOGS = (
     Log("a joint that turns on and on", parquet(ENDLESS), endless, made=ENDLESS),
     Log("that joint within one turn", parquet(ENDLESS | {"j3.position": np.mod(ENDLESS["j3.position"], 2 * np.pi)}), endless, made=ENDLESS, note="unwrapped"),
     Log("a joint without channels", parquet(without(MADE, "j3.position", "j3.effort")), joints=("j1", "j2"), note="no channels for j3: taken as locked"),
-    Log("joints by a pattern", parquet(MADE), pattern="j[13]", joints=("j1", "j3")),
-    Log("a pattern of no joint", parquet(MADE), pattern="arm_.*", refused="it has j1, j2, j3|has j1, j2, j3"),
+    Log("joints by a pattern", parquet(MADE), pattern="j[13]", joints=("j1", "j3"), note="j2: moves by 1 in the file"),
+    Log("a pattern of no joint", parquet(MADE), pattern="arm_.*", refused="has j1, j2, j3"),
     Log("a joint that follows itself", parquet(MADE), follows_itself, refused="name the joint that drives it"),
     # Messages.
     Log("names in another order", bag(MADE, ARM[::-1])),
