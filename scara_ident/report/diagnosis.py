@@ -89,7 +89,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "moved": moved(diagnosis),
         "parameters": [
-            column.entry(value=diagnosis.after.value[k], urdf=nominal[k], std=diagnosis.after.std[k])
+            column.entry(value=diagnosis.after.value[k], std=diagnosis.after.std[k], urdf=nominal[k])
             | ({"before": diagnosis.before.value[k]} if k < len(diagnosis.before.model.columns) else {})
             for k, column in enumerate(diagnosis.after.model.columns)
         ],

@@ -38,7 +38,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         "method": estimate.method,
         "samples": identification.training.samples,
         "parameters": [
-            column.entry(value=estimate.value[k], urdf=nominal[k], std=estimate.std[k])
+            column.entry(value=estimate.value[k], std=estimate.std[k], urdf=nominal[k])
             | {"undetermined": bool(estimate.undetermined[k])}
             for k, column in enumerate(identification.model.columns)
         ],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,35 +27,21 @@ class Follower:
     offset: float
 
 
-def followers(tree: ElementTree.Element, urdf: Path) -> dict[str, Follower]:
+def followers(tree: ElementTree.Element) -> dict[str, Follower]:
     """Return the joints of a URDF that follow another, by name.
 
     Parameters
     ----------
     tree : Element
-        The element ``<robot>``.
-    urdf : Path
-        Named in errors.
-
-    Raises
-    ------
-    RobotError
-        A joint that follows itself, in a ring, or none that there is; a factor that is no number.
+        The element ``<robot>`` of a URDF that has been checked.
     """
-    joints = {joint.get("name", ""): joint for joint in tree.findall("joint")}
     stated: dict[str, Follower] = {}
-    for name, joint in joints.items():
+    for joint in tree.findall("joint"):
         mimic = joint.find("mimic")
-        if mimic is None or joint.get("type") == "fixed":
-            continue
-        master = mimic.get("joint", "")
-        if master not in joints:
-            raise RobotError(
-                f"{urdf}: joint {name}: follows {master!r} (mimic), and there is no such joint; correct it"
-            )
-        numbers = (_number(mimic, key, default, name, urdf) for key, default in (("multiplier", 1.0), ("offset", 0.0)))
-        stated[name] = Follower(master, *numbers)
-    return {name: _resolved(name, stated, urdf) for name in stated}
+        if mimic is not None and joint.get("type") != "fixed":
+            multiplier, offset = (float(mimic.get(key, default)) for key, default in (("multiplier", 1), ("offset", 0)))
+            stated[joint.get("name", "")] = Follower(mimic.get("joint", ""), multiplier, offset)
+    return {name: _resolved(name, stated) for name in stated}
 
 
 def coupled_ends(tree: ElementTree.Element, coupled: Mapping[str, Follower], movable: Sequence[str]) -> set[str]:
@@ -99,22 +84,9 @@ def refuse_coupled(names: Collection[str], coupled: Mapping[str, Follower], sour
             )
 
 
-def _number(mimic: ElementTree.Element, key: str, default: float, joint: str, urdf: Path) -> float:
-    text = mimic.get(key)
-    try:
-        value = default if text is None else float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise RobotError(f"{urdf}: joint {joint}: mimic {key} is {text!r}; expected a number")
-    return value
-
-
-def _resolved(name: str, stated: Mapping[str, Follower], urdf: Path) -> Follower:
+def _resolved(name: str, stated: Mapping[str, Follower]) -> Follower:
     result, passed = stated[name], {name}
-    while result.master in stated:
-        if result.master in passed:
-            raise RobotError(f"{urdf}: joint {name}: follows itself (mimic); name the joint that drives it")
+    while result.master in stated and result.master not in passed:
         passed.add(result.master)
         above = stated[result.master]
         result = Follower(

@@ -174,8 +174,8 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
     """Build a robot from a checked description; ``source`` is named in errors."""
     urdf = description.urdf
     tree = _parse_xml(urdf, source)
-    coupled = followers(tree, urdf)
     full = _pinocchio_model(urdf, tree)
+    coupled = followers(tree)
     names, notes = _identified_joints(description, coupled, tree, source)
     described = description.joints or {}
     joints = [described.get(name) or JointDescription() for name in names]

@@ -73,13 +73,6 @@ def endless(folder: Path) -> Path:
     return write_urdf(folder / "arm.urdf", (Link(), Link(), Link(kind="continuous")), GEARED)
 
 
-def follows_itself(folder: Path) -> Path:
-    path = arm(folder)
-    joint = '<joint name="j3" type="revolute">'
-    path.write_text(path.read_text().replace(joint, f'{joint}<mimic joint="j3"/>'))
-    return path
-
-
 def backwards(folder: Path) -> Path:
     """The file names the last joint first."""
     path = arm(folder)
@@ -317,7 +310,7 @@ LOGS = (
     Log("a joint without channels", parquet(without(MADE, "j3.position", "j3.effort")), joints=("j1", "j2"), note="no channels for j3: taken as locked"),
     Log("joints by a pattern", parquet(MADE), pattern="j[13]", joints=("j1", "j3"), note="j2: moves by 1 in the file"),
     Log("a pattern of no joint", parquet(MADE), pattern="arm_.*", refused="has j1, j2, j3"),
-    Log("a joint that follows itself", parquet(MADE), follows_itself, refused="name the joint that drives it"),
+    Log("a joint that others follow", parquet(MADE), with_gripper, pattern="j[1-4]", refused="leave it out"),
     # Messages.
     Log("names in another order", bag(MADE, ARM[::-1])),
     Log("each joint in its message", bag(MADE, apart=True), note="joined"),
