@@ -113,8 +113,8 @@ def _joints(guess: Guess, robot: Robot) -> list[str]:
         if effort is not None and (unit is None or unit in DRIVE):
             entry += ", effort_gain: 1.0"
             force = "N" if robot.prismatic[k] else "N m"
-            what = f"{force} per {unit.removeprefix('m')}" if unit in ("A", "mA") else f"{force} per recorded unit"
-            comment = f"   # STATE effort_gain, {what}"
+            shares = {"A": "per A", "mA": "per A", "%": "at 100 %", "permille": "at 100 %"}
+            comment = f"   # STATE effort_gain, {force} {shares.get(unit or '', 'per recorded unit')}"
         rotor = _rotor(robot, k)
         if rotor:
             comment = f"{comment}; {rotor}" if comment else f"   # STATE {rotor}"

@@ -15,6 +15,8 @@ from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.position import Spring
 from scara_ident.estimation.run_variation import JointVariation, RunVariation
 from scara_ident.files import plain
+from scara_ident.model.model import build_model
+from scara_ident.model.urdf_values import urdf_values
 from scara_ident.report.diagnosis import best_by_label, diagnosis_dict, diagnosis_markdown, sentences
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, with_torque
@@ -162,6 +164,10 @@ def test_a_remainder_is_told_with_joint_signal_and_size():
     assert content["verdict"] == "unexplained"
     assert set(content["unexplained"]) == {"joint", "signals", "rms", "explained_share"}
     assert "depends on position of joint2" in content["summary"][-2]
+    assert content["summary"][-1].startswith("No recording tells a scale common to all torques and masses")
+    assert set(content["urdf_scale"]) <= {"joint1", "joint2"}
+    stated = {row["name"]: row["urdf"] for row in content["parameters"]}
+    assert stated["P_d1"] == pytest.approx(urdf_values(build_model(load_robot()))[0])
 
 
 def test_a_straight_friction_law_that_leaves_a_curve_is_told_what_to_try():
