@@ -21,7 +21,14 @@ if TYPE_CHECKING:
     from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
     from scara_ident.effects.catalogue import available_effects, effects_named
     from scara_ident.effects.effect import Effect
-    from scara_ident.errors import EstimationError, RecordingError, RobotError, ScaraIdentError, UsageError
+    from scara_ident.errors import (
+        ArgumentError,
+        EstimationError,
+        RecordingError,
+        RobotError,
+        ScaraIdentError,
+        UsageError,
+    )
     from scara_ident.estimation.consistent.estimator import ConsistentEstimate, consistent
     from scara_ident.estimation.consistent.options import ConsistentOptions
     from scara_ident.estimation.estimate import Estimate
@@ -43,6 +50,7 @@ if TYPE_CHECKING:
     from scara_ident.motion.motion import Motion, motion_of, stretches
     from scara_ident.motion.prepared import PreparedData, prepare
     from scara_ident.recording.recording import Recording, read_recording, read_recordings, write_recording
+    from scara_ident.recording.tables import read_arrays, read_frame
     from scara_ident.robot.robot import Robot, load_robot
     from scara_ident.simulation.arm import VirtualArm
     from scara_ident.simulation.defaults import virtual_arm
@@ -56,9 +64,10 @@ __version__ = "0.2.0"
 logging.getLogger("scara_ident").addHandler(logging.NullHandler())
 
 _NAMES = {
-    "errors": ("ScaraIdentError", "RecordingError", "RobotError", "UsageError", "EstimationError"),
+    "errors": ("ScaraIdentError", "RecordingError", "RobotError", "UsageError", "ArgumentError", "EstimationError"),
     "robot.robot": ("Robot", "load_robot"),
     "recording.recording": ("Recording", "read_recording", "read_recordings", "write_recording"),
+    "recording.tables": ("read_arrays", "read_frame"),
     "motion.motion": ("Motion", "motion_of", "stretches"),
     "motion.prepared": ("PreparedData", "prepare"),
     "model.base_parameters": ("BaseParameters", "check_base_parameters", "find_base_parameters"),

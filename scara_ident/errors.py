@@ -13,6 +13,10 @@ class UsageError(ScaraIdentError):
     exit_status = 2
 
 
+class ArgumentError(UsageError, TypeError):
+    """A function was given something of another kind than it takes."""
+
+
 class RobotError(ScaraIdentError):
     """A robot description that cannot be used."""
 

@@ -52,7 +52,8 @@ def diagnose(
     from scara_ident.effects import effects_named
     from scara_ident.files import write_json, write_text, written_together
     from scara_ident.recording.recording import read_usable
-    from scara_ident.report.diagnosis import diagnosis_dict, diagnosis_markdown
+    from scara_ident.report.diagnosis import diagnosis_dict
+    from scara_ident.report.diagnosis_markdown import diagnosis_markdown
     from scara_ident.report.told.diagnosis import tables
     from scara_ident.robot.robot import load_robot
 

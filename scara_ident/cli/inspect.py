@@ -32,6 +32,12 @@ def inspect(
     robot: Annotated[
         Path | None, typer.Option("--robot", metavar="FILE", help="robot.yaml, to check its mapping on this file.")
     ] = None,
+    joints: Annotated[
+        str | None,
+        typer.Option(
+            "--joints", metavar="PATTERN", help="Joints of the URDF to identify: a regular expression such as 'arm_.*'."
+        ),
+    ] = None,
     output: options.Output = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -48,7 +54,7 @@ def inspect(
     check_output(output)
     with progress() as work:
         work("reading the file")
-        found = inspect_file(file, urdf=urdf, robot=robot, folder=output or ".")
+        found = inspect_file(file, urdf=urdf, robot=robot, joints=joints, folder=output or ".")
     if target is not None and found.description is not None:
         write_text(target, found.description)
     if json:

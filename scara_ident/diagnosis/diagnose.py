@@ -31,6 +31,7 @@ from scara_ident.errors import RecordingError, UsageError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import robust_fit
+from scara_ident.identification.arguments import Recordings, model_of, recordings_of
 from scara_ident.identification.channel_check import channel_faults
 from scara_ident.identification.clock_check import clock_drift
 from scara_ident.identification.events import Event, find_events, same_events, without_events
@@ -38,9 +39,8 @@ from scara_ident.identification.identify import check_bands, check_held_out
 from scara_ident.identification.recording_check import held_out_events, without_stretches
 from scara_ident.identification.usable import check_rows, usable_in_bands, with_rows
 from scara_ident.manners import Saved
-from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.model.model import TorqueModel
 from scara_ident.progress import Tell, Work, log_notes, silent
-from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 from scara_ident.threads import one_blas_thread
 
@@ -143,10 +143,10 @@ class Diagnosis(Saved, told_by="diagnosis"):
 @one_blas_thread()
 def diagnose(
     robot: Robot,
-    recordings: Sequence[Recording],
+    recordings: Recordings,
     *,
     model: str | TorqueModel = "complete",
-    validation: Sequence[Recording] = (),
+    validation: Recordings = (),
     unloaded: Sequence[str] = (),
     bands: Sequence[float | None] | None = None,
     catalogue: Sequence[Effect] | None = None,
@@ -158,11 +158,11 @@ def diagnose(
     Parameters
     ----------
     robot : Robot
-    recordings : sequence of Recording
+    recordings : sequence of Recording, or of path
         Every choice is made on these.
     model : str or TorqueModel, optional
         The base model, as in `identify`.
-    validation : sequence of Recording, optional
+    validation : sequence of Recording, or of path, optional
         Recordings that no choice sees; they are only predicted, before and after. Where an effect was found that acts in
         some recordings only, the first third of each tells whether it acts there, and errors are of the rest.
     unloaded : sequence of str, optional
@@ -203,6 +203,7 @@ def diagnose(
     ()
     """
     work = Work(progress)
+    recordings, validation = recordings_of(recordings, robot), recordings_of(validation, robot, "validation")
     check_held_out(recordings, validation)
     strange = sorted({*unloaded} - {item.name for item in recordings})
     if strange:
@@ -211,7 +212,7 @@ def diagnose(
         )
     if bands is not None:
         check_bands(robot, bands, (*recordings, *validation))
-    base = build_model(robot, model) if isinstance(model, str) else model
+    base = model_of(model, robot)
     given = bands is not None
     if not given:
         work("choosing the band")
@@ -221,6 +222,7 @@ def diagnose(
     faults = channel_faults(observations)
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))
+    notes[:0] = robot.notes
     known = frozenset(unloaded)
     families = tuple(item.knowing(known) for item in (available_effects() if catalogue is None else catalogue))
     task = SearchTask(base, families, criteria, searching(work, band_given=given))

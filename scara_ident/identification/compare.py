@@ -13,13 +13,13 @@ from scara_ident.errors import RecordingError, UsageError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.estimate import paper_criteria
 from scara_ident.estimation.observations import Observations, observe
+from scara_ident.identification.arguments import Recordings, model_of, recordings_of
 from scara_ident.identification.identify import check_bands, estimate_by
 from scara_ident.identification.usable import check_rows, usable_in_bands
 from scara_ident.manners import Saved
-from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.model.model import TorqueModel
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.progress import Tell, log_notes, silent
-from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 
 _LOG = logging.getLogger(__name__)
@@ -89,7 +89,7 @@ class Comparison(Saved, told_by="comparison"):
 
 def compare(
     robot: Robot,
-    recordings: Sequence[Recording],
+    recordings: Recordings,
     *,
     model: str | TorqueModel = "complete",
     method: str = "wls",
@@ -101,7 +101,7 @@ def compare(
     Parameters
     ----------
     robot : Robot
-    recordings : sequence of Recording
+    recordings : sequence of Recording, or of path
         Repetitions of at least two trajectories.
     model, method, bands, progress
         As in `identify`; the bands are chosen from all recordings together.
@@ -126,7 +126,8 @@ def compare(
     >>> compare(robot, [simulate(virtual_arm(robot), motion, rate=250.0).recording for motion in motions])
     Comparison(scara03, complete by wls: OJK, OJD)
     """
-    equation = build_model(robot, model) if isinstance(model, str) else model
+    recordings = recordings_of(recordings, robot)
+    equation = model_of(model, robot)
     if bands is not None:
         check_bands(robot, bands, recordings)
     else:

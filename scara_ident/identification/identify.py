@@ -23,13 +23,14 @@ from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import disagreement, robust_fit
 from scara_ident.files import real_path
 from scara_ident.identification import ESTIMATORS
+from scara_ident.identification.arguments import Recordings, model_of, recordings_of
 from scara_ident.identification.channel_check import channel_faults, refuse_exchanged
 from scara_ident.identification.clock_check import clock_drift
 from scara_ident.identification.events import Event, find_events, without_events
 from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
 from scara_ident.manners import Saved
-from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.model.model import TorqueModel
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.progress import Tell, log_notes, silent
 from scara_ident.recording.recording import Recording
@@ -118,11 +119,11 @@ class Identification(Saved, told_by="identification"):
 
 def identify(
     robot: Robot,
-    recordings: Sequence[Recording],
+    recordings: Recordings,
     *,
     model: str | TorqueModel = "complete",
     method: str = "wls",
-    validation: Sequence[Recording] = (),
+    validation: Recordings = (),
     bands: Sequence[float | None] | None = None,
     options: ConsistentOptions | None = None,
     progress: Tell = silent,
@@ -132,14 +133,14 @@ def identify(
     Parameters
     ----------
     robot : Robot
-    recordings : sequence of Recording
-        The recordings to fit.
+    recordings : sequence of Recording, or of path
+        The recordings to fit, or files or folders of them.
     model : str or TorqueModel, optional
         A name of `scara_ident.model.MODELS`: ``complete``, ``reduced``, ``basic`` or an installed package's.
     method : str, optional
         A name of `scara_ident.identification.ESTIMATORS`: ``wls`` (each joint weighted by its residual), ``ols`` (every
         row counts the same, as in Indri et al. 2002), ``rls``, ``consistent`` or an installed package's.
-    validation : sequence of Recording, optional
+    validation : sequence of Recording, or of path, optional
         Recordings that take no part in the fit nor in any choice.
     bands : sequence of float or None, one per joint, optional
         Low-pass on both sides of each joint's equation, Hz; chosen from the recordings by default.
@@ -156,7 +157,7 @@ def identify(
     ------
     UsageError
         If there are no recordings, the model or the method is unknown, a recording is both fitted and held out, or a band is no
-        frequency that the slowest recording carries.
+        frequency that the slowest recording carries; an `ArgumentError` where something of another kind is given.
     RecordingError
         If none of the recordings to fit can be used, or they have fewer rows than the model has parameters, or two joints are
         exchanged (see `channel_faults`). One of several that cannot be used, or one that is held out, is left out with a note.
@@ -174,11 +175,12 @@ def identify(
     >>> result.to_frame().columns[:4]
     ['name', 'joint', 'value', 'std']
     """
+    recordings, validation = recordings_of(recordings, robot), recordings_of(validation, robot, "validation")
     if not recordings:
         raise UsageError("no recordings to identify from")
     ESTIMATORS.get(method)  # a package that cannot be loaded is named before the work, not after it
     check_held_out(recordings, validation)
-    equation = build_model(robot, model) if isinstance(model, str) else model
+    equation = model_of(model, robot)
     if bands is not None:
         check_bands(robot, bands, (*recordings, *validation))
     if bands is None:
@@ -189,6 +191,7 @@ def identify(
     check_rows(training)
     faults = channel_faults(training)
     refuse_exchanged(faults)
+    notes[:0] = robot.notes
     notes += [str(fault) for fault in faults]
     progress("looking for events", 0.6)
     # With a wrong sign or exchanged joints nothing is explained anywhere.

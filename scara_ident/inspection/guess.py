@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.inspection.chain import is_still, numbered_joints, with_locked
 from scara_ident.inspection.names import CURRENT, TORQUE, Meaning, meaning
 from scara_ident.inspection.values import Reading, position_readings, slopes, time_unit, velocity_reading
+from scara_ident.recording.one_clock import on_one_clock
 from scara_ident.robot.robot import Robot
 from scara_ident.robot.units import COUNT, DRIVE, TIME, Unit, find_unit, table_of
 
 CLOCKS = ("time", "__time", "timestamp", "t")
 """Names of clocks; where a file has several, the first of these is taken."""
+
+# Of a format in SI: when the state was measured, and when it was received.
+STATED_CLOCKS = ("time", "receive_time")
 
 
 @dataclass(frozen=True)
@@ -46,12 +52,24 @@ class Signal:
 
 @dataclass
 class Guess:
-    """What a file seems to hold of an arm; ``problems`` keep it from being read, ``notes`` do not."""
+    """What a file seems to hold of an arm; ``problems`` keep it from being read, ``notes`` do not.
+
+    Attributes
+    ----------
+    time, time_unit : str
+    signals : dict of str to Signal
+    joints : list of int
+        Those of the URDF that can be identified from the file.
+    locked : dict of str to float or None
+        The others, and where they stood, rad or m; None where the file does not say it.
+    notes, problems : list of str
+    """
 
     time: str | None = None
     time_unit: str = "s"
     signals: dict[str, Signal] = field(default_factory=dict)
     joints: list[int] = field(default_factory=list)
+    locked: dict[str, float | None] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
 
@@ -61,28 +79,38 @@ class Guess:
         return not self.problems
 
 
-def guess(meanings: Mapping[str, Meaning], numbers: Mapping[str, Array], robot: Robot) -> Guess:
+def guess(
+    meanings: Mapping[str, Meaning], numbers: Mapping[str, Array], robot: Robot, *, stated: bool = False
+) -> Guess:
     """Guess the channels of an arm.
 
     Parameters
     ----------
     meanings : mapping of str to Meaning
-        Every column and what its name says.
+        Every column and what its name says. Indices beyond the arm's joints are those of joints that it has locked.
     numbers : mapping of str to ndarray
         Columns that hold numbers.
     robot : Robot
-        All joints of the URDF.
+        The joints that may be identified.
+    stated : bool
+        Whether the format is in SI by definition, so that no unit is to be guessed.
     """
     result = Guess()
-    _find_time(result, meanings, numbers)
+    if stated:
+        # By definition too; messages of several joints may share a stamp.
+        result.time = next((name for name in STATED_CLOCKS if name in numbers), None)
+    else:
+        _find_time(result, meanings, numbers)
     size = len(numbers[result.time]) if result.time else max((len(v) for v in numbers.values()), default=0)
     usable = {
         name: said for name, said in meanings.items() if name in numbers and len(numbers[name]) == size and size > 1
     }
+    beside = ""
     for quantity in ("position", "effort", "velocity", "temperature"):
-        signal = _find_signal(result, quantity, usable, numbers, robot)
+        signal = _find_signal(result, quantity, usable, numbers, robot, beside)
         if signal is not None:
             result.signals[quantity] = signal
+            beside = beside or signal.template
     position, effort = result.signals.get("position"), result.signals.get("effort")
     if position is None:
         result.problems.append("no positions found: name their columns under recording: position")
@@ -90,13 +118,20 @@ def guess(meanings: Mapping[str, Meaning], numbers: Mapping[str, Array], robot: 
     result.joints = [k for k in range(robot.n) if k in position.columns and (effort is None or k in effort.columns)]
     if effort is None:
         result.notes.append("no efforts found: the file cannot be identified from")
-    lacking = [robot.joints[k] for k in range(robot.n) if k not in result.joints]
     if not result.joints:
         result.problems.append("no joint has both a position and an effort")
-    elif lacking:
-        result.notes.append(f"no channels for {', '.join(lacking)}: taken as locked")
+        return result
+    efforts = {} if effort is None else effort.columns
+    result.joints, result.locked, notes = with_locked(result.joints, position.columns, efforts, numbers, robot)
+    result.notes += notes
+    if not result.joints:
+        result.problems.append("every effort is constant: record the efforts, or name their columns")
     if result.time is not None and result.joints:
-        _find_units(result, meanings, numbers, robot)
+        columns = [
+            signal.columns[k] for signal in result.signals.values() for k in result.joints if k in signal.columns
+        ]
+        merged, _ = on_one_clock({name: numbers[name] for name in (result.time, *columns)}, result.time, columns)
+        _find_units(result, meanings, merged, robot, stated=stated)
     return result
 
 
@@ -115,28 +150,39 @@ def _find_time(result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping[
         if name in others:
             result.notes.append(f"{name!r} is taken for the time because it grows evenly")
         return
+    for name in named:
+        step = np.diff(numbers[name][np.isfinite(numbers[name])])
+        if len(step) and np.all(step >= 0) and np.any(step > 0):
+            still = float(np.mean(step == 0))
+            result.problems.append(
+                f"{name!r} stands still in {still:.0%} of the rows: the clock is too coarse; record time with more digits"
+            )
+            return
     result.problems.append("no time found: name its column and unit under recording: time")
 
 
 def _find_signal(
-    result: Guess, quantity: str, meanings: Mapping[str, Meaning], numbers: Mapping[str, Array], robot: Robot
-) -> Signal | None:
+    result: Guess, quantity: str, meanings: Mapping[str, Meaning], numbers: Mapping[str, Array], robot: Robot,
+    beside: str,
+) -> Signal | None:  # fmt: skip
     found: list[tuple[tuple[object, ...], Signal, str]] = []
     short: list[str] = []
-    for order, (template, by_name, members) in enumerate(_groups(quantity, meanings)):
+    for order, (template, by_name, members) in enumerate(_groups(quantity, meanings, robot.n)):
         signal, note = _of_group(quantity, template, by_name, members, robot)
         if signal is None:
             short.append(note)
             continue
         said = meanings[next(iter(signal.columns.values()))]
-        still = all(_is_still(numbers[column]) for column in signal.columns.values())
+        moving = sum(not is_still(numbers[column]) for column in signal.columns.values())
         rank = (
             said.commanded,
-            still,
+            -moving,
             -len(signal.columns),
             not by_name,
             not said.measured,
             not said.words & TORQUE,
+            # Channels of one source begin alike.
+            -sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(template, beside, strict=False))),
             order,
         )
         found.append((rank, signal, note))
@@ -151,12 +197,15 @@ def _find_signal(
     others = [signal.template for _, signal, _ in found[1:] if not taken & set(signal.columns.values())]
     if others:
         result.notes.append(f"{quantity}: {best.template} taken, not {', '.join(others[:3])}")
+    still = [robot.joints[k] for k, column in best.columns.items() if is_still(numbers[column])]
+    if 0 < len(still) < len(best.columns):
+        result.notes.append(f"{quantity}: constant for {', '.join(still)}; check its columns")
     if first[0]:
         result.notes.append(f"{quantity}: {best.template} is by its name a command, not a measurement")
     return best
 
 
-def _groups(quantity: str, meanings: Mapping[str, Meaning]) -> list[tuple[str, bool, dict[int, str]]]:
+def _groups(quantity: str, meanings: Mapping[str, Meaning], joints: int) -> list[tuple[str, bool, dict[int, str]]]:
     """List the columns that may be one signal: their template, whether joints are told by name, and the columns.
 
     What is told by name is told by number too: where columns count J0, J1 and joints j1, j2, names mislead.
@@ -164,7 +213,7 @@ def _groups(quantity: str, meanings: Mapping[str, Meaning]) -> list[tuple[str, b
     named: dict[str, dict[int, str]] = {}
     numbered: dict[str, dict[int, str]] = {}
     for name, said in meanings.items():
-        if said.quantity != quantity:
+        if said.quantity != quantity or (said.joint is not None and said.joint >= joints):
             continue
         if said.joint is not None:
             named.setdefault(said.template, {})[said.joint] = name
@@ -185,18 +234,24 @@ def _of_group(
         return Signal(quantity, dict(sorted(members.items())), template, None), ""
     numbered = sorted(members)
     first = numbered[0]
-    if len(numbered) < robot.n or numbered != list(range(first, first + len(numbered))):
-        said = f"{quantity}: {template} has {len(numbered)} channels for {robot.n} joints: not used without a mapping"
+    joints = None if numbered != list(range(first, first + len(numbered))) else numbered_joints(robot, len(numbered))
+    if joints is None:
+        said = (
+            f"{quantity}: {template} has {len(numbered)} channels for {robot.n} joints: not used without a mapping; name "
+            "the joints that it has, in --joints"
+        )
         return None, said
     note = ""
     if len(numbered) > robot.n:
         note = f"{quantity}: {template} has {len(numbered)} channels; the first {robot.n} taken, in the joints' order"
     elif robot.n > 1:
         note = f"{quantity}: {template} matched to the joints by order; check it"
-    return Signal(quantity, {k: members[first + k] for k in range(robot.n)}, template, first), note
+    return Signal(quantity, {k: members[first + place] for place, k in enumerate(joints)}, template, first), note
 
 
-def _find_units(result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping[str, Array], robot: Robot) -> None:
+def _find_units(
+    result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping[str, Array], robot: Robot, *, stated: bool
+) -> None:
     assert result.time is not None
     time = TIME[result.time_unit].factor * numbers[result.time]
     position = result.signals["position"]
@@ -214,19 +269,26 @@ def _find_units(result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping
         if not group:
             continue
         values = np.array([numbers[position.columns[k]][good] for k in group])
-        said = [meanings[position.columns[k]].unit for k in group]
+        said = [_si(robot, "position", k) if stated else meanings[position.columns[k]].unit for k in group]
         reading = _position_reading(result, robot, group, time, values, said)
         readings |= dict.fromkeys(group, reading)
         if reading.unit == COUNT:
             continue
-        factor = _factors(robot, group, "position", reading)
-        slope |= dict(zip(group, slopes(time, values * factor[:, None])[0], strict=True))
+        moved = values * _factors(robot, group, "position", reading)[:, None]
+        slope |= dict(zip(group, slopes(time, moved if linear else np.unwrap(moved, axis=1))[0], strict=True))
     sides = {reading.side for reading in readings.values()}
     if len(sides) > 1:
         result.problems.append("some positions fit the motor's side of the gear and some the joint's: state position")
     result.signals["position"] = _with(position, {k: r.unit for k, r in readings.items()}, sides.pop())
     _find_velocity_unit(result, numbers, robot, slope, good, time)
-    _find_effort_unit(result, meanings, robot)
+    if stated and (effort := result.signals.get("effort")) is not None:
+        result.signals["effort"] = _with(effort, {k: _si(robot, "effort", k) for k in result.joints}, "joint")
+    else:
+        _find_effort_unit(result, meanings, robot)
+
+
+def _si(robot: Robot, quantity: str, joint: int) -> str:
+    return next(iter(table_of(quantity, linear=bool(robot.prismatic[joint]))))
 
 
 def _position_reading(
@@ -310,11 +372,6 @@ def _factors(robot: Robot, group: Sequence[int], quantity: str, reading: Reading
     unit = table_of(quantity, linear=linear).get(reading.unit)
     factor = 1.0 if unit is None else unit.factor
     return np.array([factor / (robot.reduction[k] if motor else 1.0) for k in group])
-
-
-def _is_still(values: Array) -> bool:
-    finite = values[np.isfinite(values)]
-    return not len(finite) or bool(np.ptp(finite) == 0.0)
 
 
 def _with(signal: Signal, units: Mapping[int, str], side: str) -> Signal:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,14 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.errors import MemoryLimit, RecordingError, UsageError
 from scara_ident.files import path_fault
+from scara_ident.inspection.chain import arm_of, longest_chain
 from scara_ident.inspection.guess import Guess, guess
 from scara_ident.inspection.names import Meaning, meaning
 from scara_ident.inspection.text import description_text, mapping
+from scara_ident.inspection.unnamed import meanings_by_place
 from scara_ident.recording.files import column_names, is_bag_folder, read_columns
 from scara_ident.recording.recording import Recording, read_recording
-from scara_ident.robot.description import RobotDescription, check_description
+from scara_ident.robot.description import check_description
 from scara_ident.robot.robot import Robot, build_robot, load_robot
 from scara_ident.robot.signal_map import SIGNALS, contract_channels
 
@@ -91,7 +93,12 @@ class Inspection:
 
 
 def inspect_file(
-    path: Path | str, *, urdf: Path | str | None = None, robot: Path | str | None = None, folder: Path | str = "."
+    path: Path | str,
+    *,
+    urdf: Path | str | None = None,
+    robot: Path | str | None = None,
+    joints: str | None = None,
+    folder: Path | str = ".",
 ) -> Inspection:
     """Look into a file, guess which columns are an arm's channels, and audit it.
 
@@ -103,6 +110,8 @@ def inspect_file(
         The arm; without it columns are told by their names alone.
     robot : path, optional
         A robot description, whose mapping is then used instead of a guess.
+    joints : str, optional
+        Regular expression of the URDF's joints to identify; by default all but coupled ends such as a gripper's fingers.
     folder : path
         Where the description will stand: its ``urdf`` is relative to it.
 
@@ -111,30 +120,38 @@ def inspect_file(
     RecordingError, RobotError
         In one line: the file or URDF cannot be read at all.
     UsageError
-        Both `urdf` and `robot`, or no such file.
+        Both `urdf` and `robot`, `joints` without `urdf` or of no joint, or no such file.
     """
     path = Path(path)
     if urdf is not None and robot is not None:
         raise UsageError("--urdf and --robot: give one; a robot description names its URDF")
     if (fault := path_fault(path)) is not None:
         raise UsageError(fault)
+    if joints is not None and urdf is None:
+        raise UsageError("--joints: says which joints of a URDF to identify; give --urdf")
     if not path.exists():
         raise UsageError(f"{path}: no such file or folder")
     if path.is_dir() and not is_bag_folder(path):
         raise UsageError(f"{path}: is a folder; give one recording of it")
     if robot is not None:
         return _by_description(path, load_robot(robot))
-    arm = None if urdf is None else _whole_arm(Path(urdf))
+    arm = None if urdf is None else arm_of(Path(urdf), joints)
     topics = _topics(path)
     topic = _likely_topic(path, topics, arm)
     names = column_names(path, topic)
     numbers = _numbers(path, names, topic)
-    joints = () if arm is None else arm.joints
-    meanings = {name: meaning(name, joints) for name in names}
+    every = () if arm is None else (*arm.joints, *(name for name, _ in arm.locked))
+    meanings = {name: meaning(name, every) for name in names}
     if arm is None:
         columns = tuple(_column(name, numbers.get(name), *_by_name(name), False) for name in names)
         return Inspection(path, topics, topic, columns, {})
-    found = guess(meanings, numbers, arm)
+    by_place = {}
+    if all(re.fullmatch("column_[0-9]+", name) for name in names):
+        by_place = meanings_by_place(numbers, (arm.n, len(longest_chain(arm))))
+    found = guess(meanings | by_place, numbers, arm, stated=bool(topics))
+    found.notes[:0] = arm.notes
+    if by_place:
+        found.notes.append("no header: columns told by their places and slopes; check every one")
     described = mapping(found, arm)
     if len(topics) > 1 and topic is not None:
         described = {"topic": topic, **described}
@@ -148,7 +165,7 @@ def inspect_file(
         path=path,
         topics=topics,
         topic=topic,
-        columns=_guessed_columns(names, numbers, meanings, found, arm),
+        columns=_guessed_columns(names, numbers, meanings, found, every),
         mapping=described,
         notes=tuple(found.notes),
         problems=tuple(found.problems),
@@ -174,10 +191,6 @@ def _by_description(path: Path, robot: Robot) -> Inspection:
             columns.append(_column(name, numbers.get(name), *_by_name(name), False))
     recording, refusal = _read(path, robot)
     return Inspection(path, topics, channels.topic, tuple(columns), {}, recording=recording, refusal=refusal)
-
-
-def _whole_arm(urdf: Path) -> Robot:
-    return build_robot(RobotDescription(urdf=urdf.resolve(), effort_side="joint"), urdf)
 
 
 def _topics(path: Path) -> dict[str, int]:
@@ -229,7 +242,11 @@ def _by_name(name: str) -> tuple[str | None, str | None, str | None]:
 
 
 def _guessed_columns(
-    names: tuple[str, ...], numbers: Mapping[str, Array], meanings: Mapping[str, Meaning], found: Guess, arm: Robot
+    names: tuple[str, ...],
+    numbers: Mapping[str, Array],
+    meanings: Mapping[str, Meaning],
+    found: Guess,
+    joints: Sequence[str],
 ) -> tuple[Column, ...]:
     places: dict[str, tuple[str, str | None, str | None]] = {}
     if found.time is not None:
@@ -239,14 +256,14 @@ def _guessed_columns(
         for k in found.joints:
             if k in signal.columns:
                 unit = signal.units.get(k)
-                places[signal.columns[k]] = (quantity, arm.joints[k], None if unit is None else unit + side)
+                places[signal.columns[k]] = (quantity, joints[k], None if unit is None else unit + side)
     columns = []
     for name in names:
         if name in places:
             columns.append(_column(name, numbers.get(name), *places[name], True))
             continue
         said = meanings[name]
-        joint = None if said.joint is None else arm.joints[said.joint]
+        joint = None if said.joint is None else joints[said.joint]
         columns.append(_column(name, numbers.get(name), said.quantity, joint, said.unit, False))
     return tuple(columns)
 

@@ -3,33 +3,47 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from scara_ident.robot.units import find_unit, table_of
 
 QUANTITIES = {
-    "position": "position positions pos q jpos qpos angle angles ang theta encoder enc",
-    "velocity": "velocity velocities vel qd dq qdot qvel speed speeds omega",
-    "acceleration": "acceleration accelerations acc accel qdd ddq qddot",
-    "effort": "effort efforts torque torques trq tau current currents curr moment moments force forces",
-    "temperature": "temperature temperatures temp temps",
-    "time": "time times t timestamp timestamps stamp clock",
+    "position": "position positions pos q jpos qpos angle angles ang theta encoder enc winkel drehwinkel lage",
+    "velocity": "velocity velocities vel qd dq qdot qvel speed speeds omega geschwindigkeit winkelgeschwindigkeit drehzahl "
+    "vitesse vitesses",
+    "acceleration": "acceleration accelerations acc accel qdd ddq qddot beschleunigung winkelbeschleunigung",
+    "effort": "effort efforts torque torques trq tau current currents curr moment moments force forces drehmoment kraft "
+    "strom couple couples courant courants",
+    "temperature": "temperature temperatures temp temps temperatur",
+    "time": "time times t timestamp timestamps stamp clock date datetime zeit zeitstempel uhrzeit temps heure horodatage",
 }
-"""Words that loggers use for each quantity."""
+"""Words that loggers use for each quantity, in English, German and French, without accents."""
 
-_WORDS = {word: quantity for quantity, words in QUANTITIES.items() for word in words.split()}
+# The French word for time is also the plural of a short temperature; of the arm, not of a joint, it is the time.
+_BOTH = "temps"
+# What German puts before such words: is and shall, and whose.
+_PREFIXES = ("ist", "soll", "gelenk", "achsen", "achs", "motor")
+_WORDS = {word: quantity for quantity, words in QUANTITIES.items() for word in words.split()} | {_BOTH: "temperature"}
 COMMANDED = frozenset(
-    ["target", "desired", "des", "command", "commanded", "cmd", "ref", "reference", "setpoint", "goal", "planned"]
+    ["target", "desired", "des", "command", "commanded", "cmd", "ref", "reference", "setpoint", "goal", "planned",
+     "soll", "sollwert", "vorgabe", "consigne", "commande", "cible"]
+)  # fmt: skip
+MEASURED = frozenset(
+    ["actual", "act", "measured", "meas", "feedback", "fb", "sensor", "ist", "gemessen", "mesure", "mesuree", "reel"]
 )
-MEASURED = frozenset(["actual", "measured", "meas", "feedback", "fb", "sensor"])
 # Of such columns no channel of a joint is made.
 OTHER = frozenset(
-    ["error", "err", "std", "min", "max", "limit", "limits", "tcp", "tool", "cartesian", "pose", "gripper", "imu"]
-)
-GENERIC = frozenset(("joint", "link", "axis", "motor"))
-CURRENT = frozenset(("current", "currents", "curr", "i"))
-TORQUE = frozenset(["torque", "torques", "trq", "tau", "moment", "moments", "force", "forces"])
+    ["error", "err", "std", "min", "max", "limit", "limits", "tcp", "tool", "cartesian", "pose", "gripper", "imu",
+     "fehler", "werkzeug", "greifer", "erreur", "outil", "pince"]
+)  # fmt: skip
+GENERIC = frozenset(("joint", "link", "axis", "motor", "gelenk", "achse", "axe", "articulation", "moteur"))
+CURRENT = frozenset(("current", "currents", "curr", "i", "strom", "courant", "courants"))
+TORQUE = frozenset(
+    ["torque", "torques", "trq", "tau", "moment", "moments", "force", "forces", "drehmoment", "kraft", "couple",
+     "couples"]
+)  # fmt: skip
 
 _TOKEN = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+")
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*?)\s*[\])>}]")
@@ -38,7 +52,10 @@ _ENDINGS = {
     "rad": "rad", "radians": "rad", "deg": "deg", "degrees": "deg", "turns": "turn", "rev": "turn", "counts": "count",
     "ticks": "count", "mm": "mm", "um": "um", "ms": "ms", "us": "us", "ns": "ns", "msec": "ms", "usec": "us",
     "nsec": "ns", "sec": "s", "seconds": "s", "rpm": "rpm", "nm": "N m", "amps": "A", "percent": "%",
+    "grad": "deg", "degre": "deg", "degres": "deg", "prozent": "%",
 }  # fmt: skip
+# Units in brackets as they are also written.
+_ALSO = {"°": "deg", "°/s": "deg/s", "grad": "deg", "grad/s": "deg/s", "u/min": "rpm", "1/min": "rpm", "tr/min": "rpm"}
 # Units that their capitals tell from other words.
 _CAPITALS = re.compile(r"(?:^|[_ .])(mA|A|mNm|Nm|N)(?=$|[_ .\[])")
 
@@ -85,12 +102,12 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
     joints : sequence of str
         Joints of the arm.
     """
-    tokens = list(_TOKEN.finditer(name))
+    tokens = list(_TOKEN.finditer(_without_accents(name)))
     words = [token[0].lower() for token in tokens]
     joint, span = _joint(words, joints)
     rest = [k for k in range(len(words)) if span is None or not span[0] <= k < span[1]]
     numbers = [k for k in rest if words[k].isdigit()]
-    spoken = [words[k] for k in rest]
+    spoken = [part for k in rest for part in _parts(words[k])]
     template, number = name, None
     if span is not None:
         template = f"{name[: tokens[span[0]].start()]}{{joint}}{name[tokens[span[1] - 1].end() :]}"
@@ -98,12 +115,15 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
         last = tokens[numbers[-1]]
         number = int(last[0])
         template = f"{name[: last.start()]}{{number}}{name[last.end() :]}"
-    found = [_WORDS[word] for word in spoken if word in _WORDS]
+    alone = joint is None and number is None
+    found = ["time" if word == _BOTH and alone else _WORDS[word] for word in spoken if word in _WORDS]
     if not found and "i" in spoken and (joint is not None or number is not None):
         found = ["effort"]
     signals = [quantity for quantity in found if quantity != "time"]
     quantity = signals[-1] if signals else found[-1] if found else None
-    if OTHER & set(spoken) or (quantity == "time" and (joint is not None or number is not None)):
+    # A unit such as U/min is no minimum.
+    outside = {token[0].lower() for token in _TOKEN.finditer(_BRACKETS.sub("", name))}
+    if OTHER & set(spoken) & outside or (quantity == "time" and (joint is not None or number is not None)):
         quantity = None
     return Meaning(
         quantity=quantity,
@@ -117,6 +137,19 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
     )
 
 
+def _without_accents(text: str) -> str:
+    """Return a text of the same length without accents."""
+    return "".join(unicodedata.normalize("NFKD", letter)[0] for letter in text)
+
+
+def _parts(word: str) -> list[str]:
+    """Split a German word such as Istposition before the quantity."""
+    for prefix in _PREFIXES:
+        if word not in _WORDS and word.removeprefix(prefix) in _WORDS and word != prefix:
+            return [prefix, word.removeprefix(prefix)]
+    return [word]
+
+
 def _unit(name: str, words: Sequence[str], quantity: str) -> str | None:
     tables = [table_of(quantity, linear=linear) for linear in (False, True)]
     last = next((word for word in reversed(words) if not word.isdigit()), "")
@@ -125,7 +158,7 @@ def _unit(name: str, words: Sequence[str], quantity: str) -> str | None:
         # A speed called deg is in deg/s.
         for ending in ("", "/s", "/s^2"):
             for table in tables:
-                unit = find_unit(word + ending, table)
+                unit = find_unit(_ALSO.get(word.lower(), word) + ending, table)
                 if unit is not None:
                     return unit.name
     return None

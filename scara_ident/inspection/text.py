@@ -46,10 +46,8 @@ def description_text(guess: Guess, robot: Robot, described: Mapping[str, Any], u
     ]
     lines += _rotor_words(guess, robot)
     lines += _joints(guess, robot)
-    locked = [robot.joints[k] for k in range(robot.n) if k not in guess.joints]
-    if locked and guess.joints:
-        lines += ["", "# STATE where these stand, rad or m: the file has no channels for them."]
-        lines += [f"locked: {{{', '.join(f'{_word(name)}: 0.0' for name in locked)}}}"]
+    if guess.locked and guess.joints:
+        lines += ["", *_locked(guess)]
     lines += ["", *_recording(described)]
     lines += ["", "# gravity: [0, 0, -9.81]   # in the base frame; state it if the base is not upright"]
     for kind, said in (("missing", guess.problems), ("note", guess.notes)):
@@ -120,13 +118,20 @@ def _joints(guess: Guess, robot: Robot) -> list[str]:
         if effort is not None and (unit is None or unit in DRIVE):
             entry += ", effort_gain: 1.0"
             force = "N" if robot.prismatic[k] else "N m"
-            what = f"{force} per {unit.removeprefix('m')}" if unit in ("A", "mA") else f"{force} per recorded unit"
-            comment = f"   # STATE effort_gain, {what}"
+            shares = {"A": "per A", "mA": "per A", "%": "at 100 %", "permille": "at 100 %"}
+            comment = f"   # STATE effort_gain, {force} {shares.get(unit or '', 'per recorded unit')}"
         rotor = _rotor(robot, k)
         if rotor:
             comment = f"{comment}; {rotor}" if comment else f"   # STATE {rotor}"
         lines.append(f"{entry}}}{comment}")
     return lines
+
+
+def _locked(guess: Guess) -> list[str]:
+    places = ", ".join(f"{_word(name)}: {0.0 if at is None else round(at, 6)!r}" for name, at in guess.locked.items())
+    open_ = any(at is None for at in guess.locked.values())
+    said = "# STATE where these stand, rad or m, where it is 0.0: the file has no channels for them."
+    return [said if open_ else "# Where these stood, rad or m, by the file.", f"locked: {{{places}}}"]
 
 
 def _recording(described: Mapping[str, Any]) -> list[str]:

@@ -116,10 +116,15 @@ def _fit(robot: Robot, joints: list[int], time: Array, position: Array) -> bool:
     widest = LONGEST if linear else WIDEST
     bounded = np.isfinite(upper - lower) & (upper > lower)
     lower, upper = np.where(bounded, lower, -widest), np.where(bounded, upper, widest)
+    if bounded.any():
+        # Beside joints with limits, which tell the unit, one without may turn on and on.
+        low, high = np.where(bounded, low, 0.0), np.where(bounded, high, 0.0)
     slack = SLACK * (upper - lower)
     if np.any(low < lower - slack) or np.any(high > upper + slack):
         return False
-    speed = np.percentile(np.abs(slopes(time, position)[0]), FAST, axis=1)
+    # An angle may be held within one turn.
+    whole = position if linear else np.unwrap(position, axis=1)
+    speed = np.percentile(np.abs(slopes(time, whole)[0]), FAST, axis=1)
     limit = robot.velocity_limit[joints]
     fastest = FASTEST_SLIDE if linear else FASTEST_JOINT
     return bool(np.all(speed <= np.where(np.isfinite(limit), HASTE * limit, fastest)))

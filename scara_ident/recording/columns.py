@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,12 +35,3 @@ def recording_columns(recording: Recording, effort_gain: Array | None = None) ->
         there = zip(recording.joints, values, strict=True)
         columns |= {f"{joint}.{signal}": row for joint, row in there if not np.isnan(row).all()}
     return columns
-
-
-def rows_of_the_arm(columns: dict[str, Array], wanted: Sequence[str]) -> dict[str, Array]:
-    """Leave out the samples of other signals, in which all that is wanted of the arm is empty.
-
-    The rows that are left count from 1, as if the others were not in the file.
-    """
-    keep = np.isfinite([columns[name] for name in wanted]).any(axis=0)
-    return columns if keep.all() else {name: values[keep] for name, values in columns.items()}

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import glob
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
-from difflib import get_close_matches
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,15 +17,15 @@ from scara_ident.errors import RecordingError, UsageError
 from scara_ident.files import real_path
 from scara_ident.manners import Reported
 from scara_ident.recording.audit import Finding, Samples, audit
-from scara_ident.recording.columns import recording_columns, rows_of_the_arm
+from scara_ident.recording.columns import recording_columns
 from scara_ident.recording.files import IMPORTERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
+from scara_ident.recording.one_clock import on_one_clock
+from scara_ident.recording.wanted import lacking_numbers, optional_channels, refuse_missing
 from scara_ident.robot.signal_map import SIGNALS, Channel, Channels, contract_channels
 
 if TYPE_CHECKING:
     from scara_ident.robot.robot import Robot
-
-OPTIONAL = ("velocity", "acceleration", "temperature")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,15 +141,58 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
     """
     path = Path(path)
     channels = robot.channels or contract_channels(robot.joints)
+    shared = shares_clock(path, channels.time.column)
     names = column_names(path, channels.topic)
+
+    def read(wanted: Sequence[str]) -> dict[str, Array]:
+        return read_columns(path, wanted, channels.topic)
+
+    found = recording_of(path, names, read, robot, channels, need_effort=need_effort, shared_clock=shared)
+    return replace(found, path=path)
+
+
+def recording_of(
+    path: Path,
+    names: Sequence[str],
+    read: Callable[[Sequence[str]], dict[str, Array]],
+    robot: Robot,
+    channels: Channels,
+    *,
+    need_effort: bool = True,
+    shared_clock: bool = False,
+) -> Recording:
+    """Make a recording of columns, wherever they are, and audit it.
+
+    Parameters
+    ----------
+    path : Path
+        Names the recording, also in errors.
+    names : sequence of str
+        Columns that there are.
+    read : callable
+        Returns some of them, each of shape (N,).
+    robot : Robot
+    channels : Channels
+        Where the robot's signals stand.
+    need_effort : bool
+        See `read_recording`.
+    shared_clock : bool
+        Whether rows may hold only some of the channels.
+
+    Raises
+    ------
+    RecordingError
+        As `read_recording`.
+    """
     needed = [channels.time, *channels.position, *(channels.effort if need_effort else ())]
-    _refuse_missing(path, names, [channel.column for channel in needed], channels)
-    optional, findings = _optional_channels(path, channels, names, () if need_effort else ("effort",))
+    refuse_missing(path, names, [channel.column for channel in needed], channels)
+    optional, findings = optional_channels(path, channels, names, () if need_effort else ("effort",))
     second = {k: place for k, place in enumerate(channels.link_position) if place.column in names}
     wanted = [channel.column for channel in (*needed, *chain.from_iterable(optional.values()), *second.values())]
-    columns = read_columns(path, wanted, channels.topic)
-    if shares_clock(path, channels.time.column):
-        columns = rows_of_the_arm(columns, [channel.column for channel in needed[1:]])
+    columns = read(wanted)
+    if shared_clock:
+        columns, joined = on_one_clock(columns, channels.time.column, [channel.column for channel in needed[1:]])
+        findings += joined
 
     def rows(wanted: Sequence[Channel]) -> Array:
         return np.array([channel.si(columns.pop(channel.column)) for channel in wanted])
@@ -172,7 +214,7 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
         if np.isfinite(values).all():
             signals[signal] = values
         else:
-            findings.append(_lacking(samples, signal, [channel.column for channel in places], values))
+            findings.append(lacking_numbers(samples, signal, [channel.column for channel in places], values))
     if second:
         signals["link_position"] = link = np.full_like(samples.position, np.nan)
         link[list(second)] = rows(list(second.values()))[:, samples.row - 1]
@@ -189,7 +231,7 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
         time=samples.time,
         position=samples.position,
         findings=tuple(findings),
-        path=path,
+        path=None,
         **signals,
     )
 
@@ -290,68 +332,6 @@ def write_recording(recording: Recording, path: Path | str, *, effort_gain: Arra
     write_columns(Path(path), recording_columns(recording, effort_gain))
 
 
-def _refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str], channels: Channels) -> None:
-    missing = [name for name in wanted if name not in names]
-    if not missing:
-        return
-    if names and all(_is_number(name) for name in names):
-        raise RecordingError(
-            f"{path}: the first line holds numbers; put the column names there (time, {wanted[1]}, ...)"
-        )
-    name = missing[0]
-    more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
-    ending = name.rpartition(".")[2]
-    mapped = _declaring(channels, name)
-    have = [other for other in names if other.endswith(f".{ending}")] if "." in name and not mapped else list(names)
-    lower = {other.lower(): other for other in names}
-    near = get_close_matches(name.lower(), lower, n=1, cutoff=0.75)
-    guess = f"is it {lower[near[0]]!r}? " if near else ""
-    kind = f"{ending} columns" if "." in name and not mapped else "columns"
-    shown = ", ".join(have[:8]) + (", ..." if len(have) > 8 else "") if have else "none"
-    remedy = "rename the column, or correct the joints in the robot description"
-    if mapped:
-        remedy = f"correct recording: {mapped} in the robot description"
-    elif len(missing) == len(wanted):
-        remedy = f"map its columns in the robot description; a first one writes: scara-ident inspect {path.name}"
-    raise RecordingError(f"{path}: no column {name!r}{more}; {guess}its {kind}: {shown}; {remedy}")
-
-
-def _declaring(channels: Channels, column: str) -> str:
-    """Return the signal for which the robot description names a column, or nothing."""
-    for signal in channels.declared:
-        places = (channels.time,) if signal == "time" else channels.of(signal)
-        if any(channel.column == column for channel in places):
-            return signal
-    return ""
-
-
-def _optional_channels(
-    path: Path, channels: Channels, names: Sequence[str], more: Sequence[str]
-) -> tuple[dict[str, tuple[Channel, ...]], list[Finding]]:
-    found: dict[str, tuple[Channel, ...]] = {}
-    findings = []
-    for signal in (*more, *OPTIONAL):
-        wanted = channels.of(signal)
-        absent = [channel.column for channel in wanted if channel.column not in names]
-        if not absent:
-            found[signal] = wanted
-        elif signal in channels.declared:
-            _refuse_missing(path, names, absent, channels)
-        elif len(absent) < len(wanted):
-            said = f"no {', '.join(absent)} beside the other joints' {signal}: the {signal} columns are not used"
-            findings.append(Finding("missing_column", said, len(absent)))
-    return found, findings
-
-
-def _lacking(samples: Samples, signal: str, names: Sequence[str], values: Array) -> Finding:
-    joint = int(np.argmax((lacking := ~np.isfinite(values)).any(axis=1)))
-    said = (
-        f"{names[joint]} is empty, NaN or infinite in {int(lacking[joint].sum())} of {samples.count} rows, "
-        f"first in {samples.where(int(np.argmax(lacking[joint])))}: the {signal} columns are not used"
-    )
-    return Finding("nan", said, int(lacking.sum()))
-
-
 def _paths(word: str) -> list[Path]:
     path = Path(word)
     if path.is_dir() and not is_bag_folder(path):
@@ -388,11 +368,3 @@ def _in_folder(folder: Path) -> list[Path]:
 
 def _natural(text: str) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"([0-9]+)", text)]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from scara_ident.estimation.urdf_scale import scale_sentence
 from scara_ident.identification.compare import Comparison
+from scara_ident.model.urdf_values import urdf_values
 
 
 def comparison_dict(comparison: Comparison) -> dict[str, Any]:
@@ -14,6 +16,7 @@ def comparison_dict(comparison: Comparison) -> dict[str, Any]:
     joints = comparison.model.robot.joints
     names = [summary.name for summary in comparison.trajectories]
     own = np.array([comparison.errors[i, i] for i in range(len(names))])
+    nominal = urdf_values(comparison.model)
     return {
         "robot": comparison.model.robot.name,
         "model": comparison.model.name,
@@ -54,7 +57,12 @@ def comparison_dict(comparison: Comparison) -> dict[str, Any]:
         },
         "parameters": {
             summary.name: {
-                column.name: {"value": summary.estimate.value[k], "std": summary.estimate.std[k], "unit": column.unit}
+                column.name: {
+                    "value": summary.estimate.value[k],
+                    "urdf": nominal[k],
+                    "std": summary.estimate.std[k],
+                    "unit": column.unit,
+                }
                 for k, column in enumerate(comparison.model.columns)
             }
             for summary in comparison.trajectories
@@ -120,4 +128,5 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, ...]:
     equal = all(np.ptp(summary.estimate.weights) == 0.0 for summary in comparison.trajectories)
     weights = "every row of every joint counts the same" if equal else "each joint is weighted by its residual"
     found.append(f"Estimated by {comparison.method}: {weights}.")
+    found.append(scale_sentence(None, comparison.model.robot))
     return tuple(found)

@@ -15,9 +15,10 @@ from scara_ident.diagnosis.model_selection import Unexplained, rms_of
 from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_variation import unit_of_kind
+from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.model.terms.friction import Friction
+from scara_ident.model.urdf_values import urdf_values
 from scara_ident.report.identification import bias_of, bias_said
 from scara_ident.robot.rotors import GUESS_FACTOR
 
@@ -28,6 +29,7 @@ NEAR = 1.3
 def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the content of ``diagnosis.json``."""
     joints = diagnosis.robot.joints
+    nominal = urdf_values(diagnosis.after.model)
     return {
         "robot": diagnosis.robot.name,
         "model": diagnosis.before.model.name,
@@ -87,10 +89,11 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "moved": moved(diagnosis),
         "parameters": [
-            column.entry(value=diagnosis.after.value[k], std=diagnosis.after.std[k])
+            column.entry(value=diagnosis.after.value[k], std=diagnosis.after.std[k], urdf=nominal[k])
             | ({"before": diagnosis.before.value[k]} if k < len(diagnosis.before.model.columns) else {})
             for k, column in enumerate(diagnosis.after.model.columns)
         ],
+        "urdf_scale": urdf_scale(diagnosis.after, diagnosis.training_after),
         "run_variation": diagnosis.after.variation.sizes(diagnosis.robot) if diagnosis.after.variation else {},
         "noise_bias": bias_of(diagnosis.after),
         "not_identifiable": [
@@ -195,14 +198,14 @@ def _before_after(diagnosis: Diagnosis, old: Observations, new: Observations) ->
 
 def moved(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the parameters of the base model that moved by over three standard deviations."""
-    before, after = diagnosis.before, diagnosis.after
-    found = []
-    for k, column in enumerate(before.model.columns):
+    before, after, found = diagnosis.before, diagnosis.after, []
+    for k, (column, stated) in enumerate(zip(before.model.columns, urdf_values(before.model), strict=True)):
         change = float(after.value[k] - before.value[k])
         std = float(after.std[k])
         if diagnosis.effects and std > 0.0 and abs(change) > 3.0 * std:
             found.append(
-                {"name": column.name, "before": before.value[k], "after": after.value[k], "in_std": change / std}
+                {"name": column.name, "urdf": stated, "before": before.value[k], "after": after.value[k]}
+                | {"in_std": change / std}
             )
     return sorted(found, key=lambda item: -abs(item["in_std"]))
 
@@ -294,98 +297,5 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
             f"Unexplained: on {remainder.joint} a remainder of {remainder.rms:.3g} {unit} rms {on}; "
             f"no effect of the catalogue accounts for it{_curved(diagnosis, remainder)}."
         )
+    found.append(scale_sentence(urdf_scale(diagnosis.after, diagnosis.training_after), diagnosis.robot))
     return tuple(found)
-
-
-def diagnosis_markdown(diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]] = ()) -> str:
-    """Return the story as Markdown.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    pictures : sequence of (str, str), optional
-        Title and file name of figures that stand beside it; see `scara_ident.report.pictures`.
-    """
-    content = diagnosis_dict(diagnosis)
-    lines = [f"# Diagnosis of {diagnosis.robot.name}: {diagnosis.verdict}", ""]
-    lines += [f"{sentence}  " for sentence in content["summary"]]
-    for kind in ("training", "validation"):
-        part = content[kind]
-        if not part["before"]:
-            continue
-        lines += [
-            "",
-            f"## Error on the {kind} recordings",
-            "",
-            "| joint | before | after | before, share | after, share |",
-        ]
-        lines += ["|---|---|---|---|---|"]
-        for joint in diagnosis.robot.joints:
-            cells = [part[key][joint] for key in ("before", "after", "before_relative", "after_relative")]
-            lines.append(f"| {joint} | " + " | ".join(_cell(x, k > 1) for k, x in enumerate(cells)) + " |")
-    if pictures:
-        lines += ["", "## Residual before and after"]
-        for title, name in pictures:
-            lines += ["", f"### {title[:1].upper()}{title[1:]}", "", f"![{title}]({name})"]
-    if content["moved"]:
-        lines += ["", "## Parameters that moved when the effects came in", "", "| name | before | after | in std |"]
-        lines += ["|---|---|---|---|"]
-        lines += [
-            f"| {m['name']} | {m['before']:.4g} | {m['after']:.4g} | {m['in_std']:+.1f} |" for m in content["moved"]
-        ]
-    lines += _certainty(content, diagnosis)
-    lines += ["", "## Candidates", "", "| candidate | gain held out | p | decision | why |", "|---|---|---|---|---|"]
-    for row in content["candidates"]:
-        lines.append(
-            f"| {row['label']} | {row['gain']:.2%} | {row['p_value']:.1e} | {row['decision']} | {row['why']} |"
-        )
-    if content["not_identifiable"]:
-        lines += ["", "## What no such recording can show", "", "| effect | absorbed by | opened by |", "|---|---|---|"]
-        lines += [
-            f"| {row['effect']} | {', '.join(row['absorbed_by'])} | {row['opened_by']} |"
-            for row in content["not_identifiable"]
-        ]
-    return "\n".join(lines) + "\n"
-
-
-def _certainty(content: dict[str, Any], diagnosis: Diagnosis) -> list[str]:
-    """Return events, what is worth a look, whether what is left is noise, and how runs differ, as Markdown."""
-    lines = []
-    if content["events"]:
-        lines += ["", "## Events", "", "| recording | from | to | joints | rms | kind |", "|---|---|---|---|---|---|"]
-        lines += [
-            f"| {row['recording']} | {row['from']:.2f} | {row['to']:.2f} | {', '.join(row['joints'])} | {row['rms']:.3g} | {row['kind']} |"
-            for row in content["events"]
-        ]
-    if content["tentative"]:
-        lines += ["", "## Worth a look, not added", "", "| effect | joint | gain | p | why not | settled by |"]
-        lines += ["|---|---|---|---|---|---|"]
-        lines += [
-            f"| {row['effect']} | {row['joint'] or '-'} | {row['gain']:.2%} | {row['p_value']:.1e} | {row['why']} | {row['settled_by']} |"
-            for row in content["tentative"]
-        ]
-    lines += [
-        "",
-        "## Is what is left noise?",
-        "",
-        "| joint | shown | by | detection limit | why |",
-        "|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| {joint} | {'yes' if row['noise'] else 'no'} | {row['by'] or '-'} | {_cell(row['detection_limit'], share=True)} | {row['why']} |"
-        for joint, row in content["evidence"].items()
-    ]
-    if content["run_variation"]:
-        lines += ["", "## How runs differ", "", "| joint | what | std between runs | unit |", "|---|---|---|---|"]
-        lines += [
-            f"| {joint} | {kind} | {std:.3g} | {unit_of_kind(diagnosis.robot, joint, kind)} |"
-            for joint, kinds in content["run_variation"].items()
-            for kind, std in kinds.items()
-        ]
-    return lines
-
-
-def _cell(value: float | None, share: bool) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.1%}" if share else f"{value:.4g}"

@@ -14,8 +14,10 @@ from scara_ident.estimation.estimate import PAPER_SAMPLES
 from scara_ident.estimation.noise_bias import bias_sentence
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.saved import estimate_dict
+from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
+from scara_ident.model.urdf_values import urdf_values
 from scara_ident.robot.robot import Robot
 
 # What each shape of friction means.
@@ -31,17 +33,19 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
     estimate = identification.estimate
     robot = identification.model.robot
     possible = identification.physical_consistency
+    nominal = urdf_values(identification.model)
     content: dict[str, Any] = {
         "robot": robot.name,
         "model": identification.model.name,
         "method": estimate.method,
         "samples": identification.training.samples,
         "parameters": [
-            column.entry(value=estimate.value[k], std=estimate.std[k])
+            column.entry(value=estimate.value[k], std=estimate.std[k], urdf=nominal[k])
             | {"undetermined": bool(estimate.undetermined[k])}
             for k, column in enumerate(identification.model.columns)
         ],
         "weights": dict(zip(robot.joints, estimate.weights, strict=True)),
+        "urdf_scale": urdf_scale(estimate, identification.training),
         "std_from": estimate.std_kind,
         "run_variation": estimate.variation.sizes(robot) if estimate.variation else {},
         "noise_bias": bias_of(estimate),
@@ -146,6 +150,8 @@ def sentences(identification: Identification) -> tuple[str, ...]:
         found.append(biased)
     if isinstance(identification.estimate, ConsistentEstimate):
         found += _shapes_said(identification.estimate.shapes)
+    scales = urdf_scale(identification.estimate, identification.training)
+    found.append(scale_sentence(scales, identification.model.robot))
     return tuple(found)
 
 

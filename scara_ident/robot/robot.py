@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
@@ -20,8 +20,9 @@ from scara_ident.files import path_fault, real_path
 from scara_ident.manners import Frozen
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
 from scara_ident.robot.examples import example_urdf, is_name
+from scara_ident.robot.mimic import Follower, coupled_ends, followers, lock_followers, refuse_coupled
 from scara_ident.robot.rotors import RotorGuess, guess_rotors
-from scara_ident.robot.signal_map import Channels, build_channels
+from scara_ident.robot.signal_map import Channels, build_channels, check_rated_torque
 from scara_ident.robot.transmissions import reductions, rotor_inertias
 from scara_ident.robot.urdf_file import pinocchio_model, read_urdf
 from scara_ident.robot.urdf_validation import MOVABLE, XACRO
@@ -66,6 +67,8 @@ class Robot(Frozen):
         Locked joints and their positions.
     channels : Channels or None
         Columns and units of the recordings; None for the contract's.
+    notes : tuple of str
+        What was decided of joints that the description does not name.
     """
 
     name: str
@@ -86,6 +89,7 @@ class Robot(Frozen):
     effort_limit: Array
     locked: tuple[tuple[str, float], ...]
     channels: Channels | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def n(self) -> int:
@@ -185,9 +189,11 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
     urdf = description.urdf
     tree = read_urdf(urdf, source)
     full = pinocchio_model(urdf, tree)
-    names = _identified_joints(description, full, tree, source)
+    coupled = followers(tree)
+    names, notes = _identified_joints(description, coupled, tree, source)
     described = description.joints or {}
     joints = [described.get(name) or JointDescription() for name in names]
+    description = description.model_copy(update={"locked": lock_followers(description.locked, coupled)})
     model, locked = _lock(full, names, description, source)
     if description.gravity is not None:
         model.gravity.linear = np.asarray(description.gravity, dtype=float)
@@ -207,6 +213,11 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
                 "measured at the motor or at the joint ('motor' or 'joint')"
             )
         side = "joint"
+    gain = np.array([joint.effort_gain for joint in joints])
+    effort_limit = _positive_or_inf(_upper(model, "Effort")[order])
+    at_drive = effort_limit / np.abs(reduction) if side == "motor" else effort_limit
+    recorded = None if description.recording is None else description.recording.effort
+    check_rated_torque(recorded, names, gain, at_drive, source)
     return Robot(
         name=full.name,
         urdf=urdf,
@@ -219,11 +230,11 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
         rotor_inertia=np.where(np.isnan(rotors), 0.0, rotors),
         rotor_stated=~np.isnan(rotors),
         effort_side=side,
-        effort_gain=np.array([joint.effort_gain for joint in joints]),
+        effort_gain=gain,
         lower=np.where(unbounded, -np.inf, _given(model.lowerPositionLimit[position])),
         upper=np.where(unbounded, np.inf, _given(model.upperPositionLimit[position])),
         velocity_limit=_positive_or_inf(_upper(model, "Velocity")[order]),
-        effort_limit=_positive_or_inf(_upper(model, "Effort")[order]),
+        effort_limit=effort_limit,
         locked=locked,
         channels=None
         if description.recording is None
@@ -235,6 +246,7 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
             reduction=[float(value) for value in reduction],
             has_gain=["effort_gain" in joint.model_fields_set for joint in joints],
         ),
+        notes=notes,
     )
 
 
@@ -259,11 +271,17 @@ def _movable(tree: ElementTree.Element) -> list[str]:
 
 
 def _identified_joints(
-    description: RobotDescription, model: pin.Model, tree: ElementTree.Element, source: Path
-) -> list[str]:
+    description: RobotDescription, coupled: Mapping[str, Follower], tree: ElementTree.Element, source: Path
+) -> tuple[list[str], tuple[str, ...]]:
     movable = _movable(tree)
+    notes = []
     if description.joints is None:
-        names = [name for name in movable if name not in description.locked]
+        gripper = [name for name in movable if name in {*coupled, *coupled_ends(tree, coupled, movable)}]
+        names = [name for name in movable if name not in {*description.locked, *gripper}]
+        if gripper:
+            more = f" and {len(gripper) - 4} more" if len(gripper) > 5 else ""
+            shown = gripper[:4] if more else gripper
+            notes.append(f"{', '.join(shown)}{more}: coupled (mimic) and carry no other joint: locked")
         if source.suffix.lower() != ".yaml" and source == embedded_urdf():
             names = ["joint1", "joint2"]
     else:
@@ -284,7 +302,8 @@ def _identified_joints(
                 f"{description.urdf}: joint {name} is of type {kind}; revolute, continuous, prismatic "
                 "and fixed joints are supported"
             )
-    return names
+    refuse_coupled(names, coupled, source)
+    return names, tuple(notes)
 
 
 def _unknown_joint(name: str, movable: Sequence[str], tree: ElementTree.Element) -> str:

@@ -8,6 +8,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
+
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.description import MotionDescription, RecordingDescription, SignalDescription, TimeDescription
@@ -16,6 +18,8 @@ from scara_ident.robot.units import COUNT, Unit, find_unit, table_of
 SIGNALS = ("position", "velocity", "acceleration", "effort", "temperature", "link_position")
 # What a pattern may hold: the joint's name, its place in the robot description from 0, and from 1.
 PLACEHOLDERS = ("{joint}", "{index}", "{number}")
+# A rated torque is within this factor of the URDF's limit; below this share of it, it is that of one per cent.
+RATED_SPREAD, RATED_LEAST = 5.0, 0.1
 
 
 @dataclass(frozen=True)
@@ -220,6 +224,42 @@ class _Signal:
 
     def refuse(self, key: str, reason: str) -> NoReturn:
         _refuse(self.source, f"{self.name}.{key}", reason)
+
+
+def check_rated_torque(
+    described: SignalDescription | None, joints: Sequence[str], gain: Array, limit: Array, source: Path
+) -> None:
+    """Refuse a gain that is the torque of one per cent (permille) where that of a hundred (a thousand) is asked for.
+
+    Parameters
+    ----------
+    described : SignalDescription or None
+        Of the effort.
+    joints : sequence of str
+    gain : ndarray, shape (n,)
+        ``effort_gain``: with such a unit the rated torque, N m (N).
+    limit : ndarray, shape (n,)
+        Effort limit of the URDF where effort is recorded; infinite where there is none.
+    source : Path
+        The robot description, named in errors.
+
+    Raises
+    ------
+    RobotError
+    """
+    for joint, value, bound in zip(joints, np.abs(gain), limit, strict=True):
+        word = None if described is None else _of(described.unit, joint, None)
+        unit = None if word is None else find_unit(word, table_of("effort", linear=False))
+        # A gain of 1 states nothing yet: it stands in a first description.
+        if unit is None or unit.name not in ("%", "permille") or not np.isfinite(bound) or value == 1.0:
+            continue
+        whole = value / unit.factor
+        if value < RATED_LEAST * bound and bound / RATED_SPREAD < whole < RATED_SPREAD * bound:
+            raise RobotError(
+                f"{source}: joints.{joint}.effort_gain: {value:g} N m would be the rated torque (100 %), and the URDF's "
+                f"limit is {bound:.4g} N m; with unit {unit.name} write the torque at 100 %: {whole:g} if this is N m per "
+                f"{unit.name}"
+            )
 
 
 def fill(pattern: str, joint: str, index: int) -> str:

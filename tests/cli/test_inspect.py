@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import shlex
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from scara_ident.cli.main import run
 from scara_ident.robot.robot import embedded_urdf, load_robot
+from tests.arms import rnea, sines
+from tests.docs.pages import blocks
 from tests.made_recordings import save
-from tests.recording.files.formats import recorded, write_plotjuggler
-from tests.shared import shared_path
+from tests.recording.files.formats import recorded, write_bag, write_plotjuggler
+from tests.shared import ROOT, shared_path
 
 MADE = recorded(600)
 
@@ -112,6 +117,44 @@ def test_the_ur10e_goes_from_a_file_and_a_urdf_to_an_identification(tmp_path, ca
         "wrist_3_joint",
     }
     assert errors["shoulder_lift_joint"]["relative"] < 0.2
+
+
+def test_a_panda_with_its_gripper_goes_from_a_rosbag2_to_a_report_by_the_commands_of_the_page(
+    tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    robot = load_robot("panda")
+    shutil.copy(robot.urdf, "panda.urdf")
+    fingers = ("panda_finger_joint1", "panda_finger_joint2")
+    (tmp_path / "logs").mkdir()
+    for run_number in (1, 2):
+        rng = np.random.default_rng(run_number)
+        time = np.arange(800) / 100.0
+        q, v, a = sines(rng, time, robot.n, 0.5)
+        q += np.array([0.0, 0.0, 0.0, -1.5, 0.0, 1.8, 0.0])[:, None]
+        effort = rnea(robot, q, v, a) + 0.5 * np.sign(v) + 0.3 * v + 0.05 * rng.standard_normal(q.shape)
+        made = {"time": time}
+        for joint, position, torque in zip(robot.joints, q, effort, strict=True):
+            made |= {f"{joint}.position": position, f"{joint}.effort": torque}
+        for finger in fingers:
+            made |= {f"{finger}.position": np.full(800, 0.02), f"{finger}.effort": np.zeros(800)}
+        write_bag(tmp_path / "logs" / f"run_{run_number}", made, names=(*fingers, *robot.joints))
+    page = blocks(ROOT / "docs" / "howto" / "my-logs.md")
+    (commands,) = (block.text for block in page if block.language == "sh" and "panda.urdf" in block.text)
+    for command in commands.splitlines():
+        program, *words = shlex.split(command)
+        assert program == "scara-ident"
+        assert run(words) == 0, capsys.readouterr().err
+    described = load_robot("first/robot.yaml")
+    assert described.joints == robot.joints
+    assert dict(described.locked) == dict.fromkeys(fingers, 0.02)
+    assert {"report.html", "panda_identified.urdf"} <= {path.name for path in Path("out").iterdir()}
+    content = json.loads(Path("out/identification.json").read_text())
+    assert content["urdf_scale"]["panda_joint2"] == pytest.approx(1.0, abs=0.02)
+    errors = content["errors"]["validation"]["run_2"]
+    # Noise of 0.05 N m, of which a band keeps a part; the arm carries 30 N m.
+    assert errors["panda_joint2"]["rms"] < 0.1
+    assert load_robot("out/panda_identified.urdf").joints == robot.joints
 
 
 def test_a_mapped_file_identifies_like_the_contracts(tmp_path, log, capsys):

@@ -29,6 +29,19 @@ UR = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint
         ("actual_TCP_speed_0", None, None, 0, None),
         ("position_error_1", None, None, 1, None),
         ("status", None, None, None, None),
+        ("Istwinkel Achse 3 [°]", "position", None, 3, "deg"),
+        ("Gelenkwinkel_2", "position", None, 2, None),
+        ("Drehmoment A1 (Nm)", "effort", None, 1, "N m"),
+        ("Motorstrom[4]", "effort", None, 4, None),
+        ("Drehzahl 2 [U/min]", "velocity", None, 2, "rpm"),
+        ("Zeit [ms]", "time", None, None, "ms"),
+        ("Greiferposition 1", None, None, 1, None),
+        ("temps", "time", None, None, None),
+        ("Temps (s)", "time", None, None, "s"),
+        ("temps_3", "temperature", None, 3, None),
+        ("vitesse mesurée axe 5 (deg/s)", "velocity", None, 5, "deg/s"),
+        ("Accélération 1", "acceleration", None, 1, None),
+        ("couple_articulation_6", "effort", None, 6, None),
     ],
 )
 def test_a_name_says_quantity_joint_and_unit(name, quantity, joint, number, unit):
@@ -41,3 +54,19 @@ def test_a_prefix_of_all_joints_may_be_left_out_and_ambiguous_short_names_count_
     assert meaning("joint2/pos", panda).joint == 1
     assert meaning("elbow_pos", ("elbow_joint", "elbow_link")).joint is None
     assert meaning("joint10_pos", tuple(f"joint{k}" for k in range(1, 11))).joint == 9
+
+
+@pytest.mark.parametrize(
+    ("name", "commanded", "measured"),
+    [
+        ("Sollposition A1", True, False),
+        ("IstPosition A1", False, True),
+        ("consigne couple 2", True, False),
+        ("angle mesuré 2", False, True),
+        ("Motormoment_1", False, False),
+    ],
+)
+def test_german_and_french_say_what_was_asked_for_and_what_was_sensed(name, commanded, measured):
+    said = meaning(name)
+    assert (said.commanded, said.measured) == (commanded, measured)
+    assert said.template.count("{number}") == 1

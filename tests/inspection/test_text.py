@@ -62,3 +62,11 @@ def test_a_rotor_that_the_urdf_does_not_state_is_asked_for_with_a_guess(tmp_path
 
 def test_no_rotor_is_asked_for_where_the_urdf_states_all(tmp_path):
     assert "rotor_inertia" not in (inspected(save(tmp_path / "a.parquet", MADE), tmp_path).description or "")
+
+
+def test_a_share_of_the_rated_torque_asks_for_that_torque(tmp_path):
+    made = {name.replace("effort", "torque_percent"): values for name, values in MADE.items()}
+    found = inspected(save(tmp_path / "a.parquet", made), tmp_path)
+    assert found.mapping["effort"] == {"column": "{joint}.torque_percent", "unit": "%"}
+    assert "# STATE effort_gain, N m at 100 %" in (found.description or "")
+    assert found.recording is not None

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scara_ident.recording.columns import recording_columns, rows_of_the_arm
+from scara_ident.recording.columns import recording_columns
 from tests.results import Results
 
 
@@ -19,9 +19,3 @@ def test_signals_that_are_there_are_columns(results: Results):
     assert gain["joint2.effort"].tolist() == (run.effort[1] / 4.0).tolist()
     second = replace(run, link_position=np.stack([run.position[0], np.full_like(run.time, np.nan)]))
     assert [name for name in recording_columns(second) if "link" in name] == ["joint1.link_position"]
-
-
-def test_rows_of_other_signals_are_left_out():
-    columns = {"time": np.arange(3.0), "a": np.array([1.0, np.nan, 2.0])}
-    assert rows_of_the_arm(columns, ["a"])["time"].tolist() == [0.0, 2.0]
-    assert rows_of_the_arm(columns, ["time"]) is columns

@@ -10,12 +10,12 @@ import pytest
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.effect_parameters import RotorInertia
-from scara_ident.diagnosis.tentative import TentativeEffect
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.position import Spring
-from scara_ident.estimation.run_variation import JointVariation, RunVariation
 from scara_ident.files import plain
-from scara_ident.report.diagnosis import best_by_label, diagnosis_dict, diagnosis_markdown, sentences
+from scara_ident.model.model import build_model
+from scara_ident.model.urdf_values import urdf_values
+from scara_ident.report.diagnosis import best_by_label, diagnosis_dict, sentences
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, with_torque
 
@@ -108,15 +108,6 @@ def test_words_name_effect_value_and_error(result):
     assert "Unexplained" not in said
 
 
-def test_the_story_has_every_candidate_and_both_tables(result, content):
-    text = diagnosis_markdown(result)
-    assert text.startswith("# Diagnosis of scara03: explained\n")
-    assert "## Error on the training recordings" in text
-    assert "## Error on the validation recordings" in text
-    for row in content["candidates"]:
-        assert row["label"] in text
-
-
 def test_where_it_cannot_be_told_the_first_sentence_says_so(result):
     unsure = replace(result.evidence[0], shown=False, by="", why="it is not white")
     undecided = replace(result, verdict="undecided", evidence=(unsure, result.evidence[1]), effects=())
@@ -133,20 +124,6 @@ def test_where_it_cannot_be_told_the_first_sentence_says_so(result):
     assert found == "Undecided: these recordings cannot tell whether something more is missing than was found."
 
 
-def test_what_is_tentative_what_is_noise_and_how_runs_differ_stand_in_the_story(result):
-    guess = TentativeEffect("stribeck", "joint1", "d", "helps in only 1 of 2", "slow motion", 0.0712, 3e-4)
-    variation = RunVariation((JointVariation(np.ones((4, 4)), np.array([0.06, 0.0, 0.0, 0.003]), np.zeros((2, 4)), 0.01, np.array([0, 2, 4])), None))  # fmt: skip
-    changed = replace(result, tentative=(guess,), after=replace(result.after, variation=variation))
-    content, text = diagnosis_dict(changed), diagnosis_markdown(changed)
-    assert content["run_variation"] == {"joint1": {"friction": 0.06, "delay": 0.003}}
-    assert "| stribeck | joint1 | 7.12% | 3.0e-04 | helps in only 1 of 2 | slow motion |" in text
-    assert "| joint1 | friction | 0.06 | 1 |\n| joint1 | delay | 0.003 | s |" in text
-    for joint, row in content["evidence"].items():
-        shown = "yes" if row["noise"] else "no"
-        assert f"| {joint} | {shown} | {row['by'] or '-'} | {row['detection_limit']:.1%} | {row['why']} |" in text
-    assert "How runs differ" not in diagnosis_markdown(replace(changed, after=replace(result.after, variation=None)))
-
-
 def test_without_repetitions_the_noise_floor_is_unknown_and_said_so():
     result = diagnose(load_robot(), exact_runs()[::2], bands=BANDS, catalogue=())
     content = diagnosis_dict(result)
@@ -161,7 +138,11 @@ def test_a_remainder_is_told_with_joint_signal_and_size():
     content = diagnosis_dict(diagnose(load_robot(), runs, bands=BANDS, catalogue=()))
     assert content["verdict"] == "unexplained"
     assert set(content["unexplained"]) == {"joint", "signals", "rms", "explained_share"}
-    assert "depends on position of joint2" in content["summary"][-1]
+    assert "depends on position of joint2" in content["summary"][-2]
+    assert content["summary"][-1].startswith("No recording tells a scale common to all torques and masses")
+    assert set(content["urdf_scale"]) <= {"joint1", "joint2"}
+    stated = {row["name"]: row["urdf"] for row in content["parameters"]}
+    assert stated["P_d1"] == pytest.approx(urdf_values(build_model(load_robot()))[0])
 
 
 def test_a_straight_friction_law_that_leaves_a_curve_is_told_what_to_try():

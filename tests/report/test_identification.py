@@ -157,7 +157,7 @@ def test_the_shape_of_friction_and_why_are_said():
     content = identification_dict(found)
     first, second = found.estimate.shapes
     assert content["friction_shape"]["joint1"] == {"shape": first.shape, "p_value": first.p_value, "why": first.why}
-    assert content["summary"][-1] == (
+    assert content["summary"][-2] == (
         f"Friction is lubricated (takes energy out, and grows ever less with speed) on joint1 (p = {first.p_value:.2g}), "
         f"joint2 (p = {second.p_value:.2g}): the data do not contradict it."
     )

@@ -20,8 +20,8 @@ from scara_ident.robot.robot import load_robot
         ("ur5", "ur5_robot.urdf", 6),
         ("UR10", "ur10_robot.urdf", 6),
         ("ur3", "ur3_robot.urdf", 6),
-        # Its fingers move too, so they are identified as those of any bare URDF are.
-        ("panda", "panda.urdf", 9),
+        # Its fingers are coupled, and so locked.
+        ("panda", "panda.urdf", 7),
         ("xarm7", "xarm7.urdf", 7),
         ("asr_twodof", "TwoDofs.urdf", 2),
     ],

@@ -88,10 +88,10 @@ def test_limits_come_from_the_urdf_and_a_continuous_joint_has_none(tmp_path: Pat
 def test_arms_of_example_robot_data_load(urdf: str):
     robot = load_robot(example_urdf(urdf))
     full = pin.buildModelFromUrdf(str(example_urdf(urdf)))
-    # In the order of the file, which is not always Pinocchio's.
-    assert sorted(robot.joints) == sorted(full.names[1:])
+    # In the order of the file, which is not always Pinocchio's; coupled fingers are locked.
+    assert sorted((*robot.joints, *(name for name, _ in robot.locked))) == sorted(full.names[1:])
     assert [full.joints[full.getJointId(joint)].idx_v for joint in robot.joints] == robot.order.tolist()
-    assert robot.model.nv == robot.n == full.nv
+    assert robot.model.nv == robot.n == full.nv - len(robot.locked)
     assert sorted(robot.order) == list(range(robot.n))
 
 

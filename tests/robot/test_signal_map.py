@@ -129,3 +129,16 @@ def test_a_fault_in_the_mapping_is_one_line_with_its_key(tmp_path, recording, ke
 def test_a_current_without_its_gain_is_refused(tmp_path):
     with pytest.raises(RobotError, match=r"recording\.effort\.unit: A is no torque; give j2 its effort_gain"):
         described(tmp_path, "{effort: {unit: A}}", "{j1: {effort_gain: 14.87}, j2: {}}")
+
+
+@pytest.mark.parametrize(("unit", "gain", "whole"), [("%", 0.01, "1"), ("permille", 0.002, "2")])
+def test_a_gain_for_one_per_cent_is_refused_with_that_for_a_hundred(tmp_path, unit, gain, whole):
+    # The URDF's limit is 50 N m at the joint, and 1 N m at the motor of the first.
+    joints = f"{{j1: {{effort_gain: {gain}}}, j2: {{effort_gain: 1}}}}"
+    with pytest.raises(
+        RobotError, match=rf"joints\.j1\.effort_gain: .*write the torque at 100 %: {whole} if"
+    ) as caught:
+        described(tmp_path, f"{{effort: {{unit: '{unit}'}}}}", joints)
+    assert "\n" not in str(caught.value)
+    for told in ("1.5", "1", "0.0001"):
+        described(tmp_path, f"{{effort: {{unit: '{unit}'}}}}", joints.replace(str(gain), told, 1))

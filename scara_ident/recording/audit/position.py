@@ -68,7 +68,7 @@ def position_unit(samples: Samples) -> Checked:
     """Refuse positions that are not in rad or m, and say what they look like."""
     robot = samples.robot
     low, high = np.percentile(samples.position, (LOW, HIGH), axis=1)
-    speed = _speed(samples)
+    speed = _speed(_unwrapped(samples))
     reach = joint_range(robot)
     beyond = np.maximum(robot.lower - low, high - robot.upper) / reach
     bounded = np.isfinite(robot.upper - robot.lower) & (robot.upper > robot.lower)
@@ -213,6 +213,16 @@ def _speed(samples: Samples) -> Array:
         np.abs(samples.position[:, rows:] - samples.position[:, :-rows]) / lasting, FAST, axis=1
     )
     return speed
+
+
+def _unwrapped(samples: Samples) -> Samples:
+    """Return angles without jumps of about a turn, which are no speed; what is in another unit keeps its own."""
+    turning = ~samples.robot.prismatic
+    if not (np.abs(np.diff(samples.position[turning], axis=1)) > np.pi).any():
+        return samples
+    position = samples.position.copy()
+    position[turning] = np.unwrap(position[turning], axis=1)
+    return replace(samples, position=position)
 
 
 def _whole(values: Array) -> bool:

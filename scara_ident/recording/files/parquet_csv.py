@@ -12,6 +12,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.files import replacing
 from scara_ident.memory import check_memory
+from scara_ident.recording.files.dates import is_date, seconds
 from scara_ident.recording.files.files import check_file
 
 if TYPE_CHECKING:
@@ -42,7 +43,8 @@ def column_names(path: Path) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Names as they stand in the file, without surrounding blanks.
+        Names as they stand in the file, without surrounding blanks; ``column_1``, ``column_2``, ... of a CSV file whose
+        first line is data.
 
     Raises
     ------
@@ -55,7 +57,9 @@ def column_names(path: Path) -> tuple[str, ...]:
     check_file(path)
     try:
         if path.suffix.lower() == ".csv":
-            names = [name.strip() for name in _csv_header(path)]
+            header = _csv_header(path)
+            unnamed = _is_data(header)
+            names = [f"column_{k + 1}" if unnamed else name.strip() for k, name in enumerate(header)]
         else:
             with path.open("rb") as file:
                 names = list(pl.read_parquet_schema(file))
@@ -84,12 +88,12 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
     Returns
     -------
     dict of str to ndarray, shape (N,)
-        NaN where the file has no value.
+        NaN where the file has no value; dates and times of day in s since the first.
 
     Raises
     ------
     RecordingError
-        A text or a date where a number belongs (column, row, value), or a damaged file.
+        A text where a number belongs (column, row, value), or a damaged file.
     """
     import polars as pl
 
@@ -146,9 +150,16 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
     import polars as pl
 
     check_memory(path, CSV_FACTOR * path.stat().st_size)
-    raw = {name.strip(): name for name in _csv_header(path) if name.strip() in names}
+    header = _csv_header(path)
     separator = _separator(path)
     decimal_comma = separator == ";" and _has_decimal_comma(path)
+    if _is_data(header):
+        frame = pl.read_csv(
+            path, has_header=False, infer_schema=False, separator=separator, null_values=MISSING, glob=False
+        )
+        frame.columns = [f"column_{k + 1}" for k in range(frame.width)]
+        return _points(frame.select(names), decimal_comma=decimal_comma)
+    raw = {name.strip(): name for name in header if name.strip() in names}
     try:
         frame = pl.read_csv(
             path,
@@ -165,8 +176,7 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
         frame = pl.read_csv(
             path, columns=list(raw.values()), infer_schema=False, separator=separator, null_values=MISSING, glob=False
         )
-        if decimal_comma:
-            frame = frame.with_columns(pl.all().str.replace(",", ".", literal=True))
+        frame = _points(frame, decimal_comma=decimal_comma)
     return frame.rename({file_name: name for name, file_name in raw.items()})
 
 
@@ -177,8 +187,9 @@ def _check_parquet(path: Path, names: Sequence[str]) -> None:
     with path.open("rb") as file:
         schema = pl.read_parquet_schema(file)
     for name in names:
-        if name in schema and not (schema[name].is_numeric() or schema[name] == pl.String):
-            raise _no_number(path, name, schema[name])
+        kind = schema.get(name)
+        if kind is not None and not (kind.is_numeric() or kind.is_temporal() or kind == pl.String):
+            raise _no_number(path, name, kind)
     rows = pl.scan_parquet(path, glob=False, hive_partitioning=False).select(pl.len()).collect().item()
     check_memory(path, PER_VALUE * rows * len(names))
 
@@ -186,6 +197,12 @@ def _check_parquet(path: Path, names: Sequence[str]) -> None:
 def _no_number(path: Path, name: str, kind: pl.DataType) -> RecordingError:
     hint = "time in seconds" if name == "time" else "numbers"
     return RecordingError(f"{path}: column {name!r} holds {kind}; it must hold {hint}")
+
+
+def _points(frame: pl.DataFrame, *, decimal_comma: bool) -> pl.DataFrame:
+    import polars as pl
+
+    return frame.with_columns(pl.all().str.replace(",", ".", literal=True)) if decimal_comma else frame
 
 
 def _numbers(path: Path, series: pl.Series) -> Array:
@@ -197,12 +214,17 @@ def _numbers(path: Path, series: pl.Series) -> Array:
         numbers = words.cast(pl.Float64, strict=False)
         bad = (numbers.is_null() & words.is_not_null() & (words != "")).arg_true()
         if len(bad):
+            stamps = seconds(words)
+            if stamps is not None:
+                return stamps
             row = int(bad[0])
             raise RecordingError(
                 f"{path}: column {series.name!r}, row {row + 1}: {_short(series[row])} is not a number"
                 f"{_and_more(len(bad))}; correct it or leave it empty"
             )
         series = numbers
+    elif (stamps := seconds(series)) is not None:
+        return stamps
     elif not series.dtype.is_numeric():
         raise _no_number(path, series.name, series.dtype)
     values: Array = series.cast(pl.Float64).to_numpy()
@@ -212,6 +234,20 @@ def _numbers(path: Path, series: pl.Series) -> Array:
 def _csv_header(path: Path) -> list[str]:
     line = _first_lines(path, 1)[0]
     return next(csv.reader([line.strip()], delimiter=_sign_between(line))) if line else []
+
+
+def _is_data(header: list[str]) -> bool:
+    """Tell whether the first line is numbers, and points in time, and so no header."""
+    words = [word for word in header if not _is_number(word)]
+    return len(words) < len(header) > 1 and all(is_date(word) for word in words)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word.replace(",", "."))
+    except ValueError:
+        return False
+    return True
 
 
 def _separator(path: Path) -> str:

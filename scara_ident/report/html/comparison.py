@@ -122,10 +122,17 @@ def _parameters(context: ComparisonContext) -> list[Block]:
         known = [entry["value"] for entry in entries if entry["value"] is not None]
         middle = float(np.median(known)) if known else 0.0
         cells = [_parameter_cell(entry["value"], entry["std"], middle) for entry in entries]
-        rows.append([name(parameter), *cells, Cell(superscripts(entries[0].get("unit", "")), "unit")])
+        rows.append(
+            [
+                name(parameter),
+                Cell(number(entries[0].get("urdf"), 4), "num"),
+                *cells,
+                Cell(superscripts(entries[0].get("unit", "")), "unit"),
+            ]
+        )
     words = "Colour: how many of its own standard deviations a value lies above (blue) or below (vermillion) the median of the trajectories, full at six. Strong colours are disagreement that noise does not explain."
     scale = Scale("6 std below the median", "6 std above", two_sided=True)
-    return [Paragraph(words), scale, Table(("name", *names, "unit"), rows, range(1, len(names) + 1))]
+    return [Paragraph(words), scale, Table(("name", "URDF", *names, "unit"), rows, range(1, len(names) + 2))]
 
 
 def _parameter_cell(value: float | None, std: float | None, middle: float) -> Cell:

@@ -128,6 +128,7 @@ def _story(context: DiagnosisContext) -> list[Block]:
     rows: list[list[Cell | str]] = [
         [
             name(moved["name"]),
+            number(moved["urdf"], 4),
             number(moved["before"], 4),
             number(moved["after"], 4),
             f"{moved['in_std']:+.3g}",
@@ -140,7 +141,7 @@ def _story(context: DiagnosisContext) -> list[Block]:
         blocks += [
             Heading("Parameters that the missing effects had bent"),
             Paragraph("They had stood for what the model lacked; by over three standard deviations."),
-            Table(("name", "before", "after", "change / std", "unit", "meaning"), rows, (1, 2, 3)),
+            Table(("name", "URDF", "before", "after", "change / std", "unit", "meaning"), rows, (1, 2, 3, 4)),
         ]
     return blocks
 

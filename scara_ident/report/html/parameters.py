@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.estimation import Estimate, History, rls
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, links
 from scara_ident.estimation.observations import Observations
+from scara_ident.model.urdf_values import urdf_values
 from scara_ident.report.html.blocks import Cell, Group, Selector, Table, Tag, name, number, superscripts
 from scara_ident.report.plot import Band, Drawing, Figure, Layer, Level, Line, Mark, Matrix, Panel, Plot, single
 from scara_ident.threads import one_blas_thread
@@ -26,8 +27,9 @@ PER_PAGE = 12
 
 
 def parameter_table(estimate: Estimate) -> Table:
-    """Return the parameters with 95 % intervals, relative standard deviations and meanings."""
+    """Return the parameters beside the URDF's, with 95 % intervals, relative standard deviations and meanings."""
     rows: list[list[Cell | str]] = []
+    nominal = urdf_values(estimate.model)
     for k, column in enumerate(estimate.model.columns):
         value, std = float(estimate.value[k]), float(estimate.std[k])
         if estimate.undetermined[k]:
@@ -41,8 +43,9 @@ def parameter_table(estimate: Estimate) -> Table:
             tag = Tag("not told from 0", "bad") if weak else None
             share = Cell(words, "unit", bar=relative, weak=weak, tag=tag)
         unit, meaning = Cell(superscripts(column.unit), "unit"), Cell(superscripts(column.meaning), "words")
-        rows.append([name(column.name), digits(value, std), interval, unit, share, meaning])
-    return Table(("name", "value", "95 % interval", "unit", "std / value", "meaning"), rows, (1, 2))
+        stated = Cell(number(float(nominal[k]), 4), "num")
+        rows.append([name(column.name), digits(value, std), stated, interval, unit, share, meaning])
+    return Table(("name", "value", "URDF", "95 % interval", "unit", "std / value", "meaning"), rows, (1, 2, 3))
 
 
 def digits(value: float, std: float) -> str:

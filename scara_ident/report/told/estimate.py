@@ -8,6 +8,7 @@ import numpy as np
 
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.saved import estimate_dict
+from scara_ident.model.urdf_values import urdf_values
 from scara_ident.report.plot import Dots, Panel, Plot, single
 from scara_ident.report.told.words import number, table, text_of
 
@@ -34,6 +35,7 @@ def columns(estimate: Estimate) -> dict[str, Any]:
         "joint": [column.joint for column in described],
         "value": estimate.value.tolist(),
         "std": estimate.std.tolist(),
+        "urdf": urdf_values(estimate.model).tolist(),
         "unit": [column.unit for column in described],
         "undetermined": estimate.undetermined.tolist(),
         "meaning": [column.meaning for column in described],
@@ -59,8 +61,11 @@ def title(estimate: Estimate) -> str:
 
 
 def parameter_table(estimate: Estimate) -> Table:
-    """Return name, value, standard deviation, unit and meaning of every parameter."""
-    rows = table(title(estimate), "name", "value", "std", "unit", "meaning", right=("value", "std"))
-    for column, value, std in zip(estimate.model.columns, estimate.value, estimate.std, strict=True):
-        rows.add_row(column.name, number(value, std), f"{std:.2g}", column.unit, column.meaning)
+    """Return name, value, standard deviation, the URDF's value, unit and meaning of every parameter."""
+    right = ("value", "std", "URDF")
+    rows = table(title(estimate), "name", *right, "unit", "meaning", right=right)
+    told = zip(estimate.model.columns, estimate.value, estimate.std, urdf_values(estimate.model), strict=True)
+    for column, value, std, stated in told:
+        urdf = "-" if np.isnan(stated) else f"{stated:.4g}"
+        rows.add_row(column.name, number(value, std), f"{std:.2g}", urdf, column.unit, column.meaning)
     return rows

@@ -33,8 +33,13 @@ def write_bag(
     storage: str = "mcap",
     stamped: bool = True,
     apart: bool = False,
+    groups: Sequence[tuple[Sequence[str], float]] = (),
 ) -> Path:
-    """Write a rosbag2 folder of joint states; `apart` publishes every joint in a message of its own."""
+    """Write a rosbag2 folder of joint states.
+
+    `apart` publishes every joint in a message of its own; `groups` publish some joints together, each so many s late.
+    """
+    parts = groups or [([name], 0.0) for name in names] if groups or apart else [(names, 0.0)]
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -49,14 +54,14 @@ def write_bag(
         for topic in topics:
             connection = bag.add_connection(topic, state.__msgtype__, typestore=store)
             for k, seconds in enumerate(made["time"]):
-                instant = start + round(seconds * 1e9)
-                sent = stamp(sec=instant // 10**9, nanosec=instant % 10**9) if stamped else stamp(sec=0, nanosec=0)
-                for group in [[name] for name in names] if apart else [list(names)]:
+                for group, late in parts:
+                    instant = start + round((seconds + late) * 1e9)
+                    sent = stamp(sec=instant // 10**9, nanosec=instant % 10**9) if stamped else stamp(sec=0, nanosec=0)
                     values = {
                         signal: np.array([made[f"{name}.{signal}"][k] for name in group if f"{name}.{signal}" in made])
                         for signal in ("position", "velocity", "effort")
                     }
-                    message = state(header=header(stamp=sent, frame_id=""), name=group, **values)
+                    message = state(header=header(stamp=sent, frame_id=""), name=list(group), **values)
                     bag.write(connection, instant + 40_000, store.serialize_cdr(message, state.__msgtype__))
     return path
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from scara_ident.report.html.parameters import cheap_history, convergence_group
+from scara_ident.report.html.parameters import cheap_history, convergence_group, parameter_table
 
 
 def test_many_parameters_settle_in_pages(result):
@@ -23,3 +23,12 @@ def test_many_parameters_settle_in_pages(result):
     assert [selector.options for selector in group.selectors] == [("p0 … p11", "p12 … p23", "p24 … p29")]
     shown = [plot.panels[0].label for figure in group.figures for plot in figure.variants.values()]
     assert sorted(label.split(" ")[0] for label in shown) == sorted(f"p{k}" for k in range(30))
+
+
+def test_the_urdfs_value_stands_beside_each_parameter_that_it_has(result):
+    table = parameter_table(result.estimate)
+    column = list(table.head).index("URDF")
+    stated = {row[0].text: row[column].text for row in table.rows}
+    assert float(stated["P_d1"]) > 0.0
+    # Of friction a URDF of links says nothing.
+    assert stated["a01"] == "–"

@@ -1,0 +1,83 @@
+"""How the torque of the identified bodies compares with that of the URDF's: a scale that no recording tells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from scara_ident.estimation.estimate import Estimate
+from scara_ident.estimation.observations import Observations
+from scara_ident.model.urdf_values import urdf_values
+from scara_ident.robot.robot import Robot
+
+# The URDF's torque tells the scale of a joint where it leaves less than this share of the identified bodies' torque.
+MOST_LEFT = 0.5
+# A scale is told where it is so many of its standard deviations.
+SURE = 5.0
+# A scale within this factor of 1 is what a URDF with rough masses gives.
+USUAL = 2.0
+# Joints within this factor of their middle are scaled alike.
+ALIKE = 1.5
+
+
+def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, float]:
+    """Return the torque of the identified bodies as a multiple of that of the URDF's bodies.
+
+    Gravity and inertia are taken together, along the recorded motion, and only parameters of which the URDF says
+    something.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    observations : Observations
+
+    Returns
+    -------
+    dict of str to float
+        By joint; without those where it is not told from zero, or the identified torque is not that of the URDF in any scale.
+    """
+    model = observations.model
+    stated = urdf_values(model)
+    known = np.isfinite(stated) & ~estimate.undetermined
+    spread = np.where(np.isfinite(estimate.covariance), estimate.covariance, 0.0)
+    found = {}
+    for joint, rows in zip(model.robot.joints, observations.joints, strict=True):
+        own = rows.columns[use := known[rows.columns]]
+        columns = rows.table[:-1][use]
+        nominal = stated[own] @ columns
+        size = float(nominal @ nominal)
+        if not size > 0.0:
+            continue
+        identified = estimate.value[own] @ columns
+        # The scale is a sum of parameters, so its spread follows from theirs.
+        share = columns @ nominal / size
+        scale, std = float(share @ estimate.value[own]), float(np.sqrt(share @ spread[np.ix_(own, own)] @ share))
+        left = float(np.linalg.norm(identified - scale * nominal))
+        if scale > SURE * std and left < MOST_LEFT * np.linalg.norm(identified):
+            found[joint] = scale
+    return found
+
+
+def scale_sentence(scales: Mapping[str, float] | None, robot: Robot) -> str:
+    """Say what scale recordings cannot tell, and how the URDF's compares, where scales are given."""
+    geared = np.any(robot.reduction != 1.0)
+    rest = "effort_gain, effort_side and the clock" if geared else "effort_gain and the clock"
+    said = f"No recording tells a scale common to all torques and masses, nor, without gravity, that of time: they rest on {rest}"
+    if scales is None:
+        return f"{said}."
+    if not scales:
+        return f"{said}; the URDF's masses do not show in these torques."
+    size = np.array(list(scales.values()))
+    middle = float(np.exp(np.median(np.log(size))))
+    usual = (size > 1.0 / USUAL) & (size < USUAL)
+    if np.all(usual):
+        spread = " to ".join(dict.fromkeys((f"{size.min():.2g}", f"{size.max():.2g}")))
+        return f"{said}. Torques of the bodies are {spread} times the URDF's."
+    asked = "are effort_gain and effort_side right?" if geared else "is effort_gain right?"
+    if np.all(size < ALIKE * middle) and np.all(size > middle / ALIKE):
+        return f"{said}. All inertial parameters are {middle:.2g} of the URDF's: {asked}"
+    odd = ", ".join(
+        f"{scale:.2g} on {joint}" for (joint, scale), fits in zip(scales.items(), usual, strict=True) if not fits
+    )
+    return f"{said}. Torques of the bodies are {odd} times the URDF's: {asked}"

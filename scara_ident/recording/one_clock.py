@@ -1,0 +1,110 @@
+"""Channels that were sampled apart, as the joints of a torso and of an arm in messages of their own, on one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.recording.audit import Finding
+from scara_ident.recording.audit.samples import GAP_STEPS
+
+# Channels whose rows are the same but for this share were sampled together, and what lacks in one of them is a fault.
+TOGETHER = 0.5
+
+
+def on_one_clock(
+    columns: Mapping[str, Array], time: str, wanted: Sequence[str]
+) -> tuple[dict[str, Array], tuple[Finding, ...]]:
+    """Put channels onto the clock of those that most of them share.
+
+    Parameters
+    ----------
+    columns : mapping of str to ndarray, shape (N,)
+        NaN where a row holds other channels.
+    time : str
+        Column of the clock.
+    wanted : sequence of str
+        Channels that are needed together; the others only keep their rows.
+
+    Returns
+    -------
+    columns : dict of str to ndarray, shape (M,)
+        Of the rows that hold the most channels. The others' values stand beside them where they have the same time, and
+        are interpolated where they have not, by Hermite's cubic with slopes of second-order differences. Rows that lie
+        in a gap of another channel are left out.
+    findings : tuple of Finding
+        One where something was interpolated, or one that only says that messages were joined.
+    """
+    here = {name: np.isfinite(columns[name]) for name in wanted}
+    groups = [names for names in _groups(here) if any(here[name].any() for name in names)]
+    if not groups:
+        return dict(columns), ()
+    clock = max(groups, key=lambda names: (len(names), -int(here[names[0]].sum())))
+    rows = np.any([here[name] for name in clock], axis=0)
+    result = {name: values[rows] for name, values in columns.items()}
+    keep = np.ones(int(rows.sum()), dtype=bool)
+    resampled: list[str] = []
+    for names in groups:
+        if names is clock:
+            continue
+        own = np.any([here[name] for name in names], axis=0)
+        stamps, first = np.unique(columns[time][own], return_index=True)
+        for name in names:
+            values, exact, inside = _at(result[time], stamps, columns[name][own][first])
+            result[name] = values
+            keep &= inside
+            if not exact:
+                resampled.append(name)
+    if len(groups) > 1:
+        result = {name: values[keep] for name, values in result.items()}
+    return result, _findings(groups, clock, resampled, int(np.count_nonzero(~keep)))
+
+
+def _groups(here: Mapping[str, NDArray[np.bool_]]) -> list[list[str]]:
+    """Gather the channels that stand in the same rows."""
+    groups: list[list[str]] = []
+    for name, rows in here.items():
+        for group in groups:
+            other = here[group[0]]
+            if np.count_nonzero(rows & other) >= TOGETHER * max(1, min(rows.sum(), other.sum())):
+                group.append(name)
+                break
+        else:
+            # What is empty throughout is refused by the audit, beside the others.
+            groups.append([name]) if rows.any() or not groups else groups[0].append(name)
+    return groups
+
+
+def _at(time: Array, stamps: Array, values: Array) -> tuple[Array, bool, NDArray[np.bool_]]:
+    """Return values at other times, whether none had to be interpolated, and which times lie in no gap."""
+    if len(stamps) < 2:
+        return np.full(len(time), np.nan), False, np.ones(len(time), dtype=bool)
+    place = np.clip(np.searchsorted(stamps, time), 0, len(stamps) - 1)
+    if np.array_equal(stamps[place], time):
+        return values[place], True, np.ones(len(time), dtype=bool)
+    left = np.clip(np.searchsorted(stamps, time, side="right") - 1, 0, len(stamps) - 2)
+    step = stamps[left + 1] - stamps[left]
+    inside = (time >= stamps[0]) & (time <= stamps[-1]) & (step <= GAP_STEPS * np.median(np.diff(stamps)))
+    slope = np.gradient(values, stamps)
+    share = (time - stamps[left]) / step
+    low, high = values[left], values[left + 1]
+    rise = share**2 * (3.0 - 2.0 * share)
+    bend = step * share * (1.0 - share) * ((1.0 - share) * slope[left] - share * slope[left + 1])
+    return low + (high - low) * rise + bend, False, inside
+
+
+def _findings(
+    groups: Sequence[Sequence[str]], clock: Sequence[str], resampled: Sequence[str], lost: int
+) -> tuple[Finding, ...]:
+    if len(groups) < 2:
+        return ()
+    if not resampled:
+        said = f"{len(groups)} groups of channels stand in rows of their own with the same times: joined"
+        return (Finding("joined", said, len(groups)),)
+    cut = f"; {lost} rows in gaps of theirs left out" if lost else ""
+    shown = ", ".join(resampled[:3]) + (f" and {len(resampled) - 3} more" if len(resampled) > 3 else "")
+    said = f"{shown} were sampled apart from {clock[0]}: interpolated onto its clock{cut}"
+    return (Finding("resampled", said, len(resampled)),)

@@ -1,0 +1,172 @@
+"""Recordings out of arrays and data frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from scara_ident.arrays import Array
+from scara_ident.errors import ArgumentError, RecordingError
+from scara_ident.recording.recording import Recording, recording_of
+from scara_ident.robot.signal_map import contract_channels
+
+if TYPE_CHECKING:
+    from scara_ident.robot.robot import Robot
+
+
+def read_arrays(
+    time: ArrayLike,
+    position: ArrayLike,
+    effort: ArrayLike | None,
+    robot: Robot,
+    *,
+    velocity: ArrayLike | None = None,
+    name: str = "arrays",
+) -> Recording:
+    """Make a recording of arrays and audit it, as `read_recording` does with a file.
+
+    Parameters
+    ----------
+    time : array_like, shape (N,)
+        In s.
+    position : array_like, shape (N, n)
+        In rad or m, a column for each of ``robot.joints``; (N,) will do for one joint.
+    effort : array_like, shape (N, n), or None
+        As recorded: ``effort_gain`` makes N m (N) of it.
+    robot : Robot
+    velocity : array_like, shape (N, n), optional
+        In rad/s or m/s.
+    name : str, optional
+        Of the recording: ``<trajectory>_<repetition>``, as a file's stem.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    ArgumentError
+        `robot` is no robot, or an array holds no real numbers.
+    RecordingError
+        Shapes disagree, or the audit refuses the samples.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scara_ident import load_robot, read_arrays
+    >>> time = np.arange(500) / 250
+    >>> position = np.stack([np.sin(time), np.cos(3 * time)], axis=1)
+    >>> read_arrays(time, position, None, load_robot()).position.shape
+    (2, 500)
+    """
+    check_robot(robot)
+    clock = _real(name, "time", time)
+    if clock.ndim != 1:
+        raise RecordingError(f"{name}: time has shape {clock.shape}; expected one number for each sample")
+    columns = {"time": clock}
+    for signal, values in (("position", position), ("effort", effort), ("velocity", velocity)):
+        if values is None:
+            continue
+        array = _real(name, signal, values)
+        if robot.n == 1 and array.ndim == 1:
+            array = array[:, None]
+        if array.shape != (len(clock), robot.n):
+            turned = "; transpose it" if array.shape == (robot.n, len(clock)) else ""
+            raise RecordingError(
+                f"{name}: {signal} has shape {array.shape}; expected {(len(clock), robot.n)}, a row for each time and a "
+                f"column for each of {', '.join(robot.joints)}{turned}"
+            )
+        columns |= {f"{joint}.{signal}": array[:, k] for k, joint in enumerate(robot.joints)}
+
+    def read(wanted: Sequence[str]) -> dict[str, Array]:
+        return {column: columns[column].copy() for column in wanted}
+
+    channels = contract_channels(robot.joints)
+    return recording_of(Path(name), tuple(columns), read, robot, channels, need_effort=effort is not None)
+
+
+def read_frame(frame: Any, robot: Robot, *, name: str = "frame", need_effort: bool = True) -> Recording:
+    """Make a recording of a data frame and audit it, as `read_recording` does with a file.
+
+    Parameters
+    ----------
+    frame : polars.DataFrame or pandas.DataFrame
+        With the columns that the robot description names, else ``time``, ``<joint>.position``, ``<joint>.effort``. Of
+        pandas the index may be the time.
+    robot : Robot
+    name : str, optional
+        See `read_arrays`.
+    need_effort : bool, optional
+        See `read_recording`.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    ArgumentError
+        Not a data frame, or no robot.
+    RecordingError
+        A column is missing or holds no numbers, or the audit refuses the samples.
+    """
+    check_robot(robot)
+    if not (hasattr(frame, "columns") and hasattr(frame, "__getitem__")):
+        raise ArgumentError(f"frame: expected a data frame of polars or pandas; found {type(frame).__name__}")
+    channels = robot.channels or contract_channels(robot.joints)
+    clock = channels.time.column
+    names = [str(column) for column in frame.columns]
+    index = getattr(frame, "index", None)
+    indexed = clock not in names and index is not None and (index.name == clock or index.dtype.kind == "M")
+
+    def read(wanted: Sequence[str]) -> dict[str, Array]:
+        return {
+            column: _column(name, column, index if indexed and column == clock else frame[column]) for column in wanted
+        }
+
+    return recording_of(
+        Path(name), (*names, clock) if indexed else names, read, robot, channels, need_effort=need_effort
+    )
+
+
+def check_robot(robot: object) -> None:
+    """Refuse what is no `Robot`.
+
+    Raises
+    ------
+    ArgumentError
+    """
+    from scara_ident.robot.robot import Robot
+
+    if not isinstance(robot, Robot):
+        raise ArgumentError(f"robot: expected a Robot, as load_robot gives; found {type(robot).__name__}")
+
+
+def _real(source: str, name: str, values: ArrayLike) -> Array:
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ArgumentError(f"{source}: {name} has rows of different lengths; expected an array") from None
+    if array.dtype.kind not in "fiu":
+        raise ArgumentError(f"{source}: {name} holds {array.dtype}; expected real numbers")
+    return array.astype(np.float64)
+
+
+def _column(source: str, name: str, values: Any) -> Array:
+    """Return a column in float64; points in time in s since the first."""
+    array = np.asarray(values)
+    if array.ndim != 1:
+        raise RecordingError(f"{source}: column {name!r} stands in it twice; rename one of them")
+    if array.dtype.kind == "M":
+        array = array - array[~np.isnat(array)][:1]
+    if array.dtype.kind == "m":
+        seconds: Array = np.where(np.isnat(array), np.nan, array / np.timedelta64(1, "ns") / 1e9)
+        return seconds
+    try:
+        return np.asarray(array, dtype=np.float64).copy()
+    except (TypeError, ValueError):
+        raise RecordingError(f"{source}: column {name!r} holds {array.dtype}; it must hold numbers") from None

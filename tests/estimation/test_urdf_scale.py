@@ -1,0 +1,66 @@
+"""What no recording tells is compared with the URDF."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.estimation import wls
+from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
+from scara_ident.model.model import build_model
+from scara_ident.motion.prepared import prepare
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import Robot, load_robot
+from tests.arms import PLANAR_2R, noisy, swing, write_urdf
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Robot, Recording]:
+    robot = load_robot(write_urdf(tmp_path_factory.mktemp("arm") / "arm.urdf", PLANAR_2R))
+    return robot, noisy(swing(robot, seconds=8.0, rate=200.0), np.random.default_rng(1), 0.05)
+
+
+def scales(robot: Robot, run: Recording, gains: tuple[float, float]) -> dict[str, float]:
+    assert run.effort is not None
+    scaled = replace(run, effort=run.effort * np.array(gains)[:, None])
+    observations: Observations = observe(build_model(robot, "basic"), prepare([scaled], (8.0, 8.0)))
+    return urdf_scale(wls(observations), observations)
+
+
+@pytest.mark.parametrize(
+    ("gains", "said"),
+    [
+        ((1.0, 1.0), r"Torques of the bodies are (1|0\.99|0\.99 to 1) times the URDF's\."),
+        ((0.01, 0.01), r"All inertial parameters are 0\.01 of the URDF's: is effort_gain right\?"),
+    ],
+)
+def test_the_scale_of_each_joint_is_told(arm, gains, said):
+    robot, run = arm
+    found = scales(robot, run, gains)
+    # Noise of 0.05 N m, beside some 5 N m of gravity.
+    assert list(found.values()) == pytest.approx(gains, rel=0.02)
+    assert re.search(said, scale_sentence(found, robot))
+
+
+def test_joints_that_differ_are_named(arm):
+    said = scale_sentence({"j1": 1.1, "j2": 30.0}, arm[0])
+    assert said.endswith("Torques of the bodies are 30 on j2 times the URDF's: is effort_gain right?")
+
+
+def test_behind_a_gear_the_side_may_be_wrong_too(arm):
+    robot, _ = arm
+    geared = replace(robot, reduction=np.array([100.0, 100.0]))
+    assert "are effort_gain and effort_side right?" in scale_sentence({"j1": 100.0, "j2": 110.0}, geared)
+
+
+def test_a_urdf_that_does_not_show_says_nothing_of_scale(arm):
+    robot, run = arm
+    assert run.effort is not None
+    rng = np.random.default_rng(2)
+    assert scales(robot, replace(run, effort=rng.standard_normal(run.effort.shape)), (1.0, 1.0)) == {}
+    assert scale_sentence({}, robot).endswith("the URDF's masses do not show in these torques.")
+    assert scale_sentence(None, robot).endswith("the clock.")

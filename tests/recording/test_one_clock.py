@@ -1,0 +1,67 @@
+"""Channels sampled apart come onto one clock, interpolated only where they have to be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scara_ident.recording.one_clock import on_one_clock
+
+
+def interleaved(*parts: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Rows of parts with clocks of their own, in the order of time; NaN where a row is another's."""
+    time = np.concatenate([part["time"] for part in parts])
+    order = np.argsort(time, kind="stable")
+    found = {"time": time[order]}
+    start = 0
+    for part in parts:
+        stop = start + len(part["time"])
+        for name in part.keys() - {"time"}:
+            values = np.full(len(time), np.nan)
+            values[start:stop] = part[name]
+            found[name] = values[order]
+        start = stop
+    return found
+
+
+T = np.arange(200) / 100.0
+ARM = {"time": T, "a": np.sin(T), "b": np.cos(T)}
+
+
+def test_one_group_keeps_its_rows_and_a_number_that_lacks():
+    lacking = ARM | {"a": np.where(np.arange(200) == 7, np.nan, ARM["a"])}
+    found, said = on_one_clock(interleaved(lacking, {"time": T + 0.003, "other": T}), "time", ["a", "b"])
+    assert said == ()
+    np.testing.assert_array_equal(found["b"], ARM["b"])
+    assert np.flatnonzero(np.isnan(found["a"])).tolist() == [7]
+
+
+def test_the_same_stamps_are_joined_without_interpolating():
+    found, (said,) = on_one_clock(interleaved(ARM, {"time": T, "c": T**2}), "time", ["a", "b", "c"])
+    assert said.kind == "joined"
+    np.testing.assert_array_equal(found["time"], T)
+    np.testing.assert_array_equal(found["c"], T**2)
+
+
+def test_other_stamps_are_interpolated_onto_the_clock_of_most_channels():
+    other = T[:-1] + 0.004
+    found, (said,) = on_one_clock(interleaved(ARM, {"time": other, "c": np.sin(3 * other)}), "time", ["a", "b", "c"])
+    assert said.kind == "resampled"
+    assert "c were sampled apart from a" in said.message
+    # The first row lies before the other's first, the last beyond its last.
+    np.testing.assert_array_equal(found["time"], T[1:-1])
+    # Slopes of second-order differences err by h^2 / 6 of the third derivative, the cubic by a quarter of h times that.
+    np.testing.assert_allclose(found["c"][1:-1], np.sin(3 * T[2:-2]), rtol=0, atol=27 * 0.01**3 / 24)
+
+
+def test_nothing_is_interpolated_over_a_gap():
+    other = np.delete(T + 0.004, np.arange(50, 90))
+    found, (said,) = on_one_clock(interleaved(ARM, {"time": other, "c": other}), "time", ["a", "b", "c"])
+    gap = np.diff(found["time"])
+    assert gap.max() == pytest.approx(0.42, abs=0.011)
+    assert "left out" in said.message
+
+
+def test_a_channel_that_is_empty_stays_for_the_audit():
+    found, _ = on_one_clock(ARM | {"c": np.full(200, np.nan)}, "time", ["a", "b", "c"])
+    assert np.isnan(found["c"]).all()

@@ -1,0 +1,35 @@
+"""Columns that are not there are named with what there is and what to do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scara_ident.errors import RecordingError
+from scara_ident.recording.wanted import optional_channels, refuse_missing
+from scara_ident.robot.signal_map import contract_channels
+
+CHANNELS = contract_channels(("j1", "j2"))
+WANTED = ["time", "j1.position", "j2.position"]
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["time", "j1.position", "J2.Position"], "is it 'J2.Position'[?].*rename the column"),
+        (
+            [f"column_{k}" for k in range(1, 6)],
+            "first line holds numbers; .*or map column_1 to column_5 under recording:",
+        ),
+    ],
+)
+def test_a_missing_column_has_a_remedy(names: list[str], said: str):
+    with pytest.raises(RecordingError, match=said):
+        refuse_missing(Path("a.csv"), names, WANTED, CHANNELS)
+
+
+def test_a_signal_of_some_joints_only_is_left_out_and_said():
+    found, (said,) = optional_channels(Path("a.csv"), CHANNELS, ["j1.velocity"], ())
+    assert found == {}
+    assert "no j2.velocity beside" in said.message

@@ -1,0 +1,49 @@
+"""The story in Markdown."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis import diagnose
+from scara_ident.diagnosis.tentative import TentativeEffect
+from scara_ident.estimation.run_variation import JointVariation, RunVariation
+from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.diagnosis_markdown import diagnosis_markdown
+from scara_ident.robot.robot import load_robot
+from tests.diagnosis.made import BANDS, exact_runs, with_torque
+from tests.report.test_diagnosis import CATALOGUE, spring
+
+
+@pytest.fixture(scope="module")
+def result():
+    runs = exact_runs(3)
+    held_out = with_torque(runs[4:5], 1, spring)
+    return diagnose(
+        load_robot(), with_torque(runs[:4], 1, spring), validation=held_out, bands=BANDS, catalogue=CATALOGUE
+    )
+
+
+def test_the_story_has_every_candidate_and_both_tables(result):
+    text = diagnosis_markdown(result)
+    assert text.startswith("# Diagnosis of scara03: explained\n")
+    assert "## Error on the training recordings" in text
+    assert "## Error on the validation recordings" in text
+    for row in diagnosis_dict(result)["candidates"]:
+        assert row["label"] in text
+
+
+def test_what_is_tentative_what_is_noise_and_how_runs_differ_stand_in_the_story(result):
+    guess = TentativeEffect("stribeck", "joint1", "d", "helps in only 1 of 2", "slow motion", 0.0712, 3e-4)
+    variation = RunVariation((JointVariation(np.ones((4, 4)), np.array([0.06, 0.0, 0.0, 0.003]), np.zeros((2, 4)), 0.01, np.array([0, 2, 4])), None))  # fmt: skip
+    changed = replace(result, tentative=(guess,), after=replace(result.after, variation=variation))
+    content, text = diagnosis_dict(changed), diagnosis_markdown(changed)
+    assert content["run_variation"] == {"joint1": {"friction": 0.06, "delay": 0.003}}
+    assert "| stribeck | joint1 | 7.12% | 3.0e-04 | helps in only 1 of 2 | slow motion |" in text
+    assert "| joint1 | friction | 0.06 | 1 |\n| joint1 | delay | 0.003 | s |" in text
+    for joint, row in content["evidence"].items():
+        shown = "yes" if row["noise"] else "no"
+        assert f"| {joint} | {shown} | {row['by'] or '-'} | {row['detection_limit']:.1%} | {row['why']} |" in text
+    assert "How runs differ" not in diagnosis_markdown(replace(changed, after=replace(result.after, variation=None)))
