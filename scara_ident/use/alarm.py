@@ -1,0 +1,208 @@
+"""When an external torque is no longer what the model's errors make: thresholds with a stated rate of false alarms.
+
+The size of the residual is explained by features of the motion, joint by joint; in units of that the largest over the joints is
+watched. What exceeds a high level comes in clusters, whose peaks follow a generalised Pareto law (peaks over threshold:
+Davison and Smith, "Models for exceedances over high thresholds", JRSS B 52, 1990; Coles, *An Introduction to Statistical
+Modeling of Extreme Values*, 2001, chapters 4 and 5). The alarm is at the level that peaks exceed as often as is stated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from scara_ident.arrays import Array
+from scara_ident.errors import RecordingError
+from scara_ident.use.external_torque import Observed
+
+# Exceedances closer than this, s, are one cluster, and one alarm.
+TOGETHER = 0.5
+# Clusters that the tail is fitted to, if there are as many: a share of the seconds recorded, within bounds.
+CLUSTER_SHARE, LEAST_CLUSTERS, MOST_CLUSTERS = 0.1, 20, 400
+# Share of its samples that brings every joint's residual to one scale.
+COMMON = 0.995
+# A tail is not taken for one that ends, nor for one without variance.
+LEAST_SHAPE, MOST_SHAPE = 0.0, 0.4
+# Samples that the scale is fitted to, and its least share of the residual's mean.
+MOST_ROWS, LEAST_SCALE = 20_000, 0.1
+HOUR = 3600.0
+
+
+@dataclass(frozen=True, eq=False)
+class Alarm:
+    """Thresholds of the external torque.
+
+    Attributes
+    ----------
+    scale : ndarray, shape (n, k)
+        Threshold of each joint per feature, recorded side: the threshold is the sum over the features.
+    floor : ndarray, shape (n,)
+        Least threshold.
+    rate : float
+        Stated false alarms per hour.
+    hours : float
+        Of motion without contact that it rests on.
+    clusters : int
+        Peaks that the tail was fitted to.
+    shape : float
+        Of the tail; 0 is exponential.
+    spread : float
+        Standard deviation of the logarithm of the rate at these thresholds, by leaving recordings out.
+    """
+
+    scale: Array
+    floor: Array
+    rate: float
+    hours: float
+    clusters: int
+    shape: float
+    spread: float
+
+    def threshold(self, features: Array) -> Array:
+        """Return the threshold of each joint, recorded side: shape (n,) of features (n, k), (n, N) of (n, k, N)."""
+        found = np.einsum("jk,jk...->j...", self.scale, features)
+        return np.asarray(np.maximum(found, self.floor.reshape(-1, *(1,) * (found.ndim - 1))))
+
+
+def calibrate(runs: Sequence[Observed], rate: float) -> Alarm:
+    """Return thresholds that motion without contact exceeds at a rate.
+
+    Parameters
+    ----------
+    runs : sequence of Observed
+        Recordings without contact; best others than those that the model was identified from.
+    rate : float
+        False alarms per hour of such motion.
+
+    Raises
+    ------
+    RecordingError
+        If they are too short.
+    """
+    seconds = [float(np.sum(step_of(run)[run.settled])) for run in runs]
+    if sum(seconds) < LEAST_CLUSTERS:
+        raise RecordingError(
+            f"{runs[0].name}: {sum(seconds):.3g} s without contact in all; thresholds need {LEAST_CLUSTERS} s or more"
+        )
+    scale, floor = residual_scale(runs)
+    # Joints are brought to one scale: none makes most alarms.
+    each = [np.abs(run.torque) / sized(scale, floor, run.features) for run in runs]
+    together = np.concatenate([z[:, run.settled] for z, run in zip(each, runs, strict=True)], axis=1)
+    common = np.quantile(together, COMMON, axis=1)
+    scores = [
+        np.where(run.settled, np.max(z / common[:, None], axis=0), 0.0) for z, run in zip(each, runs, strict=True)
+    ]
+    tail = fit_tail(runs, scores, sum(seconds))
+    level = tail.level(rate)
+    left = [k for k in range(len(runs)) if len(runs) > 2]
+    logs = []
+    for k in left:
+        others = [i for i in left if i != k]
+        part = fit_tail([runs[i] for i in others], [scores[i] for i in others], sum(seconds[i] for i in others))
+        logs.append(np.log(max(part.rate(level), 1e-6)))
+    # Jackknife.
+    spread = float(np.sqrt((len(logs) - 1) * np.var(logs))) if logs else np.nan
+    factor = level * common
+    return Alarm(factor[:, None] * scale, factor * floor, rate, sum(seconds) / HOUR, tail.clusters, tail.shape, spread)
+
+
+def step_of(run: Observed) -> Array:
+    """Return how long each sample stands, s, shape (N,); those after a gap no longer than the others."""
+    steps = np.diff(run.time, prepend=run.time[0])
+    return np.minimum(steps, 5.0 * float(np.median(steps)))
+
+
+def sized(scale: Array, floor: Array, features: Array) -> Array:
+    """Return the usual size of the residual, shape (n, N)."""
+    return np.asarray(np.maximum(np.einsum("jk,jkn->jn", scale, features), floor[:, None]))
+
+
+def residual_scale(runs: Sequence[Observed]) -> tuple[Array, Array]:
+    """Return what the size of the residual is made of, shape (n, k), and the least size, shape (n,).
+
+    The mean of its absolute value is fitted by the features with coefficients that are not negative.
+    """
+    torque = np.concatenate([run.torque[:, run.settled] for run in runs], axis=1)
+    features = np.concatenate([run.features[:, :, run.settled] for run in runs], axis=2)
+    every = max(1, torque.shape[1] // MOST_ROWS)
+    size, features = np.abs(torque[:, ::every]), features[:, :, ::every]
+    scale = np.zeros(features.shape[:2])
+    for joint, (rows, own) in enumerate(zip(features, size, strict=True)):
+        unit = np.maximum(np.mean(rows, axis=1), 1e-12)
+        scale[joint] = nnls((rows / unit[:, None]).T, own)[0] / unit
+    mean = np.mean(size, axis=1)
+    return scale, LEAST_SCALE * np.maximum(mean, 1e-12)
+
+
+@dataclass(frozen=True)
+class Tail:
+    """Generalised Pareto law of the peaks of clusters above a level ``start``.
+
+    Attributes
+    ----------
+    start, width, shape : float
+    clusters : int
+    hours : float
+    """
+
+    start: float
+    width: float
+    shape: float
+    clusters: int
+    hours: float
+
+    def level(self, rate: float) -> float:
+        """Return the level that peaks exceed at a rate per hour."""
+        log = float(np.log(self.clusters / self.hours / rate))
+        grown = log if self.shape == 0.0 else float(np.expm1(self.shape * log)) / self.shape
+        return self.start + self.width * grown
+
+    def rate(self, level: float) -> float:
+        """Return how often an hour peaks exceed a level."""
+        above = (level - self.start) / self.width
+        log = above if self.shape == 0.0 else float(np.log(max(1e-12, 1.0 + self.shape * above))) / self.shape
+        return self.clusters / self.hours * float(np.exp(-log))
+
+
+def fit_tail(runs: Sequence[Observed], scores: Sequence[Array], seconds: float) -> Tail:
+    """Fit the tail of a score by probability-weighted moments (Hosking and Wallis, Technometrics 29, 1987)."""
+    wanted = int(np.clip(CLUSTER_SHARE * seconds, LEAST_CLUSTERS, MOST_CLUSTERS))
+    sample = np.concatenate([score[run.settled] for run, score in zip(runs, scores, strict=True)])
+    low, high = 0.0, float(np.max(sample))
+    # The number of clusters falls with the level once they part from each other.
+    grid = np.quantile(sample, 1.0 - np.geomspace(0.3, 1.0 / len(sample), 60))
+    counts = [sum(len(peaks(run, score, level)) for run, score in zip(runs, scores, strict=True)) for level in grid]
+    place = int(np.argmax(counts))
+    below = [k for k in range(place, len(grid)) if counts[k] >= wanted]
+    start = float(grid[below[-1]] if below else grid[place])
+    top = np.sort(np.concatenate([peaks(run, score, start) for run, score in zip(runs, scores, strict=True)]) - start)
+    count = len(top)
+    share = (np.arange(1, count + 1) - 0.35) / count
+    mean, weighted = float(np.mean(top)), float(np.mean((1.0 - share) * top))
+    shape = (
+        float(np.clip(2.0 - mean / (mean - 2.0 * weighted), LEAST_SHAPE, MOST_SHAPE))
+        if mean > 2.0 * weighted
+        else LEAST_SHAPE
+    )
+    # The mean is kept, whatever the shape was bounded to.
+    width = max(mean * (1.0 - shape), 1e-9 * (high - low + 1.0))
+    return Tail(start, width, shape, count, seconds / HOUR)
+
+
+def peaks(run: Observed, score: Array, level: float) -> Array:
+    """Return the largest score of each cluster above a level."""
+    return np.array([float(np.max(score[first : last + 1])) for first, last in clusters(run.time, score, level)])
+
+
+def clusters(time: Array, score: Array, level: float) -> list[tuple[int, int]]:
+    """Return first and last sample of each cluster above a level, which `TOGETHER` parts from the next."""
+    above: NDArray[np.intp] = np.flatnonzero(score > level)
+    if len(above) == 0:
+        return []
+    cuts = np.flatnonzero(np.diff(time[above]) > TOGETHER)
+    firsts, lasts = above[np.r_[0, cuts + 1]], above[np.r_[cuts, len(above) - 1]]
+    return [(int(first), int(last)) for first, last in zip(firsts, lasts, strict=True)]
