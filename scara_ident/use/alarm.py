@@ -23,6 +23,8 @@ from scara_ident.use.external_torque import Observed
 TOGETHER = 0.5
 # Clusters that the tail is fitted to, if there are as many: a share of the seconds recorded, within bounds.
 CLUSTER_SHARE, LEAST_CLUSTERS, MOST_CLUSTERS = 0.1, 20, 400
+# Levels that are tried for that, and groups of recordings left out to see how sure the rate is.
+LEVELS, FOLDS = 30, 5
 # Share of its samples that brings every joint's residual to one scale.
 COMMON = 0.995
 # A tail is not taken for one that ends, nor for one without variance.
@@ -83,31 +85,30 @@ def calibrate(runs: Sequence[Observed], rate: float) -> Alarm:
     RecordingError
         If they are too short.
     """
-    seconds = [float(np.sum(step_of(run)[run.settled])) for run in runs]
-    if sum(seconds) < LEAST_CLUSTERS:
+    seconds = np.array([np.sum(step_of(run)[run.settled]) for run in runs])
+    if np.sum(seconds) < LEAST_CLUSTERS:
         raise RecordingError(
-            f"{runs[0].name}: {sum(seconds):.3g} s without contact in all; thresholds need {LEAST_CLUSTERS} s or more"
+            f"{runs[0].name}: {np.sum(seconds):.3g} s without contact in all; thresholds need {LEAST_CLUSTERS} s or more"
         )
     scale, floor = residual_scale(runs)
     # Joints are brought to one scale: none makes most alarms.
-    each = [np.abs(run.torque) / sized(scale, floor, run.features) for run in runs]
-    together = np.concatenate([z[:, run.settled] for z, run in zip(each, runs, strict=True)], axis=1)
-    common = np.quantile(together, COMMON, axis=1)
-    scores = [
-        np.where(run.settled, np.max(z / common[:, None], axis=0), 0.0) for z, run in zip(each, runs, strict=True)
-    ]
-    tail = fit_tail(runs, scores, sum(seconds))
+    each = [np.abs(run.torque[:, run.settled]) / sized(scale, floor, run.features[:, :, run.settled]) for run in runs]
+    common = np.quantile(np.concatenate(each, axis=1), COMMON, axis=1)
+    scores = [np.max(z / common[:, None], axis=0) for z in each]
+    times = [run.time[run.settled] for run in runs]
+    tail = fit_tail(times, scores, float(np.sum(seconds)))
     level = tail.level(rate)
-    left = [k for k in range(len(runs)) if len(runs) > 2]
     logs = []
-    for k in left:
-        others = [i for i in left if i != k]
-        part = fit_tail([runs[i] for i in others], [scores[i] for i in others], sum(seconds[i] for i in others))
+    folds = min(FOLDS, len(runs))
+    for fold in range(folds if len(runs) > 2 else 0):
+        kept = [k for k in range(len(runs)) if k % folds != fold]
+        part = fit_tail([times[k] for k in kept], [scores[k] for k in kept], float(np.sum(seconds[kept])))
         logs.append(np.log(max(part.rate(level), 1e-6)))
     # Jackknife.
-    spread = float(np.sqrt((len(logs) - 1) * np.var(logs))) if logs else np.nan
+    spread = float(np.sqrt((folds - 1) * np.var(logs))) if logs else np.nan
     factor = level * common
-    return Alarm(factor[:, None] * scale, factor * floor, rate, sum(seconds) / HOUR, tail.clusters, tail.shape, spread)
+    hours = float(np.sum(seconds)) / HOUR
+    return Alarm(factor[:, None] * scale, factor * floor, rate, hours, tail.clusters, tail.shape, spread)
 
 
 def step_of(run: Observed) -> Array:
@@ -168,34 +169,42 @@ class Tail:
         return self.clusters / self.hours * float(np.exp(-log))
 
 
-def fit_tail(runs: Sequence[Observed], scores: Sequence[Array], seconds: float) -> Tail:
-    """Fit the tail of a score by probability-weighted moments (Hosking and Wallis, Technometrics 29, 1987)."""
+def fit_tail(times: Sequence[Array], scores: Sequence[Array], seconds: float) -> Tail:
+    """Fit the tail of a score by probability-weighted moments (Hosking and Wallis, Technometrics 29, 1987).
+
+    Parameters
+    ----------
+    times, scores : sequence of ndarray, shape (N,)
+        Of each recording.
+    seconds : float
+        In all.
+    """
     wanted = int(np.clip(CLUSTER_SHARE * seconds, LEAST_CLUSTERS, MOST_CLUSTERS))
-    sample = np.concatenate([score[run.settled] for run, score in zip(runs, scores, strict=True)])
-    low, high = 0.0, float(np.max(sample))
-    # The number of clusters falls with the level once they part from each other.
-    grid = np.quantile(sample, 1.0 - np.geomspace(0.3, 1.0 / len(sample), 60))
-    counts = [sum(len(peaks(run, score, level)) for run, score in zip(runs, scores, strict=True)) for level in grid]
-    place = int(np.argmax(counts))
-    below = [k for k in range(place, len(grid)) if counts[k] >= wanted]
-    start = float(grid[below[-1]] if below else grid[place])
-    top = np.sort(np.concatenate([peaks(run, score, start) for run, score in zip(runs, scores, strict=True)]) - start)
+    # One after the other, far enough apart for no cluster to be of two.
+    starts = np.cumsum([0.0, *(float(np.ptp(time)) + 2.0 * TOGETHER for time in times[:-1])])
+    time = np.concatenate([own - own[0] + start for own, start in zip(times, starts, strict=True)])
+    score = np.concatenate(scores)
+    # The number of clusters grows as the level falls, until they meet.
+    best = Tail(float(np.max(score)), 1.0, 0.0, 0, seconds / HOUR)
+    top = np.zeros(1)
+    for level in np.quantile(score, 1.0 - np.geomspace(1.0 / len(score), 0.3, LEVELS)):
+        found = peaks(time, score, float(level))
+        if len(found) > best.clusters:
+            best, top = Tail(float(level), 1.0, 0.0, len(found), seconds / HOUR), np.sort(found) - level
+        if len(found) >= wanted:
+            break
     count = len(top)
     share = (np.arange(1, count + 1) - 0.35) / count
     mean, weighted = float(np.mean(top)), float(np.mean((1.0 - share) * top))
-    shape = (
-        float(np.clip(2.0 - mean / (mean - 2.0 * weighted), LEAST_SHAPE, MOST_SHAPE))
-        if mean > 2.0 * weighted
-        else LEAST_SHAPE
-    )
+    shape = 2.0 - mean / (mean - 2.0 * weighted) if mean > 2.0 * weighted else LEAST_SHAPE
+    shape = float(np.clip(shape, LEAST_SHAPE, MOST_SHAPE))
     # The mean is kept, whatever the shape was bounded to.
-    width = max(mean * (1.0 - shape), 1e-9 * (high - low + 1.0))
-    return Tail(start, width, shape, count, seconds / HOUR)
+    return Tail(best.start, max(mean * (1.0 - shape), 1e-9 * best.start), shape, best.clusters, seconds / HOUR)
 
 
-def peaks(run: Observed, score: Array, level: float) -> Array:
+def peaks(time: Array, score: Array, level: float) -> Array:
     """Return the largest score of each cluster above a level."""
-    return np.array([float(np.max(score[first : last + 1])) for first, last in clusters(run.time, score, level)])
+    return np.array([float(np.max(score[first : last + 1])) for first, last in clusters(time, score, level)])
 
 
 def clusters(time: Array, score: Array, level: float) -> list[tuple[int, int]]:

@@ -217,7 +217,7 @@ class Observed:
 
 
 # Time constants of the observer after which it has forgotten how it began, and median steps that are a gap.
-SETTLES, GAP_STEPS = 5.0, 5.0
+SETTLES, GAP_STEPS = 10.0, 5.0
 
 
 def observe_recording(
