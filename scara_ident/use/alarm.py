@@ -29,8 +29,10 @@ LEVELS, FOLDS = 30, 5
 COMMON = 0.995
 # A tail is not taken for one that ends, nor for one without variance.
 LEAST_SHAPE, MOST_SHAPE = 0.0, 0.4
-# Samples that the scale is fitted to, and its least share of the residual's mean.
-MOST_ROWS, LEAST_SCALE = 20_000, 0.1
+# Largest spread of the rate that is allowed for: more is a guess.
+MOST_SPREAD = 1.5
+# Least share of the mean size of a joint's peaks that their size is taken for in any state.
+LEAST_SCALE = 0.2
 HOUR = 3600.0
 
 
@@ -53,7 +55,7 @@ class Alarm:
     shape : float
         Of the tail; 0 is exponential.
     spread : float
-        Standard deviation of the logarithm of the rate at these thresholds, by leaving recordings out.
+        Standard deviation of the logarithm of that rate, by leaving recordings out; the thresholds allow for it.
     """
 
     scale: Array
@@ -106,7 +108,9 @@ def calibrate(runs: Sequence[Observed], rate: float) -> Alarm:
         logs.append(np.log(max(part.rate(level), 1e-6)))
     # Jackknife.
     spread = float(np.sqrt((folds - 1) * np.var(logs))) if logs else np.nan
-    factor = level * common
+    # The mean of a rate that is known to so much in its logarithm is larger than its median: of a log-normal law by this.
+    sure = 0.5 * min(spread, MOST_SPREAD) ** 2 if logs else 0.0
+    factor = tail.level(rate * float(np.exp(-sure))) * common
     hours = float(np.sum(seconds)) / HOUR
     return Alarm(factor[:, None] * scale, factor * floor, rate, hours, tail.clusters, tail.shape, spread)
 
@@ -123,20 +127,31 @@ def sized(scale: Array, floor: Array, features: Array) -> Array:
 
 
 def residual_scale(runs: Sequence[Observed]) -> tuple[Array, Array]:
-    """Return what the size of the residual is made of, shape (n, k), and the least size, shape (n,).
+    """Return what the peaks of the residual are made of, shape (n, k), and the least of their size, shape (n,).
 
-    The mean of its absolute value is fitted by the features with coefficients that are not negative.
+    The largest absolute value in each `TOGETHER` is fitted by the features' means with coefficients that are not negative.
+    Peaks and not the mean, since a joint at rest has nearly the same residual all the time, and one that moves has not.
     """
-    torque = np.concatenate([run.torque[:, run.settled] for run in runs], axis=1)
-    features = np.concatenate([run.features[:, :, run.settled] for run in runs], axis=2)
-    every = max(1, torque.shape[1] // MOST_ROWS)
-    size, features = np.abs(torque[:, ::every]), features[:, :, ::every]
+    parts = [_in_windows(run) for run in runs]
+    size = np.concatenate([part[0] for part in parts], axis=1)
+    features = np.concatenate([part[1] for part in parts], axis=2)
     scale = np.zeros(features.shape[:2])
     for joint, (rows, own) in enumerate(zip(features, size, strict=True)):
         unit = np.maximum(np.mean(rows, axis=1), 1e-12)
         scale[joint] = nnls((rows / unit[:, None]).T, own)[0] / unit
-    mean = np.mean(size, axis=1)
-    return scale, LEAST_SCALE * np.maximum(mean, 1e-12)
+    return scale, LEAST_SCALE * np.maximum(np.mean(size, axis=1), 1e-12)
+
+
+def _in_windows(run: Observed) -> tuple[Array, Array]:
+    """Return the largest size of the residual (n, m) and the mean of the features (n, k, m) in each of m windows."""
+    places = np.flatnonzero(run.settled)
+    if len(places) == 0:
+        return np.zeros((len(run.torque), 0)), np.zeros((*run.features.shape[:2], 0))
+    window = np.floor(run.time[places] / TOGETHER)
+    starts = np.r_[0, np.flatnonzero(np.diff(window)) + 1]
+    count = np.diff(np.r_[starts, len(places)])
+    size = np.maximum.reduceat(np.abs(run.torque[:, places]), starts, axis=1)
+    return size, np.add.reduceat(run.features[:, :, places], starts, axis=2) / count
 
 
 @dataclass(frozen=True)
