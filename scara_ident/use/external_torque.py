@@ -21,15 +21,10 @@ BANDWIDTH, DIFFERENTIATOR = 4.0, 25.0
 REST_SHARE, FAST_SHARE = 0.02, 0.3
 # What the uncertainty of the torque may depend on, see `ExternalTorque.features`.
 FEATURES = (
-    "fast, backwards",
-    "slow, backwards",
-    "at rest",
-    "slow, forwards",
-    "fast, forwards",
-    "momentum rate",
-    "effort",
-)
-_RATE, _EFFORT = 5, 6
+    "fast, backwards", "slow, backwards", "at rest", "slow, forwards", "fast, forwards", "momentum rate", "effort",
+    "momentum swing",
+)  # fmt: skip
+_RATE, _EFFORT, _SWING = 5, 6, 7
 # States at which a term is compared with itself without acceleration and history, and how well it must agree.
 _STATES, _AGREES = 40, 1e-9
 
@@ -71,7 +66,8 @@ class ExternalTorque:
         What acts from outside, recorded side, N m or N; a force f on the tool is ``J^T f`` of it.
     features : ndarray, shape (n, k)
         `FEATURES`, through the same low-pass: share of the time at rest, slow and fast by direction, and size of the
-        momentum's rate and of the effort, which the uncertainty of the torque is made of.
+        momentum's rate, of the effort and of how fast that rate swings, where a velocity that lags shows; the uncertainty of
+        the torque is made of these.
     left_out : tuple of str
         Effects of the model that take more than position and velocity, and are no part of it.
     """
@@ -111,6 +107,7 @@ class ExternalTorque:
         self._before: tuple[Array, Array] | None = None
         self._seen: Array | None = None
         self._slopes = np.zeros((2, self.robot.n))
+        self._slow_rate = np.zeros(self.robot.n)
 
     def update(self, q: Array, v: Array | None, effort: Array, step: float) -> Array:
         """Take one sample and return `torque`.
@@ -149,6 +146,8 @@ class ExternalTorque:
         features[self._rows, np.add.reduce(v > self._edges, axis=0)] += share
         features[:, _RATE] += share * np.abs(rate)
         features[:, _EFFORT] += share * np.abs(effort)
+        self._slow_rate = self._slow_rate + share * (rate - self._slow_rate)
+        features[:, _SWING] += share * np.abs(rate - self._slow_rate)
         self.features = features
         return self.torque
 
