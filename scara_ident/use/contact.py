@@ -27,7 +27,7 @@ from scara_ident.use.known_model import KnownModel
 
 # Share of the samples whose speed is below the usual largest.
 USUAL = 0.99
-# A joint is named with a contact if it reaches this share of its threshold.
+# A joint is named with a contact if its mean reaches this share of its threshold while the contact is strong.
 NAMED = 0.5
 # A constant force at the tool explains at least this share of the squared torque of a contact there, on at least so many
 # joints: on fewer nearly any torque is that of some force.
@@ -218,11 +218,13 @@ def find_contacts(observer: ContactObserver, observed: Observed) -> tuple[Contac
 
 def _contact(observer: ContactObserver, observed: Observed, threshold: Array, share: Array, span: slice) -> Contact:
     robot = observer.known.robot
-    most = np.max(share[:, span], axis=1)
-    named = [int(j) for j in np.argsort(-most) if most[j] >= NAMED]
     inside = np.arange(span.start, span.stop)
     size = np.max(share[:, span], axis=0)
     strong = inside[size >= STRONG * float(np.max(size))]
+    # Means, so that no peak of the noise names a joint.
+    mean = np.mean(observed.torque[:, strong], axis=1)
+    most = np.abs(mean) / np.mean(threshold[:, strong], axis=1)
+    named = [int(j) for j in np.argsort(-most) if most[j] >= min(NAMED, float(np.max(most)))]
     force, explained = tool_force(observer, observed, threshold, strong)
     at_tool = explained >= FITS and len(named) >= min(LEAST_JOINTS, robot.n)
     return Contact(
@@ -230,8 +232,8 @@ def _contact(observer: ContactObserver, observed: Observed, threshold: Array, sh
         float(observed.time[span.start]),
         float(observed.time[span.stop - 1]),
         tuple(robot.joints[j] for j in named),
-        float(np.max(most)),
-        np.mean(observed.torque[:, strong], axis=1),
+        float(np.max(size)),
+        mean,
         "tool" if at_tool else robot.links[_outermost(robot, named)],
         force if at_tool else None,
         explained,
