@@ -30,7 +30,7 @@ def test_parts_add_up_to_the_torque_of_the_estimate(identified, known: KnownMode
         *(f"{word} friction" for word in ("Coulomb", "viscous", "quadratic", "cubic")),
         "offset",
     ]
-    expected = identified.estimate.predict(moved)
+    expected = np.einsum("jpn,p->jn", identified.model.regressor(moved), identified.estimate.value)
     np.testing.assert_allclose(sum(parts.values()), expected, atol=1e-12)
     np.testing.assert_allclose(known.torque(moved), expected, atol=1e-12)
 

@@ -10,7 +10,7 @@ from scara_ident.arrays import Array
 from scara_ident.report.html.blocks import Block, Cell, Group, Paragraph, Selector, Table, count, name, number
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection
-from scara_ident.report.plot import Figure, Grid, Layer, Line, Panel, Plot, Region, single
+from scara_ident.report.plot import Drawing, Figure, Grid, Layer, Line, Panel, Plot, Region, single
 from scara_ident.use.contact import ContactFindings, sentences
 from scara_ident.use.external_torque import Observed
 
@@ -71,7 +71,7 @@ def _contacts(found: ContactFindings) -> list[Block]:
 def _torque(found: ContactFindings) -> list[Block]:
     """The external torque of every joint over time."""
     robot, shown = found.observer.known.robot, found.observed[:MOST_RECORDINGS]
-    variants = {
+    variants: dict[tuple[int, ...], Drawing] = {
         (k,): Plot("time [s]", [_panel(found, run, j, 110) for j in range(robot.n)]) for k, run in enumerate(shown)
     }
     figure = Figure("external", "External torque, joint by joint", "", variants, (0,))
