@@ -15,8 +15,10 @@ import typer
 
 from scara_ident.cli import options
 from scara_ident.cli.base import base
+from scara_ident.cli.check import check
 from scara_ident.cli.compare import compare
 from scara_ident.cli.console import errors_console, plugin_notices
+from scara_ident.cli.contact import contact
 from scara_ident.cli.demo import demo
 from scara_ident.cli.diagnose import diagnose
 from scara_ident.cli.excite import excite
@@ -66,6 +68,8 @@ _COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (compare, "Set every trajectory's parameters against every trajectory."),
     (excite, "Design a motion that tells much, within the arm's limits."),
     (export, "Write the identified arm for other programs."),
+    (check, "Say whether a motion can be run, and what it costs."),
+    (contact, "Find contact with the arm in recordings, and its force."),
     (simulate, "Record the virtual arm in closed loop."),
     (use, "Say what the model wins as feed-forward and in simulation."),
     (inspect, "Show what is in a file, audit it, write a first robot.yaml."),

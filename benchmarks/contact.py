@@ -1,0 +1,195 @@
+"""How often an observer calls contact where there is none, beside what it states, and how small a force it finds.
+
+On virtual arms: six recordings are identified from; of the others without contact one half gives the thresholds and the other
+counts false alarms, then the halves change places. Pushes on the tool, in the closed loop, of random directions that the arm
+can feel and of random size, are then looked for at thresholds from all of them. On measured recordings: two are identified
+from; each of the others counts with thresholds from the rest, and pushes ``-J^T f`` are added to its effort. The interval
+is Poisson's exact one of 95 %; the force found in 90 % of pushes is by logistic regression on its logarithm.
+
+    python benchmarks/contact.py --robot ur5 --recordings 40 --output benchmarks/results/contact_ur5.json
+    python benchmarks/contact.py --measured DATA/ur10e --fit ident_50s_12harm ident_50s_14harm_noload
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.stats import chi2
+from virtual_motions import KINDS, random_motion
+
+from scara_ident import Recording, identify, load_robot, read_recordings, simulate, virtual_arm
+from scara_ident.robot.kinematics import tool_frame
+from scara_ident.simulation.arm import VirtualArm
+from scara_ident.simulation.effects.contact import Push
+from scara_ident.use.alarm import calibrate, step_of
+from scara_ident.use.contact import ContactObserver, contact_observer, find_contacts
+from scara_ident.use.external_torque import Observed
+from scara_ident.use.known_model import KnownModel, known_model
+
+Array = NDArray[np.float64]
+RATES = (10.0, 30.0, 60.0, 120.0)
+# Stated false alarms per hour at which pushes are looked for.
+PUSH_RATE = 10.0
+SECONDS, RATE = 20.0, 250.0
+# Pushes last so long, begin so far apart, and count as found up to so long after, s.
+LASTING, APART, AFTER = 0.6, 3.5, 0.3
+FORCES = {"scara03": (3.0, 150.0), "ur5": (1.0, 60.0), "measured": (2.0, 150.0)}
+
+
+def main() -> None:
+    """Print and write what was counted."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--robot", choices=("scara03", "ur5"), default="scara03")
+    parser.add_argument("--recordings", type=int, default=40, help="without contact; as many with pushes are made")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--measured", type=Path, help="folder with robot.yaml and recordings")
+    parser.add_argument("--fit", nargs="+", default=[], help="recordings of it to identify from")
+    parser.add_argument("--output", type=Path)
+    given = parser.parse_args()
+    found = measured(given.measured, given.fit, given.seed) if given.measured else virtual(given.robot, given.recordings, given.seed)  # fmt: skip
+    print(json.dumps(found, indent=1))
+    if given.output:
+        given.output.parent.mkdir(parents=True, exist_ok=True)
+        given.output.write_text(json.dumps(found, indent=1) + "\n")
+
+
+def virtual(name: str, count: int, seed: int) -> dict[str, Any]:
+    """Count on a virtual arm."""
+    arm = virtual_arm(load_robot(None if name == "scara03" else name))
+    made = [record(arm, seed, k) for k in range(6 + count)]
+    known = known_model(identify(arm.robot, made[:6]))
+    observer = contact_observer(known, made[6:], rate=PUSH_RATE)
+    runs = [observer.observe(item) for item in made[6:]]
+    halves = [runs[::2], runs[1::2]]
+    rows = [alarms(observer, rate, [(halves[0], halves[1]), (halves[1], halves[0])]) for rate in RATES]
+    tries: list[tuple[float, bool, bool]] = []
+    for k in range(count // 2):
+        rng = np.random.default_rng([seed, 10_000 + k])
+        pushes = [drawn(arm, rng, start, FORCES[name]) for start in np.arange(2.0, SECONDS - 2.0, APART)]
+        tries += looked_for(observer, observer.observe(record(arm, seed, 20_000 + k, pushes)), pushes)
+    return {"arm": name, "false_alarms": rows, **smallest(tries)}
+
+
+def record(arm: VirtualArm, seed: int, k: int, pushes: Sequence[Push] = ()) -> Recording:
+    """Record a random motion, with the velocity that the controller saw."""
+    motion = random_motion(f"m{k}", arm, KINDS[k % len(KINDS)], SECONDS, np.random.default_rng([seed, k]))
+    return simulate(arm, motion, effects=pushes, seed=k, rate=RATE, record_velocity=True).recording
+
+
+def drawn(arm: VirtualArm, rng: np.random.Generator, start: float, forces: tuple[float, float]) -> Push:
+    """Draw a push on the tool, horizontal where all axes are vertical."""
+    direction = rng.normal(size=3)
+    if arm.robot.name == "scara03":
+        direction[2] = 0.0
+    x, y, z = direction / np.linalg.norm(direction)
+    return Push(
+        force=float(np.exp(rng.uniform(*np.log(forces)))), time=float(start), duration=LASTING, direction=(x, y, z)
+    )
+
+
+def alarms(observer: ContactObserver, rate: float, splits: Sequence[tuple[list[Observed], list[Observed]]]) -> dict[str, Any]:  # fmt: skip
+    """Count false alarms in the second part of each split with thresholds from the first."""
+    count, hours = 0, 0.0
+    for free, others in splits:
+        own = ContactObserver(observer.known, observer.settings, calibrate(free, rate), velocity=observer.velocity)
+        count += sum(len(find_contacts(own, run)) for run in others)
+        hours += sum(float(np.sum(step_of(run)[run.settled])) for run in others) / 3600.0
+    low = 0.5 * chi2.ppf(0.025, 2 * count) if count else 0.0
+    high = 0.5 * chi2.ppf(0.975, 2 * count + 2)
+    return {"stated": rate, "seen": count / hours, "interval": [low / hours, high / hours], "count": count, "hours": hours, "ratio": count / hours / rate}  # fmt: skip
+
+
+def looked_for(observer: ContactObserver, run: Observed, pushes: Sequence[Push]) -> list[tuple[float, bool, bool]]:
+    """Return force, whether it was found, and whether at the tool, of every push."""
+    found = find_contacts(observer, run)
+    tries = []
+    for push in pushes:
+        hits = [each for each in found if each.stop >= push.time and each.start <= push.time + push.duration + AFTER]
+        tries.append((push.force, bool(hits), any(each.place == "tool" for each in hits)))
+    return tries
+
+
+def smallest(tries: Sequence[tuple[float, bool, bool]]) -> dict[str, Any]:
+    """Return the force that is found in 90 % of pushes, N, and the shares by size of force."""
+    force, hit = np.log([each[0] for each in tries]), np.array([each[1] for each in tries], dtype=float)
+
+    def loss(x: Array) -> float:
+        z = np.exp(x[1]) * (force - x[0])
+        return float(np.sum(np.logaddexp(0.0, z) - hit * z)) + 0.01 * x[1] ** 2
+
+    middle, steep = minimize(loss, np.array([float(np.median(force)), 0.5]), method="Nelder-Mead").x
+    edges = np.quantile(force, np.linspace(0.0, 1.0, 7))
+    bins = [
+        {
+            "from": float(np.exp(a)),
+            "to": float(np.exp(b)),
+            "pushes": int(inside.sum()),
+            "found": float(hit[inside].mean()),
+        }
+        for a, b in zip(edges[:-1], edges[1:], strict=True)
+        if (inside := (force >= a) & (force <= b)).any()
+    ]
+    named = [each[2] for each in tries if each[1]]
+    return {
+        "pushes": len(tries),
+        "stated_at_pushes": PUSH_RATE,
+        # Where every push is found, that or less.
+        "force_found_in_90_percent": float(np.exp(max(force.min(), middle + np.log(9.0) / np.exp(steep)))),
+        "found_by_force": bins,
+        "placed_at_tool": float(np.mean(named)) if named else None,
+    }
+
+
+def measured(folder: Path, fit: Sequence[str], seed: int) -> dict[str, Any]:
+    """Count on measured recordings: each with thresholds from all others that were not fitted."""
+    robot = load_robot(folder / "robot.yaml")
+    recordings = read_recordings([folder], robot)
+    known = known_model(identify(robot, [item for item in recordings if item.name in fit]))
+    others = [item for item in recordings if item.name not in fit]
+    observer = contact_observer(known, others, rate=PUSH_RATE)
+    runs = [observer.observe(item) for item in others]
+    splits = [(runs[:k] + runs[k + 1 :], [runs[k]]) for k in range(len(runs))]
+    rows = [alarms(observer, rate, splits) for rate in RATES]
+    tries: list[tuple[float, bool, bool]] = []
+    for k, (item, (free, _)) in enumerate(zip(others, splits, strict=True)):
+        own = ContactObserver(known, observer.settings, calibrate(free, PUSH_RATE), velocity=observer.velocity)
+        # Five times, with other pushes: the recordings are few.
+        for again in range(5):
+            pushed, pushes = added(known, item, np.random.default_rng([seed, k, again]))
+            tries += looked_for(own, own.observe(pushed), pushes)
+    names = [item.name for item in others]
+    return {"arm": folder.name, "counted": names, "velocity": observer.velocity, "false_alarms": rows, **smallest(tries)}  # fmt: skip
+
+
+def added(known: KnownModel, item: Recording, rng: np.random.Generator) -> tuple[Recording, list[Push]]:
+    """Return a recording with pushes on the tool added to its effort."""
+    robot = known.robot
+    assert item.effort is not None
+    effort, time = item.effort.copy(), item.time - item.time[0]
+    frame, data = robot.model.getFrameId(tool_frame(robot).name, pin.FrameType.BODY), robot.model.createData()
+    pushes = []
+    for start in np.arange(rng.uniform(1.5, 3.0), time[-1] - 1.5, APART):
+        direction = rng.normal(size=3)
+        x, y, z = direction / np.linalg.norm(direction)
+        push = Push(force=float(np.exp(rng.uniform(*np.log(FORCES["measured"])))), time=float(start), duration=LASTING, direction=(x, y, z))  # fmt: skip
+        for k in np.flatnonzero((time >= start) & (time <= start + LASTING)):
+            q = item.position[np.argsort(robot.order), k]
+            jacobian = pin.computeFrameJacobian(robot.model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+            rise = min(1.0, (time[k] - start) / 0.05, (start + LASTING - time[k]) / 0.05)
+            force = push.force * rise * np.array(push.direction)
+            effort[:, k] -= robot.row_scale * (jacobian[:3].T @ force)[robot.order]
+        pushes.append(push)
+    return replace(item, effort=effort), pushes
+
+
+if __name__ == "__main__":
+    main()

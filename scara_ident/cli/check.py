@@ -1,0 +1,87 @@
+"""``scara-ident check``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scara_ident.cli import options
+from scara_ident.cli.console import check_report, result_console, table
+
+Result = Annotated[Path, typer.Argument(metavar="RESULT", help="identification.json of this arm.")]
+
+
+def check(
+    trajectory: Annotated[
+        Path, typer.Argument(metavar="TRAJECTORY", help="trajectory.csv, or a recording, with effort or without.")
+    ],
+    result: Result,
+    robot: options.Robot = None,
+    ranges: Annotated[
+        list[str] | None, typer.Option("--range", metavar="JOINT=LOWER..UPPER", help="Instead of the URDF's, rad or m.")
+    ] = None,
+    velocities: Annotated[
+        list[str] | None, typer.Option("--velocity", metavar="JOINT=V", help="Instead of the URDF's, rad/s or m/s.")
+    ] = None,
+    accelerations: Annotated[
+        list[str] | None, typer.Option("--acceleration", metavar="JOINT=A", help="Most, rad/s^2 or m/s^2.")
+    ] = None,
+    torques: Annotated[
+        list[str] | None,
+        typer.Option("--torque", metavar="JOINT=T", help="Instead of the URDF's, on the recorded side, N m or N."),
+    ] = None,
+    powers: Annotated[
+        list[str] | None, typer.Option("--power", metavar="JOINT=P", help="Most that a drive gives or takes, W.")
+    ] = None,
+    output: options.Output = None,
+    json: options.Json = False,
+) -> None:
+    """Say whether an arm can run a motion, what limits it, and what energy it takes; exit status 1 if it cannot."""
+    from scara_ident.cli.joint_values import joint_numbers, joint_ranges
+    from scara_ident.errors import ScaraIdentError
+    from scara_ident.files import write_json, written_together
+    from scara_ident.robot.robot import load_robot
+    from scara_ident.use.check import check as run
+    from scara_ident.use.check import check_dict, read_motion
+    from scara_ident.use.joint_limits import joint_limits
+    from scara_ident.use.known_model import read_known_model
+
+    check_report(output, "check")
+    arm = load_robot(robot)
+    limits = joint_limits(
+        arm,
+        ranges=joint_ranges(ranges, "--range"),
+        velocities=joint_numbers(velocities, "--velocity"),
+        accelerations=joint_numbers(accelerations, "--acceleration"),
+        torques=joint_numbers(torques, "--torque"),
+        powers=joint_numbers(powers, "--power"),
+    )
+    known = read_known_model(result, arm)
+    found = run(known, read_motion(trajectory, known), limits)
+    content = check_dict(found)
+    console = result_console(content, json)
+    rows = table("limits", "limit", "reached", "bound", "at [s]", "used", right=("reached", "bound", "at [s]", "used"))
+    for each in found.margins:
+        used = "-" if each.share is None else f"{each.share:.0%}"
+        rows.add_row(each.name, f"{each.reached:.4g}", f"{each.bound:.4g} {each.unit}", f"{each.time:.3f}", used)
+    console.print(rows)
+    energy = table("energy, J", "joint", "given", "taken back", "heat", right=("given", "taken back", "heat"))
+    for joint, row in content["energy"].items():
+        energy.add_row(joint, *(f"{row[key]:.4g}" for key in ("given", "returned", "heat")))
+    console.print(energy)
+    console.say(content["summary"])
+    if output is not None:
+        from scara_ident.report.drawing import draw
+        from scara_ident.report.html.check import check_figures
+        from scara_ident.report.html.check import check_report as write_report
+
+        with written_together(output) as place:
+            draw(place / "check.png", f"Torque and power along {found.name}", check_figures(found))
+            write_report(place / "report.html", found)
+            write_json(place / "check.json", content)
+        console.written(output, "check.json", "report.html", "check.png")
+    if found.broken:
+        said = content["summary"][0]
+        raise ScaraIdentError(f"{trajectory}: {said[0].lower()}{said[1:].rstrip('.')}; {content['summary'][1]}")

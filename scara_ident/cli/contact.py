@@ -1,0 +1,68 @@
+"""``scara-ident contact``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scara_ident.cli import options
+from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, table
+
+
+def contact(
+    recordings: options.Recordings,
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="identification.json of this arm.")],
+    free: Annotated[
+        list[str],
+        typer.Option("--free", metavar="RECORDING", help="Without contact: thresholds are taken from it; repeatable."),
+    ],
+    robot: options.Robot = None,
+    rate: Annotated[float, typer.Option(metavar="R", min=1e-6, help="False alarms per hour to allow.")] = 1.0,
+    bandwidth: Annotated[
+        float, typer.Option(metavar="HZ", min=0.01, help="Of the observer: wider is sooner, and noisier.")
+    ] = 4.0,
+    output: options.Output = None,
+    json: options.Json = False,
+) -> None:
+    """Find contact with the arm in recordings: when, on which joints, and the force at the tool or the link."""
+    import numpy as np
+
+    from scara_ident.files import write_json, written_together
+    from scara_ident.recording.recording import read_usable
+    from scara_ident.robot.robot import load_robot
+    from scara_ident.use.contact import contact_observer, contacts_dict, look_for_contact
+    from scara_ident.use.known_model import read_known_model
+
+    check_report(output, "contact")
+    arm = load_robot(robot)
+    known = read_known_model(result, arm)
+    with progress() as work:
+        work("reading recordings", 0.0)
+        quiet, notes = read_usable(free, arm)
+        watched, more = read_usable(recordings, arm)
+        work("taking thresholds", READING_SHARE)
+        observer = contact_observer(known, quiet, rate=rate, bandwidth=bandwidth)
+        work("looking for contact", 0.5)
+        found = look_for_contact(observer, watched)
+    content = contacts_dict(found)
+    console = result_console(content, json)
+    console.note([*notes, *more])
+    rows = table("contacts", "recording", "from", "to", "joints", "place", "force", right=("from", "to", "force"))
+    for each in found.contacts:
+        force = "-" if each.force is None else f"{np.linalg.norm(each.force):.3g} N"
+        joints = ", ".join(each.joints)
+        rows.add_row(each.recording, f"{each.start:.2f}", f"{each.stop:.2f}", joints, each.place, force)
+    if found.contacts:
+        console.print(rows)
+    console.say(content["summary"])
+    if output is not None:
+        from scara_ident.report.drawing import draw
+        from scara_ident.report.html.contact import contact_figures, contact_report
+
+        with written_together(output) as place:
+            draw(place / "contact.png", f"External torque on {arm.name}", contact_figures(found))
+            contact_report(place / "report.html", found)
+            write_json(place / "contacts.json", content)
+        console.written(output, "contacts.json", "report.html", "contact.png")

@@ -1,0 +1,165 @@
+"""The report of a check: whether a motion can be run, what limits it, and what it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.report.html.blocks import (
+    Block,
+    Cell,
+    Group,
+    Paragraph,
+    Selector,
+    Table,
+    Tag,
+    count,
+    name,
+    number,
+    superscripts,
+)
+from scara_ident.report.html.page import Page, parts
+from scara_ident.report.html.section import NamedSection
+from scara_ident.report.plot import Figure, Grid, Layer, Level, Line, Mark, Panel, Plot, single, style
+from scara_ident.use.check import Check, limits_of_joint, sentences
+
+# Points of a line, at the most.
+MOST_POINTS = 6000
+
+
+def check_report(path: Path, found: Check) -> None:
+    """Write the report of a check as one HTML file.
+
+    Raises
+    ------
+    ScaraIdentError
+        If the file cannot be written.
+    """
+    robot, said = found.known.robot, sentences(found)
+    sections = (
+        NamedSection("limits", "Limits", _limits),
+        NamedSection("motion", "Motion and torque", _motion),
+        NamedSection("energy", "Energy", _energy),
+    )
+    seconds = sum(float(np.ptp(each.motion.time)) for each in found.drives)
+    subtitle = f"{seconds:.4g} s for {count(robot.n, 'joint')}; torques foreseen by the {found.known.model.name} model"
+    Page(f"Check of {found.name}", subtitle, said, parts("check", sections, found), bool(found.broken)).write(path)
+
+
+def check_figures(found: Check) -> list[list[Figure]]:
+    """Return what a still picture shows: torque and power of every joint, a row per joint."""
+    return [
+        [single(kind, f"{joint}: {kind}", "", Plot("time [s]", (_panel(found, j, kind, 150),))) for kind in _PICTURED]
+        for j, joint in enumerate(found.known.robot.joints)
+    ]
+
+
+_PICTURED = ("torque", "power")
+_KINDS = ("position", "velocity", "acceleration", "torque", "power")
+
+
+def _limits(found: Check) -> list[Block]:
+    """What is reached of each limit, and when."""
+    rows: list[list[Cell | str]] = []
+    for each in found.margins:
+        tag = None if each.kept else Tag("broken", "bad")
+        used = Cell("" if each.share is None else f"{each.share:.0%}", track=each.share, tag=tag)
+        unit = superscripts(each.unit)
+        spans = ", ".join(f"{start:.3f} to {stop:.3f}" for start, stop in each.beyond[:3])
+        more = f" and {len(each.beyond) - 3} more" if len(each.beyond) > 3 else ""
+        rows.append(
+            [
+                name(each.name),
+                number(each.reached, 4),
+                number(each.bound, 4),
+                unit,
+                f"{each.time:.3f}",
+                used,
+                spans + more,
+            ]
+        )
+    head = ("limit", "reached", "bound", "unit", "at [s]", "used", "beyond it [s]")
+    words = "The value of each that is nearest to its limit, or farthest beyond. Torque is that of the drive, with its rotor, on the side where effort is recorded."
+    return [Paragraph(words), Table(head, rows, (1, 2, 4))] if rows else []
+
+
+def _motion(found: Check) -> list[Block]:
+    """Signals of every joint over time, with their limits."""
+    panels = [tuple(_panel(found, j, kind) for kind in _KINDS) for j in range(found.known.robot.n)]
+    figure = Figure("signals", "Over time", "", {(j,): Plot("time [s]", each) for j, each in enumerate(panels)}, (0,))
+    selector = Selector("joint", tuple(found.known.robot.joints))
+    recorded = " Thin: the torque that was recorded." if found.recorded_rms is not None else ""
+    return [Paragraph(f"Dashed: limits.{recorded}"), Group("signals-group", (figure,), (selector,))]
+
+
+def _panel(found: Check, j: int, kind: str, height: int = 110) -> Panel:
+    robot = found.known.robot
+    length = robot.position_unit(j)
+    unit = {
+        "position": length,
+        "velocity": f"{length}/s",
+        "acceleration": f"{length}/s²",
+        "torque": robot.torque_unit(j),
+        "power": "W",
+    }[kind]
+    layers: list[Layer] = []
+    for each in found.drives:
+        motion = each.motion
+        if kind == "torque" and motion.torque is not None:
+            layers.append(_line(motion.time, motion.torque[j], "grey", "recorded", 0.8))
+        signal = {"position": motion.q, "velocity": motion.v, "acceleration": motion.a}.get(kind)
+        own = (each.torque if kind == "torque" else each.power) if signal is None else signal
+        layers.append(_line(motion.time, own[j], "blue", kind))
+    bounds = limits_of_joint(robot, found.limits, j)[kind]
+    layers += [Level(bound, "vermillion", "limit") for bound in bounds if np.isfinite(bound)]
+    worst = found.limited_by
+    if worst is not None and worst.joint == robot.joints[j] and worst.kind.startswith(kind):
+        layers.append(Mark(worst.time, "vermillion", f"{worst.reached:.4g}"))
+    return Panel(f"{'acc.' if kind == 'acceleration' else kind} [{unit}]", layers, height)
+
+
+def _line(time: Array, signal: Array, color: str, label: str, width: float = 1.4) -> Line:
+    every = max(1, len(time) // MOST_POINTS)
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    return Line(Grid(float(time[0]), every * step, -(-len(time) // every)), signal[::every], color, label, width)
+
+
+def _energy(found: Check) -> list[Block]:
+    """What the drives give, take back and lose, by joint and by part of the torque."""
+    robot, energy = found.known.robot, found.energy
+    names = [each for each in energy.work if np.any(energy.work[each] != 0.0)]
+    rows: list[Sequence[Cell | str]] = [
+        [
+            name(joint),
+            number(energy.given[j]),
+            number(energy.returned[j]),
+            number(energy.heated[j]),
+            *(number(energy.work[each][j]) for each in names),
+        ]
+        for j, joint in enumerate(robot.joints)
+    ]
+    head = ("joint", "given [J]", "taken back [J]", "heat [J]", *(f"{each} [J]" for each in names))
+    words = (
+        f"At the drives' shafts: resistance of windings and losses of the electronics come on top. Given less taken back is the sum "
+        f"of the parts on the right; of these {', '.join(energy.heat) or 'none'} take energy out at every moment and become heat."
+    )
+    plot = Plot("time [s]", (Panel("given less taken back [J]", _balances(found), 180),))
+    figure = single("energy-time", "Energy of each drive over time", "", plot)
+    return [Paragraph(words), Table(head, rows, tuple(range(1, len(head)))), Group("energy-group", (figure,))]
+
+
+def _balances(found: Check) -> list[Layer]:
+    layers: list[Layer] = []
+    for j, joint in enumerate(found.known.robot.joints):
+        start, (color, dash) = 0.0, style(j)
+        for each in found.drives:
+            time, power = each.motion.time, each.power[j]
+            steps = 0.5 * (power[1:] + power[:-1]) * np.diff(time)
+            sums = start + np.concatenate([[0.0], np.cumsum(steps)])
+            line = _line(time, sums, color, joint)
+            layers.append(Line(line.x, line.y, color, joint, 1.3, dash))
+            start = float(sums[-1])
+    return layers

@@ -1,0 +1,119 @@
+"""The report of contacts: which, when, where, and the external torque over time beside its thresholds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.report.html.blocks import Block, Cell, Group, Paragraph, Selector, Table, count, name, number
+from scara_ident.report.html.page import Page, parts
+from scara_ident.report.html.section import NamedSection
+from scara_ident.report.plot import Drawing, Figure, Grid, Layer, Line, Panel, Plot, Region, single
+from scara_ident.use.contact import ContactFindings, sentences
+from scara_ident.use.external_torque import Observed
+
+# Points of a line and recordings drawn, at the most.
+MOST_POINTS, MOST_RECORDINGS = 3000, 12
+
+
+def contact_report(path: Path, found: ContactFindings) -> None:
+    """Write the report of contacts as one HTML file.
+
+    Raises
+    ------
+    ScaraIdentError
+        If the file cannot be written.
+    """
+    robot, alarm = found.observer.known.robot, found.observer.alarm
+    sections = (
+        NamedSection("contacts", "Contacts", _contacts),
+        NamedSection("torque", "External torque", _torque),
+        NamedSection("thresholds", "Thresholds", _thresholds),
+    )
+    subtitle = f"{count(len(found.observed), 'recording')}; {alarm.rate:g} false alarms per hour are stated"
+    page = Page(f"Contact with {robot.name}", subtitle, sentences(found), parts("contact", sections, found))
+    page.write(path)
+
+
+def contact_figures(found: ContactFindings) -> list[list[Figure]]:
+    """Return what a still picture shows: the external torque in the recording with most contacts, a row per joint."""
+    names = [each.recording for each in found.contacts]
+    run = max(found.observed, key=lambda each: names.count(each.name))
+    joints = found.observer.known.robot.joints
+    return [
+        [single("torque", f"{run.name}, {joint}", "", Plot("time [s]", (_panel(found, run, j, 120),)))]
+        for j, joint in enumerate(joints)
+    ]
+
+
+def _contacts(found: ContactFindings) -> list[Block]:
+    """What was found."""
+    robot = found.observer.known.robot
+    rows: list[list[Cell | str]] = []
+    for each in found.contacts:
+        first = robot.joints.index(each.joints[0])
+        force = "–" if each.force is None else f"{np.linalg.norm(each.force):.3g} N"
+        torque = f"{number(float(each.torque[first]))} {robot.torque_unit(first)}"
+        spans = [f"{each.start:.2f}", f"{each.stop:.2f}"]
+        rows.append(
+            [name(each.recording), *spans, ", ".join(each.joints), torque, number(each.score), each.place, force]
+        )
+    words = (
+        "Torque is the mean on the first joint while it is strong, on the side where effort is recorded. The place is the tool where a constant force "
+        "there explains the torque of three joints or more, else the outermost link that is loaded: the contact is there or farther out."
+    )
+    head = ("recording", "from [s]", "to [s]", "joints", "torque", "over threshold", "place", "force")
+    return [Paragraph(words), Table(head, rows, (1, 2, 4, 5, 7))] if rows else []
+
+
+def _torque(found: ContactFindings) -> list[Block]:
+    """The external torque of every joint over time."""
+    robot, shown = found.observer.known.robot, found.observed[:MOST_RECORDINGS]
+    variants: dict[tuple[int, ...], Drawing] = {
+        (k,): Plot("time [s]", [_panel(found, run, j, 110) for j in range(robot.n)]) for k, run in enumerate(shown)
+    }
+    figure = Figure("external", "External torque, joint by joint", "", variants, (0,))
+    selector = Selector("recording", tuple(run.name for run in shown))
+    return [
+        Paragraph(
+            "Dashed: thresholds, which grow about reversals, with speed and with the rate of momentum. Shaded: contacts."
+        ),
+        Group("external-group", (figure,), (selector,)),
+    ]
+
+
+def _panel(found: ContactFindings, run: Observed, j: int, height: int) -> Panel:
+    robot = found.observer.known.robot
+    threshold = found.observer.alarm.threshold(run.features)[j]
+    layers: list[Layer] = [
+        Region((each.start, each.stop), "vermillion", "contact", 0.2)
+        for each in found.contacts
+        if each.recording == run.name
+    ]
+    layers.append(_line(run.time, run.torque[j], "blue", "external torque", ""))
+    layers += [_line(run.time, sign * threshold, "vermillion", "threshold", "5 3") for sign in (-1.0, 1.0)]
+    return Panel(f"{robot.joints[j]} [{robot.torque_unit(j)}]", layers, height)
+
+
+def _line(time: Array, signal: Array, color: str, label: str, dash: str) -> Line:
+    every = max(1, len(time) // MOST_POINTS)
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    return Line(Grid(float(time[0]), every * step, -(-len(time) // every)), signal[::every], color, label, 1.3, dash)
+
+
+def _thresholds(found: ContactFindings) -> list[Block]:
+    """What the thresholds are, in the usual states of a joint."""
+    observer = found.observer
+    robot, alarm = observer.known.robot, observer.alarm
+    rows: list[list[Cell | str]] = [
+        [name(joint), robot.torque_unit(j), *(number(max(value, alarm.floor[j])) for value in alarm.scale[j, :5])]
+        for j, joint in enumerate(robot.joints)
+    ]
+    head = ("joint", "unit", "fast, backwards", "slow, backwards", "at rest", "slow, forwards", "fast, forwards")
+    words = (
+        f"Thresholds by speed and direction; what the rate of momentum and the effort add comes on top. They follow from "
+        f"{alarm.clusters} peaks of the residual in {3600.0 * alarm.hours:.4g} s without contact."
+    )
+    return [Paragraph(words), Table(head, rows, (2, 3, 4, 5, 6))]

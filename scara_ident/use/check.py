@@ -1,0 +1,269 @@
+"""Whether a motion can be run, by the torque that an identified model foresees for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.errors import RecordingError
+from scara_ident.motion.motion import Motion
+from scara_ident.motion.prepared import prepare
+from scara_ident.recording.files import column_names
+from scara_ident.recording.recording import read_recording
+from scara_ident.robot.robot import Robot
+from scara_ident.simulation.reference import read_trajectory
+from scara_ident.use.energy import Drive, Energy, drive, energy_of
+from scara_ident.use.joint_limits import JointLimits, Margin, margins
+from scara_ident.use.known_model import KnownModel
+
+# A margin below so many rms errors of the model is close.
+CLOSE = 2.0
+# Slowest share of the speed that is tried, and how finely the largest that can be run is found.
+SLOWEST, STEPS = 0.02, 14
+# Samples at which slower motions are looked at.
+MOST_SAMPLES = 5000
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """What a motion takes of the drives and reaches of the limits.
+
+    Attributes
+    ----------
+    known : KnownModel
+    limits : JointLimits
+    drives : tuple of Drive
+        The motion, stretch by stretch, with its torque.
+    margins : tuple of Margin
+    energy : Energy
+    """
+
+    known: KnownModel
+    limits: JointLimits
+    drives: tuple[Drive, ...]
+    margins: tuple[Margin, ...]
+    energy: Energy
+
+    @property
+    def name(self) -> str:
+        """Of the motion."""
+        return self.drives[0].motion.name
+
+    @property
+    def broken(self) -> tuple[Margin, ...]:
+        """Limits that do not hold, the worst first."""
+        return tuple(sorted((each for each in self.margins if not each.kept), key=lambda each: -each.excess))
+
+    @property
+    def limited_by(self) -> Margin | None:
+        """The limit that is exceeded most, else the one that is used most; None where there is no limit."""
+        return self.broken[0] if self.broken else max(self.margins, key=lambda each: each.excess, default=None)
+
+    @cached_property
+    def speed_share(self) -> float | None:
+        """Largest share of the speed, along the same path, at which all limits hold; None where none does."""
+        return 1.0 if not self.broken else _speed_share(self.known, self.limits, self.drives)
+
+    @cached_property
+    def recorded_rms(self) -> Array | None:
+        """Rms of recorded less foreseen torque, shape (n,); None where no effort was recorded."""
+        left = [each.motion.torque - each.torque for each in self.drives if each.motion.torque is not None]
+        return np.asarray(np.sqrt(np.mean(np.concatenate(left, axis=1) ** 2, axis=1))) if left else None
+
+
+def read_motion(path: Path | str, known: KnownModel) -> tuple[Motion, ...]:
+    """Read a motion as stretches without gaps.
+
+    Parameters
+    ----------
+    path : path
+        A ``trajectory.csv`` with position, velocity and acceleration, which is taken as it is; or a recording, whose
+        positions are low-passed and differentiated as they were for the identification.
+    known : KnownModel
+
+    Raises
+    ------
+    RecordingError
+        If it cannot be read, or is too short.
+    """
+    path, robot = Path(path), known.robot
+    names = (
+        set() if path.is_dir() else set(column_names(path)) if path.suffix.lower() in (".csv", ".parquet") else set()
+    )
+    wanted = {f"{joint}.{kind}" for joint in robot.joints for kind in ("position", "velocity", "acceleration")}
+    if wanted <= names and not any(f"{joint}.effort" in names for joint in robot.joints):
+        told = read_trajectory(path, robot)
+        step = np.diff(told.time)
+        if len(told.time) < 2 or not np.all(step > 0.0):
+            raise RecordingError(f"{path}: time is not strictly increasing; give a trajectory of two samples or more")
+        signals = (told.position, told.velocity, told.acceleration)
+        return (Motion(told.name, told.name, told.time, *signals, None, 1.0 / float(np.median(step))),)
+    recording = read_recording(path, robot, need_effort=False)
+    found = []
+    for part in prepare([recording], known.bands).stretches:
+        # What lies beyond the ends of a recording is a guess, and the derivatives there with it.
+        inside = part.motion.part(part.trim, part.samples - part.trim)
+        if inside.samples > 1:
+            found.append(replace(inside, time=inside.time - recording.time[0]))
+    if not found:
+        raise RecordingError(f"{path}: too short for the band of the identification; give a longer recording")
+    return tuple(found)
+
+
+def check(known: KnownModel, motions: Sequence[Motion], limits: JointLimits) -> Check:
+    """Foresee torque, power and energy of a motion, and compare them with limits.
+
+    At a standstill friction is left out: it may take or give up to Coulomb's.
+
+    Parameters
+    ----------
+    known : KnownModel
+    motions : sequence of Motion, at least one
+        Stretches of one motion.
+    limits : JointLimits
+    """
+    drives = tuple(drive(known, motion) for motion in motions)
+    return Check(known, limits, drives, margins(known.robot, limits, drives), energy_of(drives))
+
+
+def slowed(motion: Motion, share: float) -> Motion:
+    """Return a motion along the same path at a share of its speed."""
+    return replace(
+        motion,
+        time=motion.time / share,
+        v=share * motion.v,
+        a=share**2 * motion.a,
+        rate=share * motion.rate,
+        torque=None,
+    )
+
+
+def _speed_share(known: KnownModel, limits: JointLimits, drives: Sequence[Drive]) -> float | None:
+    every = max(1, sum(each.motion.samples for each in drives) // MOST_SAMPLES)
+    motions = [_every(each.motion, every) for each in drives]
+
+    def runs(share: float) -> bool:
+        slower = [drive(known, slowed(motion, share)) for motion in motions]
+        return all(each.kept for each in margins(known.robot, limits, slower))
+
+    low, high = SLOWEST, 1.0
+    if not runs(low):
+        return None
+    for _ in range(STEPS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if runs(middle) else (low, middle)
+    return low
+
+
+def _every(motion: Motion, step: int) -> Motion:
+    q, v, a = (signal[:, ::step] for signal in (motion.q, motion.v, motion.a))
+    return replace(motion, time=motion.time[::step], q=q, v=v, a=a, torque=None, rate=motion.rate / step)
+
+
+def check_dict(found: Check) -> dict[str, Any]:
+    """Return the content of ``check.json``."""
+    robot, energy, limiting = found.known.robot, found.energy, found.limited_by
+    time = [each.motion.time for each in found.drives]
+    return {
+        "summary": sentences(found),
+        "robot": robot.name,
+        "model": found.known.model.name,
+        "trajectory": found.name,
+        "duration": float(sum(part[-1] - part[0] for part in time)),
+        "runs": not found.broken,
+        "limited_by": None if limiting is None else _entry(limiting),
+        "speed_share": found.speed_share,
+        "limits": {each.name: _entry(each) for each in found.margins},
+        "model_error": dict(zip(robot.joints, found.known.rms, strict=True)),
+        "recorded_minus_foreseen": None
+        if found.recorded_rms is None
+        else dict(zip(robot.joints, found.recorded_rms, strict=True)),
+        "energy": {
+            joint: {
+                "given": energy.given[j],
+                "returned": energy.returned[j],
+                "heat": energy.heated[j],
+                "work": {name: work[j] for name, work in energy.work.items() if work[j]},
+                "rms_torque": energy.rms_torque[j],
+                "peak_power": float(max(np.max(each.power[j]) for each in found.drives)),
+                "peak_braking_power": float(max(0.0, *(np.max(-each.power[j]) for each in found.drives))),
+            }
+            for j, joint in enumerate(robot.joints)
+        },
+        "heat_parts": list(energy.heat),
+        "units": {"energy": "J", "power": "W", "torque": [robot.torque_unit(j) for j in range(robot.n)]},
+    }
+
+
+def _entry(each: Margin) -> dict[str, Any]:
+    return {
+        "joint": each.joint,
+        "kind": each.kind,
+        "time": each.time,
+        "bound": each.bound,
+        "reached": each.reached,
+        "margin": each.margin,
+        "share": each.share,
+        "unit": each.unit,
+        "beyond": [list(span) for span in each.beyond],
+    }
+
+
+def sentences(found: Check) -> list[str]:
+    """Say in a few sentences whether the motion can be run, what limits it, and what it costs."""
+    said, energy = [], found.energy
+    worst = found.limited_by
+    if worst is None:
+        said.append("No limit is known, so nothing can be said against it.")
+    else:
+        near = f"{_named(worst)} at {worst.time:.3f} s: {worst.reached:.4g} of {worst.bound:.4g} {worst.unit}"
+        said.append(f"It cannot be run: {near}." if found.broken else f"It can be run. Nearest to its limit is {near}.")
+    if found.broken:
+        share = found.speed_share
+        said.append(
+            "At no lower speed either: position or gravity is beyond a limit."
+            if share is None
+            else f"Along the same path it can be run at {share:.3g} of the speed."
+        )
+        others = [f"{each.name} at {each.time:.3f} s" for each in found.broken[1:]]
+        if others:
+            said.append(f"Also beyond their limits: {_listed(others)}.")
+    close = _close(found)
+    if close:
+        said.append(f"Within twice the model's own error of the limit: {', '.join(each.name for each in close)}.")
+    said.append(
+        f"The drives give {energy.given.sum():.4g} J and take {energy.returned.sum():.4g} J back; "
+        f"{energy.heated.sum():.4g} J become heat in the joints."
+    )
+    return said
+
+
+def _close(found: Check) -> list[Margin]:
+    rms = dict(zip(found.known.robot.joints, found.known.rms, strict=True))
+    return [each for each in found.margins if each.kind == "torque" and abs(each.margin) < CLOSE * rms[each.joint]]
+
+
+def _named(each: Margin) -> str:
+    return f"{each.kind.partition('.')[0]} of {each.joint}"
+
+
+def _listed(words: list[str], most: int = 6) -> str:
+    return ", ".join(words) if len(words) <= most else f"{', '.join(words[:most])} and {len(words) - most} more"
+
+
+def limits_of_joint(robot: Robot, limits: JointLimits, joint: int) -> dict[str, tuple[float, float]]:
+    """Return lower and upper limit of a joint's signals by name, infinite where there is none."""
+    both = {
+        kind: (-float(bound[joint]), float(bound[joint]))
+        for kind, bound in (
+            ("velocity", limits.velocity), ("acceleration", limits.acceleration), ("torque", limits.torque),
+            ("power", limits.power),
+        )
+    }  # fmt: skip
+    return {"position": (float(limits.lower[joint]), float(limits.upper[joint])), **both}

@@ -1,0 +1,57 @@
+"""Recordings of a UR5 without the virtual arm's loop: its rigid bodies and friction by Pinocchio, noise, and pushes J^T f."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pinocchio as pin
+
+from scara_ident.model.model import build_model
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.kinematics import tool_frame
+from scara_ident.robot.robot import Robot, load_robot
+from scara_ident.use.known_model import KnownModel
+from tests.arms import recorded_torque, recording, sines
+
+RATE, NOISE = 100.0, 0.5
+FRICTION = [(2.0, 1.0, 0.0, 0.0, 0.1)] * 6
+
+
+@cache
+def ur5() -> Robot:
+    return load_robot("ur5")
+
+
+def known_ur5() -> KnownModel:
+    """The model of these recordings, a little wrong, as if it had been identified."""
+    robot = ur5()
+    model = build_model(robot, "complete")
+    body = model.rigid_body
+    value = np.concatenate([(body.base.grouping @ robot.standard_parameters())[body.kept], np.zeros(24 + 6)])
+    friction = value[len(body.columns) : len(body.columns) + 24].reshape(6, 4)
+    friction[:, 0], friction[:, 1] = 1.95, 1.03
+    value[-6:] = 0.1
+    return KnownModel(model, value, (10.0,) * 6, np.full(6, 0.5))
+
+
+def quiet(seed: int, seconds: float = 20.0) -> Recording:
+    """A run without contact, with recorded velocity."""
+    robot, rng = ur5(), np.random.default_rng(seed)
+    time = np.arange(round(seconds * RATE)) / RATE
+    q, v, a = sines(rng, time, robot.n, size=0.5)
+    torque = recorded_torque(robot, q, v, a, FRICTION) + NOISE * rng.standard_normal(q.shape)
+    return recording(robot, f"quiet{seed}", time, q, torque, velocity=v)
+
+
+def pushed(item: Recording, force: np.ndarray, start: float, stop: float, joints: int = 6) -> Recording:
+    """Return a run with a force on the tool, or the like on the first joints only."""
+    robot = ur5()
+    frame, data = robot.model.getFrameId(tool_frame(robot).name, pin.FrameType.BODY), robot.model.createData()
+    effort = item.effort.copy()
+    for k in np.flatnonzero((item.time >= start) & (item.time <= stop)):
+        q = item.position[np.argsort(robot.order), k]
+        jacobian = pin.computeFrameJacobian(robot.model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        effort[:joints, k] -= (jacobian[:3].T @ force)[robot.order][:joints]
+    return replace(item, effort=effort, name="pushed")

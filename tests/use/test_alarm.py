@@ -1,0 +1,70 @@
+"""Thresholds against laws whose tail is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scara_ident.errors import RecordingError
+from scara_ident.use.alarm import Tail, calibrate, clusters, fit_tail, residual_scale
+from scara_ident.use.external_torque import FEATURES, Observed
+
+RATE = 20.0
+
+
+def noise(seed: int, seconds: float = 600.0) -> Observed:
+    """Two joints of white noise of heavy tail, three times as large on the first while it is slow."""
+    rng, count = np.random.default_rng(seed), round(seconds * RATE)
+    time = np.arange(count) / RATE
+    slow = np.sin(0.3 * time) > 0.0
+    features = np.zeros((2, len(FEATURES), count))
+    features[:, 3, :], features[:, 4, :] = slow, ~slow
+    size = np.array([np.where(slow, 3.0, 1.0), np.full(count, 0.1)])
+    return Observed(f"n{seed}", time, np.zeros((2, count)), size * rng.laplace(size=(2, count)), features, time > 1.0)
+
+
+def test_the_scale_follows_the_features():
+    scale, floor = residual_scale([noise(0)])
+    assert scale[0, 3] / scale[0, 4] == pytest.approx(3.0, rel=0.1)
+    # The largest of the ten exponential sizes in half a second has the mean 1 + 1/2 + ... + 1/10.
+    assert scale[1, 3] == pytest.approx(0.1 * np.sum(1.0 / np.arange(1, 11)), rel=0.1)
+    assert np.all(scale >= 0.0) and np.all(floor > 0.0)
+
+
+def test_the_stated_rate_is_met_within_a_factor_of_one_and_a_half():
+    free, others = [noise(seed) for seed in range(6)], [noise(seed) for seed in range(10, 40)]
+    alarm = calibrate(free, 12.0)
+    assert alarm.hours == pytest.approx(1.0, rel=0.01)
+    seen = sum(
+        len(clusters(run.time, np.max(np.abs(run.torque) / alarm.threshold(run.features), axis=0), 1.0))
+        for run in others
+    )
+    # 60 alarms are stated in 5 h; their own scatter is 13 %.
+    assert 60.0 / 1.5 < seen < 60.0 * 1.5
+    assert 0.0 < alarm.spread < 1.0
+
+
+def test_a_tail_gives_back_its_rate_at_its_level():
+    for shape in (0.0, 0.2):
+        tail = Tail(1.0, 0.5, shape, 100, 2.0)
+        assert tail.rate(1.0) == pytest.approx(50.0)
+        assert tail.rate(tail.level(3.0)) == pytest.approx(3.0)
+    time = [np.arange(20_000) / RATE]
+    score = [np.random.default_rng(0).exponential(size=20_000)]
+    found = fit_tail(time, score, 1000.0)
+    # Exponential scores have peaks of an exponential law of the same width.
+    assert found.shape < 0.2
+    assert found.width == pytest.approx(1.0, rel=0.25)
+
+
+def test_clusters_are_parted_by_half_a_second():
+    time = np.arange(10) * 0.3
+    score = np.array([0, 2, 0, 2, 0, 0, 2, 0, 0, 0.0])
+    assert clusters(time, score, 1.0) == [(1, 1), (3, 3), (6, 6)]
+    assert clusters(time / 2.0, score, 1.0) == [(1, 6)]
+    assert clusters(time, score, 3.0) == []
+
+
+def test_too_little_is_one_line():
+    with pytest.raises(RecordingError, match="thresholds need 20 s"):
+        calibrate([noise(0, 5.0)], 1.0)

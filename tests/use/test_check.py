@@ -1,0 +1,101 @@
+"""A check against the torque that the virtual arm needed, and what it says of motions that cannot be run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scara_ident.identification.identify import identify
+from scara_ident.motion.motion import Motion
+from scara_ident.recording.recording import write_recording
+from scara_ident.simulation import simulate, virtual_arm
+from scara_ident.use.check import check, check_dict, read_motion, slowed
+from scara_ident.use.joint_limits import joint_limits
+from scara_ident.use.known_model import KnownModel, known_model
+from tests.arms import recording
+from tests.simulation.made import swing
+
+
+@pytest.fixture(scope="module")
+def rehearsed(tmp_path_factory: pytest.TempPathFactory):
+    """A model identified from one run of the virtual arm, and another run with its true torque."""
+    arm = virtual_arm()
+    runs = [simulate(arm, swing(arm.robot, 8.0, size, name), rate=500.0) for size, name in ((0.6, "a"), (0.4, "b"))]
+    path = tmp_path_factory.mktemp("runs") / "b_1.parquet"
+    write_recording(runs[1].recording, path)
+    return known_model(identify(arm.robot, [runs[0].recording], bands=[15.0, 15.0])), runs[1], path
+
+
+def test_torque_power_and_energy_are_the_virtual_arms_within_5_percent(rehearsed):
+    known, run, path = rehearsed
+    found = check(known, read_motion(path, known), joint_limits(known.robot))
+    (own,) = found.drives
+    inside = slice(round(own.motion.time[0] * 500.0), round(own.motion.time[-1] * 500.0) + 1)
+    torque = run.true.effort[:, inside]
+    # At reversals Coulomb friction jumps and the loop rings for some samples, so the whole is compared, and the peaks.
+    peak = np.abs(torque).max(axis=1)
+    assert np.abs(own.torque).max(axis=1) == pytest.approx(peak, rel=0.05)
+    assert np.all(np.sqrt(np.mean((own.torque - torque) ** 2, axis=1)) < 0.05 * peak)
+    assert found.energy.rms_torque == pytest.approx(np.sqrt(np.mean(torque**2, axis=1)), rel=0.05)
+    power = torque * run.true.velocity[:, inside] * known.robot.reduction[:, None]
+    given, returned = (np.trapezoid(np.maximum(sign * power, 0.0), dx=0.002, axis=1) for sign in (1.0, -1.0))
+    assert found.energy.given == pytest.approx(given, rel=0.05)
+    assert found.energy.returned == pytest.approx(returned, rel=0.05)
+    v, friction = run.true.velocity[:, inside], run.arm.friction
+    lost = sum(friction[:, k, None] * np.abs(v) ** (k + 1) for k in range(4)) * np.abs(known.robot.reduction)[:, None]
+    assert found.energy.heated == pytest.approx(np.trapezoid(lost, dx=0.002, axis=1), rel=0.05)
+    # Noise, and what is missed about reversals.
+    assert np.all(found.recorded_rms > run.arm.torque_noise)
+    assert np.all(found.recorded_rms < 2.0 * run.arm.torque_noise)
+
+
+def test_the_limiting_joint_and_time_are_named(rehearsed):
+    known, run, path = rehearsed
+    motions = read_motion(path, known)
+    seen = run.true.effort[1, np.isin(run.recording.time, motions[0].time)]
+    limits = joint_limits(known.robot, torques={"joint1": 2.0, "joint2": 0.8 * np.abs(seen).max()})
+    found = check(known, motions, limits)
+    worst = found.limited_by
+    assert (worst.joint, worst.kind) == ("joint2", "torque")
+    assert worst.time == pytest.approx(motions[0].time[np.argmax(np.abs(seen))], abs=0.02)
+    assert worst.share == pytest.approx(1.25, rel=0.05)
+    content = check_dict(found)
+    assert (content["runs"], content["limited_by"]["joint"]) == (False, "joint2")
+    assert content["summary"][0].startswith("It cannot be run: torque of joint2 at ")
+    # Slower by just so much it can be run.
+    share = content["speed_share"]
+    assert 0.5 < share < 1.0
+    motions = [slowed(each.motion, share) for each in found.drives]
+    assert not check(known, motions, limits).broken
+    assert check(known, [slowed(each.motion, 1.1 * share) for each in found.drives], limits).broken
+
+
+def test_what_is_beyond_a_position_limit_cannot_be_run_slower_either(known: KnownModel):
+    time = np.linspace(0.0, 2.0, 201)
+    zero = np.zeros((2, 201))
+    motion = Motion("still", "still", time, zero + 0.5, zero, zero, None, 100.0)
+    found = check(known, [motion], joint_limits(known.robot, ranges={"joint1": (-0.1, 0.2)}))
+    assert found.speed_share is None
+    assert "At no lower speed either" in check_dict(found)["summary"][1]
+    free = joint_limits(known.robot)
+    endless = np.full(2, np.inf)
+    free = replace(free, lower=-endless, upper=endless, velocity=endless, torque=endless)
+    assert check_dict(check(known, [motion], free))["limited_by"] is None
+
+
+def test_a_trajectory_is_taken_as_it_is_and_a_recording_filtered(known: KnownModel, tmp_path: Path):
+    arm = virtual_arm()
+    made = swing(arm.robot, 2.0)
+    shown = recording(arm.robot, "swing", made.time, made.position, None, velocity=made.velocity, acceleration=made.acceleration)  # fmt: skip
+    path = tmp_path / "swing.csv"
+    write_recording(shown, path)
+    (read,) = read_motion(path, known)
+    np.testing.assert_allclose(read.a, made.acceleration, rtol=1e-9, atol=1e-12)
+    write_recording(replace(shown, velocity=None, acceleration=None), tmp_path / "run.csv")
+    (inner,) = read_motion(tmp_path / "run.csv", known)
+    start = round(inner.time[0] * 1000.0)
+    assert start > 0
+    np.testing.assert_allclose(inner.v, made.velocity[:, start : start + inner.samples], atol=2e-2)

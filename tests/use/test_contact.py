@@ -1,0 +1,83 @@
+"""Contacts in recordings with known pushes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.errors import RecordingError, ScaraIdentError
+from scara_ident.files import json_text
+from scara_ident.use.contact import ContactObserver, contact_observer, contacts_dict, look_for_contact
+from tests.use.quiet import RATE, known_ur5, pushed, quiet
+
+FORCE = np.array([30.0, -20.0, 40.0])
+
+
+@pytest.fixture(scope="module")
+def observer() -> ContactObserver:
+    return contact_observer(known_ur5(), [quiet(seed) for seed in range(3)], rate=1.0)
+
+
+def test_a_push_on_the_tool_is_found_with_its_force(observer: ContactObserver):
+    found = look_for_contact(observer, [pushed(quiet(7), FORCE, 8.0, 9.0), quiet(8)])
+    (contact,) = found.contacts
+    assert contact.recording == "pushed"
+    assert 8.0 <= contact.start < 8.2
+    assert 9.0 <= contact.stop < 9.3
+    assert (contact.place, contact.explained > 0.9) == ("tool", True)
+    # The observer's low-pass has let nearly all of it through.
+    np.testing.assert_allclose(contact.force, FORCE, atol=0.25 * np.linalg.norm(FORCE))
+    content = contacts_dict(found)
+    assert content["contacts"][0]["joints"] == list(contact.joints)
+    assert content["false_alarms"]["per_hour"] == 1.0
+    assert content["summary"][0].startswith("1 contact in 39.98 s of motion; 0.011")
+    assert "extrapolated" in " ".join(content["summary"])
+    assert json_text(content)
+
+
+def test_what_loads_inner_joints_only_is_on_their_link(observer: ContactObserver):
+    found = look_for_contact(observer, [pushed(quiet(7), 2.0 * FORCE, 8.0, 9.0, joints=2)])
+    assert {each.place for each in found.contacts} == {"upper_arm_link"}
+    assert found.contacts[0].force is None
+
+
+def test_sample_by_sample_is_the_same(observer: ContactObserver):
+    run = pushed(quiet(7), FORCE, 8.0, 9.0)
+    observer.reset()
+    readings = [
+        observer.update(q, v, u, 1.0 / RATE)
+        for q, v, u in zip(run.position.T, run.velocity.T, run.effort.T, strict=True)
+    ]
+    offline = observer.observe(run)
+    np.testing.assert_allclose(np.array([each.torque for each in readings])[100:].T, offline.torque[:, 100:], atol=1e-6)
+    touched = [k / RATE for k, each in enumerate(readings) if each.contact and k > 50]
+    (contact,) = look_for_contact(observer, [run]).contacts
+    assert (touched[0], touched[-1]) == (pytest.approx(contact.start), pytest.approx(contact.stop))
+
+
+def test_without_velocities_positions_are_differentiated():
+    free = [replace(quiet(seed), velocity=None) for seed in range(2)]
+    observer = contact_observer(known_ur5(), free, rate=1.0)
+    assert not observer.velocity
+    (contact,) = look_for_contact(observer, [pushed(quiet(7), 2.0 * FORCE, 8.0, 9.0)]).contacts
+    assert 8.0 <= contact.start < 8.3
+
+
+@pytest.mark.parametrize(
+    ("free", "rate", "said"),
+    [
+        ([], 1.0, "no recordings without contact"),
+        ([quiet(0)], 0.0, "give numbers above 0"),
+        ([replace(quiet(0), effort=None)], 1.0, "no effort was recorded"),
+    ],
+)
+def test_what_cannot_be_is_one_line(free, rate: float, said: str):
+    with pytest.raises(ScaraIdentError, match=said):
+        contact_observer(known_ur5(), free, rate=rate)
+
+
+def test_velocities_must_be_there_as_they_were(observer: ContactObserver):
+    with pytest.raises(RecordingError, match="no velocity was recorded"):
+        observer.observe(replace(quiet(0), velocity=None))
