@@ -20,6 +20,7 @@ from scara_ident.cli.console import errors_console, plugin_notices
 from scara_ident.cli.demo import demo
 from scara_ident.cli.diagnose import diagnose
 from scara_ident.cli.excite import excite
+from scara_ident.cli.fleet import fleet
 from scara_ident.cli.identify import identify
 from scara_ident.cli.inspect import inspect
 from scara_ident.cli.paper import paper
@@ -66,6 +67,7 @@ _COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (excite, "Design a motion that tells much, within the arm's limits."),
     (simulate, "Record the virtual arm in closed loop."),
     (use, "Say what the model wins as feed-forward and in simulation."),
+    (fleet, "Watch many arms over many dates, say what changed."),
     (inspect, "Show what is in a file, audit it, write a first robot.yaml."),
     (base, "Print the base parameters: what each is made of."),
     (paper, "Set the tables of Indri et al. beside what is computed."),

@@ -37,6 +37,7 @@ class TransmissionLoss(Effect):
     nonlinear = (NonlinearParameter("_lost_share", "1", 0.005, LARGEST_LOSS_SHARE),)
     at_rest = True
     follows_estimate = True
+    watched = True
     view = View("load", along=True)
     experiment = "accelerate hard at low speed, then the same path with a known payload: a gear's loss grows with the load, friction does not"
 

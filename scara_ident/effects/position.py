@@ -31,6 +31,7 @@ class Spring(Effect):
         Coefficient("preload", "{torque}", "torque of the spring on {joint} at position zero"),
     )  # fmt: skip
     at_rest = True
+    watched = True
     view = View("position")
     experiment = "hold still, or creep, at positions over the whole range: a spring grows with the angle, a tilt follows its sine"
 

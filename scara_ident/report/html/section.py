@@ -10,7 +10,7 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.registry import Registry
 from scara_ident.report.html.blocks import Block, listing
 
-Kind = Literal["identification", "diagnosis", "comparison", "excitation", "paper", "use"]
+Kind = Literal["identification", "diagnosis", "comparison", "excitation", "paper", "use", "fleet"]
 
 
 class Section(Protocol):
@@ -38,8 +38,8 @@ class Section(Protocol):
 
         Parameters
         ----------
-        context : IdentificationContext, DiagnosisContext, ComparisonContext, ExcitationContext, PaperReport or
-            UseContext
+        context : IdentificationContext, DiagnosisContext, ComparisonContext, ExcitationContext, PaperReport,
+            UseContext or Fleet
             By the kind of report.
 
         Returns
@@ -120,7 +120,7 @@ def added_sections(kind: Kind) -> tuple[AddedSection, ...]:
     Parameters
     ----------
     kind : str
-        ``identification``, ``diagnosis``, ``comparison``, ``excitation``, ``paper`` or ``use``.
+        ``identification``, ``diagnosis``, ``comparison``, ``excitation``, ``paper``, ``use`` or ``fleet``.
 
     Raises
     ------
