@@ -200,7 +200,7 @@ def grown_residuals(history: History, histories: Sequence[History], tried: int) 
     return tuple(found)
 
 
-def tests_of(history: History, arms: int) -> int:
+def trials_of(history: History, arms: int) -> int:
     """Return how many tests a fleet's report makes where all arms are as this one."""
     return len(list(_shapes(history.days))) * (len(history.causes) + history.model.robot.n) * arms
 

@@ -143,7 +143,7 @@ def started(scheduler: str | None = None, workers: int | None = None) -> Iterato
                     n_workers=count,
                     threads_per_worker=1,
                     processes=True,
-                    dashboard_address=None,
+                    dashboard_address="localhost:0",
                     memory_limit=0,
                     silence_logs=logging.CRITICAL,
                 ) as cluster,

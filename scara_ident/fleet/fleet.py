@@ -14,7 +14,7 @@ from typing import Any
 
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.errors import ScaraIdentError
-from scara_ident.fleet.changes import Change, find_changes, fleet_scatter, grown_residuals, tests_of
+from scara_ident.fleet.changes import Change, find_changes, fleet_scatter, grown_residuals, trials_of
 from scara_ident.fleet.engine import Engine, Job, started
 from scara_ident.fleet.folder import Fault, RecordingFile, content_key, list_fleet
 from scara_ident.fleet.history import History
@@ -219,7 +219,7 @@ def _changes(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:
         scatter = fleet_scatter(several)
         found = {item.arm: find_changes(item, scatter, len(several)) for item in several}
         return {
-            item.arm: found[item.arm] or grown_residuals(item, several, tests_of(item, len(several)))
+            item.arm: found[item.arm] or grown_residuals(item, several, trials_of(item, len(several)))
             for item in several
         }
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from scara_ident.arrays import Array
 from scara_ident.estimation.information import triangular
 from scara_ident.fleet.causes import sizes_in_words
 from scara_ident.fleet.changes import Change
@@ -172,9 +171,12 @@ def _watched(history: History, visit: Visit) -> Iterator[Quantity]:
         start += cause.sizes
         columns = left[:, own_columns]
         if np.any(np.linalg.norm(columns, axis=0) <= SEEN_SHARE * size[own_columns]) or not np.all(size[own_columns]):
+            nothing = sizes_in_words(cause, history.scene, np.zeros(cause.sizes), np.eye(cause.sizes))
+            for name, item in nothing.items():
+                yield Quantity(f"{name}: {cause.label}", cause.joint, item.unit, np.nan, np.inf, cause.label)
             continue
-        covariance: Array = np.linalg.pinv(columns.T @ columns, hermitian=True)
-        value: Array = covariance @ (columns.T @ left[:, -1])
+        covariance = np.asarray(np.linalg.pinv(columns.T @ columns, hermitian=True), dtype=float)
+        value = covariance @ (columns.T @ left[:, -1])
         for name, item in sizes_in_words(cause, history.scene, value, covariance).items():
             yield Quantity(f"{name}: {cause.label}", cause.joint, item.unit, item.value, item.std, cause.label)
 

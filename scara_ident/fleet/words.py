@@ -34,7 +34,7 @@ def sentence(change: Change, scene: Scene) -> str:
         amount = ",".join(
             _amount("" if shared else f" {key.replace('_', ' ')}", item, shared) for key, item in told.items()
         )
-    how = "growing since" if change.gradual else "since"
+    how = "gradually since" if change.gradual else "since"
     alike = ", ".join(dict.fromkeys(item.words for item in change.or_else[:3]))
     other = f"; it could also be {alike}" if alike else ""
     return f"{words[0].upper()}{words[1:]}{':' if cause.candidate else ''}{amount} {how} {day(change.since)}{other}"
@@ -60,6 +60,10 @@ def listed(names: Sequence[str], most: int = 3) -> str:
 def _amount(name: str, item: Parameter, shared: bool = True) -> str:
     way = "up" if item.value > 0.0 else "down"
     if item.unit == "1" and shared:
-        return f"{name} {way} {100.0 * abs(item.value):.2g} % (± {100.0 * item.std:.1g} %)"
+        return f"{name} {way} {_percent(abs(item.value), 2)} (± {_percent(item.std, 1)})"
     unit = "" if item.unit == "1" else f" {item.unit}"
     return f"{name} {way} {abs(item.value):.3g}{unit} (± {item.std:.1g})"
+
+
+def _percent(share: float, digits: int) -> str:
+    return f"{100.0 * share:.0f} %" if share >= 0.1 else f"{100.0 * share:.{digits}g} %"
