@@ -20,7 +20,8 @@ from shutil import rmtree
 import numpy as np
 
 from scara_ident.fleet import Fleet, Settings, watch_fleet
-from scara_ident.fleet.changes import Change, find_changes, fleet_scatter
+from scara_ident.fleet.changes import Change
+from scara_ident.fleet.fleet import changes_of
 from scara_ident.fleet.history import with_dates
 from scara_ident.paper import OJD
 from scara_ident.recording.recording import Recording, write_recording
@@ -127,9 +128,7 @@ def found_when(fleet: Fleet) -> Iterator[tuple[int, dict[str, tuple[Change, ...]
     """Give the changes that each look found, as dates came in."""
     histories = [item.known for item in fleet.arms if item.history is not None]
     for count in range(FIRST_LOOK, MONTHS + 1):
-        now = [with_dates(item, count) for item in histories]
-        scatter = fleet_scatter(now)
-        yield count, {item.arm: find_changes(item, scatter, len(now)) for item in now}
+        yield count, changes_of([with_dates(item, count) for item in histories])
 
 
 def faults(folder: Path, seed: int) -> None:
@@ -164,10 +163,13 @@ def is_right(changes: tuple[Change, ...], fault: SlowFault) -> bool:
 
 
 def first_at(fleet: Fleet, arm: str, fault: SlowFault, stds: float) -> int | None:
-    """Return the number of dates after which the true change is so many standard deviations of its quantity on a date."""
+    """Return after how many dates the true change is so many standard deviations of its quantity's change.
+
+    That is of the difference between this date and the mean of those before the fault began.
+    """
     for month, each in enumerate(fleet.quantities[arm]):
         std = next((item.std for item in each if item.name == fault.quantity), np.inf)
-        if abs(fault.at(month)) >= stds * std:
+        if abs(fault.at(month)) >= stds * std * np.sqrt(1.0 + 1.0 / fault.start):
             return month + 1
     return None
 

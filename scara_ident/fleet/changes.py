@@ -3,8 +3,9 @@
 Parameters that all dates share are fitted to all of them together. Beside these each cause is tried with a step at each
 date and a slope from each date on: its F statistic has the dates' noise with what differs from run to run, scaled by
 how much more neighbouring dates differ along this cause in the whole fleet than they should. The probability is corrected
-for all causes, dates, shapes and arms that were tried (Bonferroni), so that a report of a fleet in which nothing changed names
-an arm once in a hundred reports at the most.
+for all that was tried: of one arm by the number of independent tests that its causes, dates and shapes are worth, which
+is simulated, and that of all arms by Bonferroni. A report of a fleet in which nothing changed then names an arm once in
+a hundred reports.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ LEVEL = 0.01
 # Causes named of one arm, and the probability up from which what one explains more than another is chance.
 MOST_CAUSES = 3
 AS_GOOD = 0.05
+# Draws of noise that say how many independent tests an arm's are worth, and the probability at which they do.
+SIMULATED, SIMULATED_LEVEL = 400, 0.1
 # A combination of which less is left beside the common parameters, as a share of its square, is one of them.
 LEFT_SHARE = 1e-9
 
@@ -115,15 +118,15 @@ def fleet_scatter(histories: Sequence[History]) -> Scatter:
     return Scatter(runs, ratios, freedom)
 
 
-def find_changes(history: History, scatter: Scatter, arms: int) -> tuple[Change, ...]:
+def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Change, ...]:
     """Return what changed in an arm, the surest first; nothing of fewer than two dates.
 
     Parameters
     ----------
     history : History
     scatter : Scatter
-    arms : int
-        How many are looked at.
+    tried : float
+        How many independent tests the fleet's report makes: those of an arm, see `trials_of`, times the arms.
     """
     from scipy.special import fdtri
 
@@ -132,7 +135,6 @@ def find_changes(history: History, scatter: Scatter, arms: int) -> tuple[Change,
     rows = history.whitened(scatter.runs)
     left, basis = common_removed(rows)
     shapes = list(_shapes(history.days))
-    tried = len(shapes) * (len(history.causes) + history.model.robot.n) * arms
     found: list[Change] = []
     most = max(cause.sizes for cause in history.causes)
     enough = [k * float(fdtri(k, scatter.freedom, 1.0 - AS_GOOD)) if k else 0.0 for k in range(most + 1)]
@@ -165,7 +167,7 @@ def find_changes(history: History, scatter: Scatter, arms: int) -> tuple[Change,
     return tuple(found)
 
 
-def grown_residuals(history: History, histories: Sequence[History], tried: int) -> tuple[Change, ...]:
+def grown_residuals(history: History, histories: Sequence[History], tried: float) -> tuple[Change, ...]:
     """Return the joints whose residual grew by more than it differs from date to date.
 
     Parameters
@@ -173,8 +175,8 @@ def grown_residuals(history: History, histories: Sequence[History], tried: int) 
     history : History
     histories : sequence of History
         The whole fleet.
-    tried : int
-        How many tests the fleet's report makes.
+    tried : float
+        See `find_changes`.
     """
     from scipy.special import stdtr
 
@@ -200,9 +202,38 @@ def grown_residuals(history: History, histories: Sequence[History], tried: int) 
     return tuple(found)
 
 
-def trials_of(history: History, arms: int) -> int:
-    """Return how many tests a fleet's report makes where all arms are as this one."""
-    return len(list(_shapes(history.days))) * (len(history.causes) + history.model.robot.n) * arms
+def trials_of(history: History, scatter: Scatter) -> float:
+    """Return how many independent tests all causes, dates and shapes of an arm are worth.
+
+    That is what Sidak's correction would need to meet the simulated distribution of the smallest probability in noise at
+    `SIMULATED_LEVEL`.
+
+    Parameters
+    ----------
+    history : History
+    scatter : Scatter
+    """
+    from scipy.special import chdtrc
+
+    rows = history.whitened(scatter.runs)
+    _, basis = common_removed(rows)
+    ends = np.cumsum([len(part) for part in basis])
+    known = np.concatenate(basis)
+    noise = np.random.default_rng(0).standard_normal((len(known), SIMULATED))
+    noise -= known @ (known.T @ noise)
+    left = np.split(noise, ends[:-1])
+    share = np.array([share for _, _, share in _shapes(history.days)])
+    least = np.ones(SIMULATED)
+    for k, cause in enumerate(history.causes):
+        own = [row.directions[k] for row in rows]
+        inverse, kept = _left_of(own, basis, share)
+        aims = np.array([each.T @ part for each, part in zip(own, left, strict=True)])
+        along = np.einsum("sd,din->sin", share, aims)
+        explained = np.einsum("sin,sij,sjn->sn", along, inverse, along)[kept]
+        if len(explained):
+            least = np.minimum(least, chdtrc(cause.sizes, np.max(explained, axis=0)))
+    level = float(np.quantile(least, SIMULATED_LEVEL))
+    return max(1.0, float(np.log1p(-SIMULATED_LEVEL) / np.log1p(-level)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,18 +269,12 @@ def _best(
     from scipy.special import fdtrc
 
     own = [row.directions[k] for row in rows]
-    squares = np.array([part.T @ part for part in own])
-    shared = np.array([part.T @ each for part, each in zip(basis, own, strict=True)])
     aims = np.array([each.T @ rest for each, rest in zip(own, left, strict=True)])
     share = np.array([share for _, _, share in shapes])
-    taken = np.einsum("sd,drj->srj", share, shared)
-    whole = np.einsum("sd,dij->sij", share**2, squares)
-    matrix = whole - np.einsum("sri,srj->sij", taken, taken)
-    kept = np.all(np.einsum("sii->si", matrix) > LEFT_SHARE * np.einsum("sii->si", whole), axis=1)
+    inverse, kept = _left_of(own, basis, share)
     if not np.any(kept):
         return None
     ratio = scatter.causes.get(cause.label, 1.0)
-    inverse = _inverses(matrix)
     aim = share @ aims
     value = np.einsum("sij,sj->si", inverse, aim)
     explained = np.where(kept, np.maximum(0.0, np.sum(aim * value, axis=1)) / ratio, -1.0)
@@ -273,6 +298,17 @@ def _without(
     turned, _ = np.linalg.qr(added)
     ends = np.cumsum([len(part) for part in left])[:-1]
     return np.split(rest - turned @ (turned.T @ rest), ends), np.split(np.hstack([known, turned]), ends)
+
+
+def _left_of(own: Sequence[Array], basis: Sequence[Array], share: Array) -> tuple[Array, Array]:
+    """Return for each shape the covariance of a cause's sizes, (S, s, s), and whether common parameters leave any of it."""
+    squares = np.array([part.T @ part for part in own])
+    shared = np.array([part.T @ each for part, each in zip(basis, own, strict=True)])
+    taken = np.einsum("sd,drj->srj", share, shared)
+    whole = np.einsum("sd,dij->sij", share**2, squares)
+    matrix = whole - np.einsum("sri,srj->sij", taken, taken)
+    kept = np.all(np.einsum("sii->si", matrix) > LEFT_SHARE * np.einsum("sii->si", whole), axis=1)
+    return _inverses(matrix), kept
 
 
 def _inverses(matrices: Array) -> Array:

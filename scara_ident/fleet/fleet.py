@@ -175,7 +175,7 @@ def watch_fleet(
             for arm, dates in work.visits.items()
         }
         progress("comparing the dates", IDENTIFYING)
-        changes = _changes(list(histories.values()))
+        changes = changes_of(list(histories.values()))
         if settings.diagnosed:
             work.diagnose({arm: histories[arm].dates[-1] for arm, found in changes.items() if found}, by_arm, engine)
     arms = sorted({*by_arm, *(fault.arm for fault in work.faults)})
@@ -211,17 +211,28 @@ def diagnosis_of(robot: bytes, model: str, files: Sequence[RecordingFile]) -> di
     return {"date": files[0].date, "verdict": found.verdict, "effects": effects}
 
 
-def _changes(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:
+def changes_of(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:
+    """Return by arm what changed; arms with one date are left out.
+
+    Parameters
+    ----------
+    histories : sequence of History
+        Of one robot and model.
+    """
     several = [item for item in histories if len(item.dates) > 1]
     if not several:
         return {}
     with one_thread():
         scatter = fleet_scatter(several)
-        found = {item.arm: find_changes(item, scatter, len(several)) for item in several}
-        return {
-            item.arm: found[item.arm] or grown_residuals(item, several, trials_of(item, len(several)))
-            for item in several
-        }
+        # Arms with as many dates are tried as often.
+        tried: dict[int, float] = {}
+        found = {}
+        for item in several:
+            count = len(item.dates)
+            if count not in tried:
+                tried[count] = len(several) * trials_of(item, scatter)
+            found[item.arm] = find_changes(item, scatter, tried[count]) or grown_residuals(item, several, tried[count])
+        return found
 
 
 @dataclass(eq=False)

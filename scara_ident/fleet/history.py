@@ -1,8 +1,8 @@
 """An arm over its dates, in units of noise, and how much of what changes from date to date is no wear.
 
 Friction, torque scale, offset and delay of a run differ from day to day on any arm. How much, all arms of a fleet say
-together: by the differences between neighbouring dates, which hardly hold anything of what changes slowly, and by
-their median, which a few arms that do change hardly move.
+together: by the differences between neighbouring dates, which hardly hold anything of what changes slowly, without those that
+lie far out, as a few arms that do change have them.
 """
 
 from __future__ import annotations
@@ -22,8 +22,11 @@ from scara_ident.model.model import TorqueModel
 
 # Median of the absolute value of a standard normal number.
 NORMAL_MEDIAN = 0.6745
-# What a median of absolute differences is worth beside their rms, as a share of the count (Rousseeuw and Croux 1993).
-MEDIAN_EFFICIENCY = 0.37
+# Differences beyond so many of their standard deviations, as the median has it, are left out of their rms, and what share
+# of a normal variance is left.
+CUT, LEFT = 3.0, 0.9733
+# What differences of neighbouring dates are worth beside independent values: each date is in two of them.
+EFFICIENCY = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +188,7 @@ def run_scatter(histories: Sequence[History]) -> tuple[Array, float]:
 
 def freedom_of(steps: int) -> float:
     """Return the degrees of freedom of a scatter that so many differences told."""
-    return max(1.0, MEDIAN_EFFICIENCY * steps)
+    return max(1.0, EFFICIENCY * steps)
 
 
 def scatter(steps: Array, noise: Array) -> Array:
@@ -205,7 +208,8 @@ def scatter(steps: Array, noise: Array) -> Array:
         own, var = steps[known[:, k], k], noise[known[:, k], k]
         if len(own):
             size = np.median(np.abs(own)) / NORMAL_MEDIAN
-            found[k] = max(0.0, 0.5 * float(size**2 - np.median(var)))
+            kept = own[np.abs(own) <= CUT * size]
+            found[k] = max(0.0, 0.5 * float(np.mean(kept**2) / LEFT - np.median(var)))
     return found
 
 

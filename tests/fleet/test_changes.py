@@ -18,7 +18,7 @@ def noise(histories):
 
 
 def test_the_worn_arm_is_named_with_cause_joint_size_and_date_and_no_other(histories, noise):
-    found = {item.arm: find_changes(item, noise, len(histories)) for item in histories}
+    found = {item.arm: find_changes(item, noise, 400.0) for item in histories}
     assert [arm for arm, changes in found.items() if changes] == [WORN]
     first = found[WORN][0]
     assert first.cause is not None
@@ -29,12 +29,12 @@ def test_the_worn_arm_is_named_with_cause_joint_size_and_date_and_no_other(histo
 
 
 def test_one_date_tells_no_change(histories, noise):
-    assert find_changes(with_dates(histories[1], 1), noise, 4) == ()
+    assert find_changes(with_dates(histories[1], 1), noise, 400.0) == ()
 
 
 def test_more_arms_ask_for_more(histories, noise):
-    few = find_changes(histories[1], noise, 4)[0]
-    many = find_changes(histories[1], noise, 400)[0]
+    few = find_changes(histories[1], noise, 400.0)[0]
+    many = find_changes(histories[1], noise, 40000.0)[0]
     np.testing.assert_allclose(many.p_value, 100.0 * few.p_value)
 
 
@@ -42,7 +42,7 @@ def test_where_dates_differ_more_by_nature_less_is_named(histories, noise):
     rough = replace(
         noise, runs=30.0 * noise.runs, causes={label: 50.0 * ratio for label, ratio in noise.causes.items()}
     )
-    assert find_changes(histories[1], rough, 4) == ()
+    assert find_changes(histories[1], rough, 400.0) == ()
 
 
 def test_a_residual_that_grew_is_named_where_no_cause_is(histories):
@@ -51,8 +51,15 @@ def test_a_residual_that_grew_is_named_where_no_cause_is(histories):
         replace(visit, error=visit.error * np.array([1.0, 1.0 if k < 3 else 4.0])) for k, visit in enumerate(arm.visits)
     )
     grown = replace(arm, visits=worse)
-    tried = trials_of(arm, len(histories))
+    tried = 400.0
     (found,) = grown_residuals(grown, [grown, *histories[1:]], tried)
     assert found.cause is None and found.joint == "joint2" and found.since == DATES[3]
     np.testing.assert_allclose(found.size[0], 3.0, rtol=0.3)
     assert grown_residuals(histories[3], histories, tried) == ()
+
+
+def test_the_tests_of_an_arm_are_worth_fewer_than_they_are_many_and_more_dates_ask_for_more(histories, noise):
+    arm = histories[0]
+    shapes = 2 * len(arm.dates) - 3
+    few, many = trials_of(with_dates(arm, 2), noise), trials_of(arm, noise)
+    assert 5.0 < few < many < shapes * len(arm.causes)
