@@ -4,8 +4,8 @@ Parameters that all dates share are fitted to all of them together. Beside these
 date and a slope from each date on: its F statistic has the dates' noise with what differs from run to run, scaled by
 how much more neighbouring dates differ along this cause in the whole fleet than they should. The probability is corrected
 for all that was tried: of one arm by the number of independent tests that its causes, dates and shapes are worth, which
-is simulated, and that of all arms by Bonferroni. A report of a fleet in which nothing changed then names an arm once in
-a hundred reports.
+is simulated, and of all arms by their false discovery rate (Benjamini and Hochberg 1995). One in fifty of the arms named is
+wrong on average, and one in fifty reports of a fleet in which nothing changed names any.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from scara_ident.arrays import Array
 from scara_ident.fleet.causes import Cause
 from scara_ident.fleet.history import DateRows, History, common_removed, freedom_of, run_scatter, scatter
 
-# Chance that a report names any arm of a fleet in which nothing changed.
-LEVEL = 0.01
+# Chance that a report names any arm of a fleet in which nothing changed, and share of the arms named that are wrong on average.
+LEVEL = 0.02
 # Causes named of one arm, and the probability up from which what one explains more than another is chance.
 MOST_CAUSES = 3
 AS_GOOD = 0.05
@@ -126,7 +126,7 @@ def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Chan
     history : History
     scatter : Scatter
     tried : float
-        How many independent tests the fleet's report makes: those of an arm, see `trials_of`, times the arms.
+        How many independent tests the fleet's report makes: those of an arm, see `trials_of`, times `arms_counted`.
     """
     from scipy.special import fdtri
 
@@ -165,6 +165,29 @@ def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Chan
         )  # fmt: skip
         left, basis = _without(best, rows, left, basis, shapes)
     return tuple(found)
+
+
+def arms_counted(probabilities: Sequence[float]) -> float:
+    """Return by what the smallest probability of each arm is to be multiplied, so that the false discovery rate is kept.
+
+    Parameters
+    ----------
+    probabilities : sequence of float
+        Of each arm, corrected for what was tried on it.
+    """
+    count = len(probabilities)
+    ranks = np.arange(1, count + 1)
+    named = np.flatnonzero(np.sort(probabilities) <= LEVEL * ranks / count)
+    return count / float(ranks[named[-1]] if len(named) else 1)
+
+
+def least_probability(history: History, scatter: Scatter, tried: float) -> float:
+    """Return the probability of the surest change of an arm, corrected for what was tried on it."""
+    rows = history.whitened(scatter.runs)
+    left, basis = common_removed(rows)
+    shapes = list(_shapes(history.days))
+    each = (_best(k, cause, rows, left, basis, shapes, scatter) for k, cause in enumerate(history.causes))
+    return min(1.0, tried * min((trial.p_value for trial in each if trial is not None), default=1.0))
 
 
 def grown_residuals(history: History, histories: Sequence[History], tried: float) -> tuple[Change, ...]:

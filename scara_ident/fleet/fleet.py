@@ -14,7 +14,15 @@ from typing import Any
 
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.errors import ScaraIdentError
-from scara_ident.fleet.changes import Change, find_changes, fleet_scatter, grown_residuals, trials_of
+from scara_ident.fleet.changes import (
+    Change,
+    arms_counted,
+    find_changes,
+    fleet_scatter,
+    grown_residuals,
+    least_probability,
+    trials_of,
+)
 from scara_ident.fleet.engine import Engine, Job, started
 from scara_ident.fleet.folder import Fault, RecordingFile, content_key, list_fleet
 from scara_ident.fleet.history import History
@@ -225,13 +233,15 @@ def changes_of(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:
     with one_thread():
         scatter = fleet_scatter(several)
         # Arms with as many dates are tried as often.
-        tried: dict[int, float] = {}
+        trials = {len(item.dates): item for item in several}
+        tried = {count: trials_of(item, scatter) for count, item in trials.items()}
+        arms = arms_counted([least_probability(item, scatter, tried[len(item.dates)]) for item in several])
         found = {}
         for item in several:
-            count = len(item.dates)
-            if count not in tried:
-                tried[count] = len(several) * trials_of(item, scatter)
-            found[item.arm] = find_changes(item, scatter, tried[count]) or grown_residuals(item, several, tried[count])
+            own = tried[len(item.dates)]
+            found[item.arm] = find_changes(item, scatter, own * arms) or grown_residuals(
+                item, several, own * len(several)
+            )
         return found
 
 

@@ -56,8 +56,8 @@ def _arms(fleet: Fleet) -> list[Block]:
             ]
         )
     words = (
-        f"An arm is named where a change is more than noise: the chance that this report names any arm of a fleet in which "
-        f"nothing changed is at most {LEVEL:g}, over all arms, dates and causes that were tried. Noise holds what friction, "
+        f"An arm is named where a change is more than noise: of the arms named a share of {LEVEL:g} is wrong on average, and of a "
+        f"fleet in which nothing changed a report names any with a chance of {LEVEL:g}. Noise holds what friction, "
         "torque scale, offset and delay differ by from date to date, as the whole fleet shows it."
     )
     head = ("arm", "verdict", "what changed", "chance", "diagnosis of the last date", "dates", "last", "faults")
