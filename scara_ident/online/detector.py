@@ -16,9 +16,9 @@ import numpy as np
 
 from scara_ident.arrays import Array
 
-# Grid of the length of the averaged vector, and bounds of its square in units of its variance.
+# Grid of the length of the averaged vector, and how the search for its limit widens.
 STATES = 160
-HIGHEST = 400.0
+WIDENING = 1.3
 # Directions of the causes that a block does not tell from the others, as a share of the strongest.
 TOLD = 1e-6
 
@@ -93,15 +93,16 @@ def threshold(causes: int, share: float, blocks: float) -> float:
         Weight of a new block, in (0, 1].
     blocks : float
     """
-    low, high = 1.0, HIGHEST
-    for _ in range(60):
+    low, high = 0.0, float(causes)
+    # From below: far beyond, an alarm is rarer than rounding can tell.
+    while mean_run(causes, share, high) < blocks:
+        low, high = high, WIDENING * high
+    while high - low > 1e-4 * high:
         middle = 0.5 * (low + high)
         if mean_run(causes, share, middle) < blocks:
             low = middle
         else:
             high = middle
-        if high - low < 1e-4 * high:
-            break
     return 0.5 * (low + high)
 
 

@@ -94,16 +94,16 @@ class Alarm:
     Attributes
     ----------
     sample : int
-        Samples taken in when it was seen.
+        Samples taken in when it was seen; it is told a window later, when more is known of what it is.
     effect : str
         The likeliest: ``friction``, ``torque_scale`` or ``payload_change``.
     joint : str or None
     size : float
-        How large it would be alone, averaged over the detector's window: less than the whole at first.
+        How large it would be alone, averaged over the detector's window: less than the whole.
     unit : str
         "1" for a share.
     strength : float
-        Square of the averaged score's length over the threshold, above 1.
+        Square of the averaged score's length over the threshold.
     """
 
     sample: int
@@ -156,7 +156,7 @@ class OnlineIdentifier:
         self._averages = Averages.none(self._causes)
         self._squares = self._counted = GIVEN_SAMPLES
         self._buffer = np.zeros((self.settings.block, 4, joints))
-        self._filled = self._samples = 0
+        self._filled = self._samples = self._seen = 0
 
     def update(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, effort: ArrayLike) -> Alarm | None:
         """Take in one sample.
@@ -172,7 +172,7 @@ class OnlineIdentifier:
         Returns
         -------
         Alarm or None
-            Where a change was seen with this sample.
+            Where a change is told with this sample.
         """
         row = self._buffer[self._filled]
         row[0], row[1], row[2], row[3] = q, v, a, effort
@@ -236,7 +236,7 @@ class OnlineIdentifier:
             "scores": self._averages.scores,
             "information": self._averages.information,
             "sums": np.array([self._squares, self._counted]),
-            "counts": np.array([self._filled, self._samples]),
+            "counts": np.array([self._filled, self._samples, self._seen]),
             "buffer": self._buffer,
             "noise": np.asarray(self.noise, dtype=float),
             "settings": np.array(json.dumps(asdict(self.settings))),
@@ -270,7 +270,7 @@ class OnlineIdentifier:
         found._memory = Memory(state["factor"])
         found._averages = Averages(state["vector"], state["scores"], state["information"])
         found._squares, found._counted = (float(x) for x in state["sums"])
-        found._filled, found._samples = (int(x) for x in state["counts"])
+        found._filled, found._samples, found._seen = (int(x) for x in state["counts"])
         found._buffer[:] = state["buffer"]
         return found
 
@@ -339,9 +339,13 @@ class OnlineIdentifier:
         share = self.settings.share
         self._averages = self._averages.after(products[1:, 0] / np.sqrt(scale), products[1:, 1:], share)
         strength = self._averages.length(share) / self._limit
-        if strength <= 1.0:
+        if not self._seen and strength > 1.0:
+            self._seen = self._samples + self._filled
+        # What it is, a window of it tells better than the first block.
+        if not self._seen or self._samples + self._filled - self._seen < self.settings.window * self.settings.rate:
             return None
         place, sizes = self._averages.likeliest()
         effect, joint, unit = self._suspects.names[place]
         size = float(sizes[place] * np.sqrt(scale))
-        return Alarm(self._samples + self._filled, effect, joint, size, unit, strength)
+        seen, self._seen = self._seen, 0
+        return Alarm(seen, effect, joint, size, unit, strength)

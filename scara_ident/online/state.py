@@ -81,4 +81,4 @@ class Memory:
         told = solve_triangular(self.factor[:, :-1], new.T, trans="T", check_finite=False).T
         _, singular, right = np.linalg.svd(told, full_matrices=False)
         kept = np.sqrt(np.maximum(share, 1.0 - np.minimum(singular**2, 1.0)))
-        return Memory(self.factor - ((1.0 - kept)[:, None] * right).T @ (right @ self.factor))
+        return Memory(triangular(self.factor - ((1.0 - kept)[:, None] * right).T @ (right @ self.factor)))

@@ -36,7 +36,7 @@ def batch(states, effort) -> np.ndarray:
 
 
 def test_online_is_batch_on_the_same_rows():
-    states = signals(4.0)
+    states = signals(3.0)
     effort = torque(states, truth())
     online = fed(states, effort, replace(SETTINGS, forgetting="none"))
     np.testing.assert_allclose(online.value, batch(states, effort), rtol=1e-9, atol=1e-12)
@@ -113,7 +113,8 @@ def test_noise_is_a_positive_number_for_each_joint(noise):
 
 
 def test_at_rest_nothing_winds_up():
-    moving = signals(4.0)
+    # Whole blocks, so that the first at rest has no motion in it.
+    moving = signals(4.096)
     online = fed(moving, torque(moving, truth()), replace(SETTINGS, memory=1.0))
     before = online.std.copy()
     still = [np.full((2, 5000), 0.3), np.zeros((2, 5000)), np.zeros((2, 5000))]
@@ -142,8 +143,8 @@ def changed_torque(kind: str, states) -> np.ndarray:
     ("kind", "joint"), [("payload_change", None), ("friction", "joint2"), ("torque_scale", "joint2")]
 )
 def test_a_change_is_seen_within_a_second_of_motion_and_named(kind, joint):
-    states = signals(12.0)
-    part = round(10.0 * RATE)
+    states = signals(9.0)
+    part = round(7.0 * RATE)
     before = [signal[:, :part] for signal in states]
     after = [signal[:, part:] for signal in states]
     online = OnlineIdentifier(model(), NOISE, SETTINGS)
@@ -151,4 +152,4 @@ def test_a_change_is_seen_within_a_second_of_motion_and_named(kind, joint):
     alarms = online.update_block(*after, changed_torque(kind, after))
     assert alarms and alarms[0].sample - part <= RATE
     assert (alarms[0].effect, alarms[0].joint) == (kind, joint)
-    assert alarms[0].size > 0.0 and alarms[0].strength > 1.0
+    assert alarms[0].size > 0.0 and alarms[0].unit in ("1", "kg")
