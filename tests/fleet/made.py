@@ -16,7 +16,7 @@ RATE, SECONDS = 200.0, 10.0
 DATES = ("2026-01-15", "2026-02-15", "2026-03-15", "2026-04-15", "2026-05-15", "2026-06-15")
 WORN = "arm2"
 # Coulomb friction of joint 2 of the arm that wears, by date, as a ratio.
-WEAR = (1.0, 1.0, 1.08, 1.16, 1.24, 1.32)
+WEAR = (1.0, 1.0, 1.15, 1.3, 1.45, 1.6)
 
 
 @cache

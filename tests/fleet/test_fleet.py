@@ -77,7 +77,7 @@ def test_the_arm_that_changed_is_first_and_the_only_one_diagnosed(first):
     _, found = first
     assert [item.arm for item in found.arms if item.changes] == [WORN] == [found.ranked[0].arm]
     assert [item.arm for item in found.arms if item.diagnosis is not None] == [WORN]
-    assert found.ranked[0].sentences[0].startswith("Coulomb friction of joint2 up 3")
+    assert found.ranked[0].sentences[0].startswith("Coulomb friction of joint2 up 6")
     verdicts = {item.arm: item.verdict for item in found.arms}
     assert verdicts == {
         "arm1": "unchanged",
@@ -94,7 +94,7 @@ def test_the_arm_that_changed_is_first_and_the_only_one_diagnosed(first):
 def test_a_second_run_changes_nothing_and_starts_no_engine(first, broken, monkeypatch):
     output, found = first
     before = state(output)
-    monkeypatch.setattr("scara_ident.fleet.fleet.started", None)
+    monkeypatch.setattr("scara_ident.fleet.work.started", None)
     again = watch_fleet(str(broken), load_robot(), output)
     assert fleet_table(again).equals(fleet_table(found))
     assert state(output) == before
