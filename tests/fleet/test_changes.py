@@ -40,7 +40,7 @@ def test_more_arms_ask_for_more(histories, noise):
 
 def test_where_dates_differ_more_by_nature_less_is_named(histories, noise):
     rough = replace(
-        noise, runs=30.0 * noise.runs, causes={label: 50.0 * ratio for label, ratio in noise.causes.items()}
+        noise, runs=300.0 * noise.runs, causes={label: 5000.0 * ratio for label, ratio in noise.causes.items()}
     )
     assert find_changes(histories[1], rough, 400.0) == ()
 
