@@ -68,6 +68,18 @@ def one_blas_thread() -> Iterator[None]:
             _LOCAL.alone = False
 
 
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Do one thing after the other on one BLAS thread, as in one of several processes that share the cores."""
+    before = getattr(_LOCAL, "beside", False)
+    with one_blas_thread():
+        _LOCAL.beside = True
+        try:
+            yield
+        finally:
+            _LOCAL.beside = before
+
+
 def side_by_side(function: Callable[..., T], *items: Iterable[Any]) -> list[T]:
     """Apply a function to items in two threads with one BLAS thread each, and return the results in order.
 

@@ -23,6 +23,7 @@ from scara_ident.cli.demo import demo
 from scara_ident.cli.diagnose import diagnose
 from scara_ident.cli.excite import excite
 from scara_ident.cli.export import export
+from scara_ident.cli.fleet import fleet
 from scara_ident.cli.identify import identify
 from scara_ident.cli.inspect import inspect
 from scara_ident.cli.paper import paper
@@ -72,6 +73,7 @@ _COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (contact, "Find contact with the arm in recordings, and its force."),
     (simulate, "Record the virtual arm in closed loop."),
     (use, "Say what the model wins as feed-forward and in simulation."),
+    (fleet, "Watch many arms over many dates, say what changed."),
     (inspect, "Show what is in a file, audit it, write a first robot.yaml."),
     (base, "Print the base parameters: what each is made of."),
     (paper, "Set the tables of Indri et al. beside what is computed."),

@@ -98,6 +98,8 @@ class Effect(ABC):
         cos, exp, abs and sign alone, so that code for a controller can have them.
     seeded_by : {"order", "frequency"} or None
         The lines of a residual's spectrum that suggest a member; see `seeds`.
+    watched : bool
+        Whether it comes or grows as an arm ages, so that a fleet is watched for it.
     view : View
         What a figure shows it over.
     experiment : str
@@ -117,6 +119,7 @@ class Effect(ABC):
     by_recording: ClassVar[bool] = False
     of_state: ClassVar[bool] = False
     seeded_by: ClassVar[Literal["order", "frequency"] | None] = None
+    watched: ClassVar[bool] = False
     view: ClassVar[View] = OWN
     experiment: ClassVar[str] = "record the same path at two speeds, in both directions, with and without a payload"
     not_simulated: ClassVar[str] = ""

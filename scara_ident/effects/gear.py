@@ -38,6 +38,7 @@ class TransmissionLoss(Effect):
     at_rest = True
     follows_estimate = True
     of_state = True
+    watched = True
     view = View("load", along=True)
     experiment = "accelerate hard at low speed, then the same path with a known payload: a gear's loss grows with the load, friction does not"
 

@@ -59,6 +59,7 @@ class TorqueRipple(PerMotorTurn):
 
     name = "torque_ripple"
     summary = "a torque ripple of {order:.4g} periods per motor turn"
+    watched = True
     coefficients = sine_and_cosine("ripple_{part}", "{part} of {order:g} times the motor's angle of {joint}")
     of_state = True
     experiment = "move slowly at constant speed over several motor turns and record at a high rate"

@@ -32,6 +32,7 @@ class Spring(Effect):
     )  # fmt: skip
     at_rest = True
     of_state = True
+    watched = True
     view = View("position")
     experiment = "hold still, or creep, at positions over the whole range: a spring grows with the angle, a tilt follows its sine"
 

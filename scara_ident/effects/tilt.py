@@ -131,6 +131,7 @@ class _Tilt(Effect):
     summary = "a base that is not level"
     follows_estimate = True
     of_state = True
+    watched = True
     view = View("position")
     experiment = "hold still, or creep, at positions over more than half a turn: a tilt follows the angle's sine, a spring the angle"
 

@@ -10,7 +10,7 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.registry import Registry
 from scara_ident.report.html.blocks import Block, listing
 
-Kind = Literal["identification", "diagnosis", "comparison", "excitation", "paper", "use", "check", "contact"]
+Kind = Literal["identification", "diagnosis", "comparison", "excitation", "paper", "use", "check", "contact", "fleet"]
 
 
 class Section(Protocol):
@@ -39,7 +39,7 @@ class Section(Protocol):
         Parameters
         ----------
         context : IdentificationContext, DiagnosisContext, ComparisonContext, ExcitationContext, PaperReport,
-            UseContext, Check or ContactFindings
+            UseContext, Check, ContactFindings or Fleet
             By the kind of report.
 
         Returns
@@ -120,8 +120,8 @@ def added_sections(kind: Kind) -> tuple[AddedSection, ...]:
     Parameters
     ----------
     kind : str
-        ``identification``, ``diagnosis``, ``comparison``, ``excitation``, ``paper``, ``use``, ``check`` or
-        ``contact``.
+        ``identification``, ``diagnosis``, ``comparison``, ``excitation``, ``paper``, ``use``, ``check``,
+        ``contact`` or ``fleet``.
 
     Raises
     ------

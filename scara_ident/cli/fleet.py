@@ -1,0 +1,72 @@
+"""``scara-ident fleet``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scara_ident.cli import options
+from scara_ident.cli.console import check_report, output_console, progress, table
+
+
+def fleet(
+    folder: Annotated[
+        str,
+        typer.Argument(
+            metavar="FOLDER",
+            help="Folder with a sub-folder for each arm, here or in an object store (s3://bucket/fleet); dates in the names of "
+            "files or their folders, as 2026-03-01.",
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", metavar="DIR", help="Folder for the results; a later run goes on there.")
+    ],
+    robot: options.Robot = None,
+    model: options.Model = "complete",
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler", metavar="ADDRESS", help="Dask scheduler, as tcp://host:8786; default: this machine."
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", metavar="N", min=1, help="Processes on this machine; default: one for each core."),
+    ] = None,
+) -> None:
+    """Identify many arms over many dates, and say what changed in which, and since when."""
+    from scara_ident.errors import ScaraIdentError
+    from scara_ident.fleet import Settings, watch_fleet
+    from scara_ident.fleet.table import fleet_table
+    from scara_ident.fleet.words import listed
+    from scara_ident.report.fleet import write_fleet
+    from scara_ident.robot.robot import load_robot
+
+    check_report(output, "fleet")
+    arm = load_robot(robot)
+    with progress() as work:
+        found = watch_fleet(folder, arm, output, Settings(model, scheduler, workers), work)
+    console = output_console()
+    counts = {
+        kind: sum(item.verdict == kind for item in found.arms)
+        for kind in ("changed", "unchanged", "one date", "no data")
+    }
+    said = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
+    console.print(f"{len(found.arms)} arms of {arm.name}: {said}", style="bold")
+    rows = table("arms by their need of a look", "arm", "what changed")
+    for item in found.ranked:
+        for k, words in enumerate(item.sentences):
+            rows.add_row("" if k else item.arm, words)
+    if rows.row_count:
+        console.print(rows)
+    console.note(str(fault) for fault in found.faults)
+    write_fleet(output, found, fleet_table(found))
+    console.written(output, "fleet.parquet", "report.html")
+    if found.faults:
+        count = len(found.faults)
+        raise ScaraIdentError(
+            f"{count} fault{'s' if count > 1 else ''} in {folder}: {listed([str(fault) for fault in found.faults], 1)}; mend "
+            "and run again, all else is done"
+        )

@@ -1,0 +1,343 @@
+"""What changed in an arm, since when, and how sure that is.
+
+Parameters that all dates share are fitted to all of them together. Beside these each cause is tried with a step at each
+date and a slope from each date on: its F statistic has the dates' noise with what differs from run to run, scaled by
+how much more neighbouring dates differ along this cause in the whole fleet than they should. The probability is corrected
+for all that was tried: of one arm by the number of independent tests that its causes, dates and shapes are worth, which
+is simulated, and of all arms by their false discovery rate (Benjamini and Hochberg 1995). One in fifty of the arms named is
+wrong on average, and one in fifty reports of a fleet in which nothing changed names any.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.fleet.causes import Cause
+from scara_ident.fleet.history import DateRows, History, common_removed, freedom_of, run_scatter, scatter
+
+# Chance that a report names any arm of a fleet in which nothing changed, and share of the arms named that are wrong on average.
+LEVEL = 0.02
+# Causes named of one arm, and the probability up from which what one explains more than another is chance.
+MOST_CAUSES = 3
+AS_GOOD = 0.05
+# Draws of noise that say how many independent tests an arm's are worth, and the probability at which they do.
+SIMULATED, SIMULATED_LEVEL = 400, 0.1
+# A combination of which less is left beside the common parameters, as a share of its square, is one of them.
+LEFT_SHARE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """Something that changed in an arm.
+
+    Attributes
+    ----------
+    cause : Cause or None
+        None: what no cause explains, seen in a residual that grew.
+    joint : str or None
+    since : str
+        Date at which it was seen first.
+    gradual : bool
+        Whether it grows from then on; else it came at once.
+    size : ndarray, shape (s,)
+        By how much the last date differs from the first.
+    covariance : ndarray, shape (s, s)
+    p_value : float
+        Corrected for all that was tried.
+    or_else : tuple of Cause
+        What the dates cannot tell from it.
+    """
+
+    cause: Cause | None
+    joint: str | None
+    since: str
+    gradual: bool
+    size: Array
+    covariance: Array
+    p_value: float
+    or_else: tuple[Cause, ...] = ()
+
+    @property
+    def score(self) -> float:
+        """Size in standard deviations, of several sizes together."""
+        square = float(self.size @ np.linalg.pinv(self.covariance, hermitian=True) @ self.size)
+        return float(np.sqrt(max(0.0, square)))
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """What differs from date to date in a fleet, where nothing changes.
+
+    Attributes
+    ----------
+    runs : ndarray, shape (4 n,)
+        Standard deviations, see `run_scatter`.
+    causes : mapping of str to float
+        By a cause's label how much larger than their noise differences along it are, as a ratio of squares, at least 1.
+    freedom : float
+        Degrees of freedom of both.
+    """
+
+    runs: Array
+    causes: Mapping[str, float]
+    freedom: float
+
+
+def fleet_scatter(histories: Sequence[History]) -> Scatter:
+    """Return what differs from date to date in a fleet.
+
+    Parameters
+    ----------
+    histories : sequence of History
+        Of one robot and model.
+    """
+    from scipy.special import chdtri
+
+    runs, freedom = run_scatter(histories)
+    found: dict[str, list[float]] = {}
+    for history in histories:
+        count = len(history.dates)
+        if count < 2:
+            continue
+        rows = history.whitened(runs)
+        left, _ = common_removed(rows)
+        for k, cause in enumerate(history.causes):
+            own = np.array([row.directions[k].T @ row.directions[k] for row in rows])
+            aims = np.array([row.directions[k].T @ rest for row, rest in zip(rows, left, strict=True)])
+            spread = _inverses(own)
+            sizes = np.einsum("dij,dj->di", spread, aims)
+            step, both = np.diff(sizes, axis=0), spread[1:] + spread[:-1]
+            # What all dates share took its part of the differences too.
+            squares = np.einsum("di,dij,dj->d", step, _inverses(both), step) * count / (count - 1.0)
+            found.setdefault(cause.label, []).extend(squares / float(chdtri(cause.sizes, 0.5)))
+    ratios = {label: max(1.0, float(np.median(squares))) for label, squares in found.items()}
+    return Scatter(runs, ratios, freedom)
+
+
+def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Change, ...]:
+    """Return what changed in an arm, the surest first; nothing of fewer than two dates.
+
+    Parameters
+    ----------
+    history : History
+    scatter : Scatter
+    tried : float
+        How many independent tests the fleet's report makes: those of an arm, see `trials_of`, times `arms_counted`.
+    """
+    from scipy.special import fdtri
+
+    if len(history.dates) < 2:
+        return ()
+    rows = history.whitened(scatter.runs)
+    left, basis = common_removed(rows)
+    shapes = list(_shapes(history.days))
+    found: list[Change] = []
+    most = max(cause.sizes for cause in history.causes)
+    enough = [k * float(fdtri(k, scatter.freedom, 1.0 - AS_GOOD)) if k else 0.0 for k in range(most + 1)]
+    while len(found) < MOST_CAUSES:
+        trials = [
+            trial
+            for k, cause in enumerate(history.causes)
+            if (trial := _best(k, cause, rows, left, basis, shapes, scatter)) is not None
+        ]
+        if not trials:
+            break
+        trials.sort(key=lambda item: item.p_value)
+        best = trials[0]
+        if best.p_value * tried >= LEVEL:
+            break
+        alike = tuple(
+            history.causes[item.cause]
+            for item in trials[1:]
+            if best.explained - item.explained < enough[best.size.size]
+        )
+        start, gradual, _ = shapes[best.shape]
+        cause = history.causes[best.cause]
+        found.append(
+            Change(
+                cause, cause.joint, history.dates[start], gradual, best.size, best.covariance,
+                min(1.0, best.p_value * tried), alike,
+            )
+        )  # fmt: skip
+        left, basis = _without(best, rows, left, basis, shapes)
+    return tuple(found)
+
+
+def arms_counted(probabilities: Sequence[float]) -> float:
+    """Return by what the smallest probability of each arm is to be multiplied, so that the false discovery rate is kept.
+
+    Parameters
+    ----------
+    probabilities : sequence of float
+        Of each arm, corrected for what was tried on it.
+    """
+    count = len(probabilities)
+    ranks = np.arange(1, count + 1)
+    named = np.flatnonzero(np.sort(probabilities) <= LEVEL * ranks / count)
+    return count / float(ranks[named[-1]] if len(named) else 1)
+
+
+def least_probability(history: History, scatter: Scatter, tried: float) -> float:
+    """Return the probability of the surest change of an arm, corrected for what was tried on it."""
+    rows = history.whitened(scatter.runs)
+    left, basis = common_removed(rows)
+    shapes = list(_shapes(history.days))
+    each = (_best(k, cause, rows, left, basis, shapes, scatter) for k, cause in enumerate(history.causes))
+    return min(1.0, tried * min((trial.p_value for trial in each if trial is not None), default=1.0))
+
+
+def grown_residuals(history: History, histories: Sequence[History], tried: float) -> tuple[Change, ...]:
+    """Return the joints whose residual grew by more than it differs from date to date.
+
+    Parameters
+    ----------
+    history : History
+    histories : sequence of History
+        The whole fleet.
+    tried : float
+        See `find_changes`.
+    """
+    from scipy.special import stdtr
+
+    several = [np.log([visit.error for visit in item.visits]) for item in histories if len(item.dates) > 1]
+    if not several or len(history.dates) < 2:
+        return ()
+    steps = np.concatenate([np.diff(item, axis=0) for item in several])
+    freedom = freedom_of(len(steps))
+    std = np.sqrt(scatter(steps, np.zeros_like(steps)))
+    own = np.log([visit.error for visit in history.visits])
+    count, found = len(own), []
+    for j, joint in enumerate(history.model.robot.joints):
+        if not np.all(np.isfinite(own[:, j])) or std[j] == 0.0:
+            continue
+        ends = np.arange(1, count)
+        growth = np.array([np.mean(own[k:, j]) - np.mean(own[:k, j]) for k in ends])
+        spread = std[j] * np.sqrt(1.0 / ends + 1.0 / (count - ends))
+        best = int(np.argmax(growth / spread))
+        p_value = float(stdtr(freedom, -growth[best] / spread[best])) * tried
+        if p_value < LEVEL:
+            size, variance = np.array([np.expm1(growth[best])]), np.array([[spread[best] ** 2]])
+            found.append(Change(None, joint, history.dates[ends[best]], False, size, variance, p_value))
+    return tuple(found)
+
+
+def trials_of(history: History, scatter: Scatter) -> float:
+    """Return how many independent tests all causes, dates and shapes of an arm are worth.
+
+    That is what Sidak's correction would need to meet the simulated distribution of the smallest probability in noise at
+    `SIMULATED_LEVEL`.
+
+    Parameters
+    ----------
+    history : History
+    scatter : Scatter
+    """
+    from scipy.special import chdtrc
+
+    rows = history.whitened(scatter.runs)
+    _, basis = common_removed(rows)
+    ends = np.cumsum([len(part) for part in basis])
+    known = np.concatenate(basis)
+    noise = np.random.default_rng(0).standard_normal((len(known), SIMULATED))
+    noise -= known @ (known.T @ noise)
+    left = np.split(noise, ends[:-1])
+    share = np.array([share for _, _, share in _shapes(history.days)])
+    least = np.ones(SIMULATED)
+    for k, cause in enumerate(history.causes):
+        own = [row.directions[k] for row in rows]
+        inverse, kept = _left_of(own, basis, share)
+        aims = np.array([each.T @ part for each, part in zip(own, left, strict=True)])
+        along = np.einsum("sd,din->sin", share, aims)
+        explained = np.einsum("sin,sij,sjn->sn", along, inverse, along)[kept]
+        if len(explained):
+            least = np.minimum(least, chdtrc(cause.sizes, np.max(explained, axis=0)))
+    level = float(np.quantile(least, SIMULATED_LEVEL))
+    return max(1.0, float(np.log1p(-SIMULATED_LEVEL) / np.log1p(-level)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    cause: int
+    shape: int
+    explained: float
+    p_value: float
+    size: Array
+    covariance: Array
+
+
+def _shapes(days: Array) -> Iterator[tuple[int, bool, Array]]:
+    """Give the first date that differs, whether it grows from then on, and the share of its last size on every date."""
+    count = len(days)
+    for start in range(1, count):
+        yield start, False, (np.arange(count) >= start).astype(float)
+    for start in range(1, count - 1):
+        before = days[start - 1]
+        yield start, True, np.clip((days - before) / (days[-1] - before), 0.0, 1.0)
+
+
+def _best(
+    k: int,
+    cause: Cause,
+    rows: Sequence[DateRows],
+    left: Sequence[Array],
+    basis: Sequence[Array],
+    shapes: Sequence[tuple[int, bool, Array]],
+    scatter: Scatter,
+) -> _Trial | None:
+    """Return the best shape of a cause; None where the common parameters leave nothing of it."""
+    from scipy.special import fdtrc
+
+    own = [row.directions[k] for row in rows]
+    aims = np.array([each.T @ rest for each, rest in zip(own, left, strict=True)])
+    share = np.array([share for _, _, share in shapes])
+    inverse, kept = _left_of(own, basis, share)
+    if not np.any(kept):
+        return None
+    ratio = scatter.causes.get(cause.label, 1.0)
+    aim = share @ aims
+    value = np.einsum("sij,sj->si", inverse, aim)
+    explained = np.where(kept, np.maximum(0.0, np.sum(aim * value, axis=1)) / ratio, -1.0)
+    best = int(np.argmax(explained))
+    p_value = float(fdtrc(cause.sizes, max(1.0, scatter.freedom), explained[best] / cause.sizes))
+    return _Trial(k, best, float(explained[best]), p_value, value[best], ratio * inverse[best])
+
+
+def _without(
+    trial: _Trial,
+    rows: Sequence[DateRows],
+    left: Sequence[Array],
+    basis: Sequence[Array],
+    shapes: Sequence[tuple[int, bool, Array]],
+) -> tuple[list[Array], list[Array]]:
+    """Return what is left beside a cause that was found, and the basis with it."""
+    share = shapes[trial.shape][2]
+    added = np.concatenate([x * row.directions[trial.cause] for x, row in zip(share, rows, strict=True)])
+    known, rest = np.concatenate(basis), np.concatenate(left)
+    added = added - known @ (known.T @ added)
+    turned, _ = np.linalg.qr(added)
+    ends = np.cumsum([len(part) for part in left])[:-1]
+    return np.split(rest - turned @ (turned.T @ rest), ends), np.split(np.hstack([known, turned]), ends)
+
+
+def _left_of(own: Sequence[Array], basis: Sequence[Array], share: Array) -> tuple[Array, Array]:
+    """Return for each shape the covariance of a cause's sizes, (S, s, s), and whether common parameters leave any of it."""
+    squares = np.array([part.T @ part for part in own])
+    shared = np.array([part.T @ each for part, each in zip(basis, own, strict=True)])
+    taken = np.einsum("sd,drj->srj", share, shared)
+    whole = np.einsum("sd,dij->sij", share**2, squares)
+    matrix = whole - np.einsum("sri,srj->sij", taken, taken)
+    kept = np.all(np.einsum("sii->si", matrix) > LEFT_SHARE * np.einsum("sii->si", whole), axis=1)
+    return _inverses(matrix), kept
+
+
+def _inverses(matrices: Array) -> Array:
+    """Return the pseudo-inverses of symmetric matrices, shape (N, k, k), each in units of its own diagonal."""
+    size = np.sqrt(np.maximum(np.einsum("nii->ni", matrices), np.finfo(float).tiny))
+    scale = size[:, :, None] * size[:, None, :]
+    if matrices.shape[1] == 1:
+        return np.where(matrices > np.finfo(float).tiny, 1.0 / scale, 0.0)
+    return np.asarray(np.linalg.pinv(matrices / scale, rcond=LEFT_SHARE, hermitian=True) / scale)

@@ -1,0 +1,161 @@
+"""Work on many processes, of this machine or of a cluster, by Dask: what fails or dies takes nothing else with it."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from queue import Empty, Queue
+from typing import TYPE_CHECKING, Any
+
+from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.fleet.folder import INSTALL
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+# A cluster that has had no worker for so long gets none any more, s; how often that is looked at.
+NO_WORKER_SECONDS = 60.0
+LOOK_SECONDS = 2.0
+# A piece of work that so many workers died on is given up.
+MOST_DEATHS = 3
+CONNECT_SECONDS = "10s"
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One piece of work: a function of a module, and what it is called with; both travel.
+
+    Attributes
+    ----------
+    function : callable
+    arguments : tuple
+    then : callable
+        Called here with the result, or with the exception; returns the work that follows.
+    """
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    then: Callable[[Any], Iterable[Job]]
+
+
+@dataclass(frozen=True, eq=False)
+class Engine:
+    """A scheduler with its workers."""
+
+    client: Client
+    _waiting: dict[Any, tuple[Job, Future[Any]]] = field(default_factory=dict)
+    _done: Queue[Any] = field(default_factory=Queue)
+
+    def run(self, jobs: Iterable[Job]) -> None:
+        """Do work, and what follows from it, until nothing is left.
+
+        Work that raises, or on which workers die, hands its exception to ``then``. So does all work that is left when
+        there has been no worker for a minute.
+        """
+        self._submit(jobs)
+        alone = 0.0
+        while self._waiting:
+            try:
+                key = self._done.get(timeout=LOOK_SECONDS)
+            except Empty:
+                alone = 0.0 if self._workers() else alone + LOOK_SECONDS
+                if alone >= NO_WORKER_SECONDS:
+                    self._give_up()
+                continue
+            if key in self._waiting:
+                job, future = self._waiting.pop(key)
+                self._submit(job.then(_outcome(future)))
+                future.release()
+
+    def _submit(self, jobs: Iterable[Job]) -> None:
+        for job in jobs:
+            future = self.client.submit(job.function, *job.arguments, pure=False)
+            self._waiting[future.key] = job, future
+            future.add_done_callback(lambda done: self._done.put(done.key))
+
+    def _workers(self) -> int:
+        with suppress(OSError):
+            return len(self.client.scheduler_info(n_workers=-1)["workers"])
+        return 0
+
+    def _give_up(self) -> None:
+        while self._waiting:
+            _, (job, future) = self._waiting.popitem()
+            with suppress(Exception):
+                future.cancel()
+            _refuse(job)
+
+
+def _refuse(job: Job) -> None:
+    """Tell work, and all that follows from it, that nobody does it."""
+    for more in job.then(ScaraIdentError("no worker is left; start workers and run again to go on")):
+        _refuse(more)
+
+
+@contextmanager
+def started(scheduler: str | None = None, workers: int | None = None) -> Iterator[Engine]:
+    """Start workers on this machine, or join a cluster.
+
+    Parameters
+    ----------
+    scheduler : str, optional
+        Address of a Dask scheduler, as ``tcp://host:8786``; its workers have this package installed. Without it workers
+        are processes of this machine, with one BLAS thread each.
+    workers : int, optional
+        How many processes; by default one for each core.
+
+    Raises
+    ------
+    UsageError
+        If Dask is not installed, or no scheduler answers.
+    """
+    try:
+        import dask
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise UsageError(f"fleet: its engine, dask.distributed, is missing; {INSTALL}") from None
+    quiet = {
+        "distributed.scheduler.allowed-failures": MOST_DEATHS,
+        "distributed.comm.timeouts.connect": CONNECT_SECONDS,
+    }
+    log = logging.getLogger("distributed")
+    level = log.level
+    with dask.config.set(quiet):
+        try:
+            log.setLevel(logging.CRITICAL)
+            if scheduler is not None:
+                try:
+                    client = Client(scheduler, set_as_default=False)
+                except (OSError, ValueError, TimeoutError) as error:
+                    reason = (str(error) or type(error).__name__).splitlines()[0]
+                    raise UsageError(
+                        f"{scheduler}: no scheduler answers there ({reason}); start one with: dask scheduler"
+                    ) from None
+                with client:
+                    yield Engine(client)
+                return
+            count = workers or len(os.sched_getaffinity(0))
+            with (
+                LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address="localhost:0",
+                    memory_limit=0,
+                    silence_logs=logging.CRITICAL,
+                ) as cluster,
+                Client(cluster, set_as_default=False) as client,
+            ):
+                yield Engine(client)
+        finally:
+            log.setLevel(level)
+
+
+def _outcome(future: Future[Any]) -> Any:
+    try:
+        return future.result()
+    except Exception as error:
+        return error

@@ -1,0 +1,199 @@
+"""From a folder of recordings to what changed in which arm."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from scara_ident.fleet.changes import (
+    Change,
+    arms_counted,
+    find_changes,
+    fleet_scatter,
+    grown_residuals,
+    least_probability,
+    trials_of,
+)
+from scara_ident.fleet.folder import Fault, list_fleet
+from scara_ident.fleet.history import History
+from scara_ident.fleet.store import FOLDER, Store
+from scara_ident.fleet.table import Quantity, quantities
+from scara_ident.fleet.words import sentence
+from scara_ident.fleet.work import IDENTIFYING, LateEngine, Settings, Work
+from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.progress import Tell, silent
+from scara_ident.robot.robot import Robot
+from scara_ident.threads import one_thread
+
+
+@dataclass(frozen=True, eq=False)
+class ArmReport:
+    """What was found of one arm.
+
+    Attributes
+    ----------
+    arm : str
+    history : History or None
+        None where no recording could be used.
+    changes : tuple of Change
+        The surest first.
+    diagnosis : mapping or None
+        Verdict and effects of the latest date of an arm that changed.
+    faults : tuple of Fault
+    """
+
+    arm: str
+    history: History | None
+    changes: tuple[Change, ...] = ()
+    diagnosis: Mapping[str, Any] | None = None
+    faults: tuple[Fault, ...] = ()
+
+    @property
+    def known(self) -> History:
+        """The history of an arm that has one."""
+        if self.history is None:
+            raise ValueError(f"{self.arm} has no date")
+        return self.history
+
+    @property
+    def verdict(self) -> str:
+        """``changed``, ``unchanged``, ``one date`` or ``no data``."""
+        if self.history is None:
+            return "no data"
+        if len(self.history.dates) < 2:
+            return "one date"
+        return "changed" if self.changes else "unchanged"
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What changed, in words."""
+        return tuple(sentence(change, self.known.scene) for change in self.changes)
+
+
+@dataclass(frozen=True, eq=False)
+class Fleet:
+    """What was found of a fleet.
+
+    Attributes
+    ----------
+    robot : Robot
+    model : TorqueModel
+    arms : tuple of ArmReport
+        By name.
+    quantities : mapping of str to tuple
+        By arm, for each date its quantities.
+    """
+
+    robot: Robot
+    model: TorqueModel
+    arms: tuple[ArmReport, ...]
+    quantities: Mapping[str, tuple[tuple[Quantity, ...], ...]]
+
+    @property
+    def ranked(self) -> tuple[ArmReport, ...]:
+        """The arms by their need of a look: the surest change first, then faults, then the rest by name."""
+        return tuple(sorted(self.arms, key=lambda item: (not item.changes, -_surest(item), not item.faults, item.arm)))
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """All faults, by arm."""
+        return tuple(fault for item in self.arms for fault in item.faults)
+
+
+def watch_fleet(
+    folder: str, robot: Robot, output: Path, settings: Settings | None = None, progress: Tell = silent
+) -> Fleet:
+    """Identify all arms of a fleet on all dates, and find what changed.
+
+    What is done is held in ``output`` under keys of the recordings' content: a later run goes on from there. Processes
+    of this machine are started anew, so a script calls this under ``if __name__ == "__main__"``.
+
+    Parameters
+    ----------
+    folder : str
+        A path, or an address that fsspec knows, with a sub-folder for each arm; see `list_fleet`.
+    robot : Robot
+        Of all arms.
+    output : Path
+    settings : Settings, optional
+    progress : callable, optional
+        Called with every step that begins and the share of the work done before it.
+
+    Returns
+    -------
+    Fleet
+        What could not be used is in its faults; all else is complete.
+
+    Raises
+    ------
+    UsageError
+        If there is no such folder, Dask is not installed or no scheduler answers.
+    RecordingError
+        If the folder has no sub-folder.
+    """
+    settings = settings or Settings()
+    progress("listing the recordings", 0.0)
+    files, faults = list_fleet(folder)
+    work = Work(pickle.dumps(robot), settings, Store(output / FOLDER), progress, list(faults))
+    kept = work.keyed(files)
+    by_arm = {arm: list(own) for arm, own in groupby(kept, key=lambda file: file.arm)}
+    with ExitStack() as stack:
+        engine = LateEngine(stack, settings)
+        work.identify(by_arm, engine)
+        model = build_model(robot, settings.model)
+        histories = {
+            arm: History(arm, tuple(sorted(dates)), tuple(dates[key] for key in sorted(dates)), model)
+            # In an order of their own, not in which they were done: sums are then the same to the last digit.
+            for arm, dates in sorted(work.visits.items())
+        }
+        progress("comparing the dates", IDENTIFYING)
+        changes = changes_of(list(histories.values()))
+        if settings.diagnosed:
+            work.diagnose({arm: histories[arm].dates[-1] for arm, found in changes.items() if found}, by_arm, engine)
+    arms = sorted({*by_arm, *(fault.arm for fault in work.faults)})
+    reports = tuple(
+        ArmReport(
+            arm,
+            histories.get(arm),
+            changes.get(arm, ()),
+            work.diagnoses.get(arm),
+            tuple(sorted((item for item in work.faults if item.arm == arm), key=str)),
+        )
+        for arm in arms
+    )
+    return Fleet(robot, model, reports, quantities(list(histories.values())))
+
+
+def changes_of(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:
+    """Return by arm what changed; arms with one date are left out.
+
+    Parameters
+    ----------
+    histories : sequence of History
+        Of one robot and model.
+    """
+    several = [item for item in histories if len(item.dates) > 1]
+    if not several:
+        return {}
+    with one_thread():
+        scatter = fleet_scatter(several)
+        # Arms with as many dates are tried as often.
+        trials = {len(item.dates): item for item in several}
+        tried = {count: trials_of(item, scatter) for count, item in trials.items()}
+        arms = arms_counted([least_probability(item, scatter, tried[len(item.dates)]) for item in several])
+        found = {}
+        for item in several:
+            own = tried[len(item.dates)]
+            found[item.arm] = find_changes(item, scatter, own * arms) or grown_residuals(
+                item, several, own * len(several)
+            )
+        return found
+
+
+def _surest(report: ArmReport) -> float:
+    return max((change.score for change in report.changes), default=0.0)

@@ -1,0 +1,238 @@
+"""An arm over its dates, in units of noise, and how much of what changes from date to date is no wear.
+
+Friction, torque scale, offset and delay of a run differ from day to day on any arm. How much, all arms of a fleet say
+together: by the differences between neighbouring dates, which hardly hold anything of what changes slowly, without those that
+lie far out, as a few arms that do change have them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.effects import Scene
+from scara_ident.estimation.information import UNDETERMINED, orthonormal, triangular
+from scara_ident.fleet.causes import RUN_KINDS, Cause, causes_of, run_directions
+from scara_ident.fleet.visit import Visit, watched
+from scara_ident.model.model import TorqueModel
+
+# Median of the absolute value of a standard normal number.
+NORMAL_MEDIAN = 0.6745
+# Differences beyond so many of their standard deviations, as the median has it, are left out of their rms, and what share
+# of a normal variance is left.
+CUT, LEFT = 3.0, 0.9733
+# What differences of neighbouring dates are worth beside independent values: each date is in two of them.
+EFFICIENCY = 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class DateRows:
+    """What an arm shows on one date, in units of the noise; R rows of all joints together.
+
+    Attributes
+    ----------
+    columns : ndarray, shape (R, m)
+    torque : ndarray, shape (R,)
+    directions : tuple of ndarray, shape (R, s)
+        Of each cause.
+    runs : ndarray, shape (R, 4 n)
+        What one unit of each of `RUN_KINDS` does, joint by joint.
+    """
+
+    columns: Array
+    torque: Array
+    directions: tuple[Array, ...]
+    runs: Array
+
+    def whitened(self, std: Array) -> DateRows:
+        """Return the rows with what differs from run to run weighed as the noise it is, std of shape (4 n,)."""
+        pull = self.runs * std
+        values, vectors = np.linalg.eigh(pull.T @ pull)
+        kept = values > UNDETERMINED * max(float(values[-1]), np.finfo(float).tiny)
+        if not np.any(values[kept] > 0.0):
+            return self
+        along = pull @ (vectors[:, kept] / np.sqrt(values[kept]))
+        loss = 1.0 - 1.0 / np.sqrt(1.0 + values[kept])
+
+        def white(signal: Array) -> Array:
+            return np.asarray(signal - (along * loss) @ (along.T @ signal))
+
+        each = tuple(white(item) for item in self.directions)
+        return DateRows(white(self.columns), white(self.torque), each, white(self.runs))
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """An arm over its dates.
+
+    Attributes
+    ----------
+    arm : str
+    dates : tuple of str
+        In order.
+    visits : tuple of Visit
+    model : TorqueModel
+    """
+
+    arm: str
+    dates: tuple[str, ...]
+    visits: tuple[Visit, ...]
+    model: TorqueModel
+
+    @cached_property
+    def scene(self) -> Scene:
+        """What effects ask for."""
+        return self.visits[0].reference.scene(self.model)
+
+    @cached_property
+    def causes(self) -> tuple[Cause, ...]:
+        """What may change."""
+        first = self.visits[0]
+        return causes_of(self.model, self.scene, watched(self.scene), first.columns, first.std)
+
+    @cached_property
+    def rows(self) -> tuple[DateRows, ...]:
+        """What each date says, in units of the noise."""
+        return tuple(self._rows(visit) for visit in self.visits)
+
+    @cached_property
+    def days(self) -> Array:
+        """Days since the first date, shape (dates,)."""
+        days = np.array(self.dates, dtype="datetime64[D]")
+        return np.asarray((days - days[0]).astype(float))
+
+    @cached_property
+    def run_sizes(self) -> tuple[Array, Array]:
+        """By how much each date differs in `RUN_KINDS` from all together, and its variance, shape (dates, 4 n) each."""
+        left = common_removed(self.rows)[0]
+        sizes, variances = [], []
+        for row, rest in zip(self.rows, left, strict=True):
+            inverse = _inverse(row.runs.T @ row.runs)
+            sizes.append(inverse @ (row.runs.T @ rest))
+            variances.append(np.where(np.diag(inverse) > 0.0, np.diag(inverse), np.nan))
+        return np.array(sizes), np.array(variances)
+
+    def whitened(self, std: Array) -> tuple[DateRows, ...]:
+        """Return the rows with the differences between runs weighed as noise."""
+        return tuple(row.whitened(std) for row in self.rows)
+
+    def _rows(self, visit: Visit) -> DateRows:
+        effects = watched(self.scene)
+        count = sum(len(item.effect.columns(self.scene, item.member)) for item in effects)
+        total = len(self.model.columns) + count + self.model.robot.n
+        runs = run_directions(self.model, self.scene.value, visit.columns, count)
+        columns, torque, along = [], [], []
+        directions: list[list[Array]] = [[] for _ in self.causes]
+        for j, (own, factor, rows) in enumerate(zip(visit.columns, visit.factors, visit.rows, strict=True)):
+            known = len(own)
+            noise = noise_of(factor, rows)
+            half = np.zeros((known, known + 1))
+            # A joint without noise to go by says nothing.
+            if noise > 0.0:
+                half[: len(factor[:known])] = factor[:known] / noise
+            wide = np.zeros((known, total))
+            wide[:, own] = half[:, :-1]
+            columns.append(wide)
+            torque.append(half[:, -1])
+            placed = np.zeros((known, len(RUN_KINDS) * len(visit.columns)))
+            placed[:, len(RUN_KINDS) * j : len(RUN_KINDS) * (j + 1)] = half[:, :-1] @ runs[j]
+            along.append(placed)
+            for found, cause in zip(directions, self.causes, strict=True):
+                found.append(half[:, :-1] @ cause.weights[j])
+        stacked = tuple(np.concatenate(found) for found in directions)
+        return DateRows(np.concatenate(columns), np.concatenate(torque), stacked, np.concatenate(along))
+
+
+def common_removed(rows: Sequence[DateRows]) -> tuple[list[Array], list[Array]]:
+    """Return what is left of each date's torque with parameters that all dates share, and a basis of what was taken.
+
+    Returns
+    -------
+    left : list of ndarray, shape (R,)
+    basis : list of ndarray, shape (R, r)
+        Orthonormal over all dates together.
+    """
+    stacked = np.concatenate([row.columns for row in rows])
+    factor = triangular(stacked)
+    basis = stacked @ orthonormal(factor)
+    torque = np.concatenate([row.torque for row in rows])
+    left = torque - basis @ (basis.T @ torque)
+    ends = np.cumsum([len(row.torque) for row in rows])[:-1]
+    return np.split(left, ends), np.split(basis, ends)
+
+
+def run_scatter(histories: Sequence[History]) -> tuple[Array, float]:
+    """Return the standard deviation of each of `RUN_KINDS` from date to date, joint by joint, and its degrees of freedom.
+
+    Parameters
+    ----------
+    histories : sequence of History
+        Of one robot and model.
+
+    Returns
+    -------
+    std : ndarray, shape (4 n,)
+    freedom : float
+    """
+    several = [item for item in histories if len(item.dates) > 1]
+    if not several:
+        return np.zeros(len(RUN_KINDS) * histories[0].model.robot.n if histories else 0), 0.0
+    steps = np.concatenate([np.diff(item.run_sizes[0], axis=0) for item in several])
+    noise = np.concatenate([item.run_sizes[1][1:] + item.run_sizes[1][:-1] for item in several])
+    return np.sqrt(scatter(steps, noise)), freedom_of(len(steps))
+
+
+def freedom_of(steps: int) -> float:
+    """Return the degrees of freedom of a scatter that so many differences told."""
+    return max(1.0, EFFICIENCY * steps)
+
+
+def scatter(steps: Array, noise: Array) -> Array:
+    """Return the variance of one date beyond its noise, from differences between neighbouring dates.
+
+    Parameters
+    ----------
+    steps : ndarray, shape (N, k)
+        Differences; NaN where there is none.
+    noise : ndarray, shape (N, k)
+        Their variance by noise alone.
+    """
+    with np.errstate(invalid="ignore"):
+        known = np.isfinite(steps) & np.isfinite(noise)
+    found = np.zeros(steps.shape[1])
+    for k in range(steps.shape[1]):
+        own, var = steps[known[:, k], k], noise[known[:, k], k]
+        if len(own):
+            size = np.median(np.abs(own)) / NORMAL_MEDIAN
+            kept = own[np.abs(own) <= CUT * size]
+            found[k] = max(0.0, 0.5 * float(np.mean(kept**2) / LEFT - np.median(var)))
+    return found
+
+
+def with_dates(history: History, count: int) -> History:
+    """Return the history as it was after so many dates."""
+    return replace(history, dates=history.dates[:count], visits=history.visits[:count])
+
+
+def noise_of(factor: Array, rows: float) -> float:
+    """Return the standard deviation of a row of a joint beside all columns; 0 where nothing tells it."""
+    known = factor.shape[1] - 1
+    if len(factor) <= known or rows <= known:
+        return 0.0
+    return float(abs(factor[known, known]) / np.sqrt(rows - known))
+
+
+def _inverse(matrix: Array) -> Array:
+    size = np.sqrt(np.diag(matrix))
+    entering = size > 0.0
+    result = np.zeros_like(matrix)
+    if np.any(entering):
+        scaled = matrix[np.ix_(entering, entering)] / np.outer(size[entering], size[entering])
+        result[np.ix_(entering, entering)] = np.linalg.pinv(scaled, rcond=1e-10, hermitian=True) / np.outer(
+            size[entering], size[entering]
+        )
+    return result

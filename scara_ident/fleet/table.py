@@ -1,0 +1,185 @@
+"""The table of a fleet: a row for each arm, date and quantity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from scara_ident.estimation.information import triangular
+from scara_ident.fleet.causes import sizes_in_words
+from scara_ident.fleet.changes import Change
+from scara_ident.fleet.folder import Fault
+from scara_ident.fleet.history import History, noise_of, scatter
+from scara_ident.fleet.visit import Visit
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from scara_ident.fleet.fleet import Fleet
+
+# An effect of which the model leaves less than this share of its columns is not told from it.
+SEEN_SHARE = 1e-5
+COLUMNS = (
+    "arm", "date", "quantity", "joint", "unit", "parameter", "std", "effect", "since", "error", "verdict", "fault",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One number of one arm on one date.
+
+    Attributes
+    ----------
+    name : str
+        A parameter of the model, or of a watched effect beside it, or ``friction of JOINT`` and ``torque scale of JOINT`` as
+        ratios to those of all dates together.
+    joint : str or None
+    unit : str
+    value, std : float
+        ``std`` with what differs from run to run.
+    cause : str
+        Label of the cause that it is the size of, or one of; empty for none.
+    """
+
+    name: str
+    joint: str | None
+    unit: str
+    value: float
+    std: float
+    cause: str = ""
+
+
+def quantities(histories: Sequence[History]) -> dict[str, tuple[tuple[Quantity, ...], ...]]:
+    """Return by arm and date all quantities, with standard deviations that hold from date to date.
+
+    What a quantity differs by from date to date beyond its standard deviation is what the whole fleet shows, see
+    `scara_ident.fleet.history`.
+
+    Parameters
+    ----------
+    histories : sequence of History
+        Of one robot and model.
+    """
+    raw = {item.arm: [tuple(_of_date(item, k)) for k in range(len(item.dates))] for item in histories}
+    steps: dict[str, list[tuple[float, float]]] = {}
+    for dates in raw.values():
+        for before, after in zip(dates[:-1], dates[1:], strict=True):
+            known = {item.name: item for item in before}
+            for item in after:
+                if item.name in known:
+                    old = known[item.name]
+                    steps.setdefault(item.name, []).append((item.value - old.value, item.std**2 + old.std**2))
+    more = {}
+    for name, found in steps.items():
+        both = np.array(found)
+        more[name] = float(scatter(both[:, :1], both[:, 1:])[0])
+    return {
+        arm: tuple(
+            tuple(replace(item, std=float(np.sqrt(item.std**2 + more.get(item.name, 0.0)))) for item in each)
+            for each in dates
+        )
+        for arm, dates in raw.items()
+    }
+
+
+def fleet_table(fleet: Fleet) -> pl.DataFrame:
+    """Return the table that ``fleet.parquet`` holds, in the order of arms, dates and quantities; faults last of each."""
+    import polars as pl
+
+    rows: list[Mapping[str, Any]] = []
+    for report in fleet.arms:
+        dates = fleet.quantities.get(report.arm, ())
+        for k, each in enumerate(dates):
+            visit, day = report.known.visits[k], report.known.dates[k]
+            worst = float(np.nanmax(visit.error)) if np.any(np.isfinite(visit.error)) else None
+            for item in each:
+                joint = None if item.joint is None else fleet.robot.joints.index(item.joint)
+                error = worst if joint is None else float(visit.error[joint])
+                change = _change_of(item, day, report.changes)
+                rows.append(
+                    {
+                        "arm": report.arm,
+                        "date": day,
+                        "quantity": item.name,
+                        "joint": item.joint,
+                        "unit": item.unit,
+                        "parameter": _finite(item.value),
+                        "std": _finite(item.std),
+                        "effect": None if change is None or change.cause is None else change.cause.effect,
+                        "since": None if change is None else change.since,
+                        "error": _finite(error),
+                        "verdict": report.verdict,
+                        "fault": None,
+                    }
+                )
+        rows += [_fault_row(fault, report.verdict) for fault in report.faults]
+    kinds = {name: pl.Float64 if name in ("parameter", "std", "error") else pl.String for name in COLUMNS}
+    return pl.DataFrame(rows, schema=kinds).with_columns(pl.col("date", "since").str.to_date())
+
+
+def _fault_row(fault: Fault, verdict: str) -> dict[str, Any]:
+    nothing = dict.fromkeys(COLUMNS)
+    return {**nothing, "arm": fault.arm, "date": fault.date, "verdict": verdict, "fault": str(fault)}
+
+
+def _change_of(item: Quantity, day: str, changes: Sequence[Change]) -> Change | None:
+    for change in changes:
+        if change.cause is not None and item.cause == change.cause.label and day >= change.since:
+            return change
+    return None
+
+
+def _of_date(history: History, k: int) -> Iterator[Quantity]:
+    visit, model = history.visits[k], history.model
+    labels = {cause.words: cause.label for cause in history.causes}
+    inertia = next((cause.label for cause in history.causes if cause.effect == "inertia"), "")
+    rigid = model.place(model.rigid_body)
+    for place, column in enumerate(model.columns):
+        label = inertia if rigid.start <= place < rigid.stop else labels.get(column.meaning, "")
+        value = float(visit.value[place]) if np.isfinite(visit.std[place]) else np.nan
+        yield Quantity(column.name, column.joint, column.unit, value, float(visit.std[place]), label)
+    yield from _watched(history, visit)
+    sizes, variances = (part[k] for part in history.run_sizes)
+    for j, joint in enumerate(model.robot.joints):
+        for kind, words in enumerate((f"friction of {joint}", f"torque scale of {joint}")):
+            place = 4 * j + kind
+            if words in labels and np.isfinite(variances[place]):
+                std = float(np.sqrt(variances[place]))
+                yield Quantity(words, joint, "1", 1.0 + float(sizes[place]), std, labels[words])
+
+
+def _watched(history: History, visit: Visit) -> Iterator[Quantity]:
+    """Give the parameters of each watched effect beside the model alone."""
+    base, total = len(history.model.columns), max(int(own.max(initial=0)) for own in visit.columns) + 1
+    stacked = []
+    for own, factor, rows in zip(visit.columns, visit.factors, visit.rows, strict=True):
+        noise = noise_of(factor, rows)
+        wide = np.zeros((len(factor), total + 1))
+        wide[:, [*own, total]] = factor / noise if noise > 0.0 else 0.0
+        stacked.append(wide)
+    # Below the model's rows stands what the model leaves of each effect's columns.
+    left = triangular(np.concatenate(stacked))[base:, base:]
+    size = np.linalg.norm(np.concatenate(stacked), axis=0)[base:]
+    start = 0
+    for cause in history.causes:
+        if cause.candidate is None:
+            continue
+        own_columns = np.arange(start, start + cause.sizes)
+        start += cause.sizes
+        columns = left[:, own_columns]
+        if np.any(np.linalg.norm(columns, axis=0) <= SEEN_SHARE * size[own_columns]) or not np.all(size[own_columns]):
+            nothing = sizes_in_words(cause, history.scene, np.zeros(cause.sizes), np.eye(cause.sizes))
+            for name, item in nothing.items():
+                yield Quantity(f"{name}: {cause.label}", cause.joint, item.unit, np.nan, np.inf, cause.label)
+            continue
+        covariance = np.asarray(np.linalg.pinv(columns.T @ columns, hermitian=True), dtype=float)
+        value = covariance @ (columns.T @ left[:, -1])
+        for name, item in sizes_in_words(cause, history.scene, value, covariance).items():
+            yield Quantity(f"{name}: {cause.label}", cause.joint, item.unit, item.value, item.std, cause.label)
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and np.isfinite(value) else None

@@ -1,0 +1,69 @@
+"""What changed in an arm, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import date
+
+import numpy as np
+
+from scara_ident.effects import Scene
+from scara_ident.effects.parameters import Parameter
+from scara_ident.fleet.causes import sizes_in_words
+from scara_ident.fleet.changes import Change
+
+# Of several sizes those are named that are told from zero by so many standard deviations.
+NAMED_STDS = 2.0
+
+
+def sentence(change: Change, scene: Scene) -> str:
+    """Return a change in words, such as ``Coulomb friction of joint2 up 31 % (± 2 %) since 1 March 2026``."""
+    if change.cause is None:
+        std = np.sqrt(change.covariance[0, 0])
+        share = _amount("", Parameter(float(change.size[0]), float(std), "1"))
+        return f"Residual of {change.joint}{share} since {day(change.since)}; no watched cause explains it"
+    cause = change.cause
+    words = cause.words if cause.joint is None or cause.joint in cause.words else f"{cause.words} on {cause.joint}"
+    sizes = {key: item for key, item in sizes_in_words(cause, scene, change.size, change.covariance).items()}
+    told = {key: item for key, item in sizes.items() if abs(item.value) > NAMED_STDS * item.std} or sizes
+    if cause.effect == "inertia":
+        # A sum of many parameters has no size of its own.
+        amount = f" changed by {change.score:.0f} standard deviations"
+    else:
+        shared = cause.candidate is None
+        amount = ",".join(
+            _amount("" if shared else f" {key.replace('_', ' ')}", item, shared) for key, item in told.items()
+        )
+    how = "gradually since" if change.gradual else "since"
+    alike = ", ".join(dict.fromkeys(item.words for item in change.or_else[:3]))
+    other = f"; it could also be {alike}" if alike else ""
+    return f"{words[0].upper()}{words[1:]}{':' if cause.candidate else ''}{amount} {how} {day(change.since)}{other}"
+
+
+def day(iso: str) -> str:
+    """Return a date in words.
+
+    Examples
+    --------
+    >>> day("2026-03-01")
+    '1 March 2026'
+    """
+    found = date.fromisoformat(iso)
+    return f"{found.day} {found:%B %Y}"
+
+
+def listed(names: Sequence[str], most: int = 3) -> str:
+    """Return the first of some names, and how many more there are."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def _amount(name: str, item: Parameter, shared: bool = True) -> str:
+    way = "up" if item.value > 0.0 else "down"
+    if item.unit == "1" and shared:
+        return f"{name} {way} {_percent(abs(item.value), 2)} (± {_percent(item.std, 1)})"
+    unit = "" if item.unit == "1" else f" {item.unit}"
+    return f"{name} {way} {abs(item.value):.3g}{unit} (± {item.std:.1g})"
+
+
+def _percent(share: float, digits: int) -> str:
+    return f"{100.0 * share:.0f} %" if share >= 0.1 else f"{100.0 * share:.{digits}g} %"

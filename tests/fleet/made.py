@@ -1,0 +1,52 @@
+"""A small fleet on disk: arms of one kind with noise and friction of their own on every date, one of which wears."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from scara_ident.paper import OJD, table5_parameters
+from scara_ident.recording.recording import Recording, write_recording
+from scara_ident.robot.robot import load_robot
+from tests.arms import noisy, recorded_torque, recording
+
+RATE, SECONDS = 200.0, 10.0
+DATES = ("2026-01-15", "2026-02-15", "2026-03-15", "2026-04-15", "2026-05-15", "2026-06-15")
+WORN = "arm2"
+# Coulomb friction of joint 2 of the arm that wears, by date, as a ratio.
+WEAR = (1.0, 1.0, 1.15, 1.3, 1.45, 1.6)
+
+
+@cache
+def _parts() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    robot, time = load_robot(), np.arange(round(SECONDS * RATE)) / RATE
+    q, v, a = OJD.motion(time)
+    rigid = recorded_torque(robot, q, v, a, [(0.0,) * 5] * 2)
+    truth = table5_parameters("OJD")
+    friction = np.array([truth[5 + 4 * j : 9 + 4 * j] for j in range(2)])
+    speed = v
+    each = np.array([np.sign(speed), speed, np.abs(speed) * speed, speed**3])
+    return time, q, rigid, friction, each
+
+
+def run_of(arm: int, date: int, wear: float = 1.0) -> Recording:
+    """One run of one arm on one date; all friction differs by 2 % from date to date."""
+    random = np.random.default_rng([arm, date])
+    time, q, rigid, friction, each = _parts()
+    own = friction * (1.0 + 0.02 * random.standard_normal((2, 1)))
+    own[1, 0] *= wear
+    torque = rigid + np.einsum("jp,pjt->jt", own, each)
+    return noisy(recording(load_robot(), "OJD_1", time, q, torque), random, (0.02, 0.008))
+
+
+def write_fleet(folder: Path, arms: int = 4, dates: int = len(DATES), suffix: str = ".csv") -> Path:
+    """Write a fleet, a folder for each date; of ``arm2`` the Coulomb friction of joint 2 rises from March on."""
+    for arm in range(1, arms + 1):
+        for k, date in enumerate(DATES[:dates]):
+            place = folder / f"arm{arm}" / date
+            place.mkdir(parents=True)
+            wear = WEAR[k] if f"arm{arm}" == WORN else 1.0
+            write_recording(run_of(arm, k, wear), place / f"OJD_1{suffix}")
+    return folder

@@ -1,0 +1,65 @@
+"""What changed, since when, and that nothing else is named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.fleet.changes import LEVEL, find_changes, fleet_scatter, grown_residuals, trials_of
+from scara_ident.fleet.history import with_dates
+from tests.fleet.made import DATES, WEAR, WORN
+
+
+@pytest.fixture(scope="module")
+def noise(histories):
+    return fleet_scatter(histories)
+
+
+def test_the_worn_arm_is_named_with_cause_joint_size_and_date_and_no_other(histories, noise):
+    found = {item.arm: find_changes(item, noise, 400.0) for item in histories}
+    assert [arm for arm, changes in found.items() if changes] == [WORN]
+    first = found[WORN][0]
+    assert first.cause is not None
+    assert first.cause.words == "Coulomb friction of joint2" and first.joint == "joint2"
+    assert first.since in DATES[1:4] and first.gradual
+    assert abs(first.size[0] - (WEAR[-1] - 1.0)) < 4.0 * np.sqrt(first.covariance[0, 0]) + 0.03
+    assert first.p_value < LEVEL and first.score > 5.0
+
+
+def test_one_date_tells_no_change(histories, noise):
+    assert find_changes(with_dates(histories[1], 1), noise, 400.0) == ()
+
+
+def test_more_arms_ask_for_more(histories, noise):
+    few = find_changes(histories[1], noise, 400.0)[0]
+    many = find_changes(histories[1], noise, 40000.0)[0]
+    np.testing.assert_allclose(many.p_value, 100.0 * few.p_value)
+
+
+def test_where_dates_differ_more_by_nature_less_is_named(histories, noise):
+    rough = replace(
+        noise, runs=300.0 * noise.runs, causes={label: 5000.0 * ratio for label, ratio in noise.causes.items()}
+    )
+    assert find_changes(histories[1], rough, 400.0) == ()
+
+
+def test_a_residual_that_grew_is_named_where_no_cause_is(histories):
+    arm = histories[0]
+    worse = tuple(
+        replace(visit, error=visit.error * np.array([1.0, 1.0 if k < 3 else 4.0])) for k, visit in enumerate(arm.visits)
+    )
+    grown = replace(arm, visits=worse)
+    tried = 400.0
+    (found,) = grown_residuals(grown, [grown, *histories[1:]], tried)
+    assert found.cause is None and found.joint == "joint2" and found.since == DATES[3]
+    np.testing.assert_allclose(found.size[0], 3.0, rtol=0.3)
+    assert grown_residuals(histories[3], histories, tried) == ()
+
+
+def test_the_tests_of_an_arm_are_worth_fewer_than_they_are_many_and_more_dates_ask_for_more(histories, noise):
+    arm = histories[0]
+    shapes = 2 * len(arm.dates) - 3
+    few, many = trials_of(with_dates(arm, 2), noise), trials_of(arm, noise)
+    assert 5.0 < few < many < shapes * len(arm.causes)

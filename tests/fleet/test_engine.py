@@ -1,0 +1,86 @@
+"""Work on real processes: what raises or dies takes nothing else with it."""
+
+from __future__ import annotations
+
+import builtins
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.fleet import engine as module
+from scara_ident.fleet.engine import Engine, Job, started
+
+
+def double(x: int) -> int:
+    if x < 0:
+        raise ValueError("negative")
+    return 2 * x
+
+
+def die_once(flag: str) -> str:
+    if not Path(flag).exists():
+        Path(flag).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "lived"
+
+
+def test_what_raises_hands_on_its_exception_and_what_follows_is_done(cluster, tmp_path):
+    found: list[object] = []
+
+    def then(outcome):
+        found.append(outcome)
+        return [Job(double, (outcome,), then)] if isinstance(outcome, int) and outcome < 10 else ()
+
+    flag = str(tmp_path / "flag")
+    with started(cluster.scheduler_address) as engine:
+        engine.run([Job(double, (3,), then), Job(double, (-1,), then), Job(die_once, (flag,), then)])
+        engine.run([])
+    assert sorted(str(item) for item in found) == ["12", "6", "lived", "negative"]
+
+
+def test_without_workers_all_that_is_left_is_refused(monkeypatch):
+    class Never:
+        key = "key"
+
+        def add_done_callback(self, _):
+            pass
+
+        def cancel(self):
+            pass
+
+    class Client:
+        def submit(self, *_, **__):
+            return Never()
+
+        def scheduler_info(self, **_):
+            return {"workers": {}}
+
+    monkeypatch.setattr(module, "LOOK_SECONDS", 0.01)
+    monkeypatch.setattr(module, "NO_WORKER_SECONDS", 0.02)
+    found: list[object] = []
+
+    def then(outcome):
+        found.append(outcome)
+        return [Job(double, (1,), lambda later: found.append(later) or ())] if len(found) == 1 else ()
+
+    Engine(Client()).run([Job(double, (1,), then)])
+    assert len(found) == 2 and all(isinstance(item, ScaraIdentError) for item in found)
+
+
+def test_no_scheduler_and_no_dask_are_one_line(monkeypatch):
+    monkeypatch.setattr(module, "CONNECT_SECONDS", "200ms")
+    with pytest.raises(UsageError, match="no scheduler answers there"), started("tcp://127.0.0.1:9"):
+        pass
+    real = builtins.__import__
+
+    def absent(name, *rest):
+        if name == "dask":
+            raise ImportError
+        return real(name, *rest)
+
+    monkeypatch.setattr(builtins, "__import__", absent)
+    with pytest.raises(UsageError, match=r'pip install "scara-ident\[fleet\]"'), started():
+        pass

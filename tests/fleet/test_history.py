@@ -1,0 +1,61 @@
+"""An arm over its dates in units of noise, and what differs from date to date."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scara_ident.fleet.history import common_removed, freedom_of, run_scatter, scatter, with_dates
+
+
+def test_the_scatter_is_that_which_was_put_in_and_a_slope_or_an_odd_arm_hardly_moves_it():
+    random = np.random.default_rng(0)
+    noise, runs = 0.5, 1.0
+    each = []
+    for arm in range(40):
+        values = runs * random.standard_normal((12, 1)) + noise * random.standard_normal((12, 1))
+        values += np.arange(12)[:, None] * (1.5 if arm < 6 else 0.02)
+        each.append(np.diff(values, axis=0))
+    steps = np.concatenate(each)
+    found = scatter(steps, np.full_like(steps, 2.0 * noise**2))
+    np.testing.assert_allclose(np.sqrt(found[0]), runs, rtol=0.15)
+    assert scatter(0.1 * steps, np.full_like(steps, 2.0 * noise**2))[0] == 0.0
+    assert scatter(np.full((3, 1), np.nan), np.ones((3, 1)))[0] == 0.0
+
+
+def test_friction_differs_by_what_the_runs_were_made_with(histories):
+    std, freedom = run_scatter(histories)
+    assert freedom == freedom_of(4 * 5)
+    friction, offset, delay = std[0], std[2], std[3]
+    # Twenty differences tell a standard deviation to a quarter or so.
+    assert 0.008 < friction < 0.04
+    assert offset < 0.003 and delay < 0.0005
+
+
+def test_whitening_weighs_runs_as_noise(histories):
+    row, std = histories[0].rows[0], np.full(8, 0.05)
+    white = row.whitened(std)
+    cover = np.eye(len(row.torque)) + (row.runs * std) @ (row.runs * std).T
+    mapped = white.columns.T @ white.columns
+    np.testing.assert_allclose(
+        mapped, row.columns.T @ np.linalg.solve(cover, row.columns), rtol=1e-6, atol=1e-6 * mapped.max()
+    )
+    same = row.whitened(np.zeros(8))
+    np.testing.assert_array_equal(same.torque, row.torque)
+
+
+def test_parameters_that_all_dates_share_leave_nothing_of_themselves(histories):
+    rows = histories[0].whitened(np.tile([0.02, 0.0, 0.0, 0.0], 2))
+    left, basis = common_removed(rows)
+    stacked = np.concatenate(basis)
+    np.testing.assert_allclose(stacked.T @ stacked, np.eye(stacked.shape[1]), atol=1e-9)
+    along = np.concatenate([row.columns for row in rows]).T @ np.concatenate(left)
+    size = np.linalg.norm(np.concatenate([row.columns for row in rows]), axis=0)
+    assert np.max(np.abs(along) / np.maximum(size, 1e-12)) < 1e-5 * np.linalg.norm(np.concatenate(left))
+    # What is left is of the size of the noise.
+    assert 0.5 < np.mean(np.concatenate(left) ** 2) < 1.5
+
+
+def test_fewer_dates_are_the_first_ones(histories):
+    early = with_dates(histories[0], 3)
+    assert early.dates == histories[0].dates[:3] and len(early.rows) == 3
+    assert early.days[0] == 0.0 and early.days[1] == 31.0

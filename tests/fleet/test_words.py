@@ -1,0 +1,42 @@
+"""Changes in words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from scara_ident.fleet.changes import Change
+from scara_ident.fleet.words import day, listed, sentence
+
+
+def test_a_change_is_said_with_size_uncertainty_and_date(histories):
+    history = histories[0]
+    causes = {cause.label: cause for cause in history.causes}
+
+    def of(label, size, variance, **more):
+        cause = causes[label]
+        change = Change(cause, cause.joint, "2026-03-01", False, np.array(size), np.diag(variance), 1e-6)
+        return sentence(replace(change, **more), history.scene)
+
+    coulomb = "Coulomb friction of joint2"
+    assert of(coulomb, [0.314], [4e-4]) == "Coulomb friction of joint2 up 31 % (± 2 %) since 1 March 2026"
+    slow = of(coulomb, [-0.05], [1e-4], gradual=True, or_else=(causes["friction of joint2"],))
+    assert slow == (
+        "Coulomb friction of joint2 down 5 % (± 1 %) gradually since 1 March 2026; it could also be friction of joint2"
+    )
+    loss = of("transmission_loss of joint1", [0.052], [1e-6])
+    assert loss == (
+        "Gear loss that grows with the transmitted torque on joint1: loss coefficient up 0.052 (± 0.001) since 1 March 2026"
+    )
+    inertia = next(label for label, cause in causes.items() if cause.effect == "inertia")
+    count = causes[inertia].sizes
+    assert "masses and inertias" in of(inertia, [1.0] + [0.0] * (count - 1), [1e-2] * count).lower()
+    unknown = of(coulomb, [2.0], [0.01], cause=None)
+    assert unknown == "Residual of joint2 up 200 % (± 10 %) since 1 March 2026; no watched cause explains it"
+
+
+def test_dates_and_lists_are_short():
+    assert day("2026-12-31") == "31 December 2026"
+    assert listed(["a", "b", "c", "d", "e"]) == "a, b, c and 2 more"
+    assert listed(["a"]) == "a"

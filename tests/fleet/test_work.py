@@ -1,0 +1,30 @@
+"""Which files are worked on, and what work is left when something is held."""
+
+from __future__ import annotations
+
+import pickle
+from contextlib import ExitStack
+from pathlib import Path
+
+from scara_ident.fleet.folder import RecordingFile
+from scara_ident.fleet.store import Store
+from scara_ident.fleet.work import LateEngine, Settings, Work
+from scara_ident.progress import silent
+from scara_ident.robot.robot import load_robot
+
+
+def test_each_content_is_worked_on_once_and_what_is_not_there_is_a_fault(tmp_path: Path):
+    files = []
+    for arm, text in (("a", "one"), ("b", "one"), ("c", "two"), ("d", None)):
+        if text is not None:
+            (tmp_path / f"{arm}.csv").write_text(text)
+        files.append(RecordingFile(arm, "2026-01-01", "x.csv", str(tmp_path / f"{arm}.csv")))
+    work = Work(pickle.dumps(load_robot()), Settings(), Store(tmp_path / "cache"), silent, [])
+    assert [file.arm for file in work.keyed(files)] == ["a", "c"]
+    assert [(fault.arm, fault.passing) for fault in work.faults] == [("b", False), ("d", True)]
+
+
+def test_an_engine_starts_for_work_only():
+    with ExitStack() as stack:
+        late = LateEngine(stack, Settings(scheduler="tcp://127.0.0.1:9"))
+        late.run([])
