@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.confounding import Confounder, confounders
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
@@ -64,6 +64,8 @@ class FoundEffect:
         Trajectories in which it helps, of those that excite it.
     before, after : mapping of str to float or None
         Rms of each joint over the training recordings when it came in.
+    candidate : Candidate or None
+        As a term of the model; None where it was taken out of the recordings.
     """
 
     effect: str
@@ -76,6 +78,7 @@ class FoundEffect:
     votes: tuple[int, int]
     before: Mapping[str, float | None]
     after: Mapping[str, float | None]
+    candidate: Candidate | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,6 +335,7 @@ def _effects(found: Search, step: SelectionStep, parameters: PhysicalParameters)
                 decision.examination.votes,
                 dict(zip(scene.robot.joints, before, strict=True)),
                 dict(zip(scene.robot.joints, now, strict=True)),
+                None if candidate.corrects_data else candidate,
             )
         )
         before = now
