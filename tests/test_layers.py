@@ -19,7 +19,7 @@ PACKAGE = ROOT / "scara_ident"
 ROOMS = (
     "errors", "arrays", "threads", "progress", "registry", "files",
     "robot", "paper", "recording", "motion", "model", "estimation", "inspection", "identification",
-    "effects", "diagnosis", "excitation", "export", "simulation", "use", "report", "cli", "__main__",
+    "effects", "diagnosis", "excitation", "export", "simulation", "use", "report", "asking", "cli", "__main__",
 )  # fmt: skip
 LARGEST, MEDIAN = 400, 145
 

@@ -302,9 +302,7 @@ def inquiry_of(content: Mapping[str, Any], robot: Robot, recordings: Sequence[Re
     return replace(inquiry, known=known_rows(inquiry, CandidateColumns(observations))) if asked else inquiry
 
 
-def _unseen(
-    model: TorqueModel, value: Array, bands: Sequence[float | None], armatures: Mapping[int, float]
-) -> Scene:
+def _unseen(model: TorqueModel, value: Array, bands: Sequence[float | None], armatures: Mapping[int, float]) -> Scene:
     """Return the scene of no recording: joints may travel as far and as fast as they can."""
     robot = model.robot
     travel = np.where(np.isfinite(robot.upper - robot.lower), robot.upper - robot.lower, 2.0 * np.pi)

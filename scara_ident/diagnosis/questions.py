@@ -19,12 +19,10 @@ from scara_ident.effects import EFFECTS, Effect, Member
 from scara_ident.errors import ScaraIdentError
 
 Kind = Literal["rivals", "unexplained", "below_limit", "parameter"]
-# Rivals of one effect, and candidates that these recordings would hardly have shown, of each family and in all.
-MOST_RIVALS, MOST_OF_FAMILY, MOST_BELOW = 4, 2, 10
+# Rivals of one effect, and candidates that these recordings would hardly have shown: of each family, in all, and by name.
+MOST_RIVALS, MOST_OF_FAMILY, MOST_BELOW, MOST_NAMED = 4, 2, 24, 3
 # Parameters asked for, and the standard deviation over the size that makes one unsure.
 MOST_PARAMETERS, UNSURE = 3, 0.3
-# Standard errors of an effect that was not significant from which on it is worth a question of its own.
-SUGGESTIVE = 2.5
 
 
 @dataclass(frozen=True)
@@ -209,10 +207,7 @@ def _remainder(diagnosis: Diagnosis) -> Iterator[Question]:
 def _worth_a_look(diagnosis: Diagnosis) -> Iterator[Question]:
     scene = diagnosis.search.scene
     known = {item.label(scene) for item in diagnosis.search.chosen}
-    decisions = [item.decision for item in diagnosis.tentative if item.decision is not None]
-    suggestive = [item for item in _others(diagnosis) if _errors(item.examination) >= SUGGESTIVE]
-    decisions += sorted(suggestive, key=lambda item: -_errors(item.examination))[:MOST_OF_FAMILY]
-    for decision in decisions:
+    for decision in (item.decision for item in diagnosis.tentative if item.decision is not None):
         suspect = _as_found(decision)
         if _moves(decision.candidate) and decision.label not in known and np.any(suspect.value):
             known.add(decision.label)
@@ -234,8 +229,8 @@ def _below_limit(diagnosis: Diagnosis, asked: set[str]) -> Iterator[Question]:
         suspects.append(Suspect(decision.candidate, decision.label, tuple(float(x) for x in value)))
     if suspects:
         chosen = tuple(suspects[:MOST_BELOW])
-        names = list(dict.fromkeys(item.label for item in chosen))
-        text = f"what these recordings hardly show: {', '.join(names)}"
+        more = f" and {len(chosen) - MOST_NAMED} more" if len(chosen) > MOST_NAMED else ""
+        text = f"what these recordings hardly show: {', '.join(item.label for item in chosen[:MOST_NAMED])}{more}"
         yield Question("below_limit", text, chosen, experiment="record another motion over the whole workspace")
 
 
@@ -256,22 +251,25 @@ def _parameters(diagnosis: Diagnosis) -> Iterator[Question]:
 
 
 def _others(diagnosis: Diagnosis) -> list[Decision]:
-    """Return the best member of each family and joint that is not in the model and that a motion can show."""
+    """Return the best member of each family and joint not in the model that a motion can show and an arm can have."""
     search = diagnosis.search
     known = {item.label(search.scene) for item in search.chosen}
     best = best_of_each(search.decisions).values()
     return [
         item
         for item in best
-        if item.label not in known and not item.accepted and _moves(item.candidate) and _possible(item, diagnosis)
+        if item.label not in known
+        and not item.accepted
+        and not item.candidate.corrects_data
+        and _moves(item.candidate)
+        and bool(np.isfinite(item.examination.covariance).all())
+        and possible(item, diagnosis)
     ]
 
 
-def _possible(decision: Decision, diagnosis: Diagnosis) -> bool:
-    """Whether a real arm can have the coefficients found, and the recordings say anything of them."""
+def possible(decision: Decision, diagnosis: Diagnosis) -> bool:
+    """Return whether a real arm can have the coefficients found."""
     examination, candidate = decision.examination, decision.candidate
-    if not np.all(np.isfinite(examination.covariance)) or candidate.corrects_data:
-        return False
     std = np.sqrt(np.clip(np.diag(examination.covariance), 0.0, None))
     return candidate.effect.inadmissible(diagnosis.search.scene, candidate.member, examination.value, std) is None
 

@@ -196,7 +196,7 @@ def verified_inside(problem: Problem, x: Array) -> tuple[Array, int]:
 
 
 def _verified_times(problem: Problem) -> int:
-    return max(FINER * problem.rows.shape[1], int(np.ceil(LEAST_RATE * problem.task.basis.duration))) + 1
+    return max(FINER * int(problem.rows.shape[1]), int(np.ceil(LEAST_RATE * problem.task.basis.duration))) + 1
 
 
 def _excess(task: Task, x: Array, times: int) -> Array:

@@ -41,7 +41,7 @@ from scara_ident.threads import one_blas_thread
 # Samples per second of a motion in the search, where a suspect follows the motor's turns, and of what is promised.
 RATE, TURNING_RATE, FINE_RATE = 200.0, 500.0, 1000.0
 # Motions that a search draws first, and changes of the best of them per round.
-DRAWN, CHANGED = 40, 60
+DRAWN, CHANGED = 24, 30
 # Speeds of a drawn motion as shares of the limits, evenly in their logarithm; how often a joint stands still.
 SLOWEST, STILL = 0.03, 0.15
 # Sizes of a change, as shares of the motion; by how much a joint's motion grows or shrinks, in its logarithm.
@@ -285,4 +285,3 @@ def _inside(problem: Problem, x: Array) -> Array | None:
             return x
         x = SHRINKING * x
     return None
-
