@@ -46,10 +46,11 @@ PAIRS = (
     ("payload_change", "torque_gain_mismatch"),
 )
 # Sizes of effects against the usual, reach of the first motion, rad, its largest speed, rad/s, and lengths, s.
-FACTORS, REACHES, SPEEDS = (0.1, 0.7), (0.1, 0.3), (0.4, 1.0)
+FACTORS, REACHES, SPEEDS = (0.15, 1.5), (0.1, 0.3), (0.4, 1.0)
 FIRST, ASKED, SAMPLED = 8.0, 15.0, 500.0
 EFFORT = Effort(starts=2, rounds=2, processes=1)
 WAYS = ("tell", "random", "logdet")
+KINDS = ("rivals", "below_limit")
 
 
 def poor_motion(arm: VirtualArm, rng: np.random.Generator) -> ReferenceMotion:
@@ -151,10 +152,10 @@ def one_set(robot: str, number: int, seed: int) -> dict[str, Any]:
         result[way] = right(found, truth)
         result[f"found_{way}"] = _found(found)
         if way == "tell":
-            told = design.tells[0]
-            result["promised"] = [told.before, told.after]
-            result["seen"] = seen(found, first, told.question)
-            result["kind"] = told.question.kind
+            told = next((item for item in design.tells if item.question.suspects), None)
+            if told is not None:
+                result["kind"], result["promised"] = told.question.kind, [told.before, told.after]
+                result["seen"] = seen(found, first, told.question)
     return result
 
 
@@ -173,10 +174,11 @@ def show(rows: Sequence[dict[str, Any]]) -> None:
         print(f"{robot}: {len(own)} sets, {sum(row['before'] for row in own)} named right at once, {len(opened)} open")
         print("| pair | open | after --tell | after a random motion | after logdet |\n|---|---|---|---|---|")
         pairs = [("all", opened)]
+        pairs += [(f"first question {kind}", [row for row in opened if row.get("kind") == kind]) for kind in KINDS]
         pairs += [(" / ".join(pair), [row for row in opened if row["pair"] == list(pair)]) for pair in PAIRS]
         for name, some in pairs:
             print(f"| {name} | {len(some)} | " + " | ".join(str(sum(row[way] for row in some)) for way in WAYS) + " |")
-        ratio = [row["seen"] / row["promised"][1] for row in opened if row["promised"][1] > 0.0]
+        ratio = [row["seen"] / row["promised"][1] for row in opened if row.get("promised", (0.0, 0.0))[1] > 0.0]
         if ratio:
             near = np.mean(np.abs(np.array(ratio) - 1.0) <= 0.3)
             print(f"seen over promised: median {np.median(ratio):.2f}, {near:.0%} within 30 % of {len(ratio)}")
@@ -200,7 +202,7 @@ def main() -> None:
         try:
             rows.append(one_set(given.robot, number, given.seed))
         except ScaraIdentError as error:
-            print(f"set {number}: {error}")
+            print(f"set {number}: {error}", flush=True)
             continue
         with given.output.open("a", encoding="utf-8") as file:
             file.write(json.dumps(rows[-1]) + "\n")

@@ -131,11 +131,11 @@ def ask(folder: Path, settings: Settings, work: Work | None = None) -> Asked:
     recordings = recordings_in(folder)
     inputs = settings.hash(recordings)
     before = read_asked(folder)
-    if before is not None and before.inputs == inputs and before.state is not None:
+    if before is not None and before.inputs == inputs and _complete(folder, before):
         return before
-    if before is None or before.inputs != inputs:
+    if before is None or before.inputs != inputs or not recordings:
         times = dict(before.times) if before is not None else {}
-        for question in before.asked if before is not None else ():
+        for question in before.asked if before is not None and before.inputs != inputs else ():
             times[question] = times.get(question, 0) + 1
         if not recordings:
             return _first(folder, settings, Asked(inputs, times=times))
@@ -144,6 +144,12 @@ def ask(folder: Path, settings: Settings, work: Work | None = None) -> Asked:
         _note(folder, before)
     work("designing the next motion", 0.6)
     return _designed(folder, settings, recordings, before)
+
+
+def _complete(folder: Path, asked: Asked) -> bool:
+    """Whether a step is done and what it wrote still lies there."""
+    waits = asked.state == "record"
+    return asked.state is not None and (not waits or all((folder / "next" / name).is_file() for name in FILES))
 
 
 def recordings_in(folder: Path) -> list[Path]:

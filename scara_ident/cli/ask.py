@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Annotated
 
@@ -51,7 +52,8 @@ def ask(
 
         real = virtual_arm(arm)
         asked = read_trajectory(folder / "next" / "trajectory.csv", arm)
-        name = f"asked{len(recordings_in(folder)) // 2 + 1}"
+        taken = {path.stem.rpartition("_")[0] for path in recordings_in(folder)}
+        name = next(word for word in (f"asked{k}" for k in count(1)) if word not in taken)
         with written_together(folder / "recordings") as place:
             for repetition in (1, 2):
                 done = simulate(

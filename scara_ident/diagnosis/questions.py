@@ -154,14 +154,12 @@ def questions(diagnosis: Diagnosis) -> tuple[Question, ...]:
 
     Notes
     -----
-    First effects that were found and may be another, then a remainder, then effects that are worth a look, parameters
-    that are hardly known, and last what these recordings would have shown least of.
+    First effects that were found and may be another, then a remainder, then effects that are worth a look, then what these
+    recordings would have shown least of, and last parameters that are hardly known.
     """
     found = [*_rivals(diagnosis), *_remainder(diagnosis), *_worth_a_look(diagnosis)]
-    below = _below_limit(diagnosis, {item.label for question in found for item in question.suspects})
-    unsure = not all(item.shown for item in diagnosis.evidence)
-    late = [*_parameters(diagnosis)]
-    return tuple([*found, *below, *late] if unsure else [*found, *late, *below])
+    asked = {item.label for question in found for item in question.suspects}
+    return tuple([*found, *_below_limit(diagnosis, asked), *_parameters(diagnosis)])
 
 
 def suspects_in_model(diagnosis: Diagnosis) -> tuple[Suspect, ...]:
@@ -288,7 +286,7 @@ def _errors(found: Examination) -> float:
     if not np.all(np.isfinite(found.covariance)):
         return 0.0
     wald = found.value @ np.linalg.pinv(found.covariance, rcond=1e-9, hermitian=True) @ found.value
-    return float(np.sqrt(max(wald, 0.0)))
+    return float(np.sqrt(max(float(wald), 0.0)))
 
 
 def _limit(found: Examination, diagnosis: Diagnosis) -> float:
