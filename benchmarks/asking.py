@@ -89,17 +89,19 @@ def right(found: Diagnosis, truth: Effect) -> bool:
 def seen(found: Diagnosis, first: Diagnosis, question: Question) -> float:
     """Return how far apart the answers are on all recordings, by the scatter of blocks."""
     inquiry = inquire(first, [question])
-    columns = CandidateColumns(found.search.uncorrected)
-    made = inquiry.rows(lambda wanted: columns.rows(found.search.scene, wanted))
-    wide = dict(zip(inquiry.suspects, made, strict=True))
+    columns, scene = CandidateColumns(found.search.uncorrected), found.search.scene
+    made = inquiry.rows(lambda wanted: columns.rows(scene, wanted))
+    wide = {item.label: rows for item, rows in zip(inquiry.suspects, made, strict=True)}
+    # What was found by then is no noise.
+    now = {item.label(scene): item for item in found.search.chosen}
 
     def apart(one: Suspect, other: Suspect | None) -> float:
-        labels = {item.label for item in question.suspects}
-        beside = [wide[item] for item in inquiry.in_model if item.label not in labels]
-        beside += [] if other is None else [wide[other]]
+        gone = {one.label} if other is None else {item.label for item in question.suspects}
+        beside = columns.rows(scene, [item for label, item in now.items() if label not in gone])
+        beside += [] if other is None else [wide[other.label]]
         model = fitted_model(columns.observations, beside, found.after.weights, 4)
         value = np.array(one.value)
-        torque = {joint: (value @ rows[: len(value)])[None] for joint, rows in wide[one].items()}
+        torque = {joint: (value @ rows[: len(value)])[None] for joint, rows in wide[one.label].items()}
         spread = float(examine(model, [torque])[0].covariance[0, 0])
         return 1.0 / np.sqrt(spread) if np.isfinite(spread) and spread > 0.0 else 0.0
 

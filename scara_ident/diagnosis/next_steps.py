@@ -9,7 +9,7 @@ from typing import Any
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.diagnose import Diagnosis
-from scara_ident.diagnosis.questions import Question, possible, questions
+from scara_ident.diagnosis.questions import HALF_THE_SPEED, Question, possible, questions
 from scara_ident.diagnosis.selection_step import best_of_each
 
 # A motion that is designed to tell, s, and how that is asked for.
@@ -73,6 +73,7 @@ def next_steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
     late = [item for item in asked if item not in urgent]
     return (
         *_motions(diagnosis, urgent),
+        *_remainder(diagnosis, urgent),
         *_recordings(diagnosis),
         *_motions(diagnosis, late),
         *_confirmations(diagnosis),
@@ -87,14 +88,14 @@ def next_steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
 def _motions(diagnosis: Diagnosis, asked: Sequence[Question]) -> Iterator[NextStep]:
     sigmas = inquire(diagnosis, asked).sigmas()
     for question, sigma in zip(asked, sigmas, strict=True):
-        moves = question.kind != "unexplained" or bool(question.signals)
-        yield NextStep(
-            question.text,
-            ASKED_MOTION if moves else question.experiment,
-            ASKED_SECONDS,
-            float(sigma) if moves else None,
-            question if moves else None,
-        )
+        yield NextStep(question.text, ASKED_MOTION, ASKED_SECONDS, float(sigma), question)
+
+
+def _remainder(diagnosis: Diagnosis, asked: Sequence[Question]) -> Iterator[NextStep]:
+    """Say what tells a remainder over which no motion can be spread."""
+    left = diagnosis.unexplained
+    if left is not None and not any(item.kind == "unexplained" for item in asked):
+        yield NextStep(f"what is left on {left.joint}", HALF_THE_SPEED, 2.0 * diagnosis.search.scene.duration)
 
 
 def _recordings(diagnosis: Diagnosis) -> Iterator[NextStep]:

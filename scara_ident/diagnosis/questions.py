@@ -15,12 +15,17 @@ from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.selection_step import best_of_each
+from scara_ident.diagnosis.shape import shape_over
 from scara_ident.effects import EFFECTS, Effect, Member
 from scara_ident.errors import ScaraIdentError
 
 Kind = Literal["rivals", "unexplained", "below_limit", "parameter"]
 # Rivals of one effect, and candidates that these recordings would hardly have shown: of each family, in all, and by name.
 MOST_RIVALS, MOST_OF_FAMILY, MOST_BELOW, MOST_NAMED = 4, 2, 24, 3
+# What tells a remainder that no signal of the motion is known to make.
+HALF_THE_SPEED = (
+    "repeat one trajectory at half the speed; how the remainder scales tells friction from inertia and from delays"
+)
 # Parameters asked for, and the standard deviation over the size that makes one unsure.
 MOST_PARAMETERS, UNSURE = 3, 0.3
 
@@ -193,13 +198,12 @@ def _rivals(diagnosis: Diagnosis) -> Iterator[Question]:
 
 def _remainder(diagnosis: Diagnosis) -> Iterator[Question]:
     left = diagnosis.unexplained
-    if left is not None:
-        on = " and ".join(left.signals) or "what"
-        text = f"what is left on {left.joint}, over {on}" if left.signals else f"what is left on {left.joint}"
-        experiment = "repeat one trajectory at half the speed; how the remainder scales tells friction from inertia and from delays"
-        yield Question(
-            "unexplained", text, joint=left.joint, signals=left.signals, size=left.rms, experiment=experiment
-        )
+    if left is None or shape_over(diagnosis.robot, left.signals, diagnosis.robot.joints.index(left.joint)) is None:
+        return
+    text = f"what is left on {left.joint}, over {' and '.join(left.signals)}"
+    yield Question(
+        "unexplained", text, joint=left.joint, signals=left.signals, size=left.rms, experiment=HALF_THE_SPEED
+    )
 
 
 def _worth_a_look(diagnosis: Diagnosis) -> Iterator[Question]:
