@@ -11,6 +11,7 @@ from scara_ident.diagnosis.answerability import inquire, inquiry_of
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.questions import Question, questions
 from scara_ident.diagnosis.selection_step import fitted_model
+from scara_ident.diagnosis.shape import KNOTS
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation.information import Information
 from scara_ident.robot.robot import load_robot
@@ -54,6 +55,24 @@ def test_an_effect_is_apart_from_none_by_what_the_model_leaves_of_it_and_a_param
     model, b = rows[:, : p + own], rows[:, p + own : p + own + len(tilt.value)]
     assert sigma[0] == pytest.approx(np.sqrt(left_of(model, b @ tilt.value)), rel=1e-9)
     assert sigma[1] == pytest.approx(2.0 / np.sqrt(np.linalg.inv(model.T @ model)[0, 0]), rel=1e-9)
+
+
+def test_a_remainder_is_as_sure_as_the_knots_of_a_free_curve():
+    found = open_diagnosis()
+    name = "position of joint2"
+    asked = [Question("unexplained", "what is left", joint="joint2", signals=(name,), size=0.2)]
+    inquiry = replace(inquire(found, asked), known=None)
+    p, knots = len(inquiry.scene.model.columns), KNOTS
+    width = p + 1 + knots
+    rows = np.random.default_rng(5).normal(size=(90, width))
+    sigma = inquiry.sigmas(Information.empty(width).absorb(rows, np.zeros(90)))
+    model, hats = rows[:, : p + 1], rows[:, p + 1 :]
+    left = hats - model @ np.linalg.lstsq(model, hats)[0]
+    # A knot is known beforehand to be no larger than three times the rms.
+    variance = np.diag(np.linalg.inv(left.T @ left + np.eye(knots) / 0.6**2))
+    assert sigma[0] == pytest.approx(0.2 / np.sqrt(np.mean(variance)), rel=1e-9)
+    # Where nothing reaches a knot, nothing more is known of it.
+    assert inquiry.sigmas(Information.empty(width).absorb(0.0 * rows, np.zeros(90)))[0] == pytest.approx(1.0 / 3.0)
 
 
 def test_the_separation_so_far_is_that_of_the_tests_of_the_diagnosis():
