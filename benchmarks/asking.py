@@ -17,6 +17,7 @@ import argparse
 import json
 import time
 from collections.abc import Sequence
+from functools import cache
 from itertools import permutations
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from scara_ident.diagnosis import Diagnosis, diagnose
 from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import CandidateColumns
+from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.questions import Question, Suspect
 from scara_ident.diagnosis.selection_step import fitted_model
 from scara_ident.errors import ScaraIdentError
@@ -95,11 +97,14 @@ def seen(found: Diagnosis, first: Diagnosis, question: Question) -> float:
     # What was found by then is no noise.
     now = {item.label(scene): item for item in found.search.chosen}
 
+    @cache
+    def beside(kept: tuple[str, ...], other: str | None) -> FittedModel:
+        rows = [*columns.rows(scene, [now[label] for label in kept]), *([] if other is None else [wide[other]])]
+        return fitted_model(columns.observations, rows, found.after.weights, 4)
+
     def apart(one: Suspect, other: Suspect | None) -> float:
         gone = {one.label} if other is None else {item.label for item in question.suspects}
-        beside = columns.rows(scene, [item for label, item in now.items() if label not in gone])
-        beside += [] if other is None else [wide[other.label]]
-        model = fitted_model(columns.observations, beside, found.after.weights, 4)
+        model = beside(tuple(label for label in now if label not in gone), None if other is None else other.label)
         value = np.array(one.value)
         torque = {joint: (value @ rows[: len(value)])[None] for joint, rows in wide[one.label].items()}
         spread = float(examine(model, [torque])[0].covariance[0, 0])
