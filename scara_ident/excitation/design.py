@@ -11,7 +11,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.answerability import Inquiry, inquire
 from scara_ident.diagnosis.diagnose import Diagnosis
-from scara_ident.errors import UsageError
+from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information, merge
 from scara_ident.excitation.criteria import Criterion, LogDet
 from scara_ident.excitation.curves import ExcitationTrajectory, Family, make_basis
@@ -191,6 +191,8 @@ def design_excitation(
         If a joint has no limits.
     UsageError
         If the arguments do not fit the model.
+    ScaraIdentError
+        If ``tell`` has no question.
 
     References
     ----------
@@ -265,7 +267,9 @@ def _check_asked(
     inquiry: Inquiry, model: TorqueModel, criterion: Criterion | None, trajectories: int, family: Family
 ) -> None:
     if not inquiry.questions:
-        raise UsageError("the diagnosis left no question that a motion could answer")
+        raise ScaraIdentError(
+            "the diagnosis left no question that a motion could answer; nothing is to be recorded for it"
+        )
     if criterion is not None or trajectories > 1 or family != "fourier":
         raise UsageError("a motion that tells is one trajectory of harmonics, without a criterion of its own")
     asked = inquiry.scene.model

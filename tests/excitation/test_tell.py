@@ -11,7 +11,7 @@ from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.questions import questions
 from scara_ident.effects.position import Spring
 from scara_ident.effects.tilt import BaseTilt
-from scara_ident.errors import UsageError
+from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.observations import observe
 from scara_ident.excitation import Effort, design_excitation, excitation_dict
 from scara_ident.excitation.tell import told
@@ -63,5 +63,5 @@ def test_goals_that_exclude_each_other_are_said(asked):
     model = asked[0].scene.model
     with pytest.raises(UsageError, match="without a criterion of its own"):
         design_excitation(model, tell=asked[0], trajectories=2)
-    with pytest.raises(UsageError, match="left no question"):
+    with pytest.raises(ScaraIdentError, match="left no question"):
         design_excitation(model, tell=inquire(open_diagnosis(), []))
