@@ -50,7 +50,7 @@ PAIRS = (
 # Sizes of effects against the usual, reach of the first motion, rad, its largest speed, rad/s, and lengths, s.
 FACTORS, REACHES, SPEEDS = (0.15, 1.5), (0.1, 0.3), (0.4, 1.0)
 FIRST, ASKED, SAMPLED = 8.0, 15.0, 500.0
-EFFORT = Effort(starts=2, rounds=2, processes=1)
+EFFORT, PLAIN = Effort(starts=2, rounds=2, processes=1), Effort(starts=2, rounds=0, processes=1)
 WAYS = ("tell", "random", "logdet")
 KINDS = ("rivals", "below_limit")
 
@@ -108,11 +108,11 @@ def seen(found: Diagnosis, first: Diagnosis, question: Question) -> float:
         value = np.array(one.value)
         torque = {joint: (value @ rows[: len(value)])[None] for joint, rows in wide[one.label].items()}
         spread = float(examine(model, [torque])[0].covariance[0, 0])
-        return 1.0 / np.sqrt(spread) if np.isfinite(spread) and spread > 0.0 else 0.0
+        return float(1.0 / np.sqrt(spread)) if np.isfinite(spread) and spread > 0.0 else 1e-12
 
     if question.kind == "rivals":
         return min(apart(one, other) for one, other in permutations(question.suspects, 2))
-    return float(np.exp(np.mean([np.log(max(apart(item, None), 1e-12)) for item in question.suspects])))
+    return float(np.mean([apart(item, None) ** -2.0 for item in question.suspects]) ** -0.5)
 
 
 def record(arm: VirtualArm, motion: ReferenceMotion, truth: Effect, seed: int, repetition: int = 1) -> Recording:
@@ -148,14 +148,13 @@ def one_set(robot: str, number: int, seed: int) -> dict[str, Any]:
     start = time.perf_counter()
     design = design_excitation(model, duration=ASKED, tell=inquiry, effort=EFFORT)
     result["design_seconds"] = time.perf_counter() - start
-    plain = design_excitation(model, duration=ASKED, effort=Effort(starts=2, rounds=0, processes=1))
     motions = {
-        "tell": as_reference(design),
-        "random": random_motion("more", arm, "fourier", ASKED, rng),
-        "logdet": as_reference(plain),
+        "tell": lambda: as_reference(design),
+        "random": lambda: random_motion("more", arm, "fourier", ASKED, rng),
+        "logdet": lambda: as_reference(design_excitation(model, duration=ASKED, effort=PLAIN)),
     }
     for way in WAYS:
-        found = diagnose(arm.robot, [*begun, record(arm, motions[way], truth, number, 3)])
+        found = diagnose(arm.robot, [*begun, record(arm, motions[way](), truth, number, 3)])
         result[way] = right(found, truth)
         result[f"found_{way}"] = _found(found)
         if way == "tell":

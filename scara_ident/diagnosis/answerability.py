@@ -159,8 +159,9 @@ class _View:
             pairs = permutations(question.suspects, 2)
             names = {item.label for item in question.suspects}
             return min((self._apart(one, names, other) for one, other in pairs), default=0.0)
-        sizes = [self._apart(item, {item.label}, None) for item in question.suspects]
-        return float(np.exp(np.mean(np.log(np.maximum(sizes, 1e-12))))) if sizes else 0.0
+        sizes = np.array([self._apart(item, {item.label}, None) for item in question.suspects])
+        # The mean variance counts, so that no suspect is forgotten for the others.
+        return float(1.0 / np.sqrt(np.mean(1.0 / sizes**2))) if np.all(sizes > 0.0) else 0.0
 
     def _place(self, wanted: Suspect) -> int:
         # An effect in the model stands there once, whoever asks for it.

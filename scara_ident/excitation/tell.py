@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -48,6 +48,8 @@ SLOWEST, STILL = 0.03, 0.15
 CHANGE, GROWTH = (0.05, 0.6), 0.4
 # What a motion that breaks a limit shrinks by, and how often at most.
 SHRINKING, TRIES = 0.85, 40
+# Weight of all parameters together against that of another kind of question.
+PARAMETERS = 0.5
 # Standard errors at which an answer is sure enough: beyond, other questions count as much.
 SURE = 5.0
 
@@ -170,12 +172,19 @@ class _Judge:
     rate: float
 
     def cost(self, x: Array) -> float:
-        """Return minus the sum of the logarithms of what questions gain; those asked first count more."""
+        """Return minus the weighted sum of the logarithms of what questions gain."""
         basis = self.task.basis
         motion = motion_of(basis, self.task.posture, x[0], self.rate)
         sigma = self.inquiry.sigmas(spectral_rows(self.inquiry, motion))
-        weight = 1.0 / (1.0 + np.arange(len(sigma)))
-        return -float(weight @ np.log1p((sigma / SURE) ** 2))
+        return -float(self.weights @ np.log1p((sigma / SURE) ** 2))
+
+    @cached_property
+    def weights(self) -> Array:
+        """Questions of one kind share its weight, so that many effects worth a look do not outweigh all others."""
+        kinds = [(item.kind, len(item.suspects) > 1) for item in self.inquiry.questions]
+        return np.array(
+            [(PARAMETERS if kind == "parameter" else 1.0) / kinds.count((kind, more)) for kind, more in kinds]
+        )
 
 
 def motion_of(basis: Basis, posture: Array, coefficients: Array, rate: float) -> Motion:
