@@ -20,7 +20,7 @@ ROOMS = (
     "errors", "arrays", "threads", "progress", "registry", "files", "memory",
     "manners",
     "robot", "paper", "recording", "motion", "model", "estimation", "inspection", "identification",
-    "effects", "diagnosis", "excitation", "export", "simulation", "use", "report", "cli", "__main__",
+    "effects", "diagnosis", "excitation", "export", "simulation", "use", "report", "asking", "cli", "__main__",
 )  # fmt: skip
 LARGEST, MEDIAN = 400, 145
 

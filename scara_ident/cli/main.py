@@ -14,6 +14,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from scara_ident.cli import options
+from scara_ident.cli.ask import ask
 from scara_ident.cli.base import base
 from scara_ident.cli.compare import compare
 from scara_ident.cli.console import errors_console, plugin_notices
@@ -64,6 +65,7 @@ _COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (diagnose, "Find what the model lacks, trace it to an effect, add that."),
     (compare, "Set every trajectory's parameters against every trajectory."),
     (excite, "Design a motion that tells much, within the arm's limits."),
+    (ask, "Say what to record next, and design that motion."),
     (simulate, "Record the virtual arm in closed loop."),
     (use, "Say what the model wins as feed-forward and in simulation."),
     (inspect, "Show what is in a file, audit it, write a first robot.yaml."),
