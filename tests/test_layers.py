@@ -20,7 +20,8 @@ ROOMS = (
     "errors", "arrays", "threads", "progress", "registry", "files", "memory",
     "manners",
     "robot", "paper", "recording", "motion", "model", "estimation", "inspection", "identification",
-    "effects", "diagnosis", "online", "excitation", "export", "simulation", "fleet", "use", "report", "cli", "__main__",
+    "effects", "diagnosis", "online", "excitation", "export", "simulation", "fleet", "use", "report", "asking", "cli",
+    "__main__",
 )  # fmt: skip
 LARGEST, MEDIAN = 400, 145
 

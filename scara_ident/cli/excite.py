@@ -24,6 +24,12 @@ def excite(
         list[str] | None,
         typer.Option("--for", metavar="NAME", help="Parameter or term to tell from all others; may be repeated."),
     ] = None,
+    tell: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIAGNOSIS", help="diagnosis.json: the motion that best answers what it left open, of its model."
+        ),
+    ] = None,
     duration: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Of each trajectory, s.")] = 25.0,
     harmonics: Annotated[int | None, typer.Option(min=3, help="Per joint; default: by the duration.")] = None,
     family: Annotated[Literal["fourier", "spline"], typer.Option(help="Harmonics, or B-splines.")] = "fourier",
@@ -66,6 +72,8 @@ def excite(
     import numpy as np
 
     from scara_ident.cli.joint_values import joint_numbers, joint_ranges, numbers
+    from scara_ident.diagnosis.answerability import inquiry_of
+    from scara_ident.errors import UsageError
     from scara_ident.estimation.estimate import PAPER_SAMPLES
     from scara_ident.excitation import (
         Effort,
@@ -79,7 +87,7 @@ def excite(
     )
     from scara_ident.excitation.criteria import criterion_of
     from scara_ident.excitation.design import SAMPLES, check_size
-    from scara_ident.excitation.known import read_parameters
+    from scara_ident.excitation.known import read_diagnosis, read_parameters
     from scara_ident.excitation.output import check_rate, file_names
     from scara_ident.files import write_json, written_together
     from scara_ident.identification.identify import known_information
@@ -92,8 +100,11 @@ def excite(
 
     check_report(output, "excitation")
     arm = load_robot(robot)
-    equation = build_model(arm, model)
-    goal = criterion_of(criterion, equation, wanted or ())
+    if tell is not None and wanted:
+        raise UsageError("--for and --tell: two goals of one motion; give one of them")
+    asked = None if tell is None else read_diagnosis(tell)
+    equation = build_model(arm, model if asked is None else str(asked["model"]))
+    goal = None if asked is not None else criterion_of(criterion, equation, wanted or ())
     place = numbers(start, "--start")
     limits = limits_of(
         arm,
@@ -112,6 +123,7 @@ def excite(
     nominal = None if parameters is None else read_parameters(parameters, equation)
     recorded, useless = read_usable(known or (), arm)
     prior = known_information(equation, recorded, PAPER_SAMPLES / duration) if recorded else None
+    inquiry = None if asked is None else inquiry_of(asked, arm, recorded)
     with progress() as work:
 
         def told(state: Progress) -> None:
@@ -124,6 +136,7 @@ def excite(
             duration=duration,
             harmonics=count,
             criterion=goal,
+            tell=inquiry,
             limits=limits,
             known=nominal,
             trajectories=trajectories,

@@ -14,6 +14,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from scara_ident.cli import options
+from scara_ident.cli.ask import ask
 from scara_ident.cli.base import base
 from scara_ident.cli.check import check
 from scara_ident.cli.compare import compare
@@ -71,6 +72,7 @@ _COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (export, "Write the identified arm for other programs."),
     (check, "Say whether a motion can be run, and what it costs."),
     (contact, "Find contact with the arm in recordings, and its force."),
+    (ask, "Say what to record next, and design that motion."),
     (simulate, "Record the virtual arm in closed loop."),
     (use, "Say what the model wins as feed-forward and in simulation."),
     (fleet, "Watch many arms over many dates, say what changed."),

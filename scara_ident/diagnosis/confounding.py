@@ -25,6 +25,9 @@ class Confounder:
         Of it in the place of the effect found; see `gains`.
     found_gain : float
         Of the effect found.
+    candidate : Candidate
+    value : tuple of float
+        Its coefficients in the place of the effect found.
     """
 
     label: str
@@ -32,6 +35,8 @@ class Confounder:
     joint: str | None
     gain: float
     found_gain: float
+    candidate: Candidate
+    value: tuple[float, ...]
 
 
 def confounders(step: SelectionStep, decisions: Sequence[Decision]) -> list[tuple[Confounder, ...]]:
@@ -68,5 +73,6 @@ def _confounders_of(step: SelectionStep, found: Candidate, pool: Sequence[Candid
         if decision.accepted and (alike or decision.examination.held_out >= saved):
             candidate = decision.candidate
             name, joint = candidate.effect.name, candidate.joint(scene)
-            others.append(Confounder(decision.label, name, joint, decision.gain, own.gain))
+            value = tuple(float(x) for x in decision.examination.value)
+            others.append(Confounder(decision.label, name, joint, decision.gain, own.gain, candidate, value))
     return tuple(sorted(others, key=lambda item: -item.gain))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.confounding import Confounder, confounders
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters
 from scara_ident.diagnosis.model_selection import rms_of
@@ -35,6 +36,8 @@ class FoundEffect:
         Trajectories in which it helps, of those that excite it.
     before, after : mapping of str to float or None
         Rms of each joint over the training recordings when it came in.
+    candidate : Candidate or None
+        As a term of the model; None where it was taken out of the recordings.
     """
 
     effect: str
@@ -47,6 +50,7 @@ class FoundEffect:
     votes: tuple[int, int]
     before: Mapping[str, float | None]
     after: Mapping[str, float | None]
+    candidate: Candidate | None = None
 
     @property
     def label(self) -> str:
@@ -90,6 +94,7 @@ def found_effects(found: Search, step: SelectionStep, parameters: PhysicalParame
                 decision.examination.votes,
                 dict(zip(scene.robot.joints, before, strict=True)),
                 dict(zip(scene.robot.joints, now, strict=True)),
+                None if candidate.corrects_data else candidate,
             )
         )
         before = now

@@ -27,6 +27,8 @@ class TentativeEffect:
         Share of the squared residual of its joints that it would remove on data that it was not fitted to.
     p_value : float
         Corrected for the candidates tried.
+    decision : Decision or None
+        With its member and coefficients, where it was judged.
     """
 
     effect: str
@@ -36,6 +38,7 @@ class TentativeEffect:
     settled_by: str
     gain: float
     p_value: float
+    decision: Decision | None = None
 
 
 def tentative_effects(
@@ -63,5 +66,5 @@ def tentative_effects(
         if (name, joint) not in believed:
             p_value = min(1.0, decision.examination.p_value * found.tried)
             words, settled = candidate.effect.description(scene, candidate.member), candidate.effect.experiment
-            result.append(TentativeEffect(name, joint, words, decision.why, settled, decision.gain, p_value))
+            result.append(TentativeEffect(name, joint, words, decision.why, settled, decision.gain, p_value, decision))
     return tuple(result[: found.step.criteria.most_tentative])

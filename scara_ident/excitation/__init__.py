@@ -6,6 +6,7 @@ from scara_ident.excitation.design import Design, default_harmonics, design_exci
 from scara_ident.excitation.limits import InfeasibleLimits, Limits, limits_of, nominal_parameters
 from scara_ident.excitation.output import excitation_dict, write_joint_trajectory, write_trajectory
 from scara_ident.excitation.search import Effort, Progress
+from scara_ident.excitation.tell import Told, told
 from scara_ident.excitation.verification import Reached
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "LogDet",
     "Progress",
     "Reached",
+    "Told",
     "block_of",
     "default_harmonics",
     "design_excitation",
@@ -29,6 +31,7 @@ __all__ = [
     "limits_of",
     "make_basis",
     "nominal_parameters",
+    "told",
     "write_joint_trajectory",
     "write_trajectory",
 ]

@@ -9,7 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import UsageError
+from scara_ident.diagnosis.answerability import Inquiry, inquire
+from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information, merge
 from scara_ident.excitation.criteria import Criterion, LogDet
 from scara_ident.excitation.curves import ExcitationTrajectory, Family, make_basis
@@ -17,6 +19,7 @@ from scara_ident.excitation.limits import Limits, limits_of, nominal_parameters,
 from scara_ident.excitation.problem import NARROWEST, Task
 from scara_ident.excitation.search import Effort, Progress, search
 from scara_ident.excitation.sensitivity import SmoothModel
+from scara_ident.excitation.tell import FINE_RATE, Told, motion_of, search_to_tell, told
 from scara_ident.excitation.verification import Reached, reached
 from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
@@ -63,6 +66,8 @@ class Design(Saved, told_by="design"):
     effort : Effort
     seconds : float
         What the search took.
+    tells : tuple of Told
+        Where it was designed to answer questions, what it tells of each.
     """
 
     model: TorqueModel
@@ -79,6 +84,7 @@ class Design(Saved, told_by="design"):
     costs: tuple[float, ...]
     effort: Effort
     seconds: float
+    tells: tuple[Told, ...] = ()
 
     def _in_short(self) -> str:
         names = ", ".join(each.name for each in self.trajectories)
@@ -129,6 +135,7 @@ def design_excitation(
     duration: float = 25.0,
     harmonics: int | Sequence[int] | None = None,
     criterion: Criterion | None = None,
+    tell: Inquiry | Diagnosis | None = None,
     limits: Limits | None = None,
     known: Mapping[str, float] | None = None,
     trajectories: int = 1,
@@ -153,6 +160,9 @@ def design_excitation(
         How many, or which: a multisine. See `default_harmonics`.
     criterion : Criterion, optional
         By default the log determinant.
+    tell : Inquiry or Diagnosis, optional
+        Instead of a criterion, the questions that one motion of harmonics is to answer best, about this model; see
+        `scara_ident.diagnosis.answerability`.
     limits : Limits, optional
         By default those of `limits_of`.
     known : mapping from parameter to value, optional
@@ -186,6 +196,8 @@ def design_excitation(
         If a joint has no limits.
     UsageError
         If the arguments do not fit the model.
+    ScaraIdentError
+        If ``tell`` has no question.
 
     References
     ----------
@@ -216,7 +228,6 @@ def design_excitation(
     effort = Effort() if effort is None else effort
     if effort.starts < 1 or effort.rounds < 0:
         raise UsageError(f"starts {effort.starts}, rounds {effort.rounds}: expected at least 1 and 0")
-    criterion = LogDet() if criterion is None else criterion
     limits = limits_of(robot) if limits is None else limits
     weights = _weights(torque_std, robot.n)
     nominal = nominal_parameters(model, known)
@@ -228,7 +239,7 @@ def design_excitation(
         smooth=SmoothModel(model, NARROWEST * limits.velocity),
         limits=left,
         nominal=smooth,
-        criterion=criterion,
+        criterion=LogDet() if criterion is None else criterion,
         basis=make_basis(duration, harmonics, family, fixed_start=start is not None),
         posture=resting_posture(model, left, smooth, start=start, seed=effort.seed),
         trajectories=trajectories,
@@ -236,7 +247,12 @@ def design_excitation(
         weights=weights,
         prior=np.zeros((count, count)) if prior is None else prior.regressor_factor.T @ prior.regressor_factor,
     )
-    found = search(task, effort, progress)
+    if tell is None:
+        found = search(task, effort, progress)
+    else:
+        inquiry = inquire(tell) if isinstance(tell, Diagnosis) else tell
+        _check_asked(inquiry, model, criterion, trajectories, family)
+        found = search_to_tell(task, inquiry, effort, progress)
     suffixes = [""] if trajectories == 1 else [f"-{chr(ord('a') + k)}" for k in range(trajectories)]
     designed = tuple(
         ExcitationTrajectory(name + suffix, robot.joints, task.basis, task.posture, x)
@@ -244,7 +260,7 @@ def design_excitation(
     )
     return Design(
         model=model,
-        criterion=criterion,
+        criterion=task.criterion,
         trajectories=designed,
         limits=limits,
         nominal=nominal,
@@ -257,7 +273,22 @@ def design_excitation(
         costs=found.costs,
         effort=effort,
         seconds=time.perf_counter() - begun,
+        tells=() if tell is None else told(inquiry, [motion_of(task.basis, task.posture, found.x[0], FINE_RATE)]),
     )
+
+
+def _check_asked(
+    inquiry: Inquiry, model: TorqueModel, criterion: Criterion | None, trajectories: int, family: Family
+) -> None:
+    if not inquiry.questions:
+        raise ScaraIdentError(
+            "the diagnosis left no question that a motion could answer; nothing is to be recorded for it"
+        )
+    if criterion is not None or trajectories > 1 or family != "fourier":
+        raise UsageError("a motion that tells is one trajectory of harmonics, without a criterion of its own")
+    asked = inquiry.scene.model
+    if asked.names != model.names:
+        raise UsageError(f"the diagnosis is about the model {asked.name}, the design about {model.name}; use that")
 
 
 def information_of(

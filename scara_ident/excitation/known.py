@@ -1,9 +1,10 @@
-"""What an earlier identification found, to foresee torques with."""
+"""What an earlier identification or diagnosis found, to foresee torques with and to ask for."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -53,6 +54,25 @@ def read_parameters(path: Path, model: TorqueModel) -> dict[str, float]:
                 "identify and excite with one --robot and --model"
             )
     return found
+
+
+def read_diagnosis(path: Path) -> dict[str, Any]:
+    """Read a ``diagnosis.json`` that a motion is to be designed for.
+
+    Raises
+    ------
+    ScaraIdentError
+        If the file cannot be read or is no diagnosis.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScaraIdentError(f"{path}: cannot be read: {error.strerror or error}; give a diagnosis.json") from None
+    except ValueError:
+        content = None
+    if not isinstance(content, dict) or not {"verdict", "model", "next"} <= content.keys():
+        raise ScaraIdentError(f"{path}: no diagnosis; give the diagnosis.json that diagnose wrote")
+    return content
 
 
 def _undetermined(row: dict[str, object]) -> bool:

@@ -135,7 +135,7 @@ def excitation_dict(design: Design) -> dict[str, Any]:
     """
     basis, effort = design.trajectories[0].basis, design.effort
     scaled = scaled_condition(design.information)
-    criterion: dict[str, Any] = {"name": design.criterion.name}
+    criterion: dict[str, Any] = {"name": "tell" if design.tells else design.criterion.name}
     columns = design.criterion.columns if isinstance(design.criterion, (BlockLogDet, Condition)) else None
     if columns is not None:
         criterion["parameters"] = [design.model.names[k] for k in columns]
@@ -146,6 +146,7 @@ def excitation_dict(design: Design) -> dict[str, Any]:
         "robot": design.model.robot.name,
         "model": design.model.name,
         "criterion": criterion,
+        **({"tells": [item.entry() for item in design.tells]} if design.tells else {}),
         "log_det": design.log_det,
         "condition": design.condition,
         "condition_of_regressor": float(np.sqrt(design.condition)),
@@ -204,6 +205,10 @@ def summary(design: Design) -> list[str]:
         f"Limits broken: {', '.join(broken)}."
         if broken
         else f"All limits hold, at {design.verified} samples and between them.",
+        *(
+            f"{item.question.text}: {item.before:.2g} standard errors apart so far, {item.after:.2g} expected with it."
+            for item in design.tells
+        ),
         f"Held back by {', '.join(held)}." if held else "No limit holds it back: use more harmonics.",
     ]
 

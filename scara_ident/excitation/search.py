@@ -104,7 +104,7 @@ def search(task: Task, effort: Effort, progress: Callable[[Progress], None] | No
             f"no motion can tell {', '.join(alike)} apart in the model {task.smooth.model.name}; use a model without "
             "one of them, or give information about them"
         )
-    problem = _problem(task, COARSE, 1, np.full(_rows(task), BOUND))
+    problem = within_grid(task, COARSE, np.full(_rows(task), BOUND))
     total = effort.starts * (1 + effort.rounds)
     costs: list[float] = []
     elite: list[Minimum] = []
@@ -133,7 +133,8 @@ def _rows(task: Task) -> int:
     return len(row_names(task.limits, len(task.posture)))
 
 
-def _problem(task: Task, density: int, stride: int, bounds: Array) -> Problem:
+def within_grid(task: Task, density: int, bounds: Array, stride: int = 1) -> Problem:
+    """Return a task on so many times per period of its highest frequency; every stride-th counts in the criterion."""
     periods = task.basis.bandwidth * task.basis.duration
     counted = max(LEAST_TIMES, int(np.ceil(density / stride * periods)))
     return Problem(task, grid(task.basis, stride * counted), stride, bounds)
@@ -170,8 +171,8 @@ def _finish(task: Task, x: Array) -> tuple[Array, int]:
     """Take a motion to a fine grid, and tighten bounds until it keeps its limits between the samples as well."""
     bounds = np.full(_rows(task), EXACT)
     plan = Schedule(first=2.0, last=2e-3, tolerance=1e-2, steps=300)
-    problem = _problem(task, FINE, FINE // COARSE, bounds)
-    times = max(FINER * problem.rows.shape[1], int(np.ceil(LEAST_RATE * task.basis.duration))) + 1
+    problem = within_grid(task, FINE, bounds, FINE // COARSE)
+    times = _verified_times(problem)
     for _ in range(CORRECTIONS):
         start = shrunk_inside(problem.sharpened(plan.sharpness), x, room=1e-3, factor=0.998)
         if start is None:
@@ -181,11 +182,21 @@ def _finish(task: Task, x: Array) -> tuple[Array, int]:
         if np.all(excess <= 1.0):
             return x, times
         bounds = bounds * np.where(excess > 1.0, (1.0 - MARGIN) / excess, 1.0)
-        problem = _problem(task, FINE, FINE // COARSE, bounds)
+        problem = within_grid(task, FINE, bounds, FINE // COARSE)
         plan = Schedule(first=0.5, last=2e-3, tolerance=1e-2, steps=150, sharpness=1.0)
-    while np.any(_excess(task, x, times) > 1.0):
+    return verified_inside(problem, x)
+
+
+def verified_inside(problem: Problem, x: Array) -> tuple[Array, int]:
+    """Shrink a motion until it keeps all limits between samples ten times finer too; return it, and their number."""
+    times = _verified_times(problem)
+    while np.any(_excess(problem.task, x, times) > 1.0):
         x = 0.999 * x
     return x, times
+
+
+def _verified_times(problem: Problem) -> int:
+    return max(FINER * int(problem.rows.shape[1]), int(np.ceil(LEAST_RATE * problem.task.basis.duration))) + 1
 
 
 def _excess(task: Task, x: Array, times: int) -> Array:

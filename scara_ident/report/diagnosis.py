@@ -12,6 +12,8 @@ from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.effect_parameters import RotorInertia
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.model_selection import Unexplained, rms_of
+from scara_ident.diagnosis.next_steps import next_steps
+from scara_ident.diagnosis.questions import noise_density, suspects_in_model
 from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
@@ -30,6 +32,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the content of ``diagnosis.json``."""
     joints = diagnosis.robot.joints
     nominal = urdf_values(diagnosis.after.model)
+    suspects = {item.candidate: item for item in suspects_in_model(diagnosis)}
     return {
         "robot": diagnosis.robot.name,
         "model": diagnosis.before.model.name,
@@ -57,10 +60,15 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
                 "gain": effect.gain,
                 "helps_in": list(effect.votes),
                 "training": {"before": dict(effect.before), "after": dict(effect.after)},
+                "suspect": suspects[effect.candidate].entry() if effect.candidate in suspects else None,
             }
             for effect in diagnosis.effects
         ],
-        "tentative": [dict(vars(item)) for item in diagnosis.tentative],
+        "tentative": [
+            {name: value for name, value in vars(item).items() if name != "decision"} for item in diagnosis.tentative
+        ],
+        "next": [item.entry() for item in next_steps(diagnosis)],
+        "noise_density": dict(zip(joints, noise_density(diagnosis).tolist(), strict=True)),
         "events": [event.entry for event in diagnosis.events],
         "evidence": {
             item.joint: {

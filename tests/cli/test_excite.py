@@ -9,6 +9,11 @@ import numpy as np
 import polars as pl
 import pytest
 
+from scara_ident.files import write_json
+from scara_ident.recording.recording import write_recording
+from scara_ident.report.diagnosis import diagnosis_dict
+from tests.diagnosis.asked import PAIR, open_diagnosis, small_runs
+
 
 @pytest.mark.slow
 def test_a_small_design_keeps_its_limits_and_writes_its_files(command, tmp_path: Path):
@@ -97,3 +102,26 @@ def test_bad_usage_is_status_2(command, tmp_path: Path):
     for words in (["--duration", "0"], ["--harmonics", "1"], ["--starts", "0"], ["--criterion", "magic"]):
         assert command("excite", *words, "--output", tmp_path).status == 2
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_motion_is_designed_for_what_a_diagnosis_left_open(command, tmp_path: Path):
+    for item in small_runs():
+        (tmp_path / "logs").mkdir(exist_ok=True)
+        write_recording(item, tmp_path / "logs" / f"{item.name}.parquet")
+    write_json(tmp_path / "diagnosis.json", diagnosis_dict(open_diagnosis()))
+    words = ("--known", tmp_path / "logs", "--duration", "5", "--harmonics", "5", "--starts", "1", "--output", tmp_path)
+    result = command("excite", "--tell", tmp_path / "diagnosis.json", *words)
+    assert result.status == 0
+    content = json.loads((tmp_path / "excitation.json").read_text())
+    first = content["tells"][0]
+    assert first["question"] == PAIR and first["sigma_after"] > first["sigma_before"]
+    assert all(limit["share"] <= 1.0 for limit in content["limits"].values())
+    assert (tmp_path / "trajectory.csv").is_file() and (tmp_path / "report.html").is_file()
+
+
+def test_a_file_that_is_no_diagnosis_is_said(command, tmp_path: Path):
+    (tmp_path / "other.json").write_text("[]", encoding="utf-8")
+    assert "no diagnosis" in command("excite", "--tell", tmp_path / "other.json").err
+    assert "cannot be read" in command("excite", "--tell", tmp_path / "none.json").err
+    assert "two goals" in command("excite", "--tell", tmp_path / "other.json", "--for", "friction").err

@@ -13,6 +13,7 @@ import numpy as np
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
+from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.html.blocks import (
     Block,
@@ -33,7 +34,6 @@ from scara_ident.report.html.candidates import candidate_blocks
 from scara_ident.report.html.certainty import evidence_blocks, tentative_blocks
 from scara_ident.report.html.chapters import Chapter, chapters
 from scara_ident.report.html.events import events_blocks
-from scara_ident.report.html.experiments import next_experiments
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.parameters import digits
 from scara_ident.report.html.remainder import remainder_group
@@ -206,7 +206,7 @@ def _variation(context: DiagnosisContext) -> Sequence[Block]:
 
 def _next(context: DiagnosisContext) -> list[Block]:
     """What to record next."""
-    found = next_experiments(context.diagnosis)
+    found = [item.sentence() for item in next_steps(context.diagnosis)]
     return [listing(found) if found else Paragraph("Nothing in these recordings asks for another experiment.")]
 
 

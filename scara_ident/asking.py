@@ -1,0 +1,272 @@
+"""The loop of measuring and asking, kept in a folder: recordings so far, what they tell, and the motion to record next.
+
+Every step is written whole before the note that it is done, and a step depends on what lies in the folder alone. So a run
+that is stopped at any moment is gone on with by the next, and one that finds nothing new changes nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+from scara_ident.diagnosis import diagnose
+from scara_ident.diagnosis.answerability import Inquiry, inquiry_of
+from scara_ident.diagnosis.questions import Question
+from scara_ident.errors import ScaraIdentError
+from scara_ident.excitation.design import Design, design_excitation
+from scara_ident.excitation.known import read_diagnosis
+from scara_ident.excitation.output import excitation_dict, write_joint_trajectory, write_trajectory
+from scara_ident.excitation.search import Effort
+from scara_ident.excitation.tell import SURE, Told
+from scara_ident.files import write_json, written_together
+from scara_ident.model.model import build_model
+from scara_ident.progress import Work
+from scara_ident.recording.recording import read_usable
+from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.html import DiagnosisContext, diagnosis_report
+from scara_ident.robot.robot import Robot
+
+State = Literal["record", "settled", "untold"]
+# A motion is worth recording if it brings the answers so many times further apart than they are.
+WORTH = 1.5
+# How often recordings are asked for to answer one question, and to lower what they hardly show.
+MOST_ASKED, ONCE = 2, 1
+NOTE = "ask.json"
+FILES = ("trajectory.csv", "trajectory.yaml", "excitation.json")
+UNFINISHED = ".scara-ident-*"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """How far the loop is.
+
+    Attributes
+    ----------
+    inputs : str
+        Hash of the recordings and of how they are diagnosed.
+    state : {"record", "settled", "untold"} or None
+        Whether a motion waits to be recorded, nothing is open, or no motion within the limits would tell; None where
+        ``diagnosis.json`` is of these recordings and that is still to be found.
+    words : str
+        The same for a person.
+    asked : tuple of str
+        Questions that the motion is to answer.
+    times : mapping of str to int
+        How often each question was asked before.
+    """
+
+    inputs: str
+    state: State | None = None
+    words: str = ""
+    asked: tuple[str, ...] = ()
+    times: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a folder is asked.
+
+    Attributes
+    ----------
+    robot : Robot
+    model : str
+        The base model.
+    duration : float
+        Of an asked motion, s.
+    effort : Effort
+    """
+
+    robot: Robot
+    model: str = "complete"
+    duration: float = 15.0
+    effort: Effort = field(default_factory=Effort)
+
+    def hash(self, recordings: Sequence[Path]) -> str:
+        """Return a hash of recordings, by name and content, and of what the answer depends on."""
+        urdf = hashlib.sha256(self.robot.urdf.read_bytes()).hexdigest()
+        words = [
+            self.robot.name,
+            urdf,
+            self.robot.joints,
+            self.model,
+            self.duration,
+            self.effort.starts,
+            self.effort.seed,
+        ]
+        found = hashlib.sha256(repr(words).encode())
+        for path in recordings:
+            found.update(path.name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+        return found.hexdigest()
+
+
+def ask(folder: Path, settings: Settings, work: Work | None = None) -> Asked:
+    """Go one step on: diagnose the recordings if they are new, and design the motion to record next.
+
+    Parameters
+    ----------
+    folder : Path
+        With ``recordings``; gets ``diagnosis.json``, ``report.html``, ``next`` and ``ask.json``.
+    settings : Settings
+    work : Work, optional
+        Told every step that begins.
+
+    Returns
+    -------
+    Asked
+
+    Raises
+    ------
+    ScaraIdentError
+        If the folder's note is none, or as `diagnose` and `design_excitation` do.
+    """
+    work = work or Work()
+    for place in (folder, folder / "next"):
+        for left in place.glob(UNFINISHED):
+            shutil.rmtree(left, ignore_errors=True)
+    recordings = recordings_in(folder)
+    inputs = settings.hash(recordings)
+    before = read_asked(folder)
+    if before is not None and before.inputs == inputs and _complete(folder, before):
+        return before
+    if before is None or before.inputs != inputs or not recordings:
+        times = dict(before.times) if before is not None else {}
+        for question in before.asked if before is not None and before.inputs != inputs else ():
+            times[question] = times.get(question, 0) + 1
+        if not recordings:
+            return _first(folder, settings, Asked(inputs, times=times))
+        _diagnosed(folder, settings, recordings, work.part(0.0, 0.6))
+        before = Asked(inputs, times=times)
+        _note(folder, before)
+    work("designing the next motion", 0.6)
+    return _designed(folder, settings, recordings, before)
+
+
+def _complete(folder: Path, asked: Asked) -> bool:
+    """Whether a step is done and what it wrote still lies there."""
+    waits = asked.state == "record"
+    return asked.state is not None and (not waits or all((folder / "next" / name).is_file() for name in FILES))
+
+
+def recordings_in(folder: Path) -> list[Path]:
+    """Return the recordings that lie in a folder, by name; the truth of virtual ones is none."""
+    place = folder / "recordings"
+    return sorted(path for path in place.glob("*") if not path.name.startswith(".") and path.suffix != ".json")
+
+
+def read_asked(folder: Path) -> Asked | None:
+    """Return how far a folder is; None where nothing was asked.
+
+    Raises
+    ------
+    ScaraIdentError
+        If its note is not one.
+    """
+    path = folder / NOTE
+    if not path.is_file():
+        return None
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return Asked(**{**content, "asked": tuple(content["asked"])})
+    except (ValueError, TypeError, KeyError):
+        raise ScaraIdentError(f"{path}: not what ask writes; remove it to begin again") from None
+
+
+def _note(folder: Path, asked: Asked) -> Asked:
+    write_json(folder / NOTE, vars(asked))
+    return asked
+
+
+def _first(folder: Path, settings: Settings, asked: Asked) -> Asked:
+    """Ask for a motion that tells much of everything, where nothing was recorded."""
+    model = build_model(settings.robot, settings.model)
+    design = design_excitation(model, duration=settings.duration, effort=settings.effort)
+    words = "Nothing is recorded yet: record next/trajectory.csv, twice, into recordings/."
+    _written(folder, design)
+    return _note(folder, replace(asked, state="record", words=words))
+
+
+def _diagnosed(folder: Path, settings: Settings, recordings: Sequence[Path], work: Work) -> None:
+    read, useless = read_usable(recordings, settings.robot)
+    found = diagnose(settings.robot, read, model=settings.model, progress=work)
+    content = diagnosis_dict(found)
+    with written_together(folder) as place:
+        diagnosis_report(place / "report.html", DiagnosisContext(found))
+        write_json(place / "diagnosis.json", {**content, "notes": [*useless, *content["notes"]]})
+
+
+def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], asked: Asked) -> Asked:
+    content = read_diagnosis(folder / "diagnosis.json")
+    read, _ = read_usable(recordings, settings.robot)
+    inquiry = inquiry_of(content, settings.robot, read)
+    left = still_open(inquiry, content["verdict"], asked.times)
+    if not left:
+        _removed(folder)
+        tired = [item.text for item in inquiry.questions if asked.times.get(key_of(item), 0) >= MOST_ASKED]
+        words = f"Asked {MOST_ASKED} times and still open: {'; '.join(tired)}." if tired else "Nothing is open."
+        return _note(folder, replace(asked, state="untold" if tired else "settled", words=words))
+    inquiry = inquiry_of({**content, "next": [item.entry() for item in left]}, settings.robot, read)
+    design = design_excitation(inquiry.scene.model, duration=settings.duration, tell=inquiry, effort=settings.effort)
+    told = worth_recording(design.tells)
+    if not told:
+        _removed(folder)
+        others = "; ".join(f"{item.text}: {item.experiment}" for item in left)
+        words = f"No motion within the limits would tell. What would: {others}."
+        return _note(folder, replace(asked, state="untold", words=words))
+    _written(folder, design)
+    words = (
+        f"Record next/trajectory.csv into recordings/. It asks: {told[0].question.text}; "
+        f"{told[0].before:.2g} standard errors apart so far, {told[0].after:.2g} expected with it."
+    )
+    keys = tuple(dict.fromkeys(key_of(item.question) for item in told))
+    return _note(folder, replace(asked, state="record", words=words, asked=keys))
+
+
+def key_of(question: Question) -> str:
+    """Return what a question is counted by: its words, or its kind where the words change with every recording."""
+    return question.kind if _general(question) else question.text
+
+
+def _general(question: Question) -> bool:
+    return question.kind == "parameter" or (question.kind == "below_limit" and len(question.suspects) > 1)
+
+
+def still_open(inquiry: Inquiry, verdict: str, times: Mapping[str, int]) -> list[Question]:
+    """Return the questions to ask: those not asked too often; what the recordings hardly show is asked for once.
+
+    Parameters
+    ----------
+    inquiry : Inquiry
+    verdict : str
+        Of the diagnosis; an undecided one asks for more.
+    times : mapping of str to int
+        How often each was asked.
+    """
+    found = []
+    for question in inquiry.questions:
+        most = ONCE if _general(question) and verdict != "undecided" else MOST_ASKED
+        if times.get(key_of(question), 0) < most:
+            found.append(question)
+    return found
+
+
+def worth_recording(tells: Sequence[Told]) -> list[Told]:
+    """Return what a motion tells for sure and much surer than is known."""
+    return [item for item in tells if item.after >= SURE and item.after >= WORTH * item.before]
+
+
+def _written(folder: Path, design: Design) -> None:
+    with written_together(folder / "next") as place:
+        write_trajectory(design.trajectories[0], place / FILES[0])
+        write_joint_trajectory(design.trajectories[0], place / FILES[1])
+        write_json(place / FILES[2], excitation_dict(design))
+
+
+def _removed(folder: Path) -> None:
+    """Remove a motion that is no longer asked for."""
+    for name in FILES:
+        (folder / "next" / name).unlink(missing_ok=True)

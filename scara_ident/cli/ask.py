@@ -1,0 +1,65 @@
+"""``scara-ident ask``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scara_ident.cli import options
+from scara_ident.cli.console import output_console, progress
+
+
+def ask(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Holds recordings/; keeps all else.")],
+    robot: options.Robot = None,
+    model: options.Model = "complete",
+    duration: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Of each asked motion, s.")] = 15.0,
+    starts: Annotated[int, typer.Option(min=1, help="Random starts of each design.")] = 8,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random starts, and of the virtual arm.")] = 0,
+    virtual: Annotated[bool, typer.Option("--virtual", help="Let the virtual arm record what is asked for.")] = False,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option("--effect", metavar="NAME[:JOINT][:KEY=VALUE,..]", help="That the virtual arm has; repeatable."),
+    ] = None,
+    steps: Annotated[int, typer.Option(min=1, help="Motions that the virtual arm records at most.")] = 4,
+) -> None:
+    """Say what to record next: diagnose the recordings so far, and design the motion that settles what they leave open."""
+    from scara_ident.asking import Settings, recordings_in
+    from scara_ident.asking import ask as run
+    from scara_ident.errors import UsageError
+    from scara_ident.excitation import Effort
+    from scara_ident.files import check_output, written_together
+    from scara_ident.robot.robot import load_robot
+
+    if effect and not virtual:
+        raise UsageError("--effect is what the virtual arm has; give --virtual with it")
+    check_output(folder)
+    arm = load_robot(robot)
+    settings = Settings(arm, model, duration, Effort(starts=starts, seed=seed))
+    console = output_console()
+    made = 0
+    while True:
+        with progress() as work:
+            found = run(folder, settings, work)
+        console.print(found.words)
+        if not virtual or found.state != "record" or made >= steps:
+            return
+        from scara_ident.simulation import parse_effect, read_trajectory, simulate, virtual_arm, write_simulation
+
+        real = virtual_arm(arm)
+        asked = read_trajectory(folder / "next" / "trajectory.csv", arm)
+        taken = {path.stem.rpartition("_")[0] for path in recordings_in(folder)}
+        name = next(word for word in (f"asked{k}" for k in count(1)) if word not in taken)
+        with written_together(folder / "recordings") as place:
+            for repetition in (1, 2):
+                done = simulate(
+                    real, replace(asked, name=name), effects=[parse_effect(text) for text in effect or ()], seed=seed,
+                    repetition=repetition,
+                )  # fmt: skip
+                write_simulation(done, place)
+        console.written(folder / "recordings", f"{name}_1.parquet", f"{name}_2.parquet")
+        made += 1

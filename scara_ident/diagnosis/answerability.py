@@ -1,0 +1,312 @@
+"""How far apart the answers to questions are, in standard errors, from a triangular factor.
+
+The columns are those of the model, then those of the effects in question, each with the change of its torque by its
+nonlinear parameters. Rows are weighted to have noise of variance one, so that what is left of a column, once others are
+projected out, is as long as the standard errors that it makes. Of rivals A and B with the torque ``A a`` that A has,
+
+    t^2 = |(I - P) A a|^2,  P the projection on the model and B with all of its parameters
+
+is the least squared error with which B stands for A over the noise: T-optimality (Atkinson and Fedorov 1975), here
+linear in B's nonlinear parameters. Rows that there are and rows that are planned merge as factors do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
+from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.diagnosis.questions import (
+    Question,
+    Suspect,
+    all_suspects,
+    noise_density,
+    question_of,
+    questions,
+    suspect_of,
+    suspects_in_model,
+)
+from scara_ident.diagnosis.search import scene_of
+from scara_ident.diagnosis.shape import shape_over
+from scara_ident.diagnosis.unknowns import DERIVATIVE_STEP
+from scara_ident.effects import Member, Scene
+from scara_ident.errors import ScaraIdentError
+from scara_ident.estimation.information import Information, merge, orthonormal
+from scara_ident.estimation.observations import Observations, observe
+from scara_ident.identification.usable import usable_in_bands
+from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.motion.low_pass import HIGHEST_CUT
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import Robot
+
+# Nothing is known of a curve before but that it is no larger than so many times the rms of what is left.
+LARGEST_SHAPE = 3.0
+# Columns of unit length span a direction above this share.
+_RANK = 1e-9
+# Of recordings that are not at hand, Hz and s.
+USUAL_RATE, USUAL_LENGTH = 1000.0, 30.0
+
+
+@dataclass(frozen=True, eq=False)
+class Inquiry:
+    """Questions with all that is needed to say how well rows answer them.
+
+    Attributes
+    ----------
+    scene : Scene
+        Base model and estimate.
+    questions : tuple of Question
+    in_model : tuple of Suspect
+        Effects that the model has.
+    noise : ndarray, shape (n,)
+        Of each joint's torque, (N m)^2 s; see `noise_density`.
+    bands : tuple of float or None
+        Hz.
+    known : Information or None
+        Of the recordings at hand, rows of unit noise; see `known_rows`.
+    """
+
+    scene: Scene
+    questions: tuple[Question, ...]
+    in_model: tuple[Suspect, ...]
+    noise: Array
+    bands: tuple[float | None, ...]
+    known: Information | None = None
+
+    @cached_property
+    def suspects(self) -> tuple[Suspect, ...]:
+        """Those in the model, then others, then the curves; the columns stand in this order behind the base model's."""
+        others = [item for item in all_suspects(self.questions) if item.label not in self._labels]
+        return (*self.in_model, *others, *self._shapes.values())
+
+    @cached_property
+    def _labels(self) -> frozenset[str]:
+        return frozenset(item.label for item in self.in_model)
+
+    @cached_property
+    def _shapes(self) -> dict[str, Suspect]:
+        robot, found = self.scene.robot, {}
+        for item in self.questions:
+            if item.kind == "unexplained" and item.joint is not None:
+                joint = robot.joints.index(item.joint)
+                shape = shape_over(robot, item.signals, joint)
+                if shape is not None:
+                    found[item.text] = Suspect(Candidate(shape, Member(joint)), item.text, ())
+        return found
+
+    def rows(self, made: Callable[[Sequence[Candidate]], Sequence[Rows]]) -> list[Rows]:
+        """Return every suspect's columns and the change of its torque by its nonlinear parameters.
+
+        Parameters
+        ----------
+        made : callable
+            Makes the columns of candidates, on whatever rows.
+        """
+        wanted: list[Candidate] = []
+        for item in self.suspects:
+            wanted.append(item.candidate)
+            wanted += [side for pair in _sides(item.candidate) for side in pair[:2]]
+        found = iter(made(wanted))
+        result = []
+        for item in self.suspects:
+            wide = dict(next(found))
+            for _, _, reach in _sides(item.candidate):
+                up, down = next(found), next(found)
+                for joint in wide:
+                    change = np.asarray(item.value) @ (up[joint] - down[joint]) / (2.0 * reach)
+                    wide[joint] = np.concatenate([wide[joint], change[None]])
+            result.append(wide)
+        return result
+
+    def sigmas(self, rows: Information | None = None) -> Array:
+        """Return standard errors between the answers to each question, from what is known and further rows; 0 if none."""
+        parts = [part for part in (self.known, rows) if part is not None]
+        if not parts:
+            return np.zeros(len(self.questions))
+        p = len(self.scene.model.columns)
+        factor = (parts[0] if len(parts) == 1 else merge(parts)).factor[:, :-1]
+        beside, places, start = factor[p:, p:], [], 0
+        for item in self.suspects:
+            columns = _widths(item, self.scene)
+            places.append((slice(start, start + columns[0]), slice(start, start + sum(columns))))
+            start += sum(columns)
+        view = _View(self, factor, beside, places)
+        return np.array([view.sigma(item) for item in self.questions])
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """The factor with the places of each suspect: its own columns, and those with its nonlinear parameters'."""
+
+    inquiry: Inquiry
+    factor: Array
+    beside: Array
+    places: Sequence[tuple[slice, slice]]
+
+    def sigma(self, question: Question) -> float:
+        if question.kind == "parameter":
+            return self._parameter(question)
+        if question.kind == "unexplained":
+            return self._shape(question)
+        if question.kind == "rivals":
+            pairs = permutations(question.suspects, 2)
+            names = {item.label for item in question.suspects}
+            return min((self._apart(one, names, other) for one, other in pairs), default=0.0)
+        sizes = np.array([self._apart(item, {item.label}, None) for item in question.suspects])
+        # The mean variance counts, so that no suspect is forgotten for the others.
+        return float(1.0 / np.sqrt(np.mean(1.0 / sizes**2))) if np.all(sizes > 0.0) else 0.0
+
+    def _place(self, wanted: Suspect) -> int:
+        # An effect in the model stands there once, whoever asks for it.
+        known = self.inquiry.suspects
+        return known.index(wanted) if wanted in known else [item.label for item in known].index(wanted.label)
+
+    def _model(self, without: set[str]) -> list[Array]:
+        """Return what the base model leaves of the effects in it, but for some."""
+        names = [item.label for item in self.inquiry.in_model]
+        return [self.beside[:, self.places[k][1]] for k, name in enumerate(names) if name not in without]
+
+    def _apart(self, truth: Suspect, questioned: set[str], instead: Suspect | None) -> float:
+        own = self.beside[:, self.places[self._place(truth)][0]] @ np.asarray(truth.value)
+        spanning = self._model(questioned)
+        if instead is not None:
+            spanning.append(self.beside[:, self.places[self._place(instead)][1]])
+        return float(np.linalg.norm(_outside(spanning, own)))
+
+    def _parameter(self, question: Question) -> float:
+        model = self.inquiry.scene.model
+        p, k = len(model.columns), model.names.index(question.parameter or "")
+        stop = p + sum(self.places[i][1].stop - self.places[i][1].start for i in range(len(self.inquiry.in_model)))
+        half = orthonormal(self.factor[:, :stop])
+        known = _outside([np.delete(self.factor[:, :stop], k, axis=1)], self.factor[:, k])
+        if np.linalg.norm(known) <= np.sqrt(_RANK) * np.linalg.norm(self.factor[:, k]):
+            return 0.0
+        return float(question.size / np.linalg.norm(half[k]))
+
+    def _shape(self, question: Question) -> float:
+        shape = self.inquiry._shapes.get(question.text)
+        if shape is None:
+            return 0.0
+        own = self.beside[:, self.places[self._place(shape)][1]]
+        spanning = self._model(set())
+        left = np.column_stack([_outside(spanning, column) for column in own.T])
+        before = np.eye(left.shape[1]) / (LARGEST_SHAPE * question.size) ** 2
+        variance = np.diag(np.linalg.inv(left.T @ left + before))
+        return float(question.size / np.sqrt(np.mean(variance)))
+
+
+def _outside(spanning: Sequence[Array], own: Array) -> Array:
+    """Return what columns do not span of another."""
+    if not spanning or not len(own):
+        return own
+    columns = np.concatenate(spanning, axis=1)
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns[:, size > 0.0] / size[size > 0.0]
+    if not columns.size:
+        return own
+    left, singular, _ = np.linalg.svd(columns, full_matrices=False)
+    basis = left[:, singular > _RANK * singular[0]]
+    return np.asarray(own - basis @ (basis.T @ own))
+
+
+def _sides(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
+    """Return for each nonlinear parameter the candidates on either side, and how far they are from it."""
+    found = []
+    for place, parameter in enumerate(candidate.effect.nonlinear):
+        value = candidate.member.nonlinear[place]
+        reach = DERIVATIVE_STEP * (abs(value) if value else parameter.upper - parameter.lower)
+        moved = [list(candidate.member.nonlinear) for _ in range(2)]
+        moved[0][place], moved[1][place] = value + reach, value - reach
+        found.append((candidate.at(moved[0]), candidate.at(moved[1]), reach))
+    return found
+
+
+def _widths(item: Suspect, scene: Scene) -> tuple[int, int]:
+    effect = item.candidate.effect
+    if item.value:
+        return len(item.value), len(effect.nonlinear)
+    from scara_ident.diagnosis.shape import KNOTS, PAIR_KNOTS, Shape
+
+    assert isinstance(effect, Shape)
+    return (KNOTS if len(effect.signals) == 1 else PAIR_KNOTS**2), 0
+
+
+def known_rows(inquiry: Inquiry, columns: CandidateColumns) -> Information:
+    """Return what recordings at hand say: the factor of all columns of an inquiry, rows of unit noise."""
+    observations = columns.observations
+    added = inquiry.rows(lambda wanted: columns.rows(inquiry.scene, wanted))
+    total = observations.parameters + sum(len(next(iter(rows.values()))) for rows in added)
+    rate = min(part.rate for part in observations.data.stretches)
+    return merge(
+        rows.information(total).scaled(float(1.0 / np.sqrt(noise * rate)))
+        for rows, noise in zip(with_columns(observations, added), inquiry.noise, strict=True)
+    )
+
+
+def inquire(diagnosis: Diagnosis, asked: Sequence[Question] | None = None) -> Inquiry:
+    """Return the questions that a diagnosis left open, with its recordings as what is known.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    asked : sequence of Question, optional
+        Some of them; all by default.
+    """
+    search = diagnosis.search
+    chosen = questions(diagnosis) if asked is None else tuple(asked)
+    inquiry = Inquiry(search.scene, chosen, suspects_in_model(diagnosis), noise_density(diagnosis), search.bands)
+    return replace(inquiry, known=known_rows(inquiry, search.step.columns)) if chosen else inquiry
+
+
+def inquiry_of(content: Mapping[str, Any], robot: Robot, recordings: Sequence[Recording] = ()) -> Inquiry:
+    """Return the questions of a ``diagnosis.json``, with recordings at hand as what is known.
+
+    Parameters
+    ----------
+    content : mapping
+        Of the file.
+    robot : Robot
+    recordings : sequence of Recording, optional
+
+    Raises
+    ------
+    ScaraIdentError
+        If the file is of another robot, or holds no such questions.
+    """
+    try:
+        if content["robot"] != robot.name:
+            raise ScaraIdentError(f"diagnosis of {content['robot']}, but the robot is {robot.name}; give its --robot")
+        model = build_model(robot, content["model"])
+        value = np.array([row["value"] for row in content["parameters"]][: len(model.columns)], dtype=float)
+        asked = tuple(question_of(item) for item in content["next"] if item.get("kind"))
+        in_model = tuple(suspect_of(item["suspect"]) for item in content["effects"] if item.get("suspect"))
+        noise = np.array([content["noise_density"][joint] for joint in robot.joints], dtype=float)
+        bands = tuple(content["band_hz"][joint] for joint in robot.joints)
+        armatures = {robot.joints.index(row["joint"]): float(row["armature"]) for row in content["rotors"]}
+    except (KeyError, TypeError, ValueError) as error:
+        raise ScaraIdentError(f"no questions in it ({error}); give the diagnosis.json of this version") from None
+    if not recordings:
+        scene = _unseen(model, value, bands, armatures)
+        return Inquiry(scene, asked, in_model, noise, bands)
+    data, _, _ = usable_in_bands(model, recordings, (), bands, alike=True)
+    observations: Observations = observe(model, data)
+    scene = scene_of(model, value, observations)
+    scene = replace(scene, armatures={**scene.armatures, **armatures})
+    inquiry = Inquiry(scene, asked, in_model, noise, bands)
+    return replace(inquiry, known=known_rows(inquiry, CandidateColumns(observations))) if asked else inquiry
+
+
+def _unseen(model: TorqueModel, value: Array, bands: Sequence[float | None], armatures: Mapping[int, float]) -> Scene:
+    """Return the scene of no recording: joints may travel as far and as fast as they can."""
+    robot = model.robot
+    travel = np.where(np.isfinite(robot.upper - robot.lower), robot.upper - robot.lower, 2.0 * np.pi)
+    speed = np.where(np.isfinite(robot.velocity_limit), robot.velocity_limit, 1.0)
+    band = max((band for band in bands if band is not None), default=HIGHEST_CUT * USUAL_RATE)
+    return Scene(model, value, USUAL_LENGTH, USUAL_RATE, band, travel, speed, {}, dict(armatures))

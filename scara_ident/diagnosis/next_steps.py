@@ -1,0 +1,158 @@
+"""What to do next: the questions that are open, each with the motion or the experiment that answers it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.answerability import inquire
+from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.diagnosis.questions import HALF_THE_SPEED, Question, possible, questions
+from scara_ident.diagnosis.selection_step import best_of_each
+
+# A motion that is designed to tell, s, and how that is asked for.
+ASKED_SECONDS, ASKED_MOTION = 15.0, "excite --tell"
+# Effects of which more could be said, and joints that are named of each.
+MOST, MOST_LABELS = 4, 3
+
+
+@dataclass(frozen=True)
+class NextStep:
+    """Something to do.
+
+    Attributes
+    ----------
+    question : str
+    motion : str
+        ``excite --tell``, or an experiment in words.
+    seconds : float or None
+        Of arm time; None where the experiment decides.
+    sigma_before : float or None
+        Standard errors between the answers by the recordings at hand; None where they were not computed.
+    asked : Question or None
+        For a motion that is designed.
+    """
+
+    question: str
+    motion: str
+    seconds: float | None = None
+    sigma_before: float | None = None
+    asked: Question | None = None
+
+    def entry(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        found = {
+            "question": self.question,
+            "motion": self.motion,
+            "sigma_before": self.sigma_before,
+            "sigma_after": None,
+            "seconds": self.seconds,
+        }
+        return found if self.asked is None else {**self.asked.entry(), **found}
+
+    def sentence(self) -> str:
+        """Say it for a person."""
+        said = f"{self.question[:1].upper()}{self.question[1:]}: "
+        if self.asked is None:
+            return f"{said}{self.motion}{'' if self.seconds is None else f' ({self.seconds:.0f} s)'}."
+        now = "" if self.sigma_before is None else f"; {self.sigma_before:.2g} standard errors apart so far"
+        return f"{said}{self.motion} designs a motion ({self.seconds:.0f} s){now}; by hand: {self.asked.experiment}."
+
+
+def next_steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
+    """Return what to do next, the most useful first: motions, then recordings of another kind, then experiments.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    """
+    asked = questions(diagnosis)
+    urgent = [item for item in asked if item.kind in ("rivals", "unexplained")]
+    late = [item for item in asked if item not in urgent]
+    return (
+        *_motions(diagnosis, urgent),
+        *_remainder(diagnosis, urgent),
+        *_recordings(diagnosis),
+        *_motions(diagnosis, late),
+        *_confirmations(diagnosis),
+        *_faint(diagnosis),
+        *(
+            NextStep(f"{item.effect} or what absorbs it ({', '.join(item.absorbed_by)})", item.opened_by)
+            for item in diagnosis.aliases
+        ),
+    )
+
+
+def _motions(diagnosis: Diagnosis, asked: Sequence[Question]) -> Iterator[NextStep]:
+    sigmas = inquire(diagnosis, asked).sigmas()
+    for question, sigma in zip(asked, sigmas, strict=True):
+        yield NextStep(question.text, ASKED_MOTION, ASKED_SECONDS, float(sigma), question)
+
+
+def _remainder(diagnosis: Diagnosis, asked: Sequence[Question]) -> Iterator[NextStep]:
+    """Say what tells a remainder over which no motion can be spread."""
+    left = diagnosis.unexplained
+    if left is not None and not any(item.kind == "unexplained" for item in asked):
+        yield NextStep(f"what is left on {left.joint}", HALF_THE_SPEED, 2.0 * diagnosis.search.scene.duration)
+
+
+def _recordings(diagnosis: Diagnosis) -> Iterator[NextStep]:
+    length = sum(part.samples / part.rate for part in diagnosis.training_after.data.stretches)
+    if not diagnosis.fit_after:
+        yield NextStep("the noise floor", "record every trajectory at least twice", length)
+    if not diagnosis.validation_before.data.recordings:
+        longest = diagnosis.search.scene.duration
+        yield NextStep(
+            "whether the result holds elsewhere",
+            "record a trajectory that takes no part in the diagnosis and give it with --validate",
+            longest,
+        )
+    speeds = "the same path at another speed, so that a lag in time is told from what goes with speed"
+    if any(item.decision.candidate.corrects_data for item in diagnosis.search.steps):
+        yield NextStep("the delay that was taken out", speeds, diagnosis.search.scene.duration)
+
+
+def _confirmations(diagnosis: Diagnosis) -> Iterator[NextStep]:
+    """Ask for the experiment that brings an effect out, one for all of its joints."""
+    told = {effect.effect for effect in diagnosis.effects if effect.confounded_with}
+    confirm: dict[str, list[str]] = {}
+    experiment = {item.decision.candidate.effect.name: item.decision for item in diagnosis.search.steps}
+    for effect in diagnosis.effects:
+        if effect.effect not in told:
+            label = effect.effect if effect.joint is None else f"{effect.effect} of {effect.joint}"
+            confirm.setdefault(effect.effect, []).append(label)
+    for name, labels in confirm.items():
+        yield NextStep(f"to confirm {' and '.join(labels)}", experiment[name].candidate.effect.experiment)
+
+
+def _faint(diagnosis: Diagnosis) -> Iterator[NextStep]:
+    """Ask for the experiments that show what these recordings hardly or never do, one for all joints of an effect."""
+    criteria = diagnosis.search.step.criteria
+    faint: dict[str, list[Decision]] = {}
+    hidden: dict[str, list[Decision]] = {}
+    for decision in sorted(best_of_each(diagnosis.search.decisions).values(), key=lambda item: -item.gain):
+        if decision.accepted:
+            continue
+        name = decision.candidate.effect.name
+        if decision.examination.outside < criteria.least_outside:
+            hidden.setdefault(name, []).append(decision)
+        elif decision.gain > 0.0 and _significant(decision, diagnosis) and possible(decision, diagnosis):
+            faint.setdefault(name, []).append(decision)
+    for words, found in (
+        ("to judge {}, significant but not accepted ({})", faint),
+        ("to see {} at all, which these recordings cannot show", hidden),
+    ):
+        for members in list(found.values())[:MOST]:
+            labels = " and ".join(member.label for member in members[:MOST_LABELS])
+            labels += f" and {len(members) - MOST_LABELS} more" if len(members) > MOST_LABELS else ""
+            yield NextStep(words.format(labels, members[0].why), members[0].candidate.effect.experiment)
+
+
+def _significant(decision: Decision, diagnosis: Diagnosis) -> bool:
+    # Of what is negligible, such as a delay within a sample's period, no motion of the arm tells more.
+    effect, member, scene = decision.candidate.effect, decision.candidate.member, diagnosis.search.scene
+    if not effect.corrects_data(member) and effect.negligible(scene, member, decision.examination.value) is not None:
+        return False
+    return decision.examination.p_value * diagnosis.search.tried < diagnosis.search.step.criteria.family_error

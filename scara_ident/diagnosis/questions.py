@@ -1,0 +1,336 @@
+"""What a diagnosis left open, as questions that a motion of the arm may answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any, Literal
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.candidate_tests import Examination
+from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.diagnosis.selection_step import best_of_each
+from scara_ident.diagnosis.shape import shape_over
+from scara_ident.effects import EFFECTS, Effect, Member
+from scara_ident.errors import ScaraIdentError
+
+Kind = Literal["rivals", "unexplained", "below_limit", "parameter"]
+# Rivals of one effect, and candidates that these recordings would hardly have shown: of each family, in all, and by name.
+MOST_RIVALS, MOST_OF_FAMILY, MOST_BELOW, MOST_NAMED = 4, 2, 24, 3
+# What tells a remainder that no signal of the motion is known to make.
+HALF_THE_SPEED = (
+    "repeat one trajectory at half the speed; how the remainder scales tells friction from inertia and from delays"
+)
+# Parameters asked for, and the standard deviation over the size that makes one unsure.
+MOST_PARAMETERS, UNSURE = 3, 0.3
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """An effect as it may be.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    label : str
+        Effect and joint.
+    value : tuple of float
+        Its coefficients.
+    """
+
+    candidate: Candidate
+    label: str
+    value: tuple[float, ...]
+
+    def entry(self) -> dict[str, Any]:
+        """Return it as plain values; see `suspect_of`."""
+        effect, member = self.candidate.effect, self.candidate.member
+        return {
+            "effect": effect.name,
+            "variant": _variant(effect),
+            "label": self.label,
+            "place": member.joint,
+            "partner": member.partner,
+            "nonlinear": list(member.nonlinear),
+            "value": list(self.value),
+        }
+
+
+@dataclass(frozen=True)
+class Question:
+    """Something that recordings left open.
+
+    Attributes
+    ----------
+    kind : {"rivals", "unexplained", "below_limit", "parameter"}
+        Which of some effects it is; what a remainder looks like; whether effects of a size are there; how large a
+        parameter is.
+    text : str
+        For a person.
+    suspects : tuple of Suspect
+        The effects in question; of rivals the first is the one in the model.
+    joint : str or None
+        Whose remainder it is.
+    signals : tuple of str
+        What that depends on.
+    parameter : str or None
+    size : float
+        Rms of the remainder, or size of the parameter.
+    experiment : str
+        What to do where no motion of the arm answers it.
+    """
+
+    kind: Kind
+    text: str
+    suspects: tuple[Suspect, ...] = ()
+    joint: str | None = None
+    signals: tuple[str, ...] = ()
+    parameter: str | None = None
+    size: float = np.nan
+    experiment: str = ""
+
+    def entry(self) -> dict[str, Any]:
+        """Return it as plain values; see `question_of`."""
+        return {
+            "question": self.text,
+            "kind": self.kind,
+            "suspects": [item.entry() for item in self.suspects],
+            "joint": self.joint,
+            "signals": list(self.signals),
+            "parameter": self.parameter,
+            "size": self.size,
+            "experiment": self.experiment,
+        }
+
+
+def question_of(entry: Mapping[str, Any]) -> Question:
+    """Return a question from its entry in a ``diagnosis.json``.
+
+    Raises
+    ------
+    ScaraIdentError
+        If it names an effect that is not installed.
+    """
+    return Question(
+        entry["kind"],
+        str(entry["question"]),
+        tuple(suspect_of(item) for item in entry["suspects"]),
+        entry["joint"],
+        tuple(entry["signals"]),
+        entry["parameter"],
+        np.nan if entry["size"] is None else float(entry["size"]),
+        str(entry["experiment"]),
+    )
+
+
+def suspect_of(entry: Mapping[str, Any]) -> Suspect:
+    """Return a suspect from its entry.
+
+    Raises
+    ------
+    ScaraIdentError
+        If the effect is not installed.
+    """
+    families = EFFECTS.get(entry["effect"])
+    if not 0 <= entry["variant"] < len(families):
+        raise ScaraIdentError(f"effect {entry['effect']}: not as the diagnosis had it; diagnose again")
+    nonlinear, value = (tuple(float(x) for x in entry[key]) for key in ("nonlinear", "value"))
+    member = Member(entry["place"], nonlinear, entry["partner"])
+    return Suspect(Candidate(families[entry["variant"]], member), str(entry["label"]), value)
+
+
+def _variant(effect: Effect) -> int:
+    families = EFFECTS.get(effect.name) if effect.name in EFFECTS.names() else ()
+    alike = [k for k, family in enumerate(families) if type(family) is type(effect)]
+    return next((k for k in alike if families[k] == effect), alike[0] if alike else -1)
+
+
+def questions(diagnosis: Diagnosis) -> tuple[Question, ...]:
+    """Return what a diagnosis left open and a motion may answer, the most valuable first.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+
+    Notes
+    -----
+    First effects that were found and may be another, then a remainder, then effects that are worth a look, then what these
+    recordings would have shown least of, and last parameters that are hardly known.
+    """
+    found = [*_rivals(diagnosis), *_remainder(diagnosis), *_worth_a_look(diagnosis)]
+    asked = {item.label for question in found for item in question.suspects}
+    return tuple([*found, *_below_limit(diagnosis, asked), *_parameters(diagnosis)])
+
+
+def suspects_in_model(diagnosis: Diagnosis) -> tuple[Suspect, ...]:
+    """Return the effects in the model with their coefficients, in its order."""
+    search = diagnosis.search
+    start = len(search.base.columns)
+    result = []
+    for candidate in search.chosen:
+        stop = start + len(candidate.effect.columns(search.scene, candidate.member))
+        value = tuple(float(x) for x in diagnosis.after.value[start:stop])
+        result.append(Suspect(candidate, candidate.label(search.scene), value))
+        start = stop
+    return tuple(result)
+
+
+def _rivals(diagnosis: Diagnosis) -> Iterator[Question]:
+    own = {item.candidate: item for item in suspects_in_model(diagnosis)}
+    asked: set[frozenset[str]] = set()
+    for effect in sorted(diagnosis.effects, key=lambda item: -item.gain):
+        if effect.candidate not in own or effect.candidate is None:
+            continue
+        first = own[effect.candidate]
+        others = [item for item in effect.confounded_with if _moves(item.candidate)][:MOST_RIVALS]
+        suspects = (first, *(Suspect(item.candidate, item.label, item.value) for item in others))
+        labels = frozenset(item.label for item in suspects)
+        if others and _moves(first.candidate) and labels not in asked:
+            asked.add(labels)
+            text = " or ".join(item.label for item in suspects)
+            yield Question("rivals", text, suspects, experiment=first.candidate.effect.experiment)
+
+
+def _remainder(diagnosis: Diagnosis) -> Iterator[Question]:
+    left = diagnosis.unexplained
+    if left is None or shape_over(diagnosis.robot, left.signals, diagnosis.robot.joints.index(left.joint)) is None:
+        return
+    text = f"what is left on {left.joint}, over {' and '.join(left.signals)}"
+    yield Question(
+        "unexplained", text, joint=left.joint, signals=left.signals, size=left.rms, experiment=HALF_THE_SPEED
+    )
+
+
+def _worth_a_look(diagnosis: Diagnosis) -> Iterator[Question]:
+    scene = diagnosis.search.scene
+    known = {item.label(scene) for item in diagnosis.search.chosen}
+    for decision in (item.decision for item in diagnosis.tentative if item.decision is not None):
+        suspect = _as_found(decision)
+        if _moves(decision.candidate) and decision.label not in known and np.any(suspect.value):
+            known.add(decision.label)
+            experiment = decision.candidate.effect.experiment
+            yield Question("below_limit", f"{decision.label} or none", (suspect,), experiment=experiment)
+
+
+def _below_limit(diagnosis: Diagnosis, asked: set[str]) -> Iterator[Question]:
+    """Ask for what these recordings would have shown least of, of a size that they would just have shown."""
+    seen: dict[str, int] = {}
+    suspects = []
+    for decision in sorted(_others(diagnosis), key=lambda item: item.examination.outside):
+        name = decision.candidate.effect.name
+        limit, errors = _limit(decision.examination, diagnosis), _errors(decision.examination)
+        if decision.label in asked or not np.isfinite(limit) or errors == 0.0 or seen.get(name, 0) >= MOST_OF_FAMILY:
+            continue
+        seen[name] = seen.get(name, 0) + 1
+        value = limit / errors * decision.examination.value
+        suspects.append(Suspect(decision.candidate, decision.label, tuple(float(x) for x in value)))
+    if suspects:
+        chosen = tuple(suspects[:MOST_BELOW])
+        more = f" and {len(chosen) - MOST_NAMED} more" if len(chosen) > MOST_NAMED else ""
+        text = f"what these recordings hardly show: {', '.join(item.label for item in chosen[:MOST_NAMED])}{more}"
+        yield Question("below_limit", text, chosen, experiment="record another motion over the whole workspace")
+
+
+def _parameters(diagnosis: Diagnosis) -> Iterator[Question]:
+    from scara_ident.model.terms import RigidBody
+
+    model, after = diagnosis.before.model, diagnosis.after
+    nominal = np.zeros(len(model.columns))
+    body: RigidBody = model.rigid_body
+    nominal[model.place(body)] = (body.base.grouping @ model.robot.standard_parameters())[body.kept]
+    size = np.maximum(np.abs(after.value[: len(nominal)]), np.abs(nominal))
+    share = np.divide(after.std[: len(size)], size, out=np.zeros(len(size)), where=nominal != 0.0)
+    for k in np.argsort(-share)[:MOST_PARAMETERS]:
+        if share[k] > UNSURE:
+            name = model.columns[k].name
+            yield Question("parameter", f"value of {name}", parameter=name, size=float(size[k]),
+                           experiment="record another motion over the whole workspace")  # fmt: skip
+
+
+def _others(diagnosis: Diagnosis) -> list[Decision]:
+    """Return the best member of each family and joint not in the model that a motion can show and an arm can have."""
+    search = diagnosis.search
+    known = {item.label(search.scene) for item in search.chosen}
+    best = best_of_each(search.decisions).values()
+    return [
+        item
+        for item in best
+        if item.label not in known
+        and not item.accepted
+        and not item.candidate.corrects_data
+        and _moves(item.candidate)
+        and bool(np.isfinite(item.examination.covariance).all())
+        and possible(item, diagnosis)
+    ]
+
+
+def possible(decision: Decision, diagnosis: Diagnosis) -> bool:
+    """Return whether a real arm can have the coefficients found."""
+    examination, candidate = decision.examination, decision.candidate
+    std = np.sqrt(np.clip(np.diag(examination.covariance), 0.0, None))
+    return candidate.effect.inadmissible(diagnosis.search.scene, candidate.member, examination.value, std) is None
+
+
+def _moves(candidate: Candidate) -> bool:
+    """Whether what the arm does decides how large it shows, not which recording it is."""
+    return not candidate.effect.by_recording and _variant(candidate.effect) >= 0
+
+
+def _as_found(decision: Decision) -> Suspect:
+    return Suspect(decision.candidate, decision.label, tuple(float(x) for x in decision.examination.value))
+
+
+def _errors(found: Examination) -> float:
+    """Return by how many standard errors coefficients differ from none."""
+    if not np.all(np.isfinite(found.covariance)):
+        return 0.0
+    wald = found.value @ np.linalg.pinv(found.covariance, rcond=1e-9, hermitian=True) @ found.value
+    return float(np.sqrt(max(float(wald), 0.0)))
+
+
+def _limit(found: Examination, diagnosis: Diagnosis) -> float:
+    """Return the standard errors that coefficients would have to have to be significant."""
+    from scipy.special import fdtri
+
+    count = len(found.value)
+    rest = found.freedom - count + 1.0
+    if rest <= 0.0 or not np.isfinite(rest):
+        return np.inf
+    chance = 1.0 - diagnosis.search.step.criteria.family_error / diagnosis.search.tried
+    return float(np.sqrt(fdtri(count, rest, chance) * found.freedom * count / rest))
+
+
+def noise_density(diagnosis: Diagnosis) -> Array:
+    """Return the noise of each joint that an estimate sees, (N m)^2 s, shape (n,).
+
+    Mean square of what is left per row, over the rows in a second, times by how much blocks of time scatter more than
+    white residuals would: the noise that the standard deviations of the diagnosis stand on.
+    """
+    step, after = diagnosis.search.step, diagnosis.after
+    rows = diagnosis.training_after.joints
+    rate = min(part.rate for part in step.observations.data.stretches)
+    level, count = np.zeros(len(rows)), 0
+    for j, own in enumerate(rows):
+        left = own.table[-1] - after.value[own.columns] @ own.table[:-1]
+        level[j] = float(np.mean(left**2)) if len(left) else np.nan
+        count += len(left)
+    size = np.sqrt(np.clip(np.diag(after.information.inverse()), 0.0, None))
+    white = np.sqrt(after.information.residual_sum(after.value) / max(1, count)) * size
+    known = (white > 0.0) & np.isfinite(after.std) & ~after.undetermined
+    ratio = np.divide(after.std, white, out=np.ones(len(size)), where=known) ** 2
+    joints = diagnosis.robot.joints
+    names = np.array([column.joint for column in after.model.columns], dtype=object)
+    for j, joint in enumerate(joints):
+        own = known & (names == joint)
+        level[j] *= max(1.0, float(np.median(ratio[own if own.any() else known]))) if known.any() else 1.0
+    return level / rate
+
+
+def all_suspects(asked: Sequence[Question]) -> tuple[Suspect, ...]:
+    """Return the suspects of all questions, each once."""
+    return tuple(dict.fromkeys(chain.from_iterable(item.suspects for item in asked)))

@@ -1,0 +1,296 @@
+"""The motion that best tells what recordings left open.
+
+Effects remember, turn with the sign of a speed and pass the bands of the diagnosis, so that their columns have no useful
+derivative by a motion's coefficients. The search draws motions, takes each as large as its limits allow or smaller, and
+changes the best of them; a motion is judged by what the diagnosis would see of it: its columns within the bands, by their
+spectra, over the noise, merged with what is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.answerability import Inquiry
+from scara_ident.diagnosis.candidates import Candidate, Rows
+from scara_ident.diagnosis.questions import Question
+from scara_ident.effects import Signals
+from scara_ident.estimation.information import Information, merge, triangular
+from scara_ident.excitation.curves import Basis
+from scara_ident.excitation.limits import InfeasibleLimits
+from scara_ident.excitation.parallel import map_in_order
+from scara_ident.excitation.problem import Problem, Task, row_names
+from scara_ident.excitation.search import (
+    BOUND,
+    COARSE,
+    FINE,
+    Effort,
+    Found,
+    Progress,
+    verified_inside,
+    within_grid,
+)
+from scara_ident.excitation.verification import grid
+from scara_ident.motion.motion import Motion
+from scara_ident.threads import one_blas_thread
+
+# Samples per second of a motion in the search, where a suspect follows the motor's turns, and of what is promised.
+RATE, TURNING_RATE, FINE_RATE = 200.0, 500.0, 1000.0
+# Motions that a search draws first, and changes of the best of them per round.
+DRAWN, CHANGED = 24, 30
+# Speeds of a drawn motion as shares of the limits, evenly in their logarithm; how often a joint stands still.
+SLOWEST, STILL = 0.03, 0.15
+# Sizes of a change, as shares of the motion; by how much a joint's motion grows or shrinks, in its logarithm.
+CHANGE, GROWTH = (0.05, 0.6), 0.4
+# What a motion that breaks a limit shrinks by, and how often at most.
+SHRINKING, TRIES = 0.85, 40
+# Weight of all parameters together against that of another kind of question.
+PARAMETERS = 0.5
+# Standard errors at which an answer is sure enough: beyond, other questions count as much.
+SURE = 5.0
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a motion tells of a question: standard errors between the answers, without and with it."""
+
+    question: Question
+    before: float
+    after: float
+
+    def entry(self) -> dict[str, object]:
+        """Return it as plain values."""
+        return {"question": self.question.text, "sigma_before": self.before, "sigma_after": self.after}
+
+
+def spectral_rows(inquiry: Inquiry, motion: Motion) -> Information:
+    """Return what a motion would say of an inquiry: the factor of its columns within the bands, rows of unit noise.
+
+    Parameters
+    ----------
+    inquiry : Inquiry
+    motion : Motion
+        At rest at both ends.
+
+    Notes
+    -----
+    By Parseval's theorem the sum of squares over time is that over frequencies; within the band every frequency is one
+    row of a real and one of an imaginary part, in which white noise is as large as in any other.
+    """
+    signals = Signals(inquiry.scene, motion)
+    model, count = inquiry.scene.model, motion.samples
+
+    def within(joint: int, columns: Array) -> Array:
+        band = inquiry.bands[joint]
+        kept = count // 2 + 1 if band is None else min(count // 2 + 1, int(band * count / motion.rate) + 1)
+        spectrum = np.fft.rfft(columns, axis=1)[:, :kept]
+        spectrum[:, 1:] *= np.sqrt(2.0)
+        size = np.sqrt(1.0 / (count * motion.rate * inquiry.noise[joint]))
+        return np.asarray(size * np.concatenate([spectrum.real, spectrum.imag], axis=1))
+
+    def made(wanted: Sequence[Candidate]) -> list[Rows]:
+        each = [item.effect.by_joint(signals, item.member) for item in wanted]
+        return [{joint: within(joint, np.array(own)) for joint, own in item.items()} for item in each]
+
+    added = inquiry.rows(made)
+    widths = [len(next(iter(rows.values()))) for rows in added]
+    total = len(model.columns) + sum(widths)
+    factors = []
+    for joint, (own, raw) in enumerate(zip(model.active, signals.columns, strict=True)):
+        base = within(joint, raw)
+        table = np.zeros((total + 1, base.shape[1]))
+        table[np.flatnonzero(own) if own.dtype == bool else own] = base
+        start = len(model.columns)
+        for rows, width in zip(added, widths, strict=True):
+            if joint in rows:
+                table[start : start + width] = rows[joint]
+            start += width
+        factors.append(triangular(table.T))
+    return Information(triangular(np.vstack(factors)), float(model.robot.n * count))
+
+
+def told(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[Told, ...]:
+    """Return what motions tell of every question, beside what is known."""
+    before = inquiry.sigmas()
+    after = inquiry.sigmas(merge([spectral_rows(inquiry, motion) for motion in motions]))
+    return tuple(
+        Told(item, float(one), float(other)) for item, one, other in zip(inquiry.questions, before, after, strict=True)
+    )
+
+
+def search_to_tell(
+    task: Task, inquiry: Inquiry, effort: Effort, progress: Callable[[Progress], None] | None = None
+) -> Found:
+    """Search for the motion that answers questions best.
+
+    Parameters
+    ----------
+    task : Task
+        Of one trajectory; its criterion takes no part.
+    inquiry : Inquiry
+    effort : Effort
+        Searches from ``starts`` sets of random motions, each with as many changes as ``1 + rounds`` say.
+    progress : callable, optional
+        Called after every search.
+
+    Raises
+    ------
+    InfeasibleLimits
+        If no random motion is within the limits.
+    """
+    problem = within_grid(task, COARSE, np.full(len(row_names(task.limits, len(task.posture))), BOUND))
+    turning = any(item.candidate.effect.seeded_by == "order" for item in inquiry.suspects)
+    judge = _Judge(inquiry, task, TURNING_RATE if turning else RATE)
+
+    def work(index: int) -> tuple[float, Array] | None:
+        return _best(problem, judge, np.random.default_rng([effort.seed, index]), effort.rounds)
+
+    found: list[tuple[float, Array]] = []
+    costs: list[float] = []
+    for result in map_in_order(work, range(effort.starts), effort.processes):
+        costs.append(np.inf if result is None else result[0])
+        if result is not None:
+            found.append(result)
+        if progress is not None:
+            progress(Progress(len(costs), effort.starts, min(costs)))
+    if not found:
+        raise InfeasibleLimits("no motion drawn is within the limits; widen the tightest of them")
+    with one_blas_thread():
+        fine = within_grid(task, FINE, problem.bounds)
+        x, times = verified_inside(fine, min(found, key=lambda item: item[0])[1])
+    return Found(x, tuple(costs), times)
+
+
+@dataclass(frozen=True, eq=False)
+class _Judge:
+    inquiry: Inquiry
+    task: Task
+    rate: float
+
+    def cost(self, x: Array) -> float:
+        """Return minus the weighted sum of the logarithms of what questions gain."""
+        basis = self.task.basis
+        motion = motion_of(basis, self.task.posture, x[0], self.rate)
+        sigma = self.inquiry.sigmas(spectral_rows(self.inquiry, motion))
+        return -float(self.weights @ np.log1p((sigma / SURE) ** 2))
+
+    @cached_property
+    def weights(self) -> Array:
+        """Questions of one kind share its weight, so that many effects worth a look do not outweigh all others."""
+        kinds = [(item.kind, len(item.suspects) > 1) for item in self.inquiry.questions]
+        return np.array(
+            [(PARAMETERS if kind == "parameter" else 1.0) / kinds.count((kind, more)) for kind, more in kinds]
+        )
+
+
+def motion_of(basis: Basis, posture: Array, coefficients: Array, rate: float) -> Motion:
+    """Return samples of a motion at equal steps over its period, the end left out."""
+    count = round(basis.duration * rate)
+    time = np.arange(count, dtype=np.float64) / rate
+    q, v, a = (coefficients @ rows.T for rows in _rows(basis, count))
+    return Motion("asked", "asked", time, q + posture[:, None], v, a, None, rate)
+
+
+def _best(problem: Problem, judge: _Judge, random: np.random.Generator, rounds: int) -> tuple[float, Array] | None:
+    """Return cost and coefficients of the best of some random motions, changed as long as that helps."""
+    drawn = (_inside(problem, random_motion(problem.task, random)) for _ in range(DRAWN))
+    ranked = sorted(((judge.cost(x), k, x) for k, x in enumerate(drawn) if x is not None), key=lambda item: item[:2])
+    if not ranked:
+        return None
+    cost, _, best = ranked[0]
+    for _ in range(CHANGED * (1 + rounds)):
+        x = _inside(problem, _changed(problem.task, best, random))
+        if x is not None and (now := judge.cost(x)) < cost:
+            cost, best = now, x
+    return cost, best
+
+
+def random_motion(task: Task, random: np.random.Generator) -> Array:
+    """Draw a motion, shape (1, n, m): each joint with its own speed and pace, about its own place, or at rest."""
+    _, n, m = task.shape
+    basis, limits = task.basis, task.limits
+    highest = basis.bandwidth * basis.duration
+    time = basis.duration * np.arange(8 * m) / (8 * m)
+    velocity = np.zeros((n, len(time)))
+    shared = np.exp(random.uniform(np.log(2.0), np.log(max(3.0, highest))))
+    for j in range(n):
+        top = shared if random.uniform() < 0.5 else np.exp(random.uniform(np.log(2.0), np.log(max(3.0, highest))))
+        orders = np.arange(1, int(np.ceil(top)) + 1)
+        phases = 2.0 * np.pi / basis.duration * np.outer(orders, time)
+        size = random.normal(size=(2, len(orders))) / np.sqrt(len(orders))
+        if n < 2 or random.uniform() >= STILL:
+            share = np.exp(random.uniform(np.log(SLOWEST), 0.0))
+            velocity[j] = share * limits.velocity[j] * (size[0] @ np.cos(phases) + size[1] @ np.sin(phases))
+    x = velocity @ _inverse(basis, 1).T
+    place = random.uniform(limits.lower, limits.upper)
+    return np.asarray(_placed(basis, x, place - task.posture)[None])
+
+
+def _placed(basis: Basis, x: Array, mean: Array) -> Array:
+    """Return coefficients with the mean of each joint's position moved to a place relative to the posture."""
+    constant = _inverse(basis, 0) @ np.ones(8 * basis.size)
+    return np.asarray(x + np.outer(mean - _mean(basis, x), constant))
+
+
+def _mean(basis: Basis, x: Array) -> Array:
+    return np.asarray(x @ np.mean(_rows(basis, 8 * basis.size)[0], axis=0))
+
+
+@lru_cache(maxsize=8)
+def _rows(basis: Basis, count: int) -> Array:
+    """The basis and its derivatives at equal steps over its period, shape (3, count, m)."""
+    return grid(basis, count)
+
+
+@lru_cache(maxsize=8)
+def _inverse(basis: Basis, derivative: int) -> Array:
+    """From values at equal steps to the coefficients of the nearest motion, shape (m, 8 m)."""
+    return np.linalg.pinv(_rows(basis, 8 * basis.size)[derivative], rcond=1e-9)
+
+
+def _changed(task: Task, x: Array, random: np.random.Generator) -> Array:
+    """Return a change of a motion: something added to some joints, a joint larger, smaller or elsewhere."""
+    n = x.shape[1]
+    chosen = random.uniform(size=n) < max(0.4, 1.0 / n)
+    chosen[random.integers(n)] = True
+    kind = random.integers(3)
+    y = x.copy()
+    if kind == 0:
+        other = random_motion(task, random)
+        size = random.uniform(*CHANGE)
+        y[0, chosen] = (1.0 - 0.5 * size) * x[0, chosen] + size * other[0, chosen]
+    elif kind == 1:
+        y[0, chosen] *= np.exp(GROWTH * random.normal(size=(int(np.sum(chosen)), 1)))
+    else:
+        basis = task.basis
+        reach = 0.3 * (task.limits.upper - task.limits.lower) * random.normal(size=n)
+        y[0] = np.where(chosen[:, None], _placed(basis, x[0], _mean(basis, x[0]) + reach), x[0])
+    return y
+
+
+def _inside(problem: Problem, x: Array) -> Array | None:
+    """Bring a motion within its limits: first each joint's position and speed, then all of it; None where it never is."""
+    limits, basis, posture = problem.task.limits, problem.task.basis, problem.task.posture
+    bound = float(np.min(problem.bounds))
+    speed = np.max(np.abs(x[0] @ problem.rows[1].T), axis=1)
+    x = x * np.minimum(1.0, bound * limits.velocity / np.maximum(speed, 1e-12))[None, :, None]
+    q = x[0] @ problem.rows[0].T + posture[:, None]
+    low, high = q.min(axis=1), q.max(axis=1)
+    half = 0.5 * bound * (limits.upper - limits.lower)
+    size = np.minimum(1.0, 2.0 * half / np.maximum(high - low, 1e-12))
+    middle = np.clip(0.5 * (low + high), limits.centre - half + 0.5 * size * (high - low),
+                     limits.centre + half - 0.5 * size * (high - low))  # fmt: skip
+    mean = np.mean(q, axis=1)
+    moved = middle + size * (mean - 0.5 * (low + high)) - posture
+    x = _placed(basis, size[:, None] * x[0], moved)[None]
+    for _ in range(TRIES):
+        values = problem.limited(x)
+        share = np.where(problem.two_sided, np.max(np.abs(values), axis=1), np.max(values, axis=1))
+        if np.all(share <= problem.bounds):
+            return x
+        x = SHRINKING * x
+    return None

@@ -1,0 +1,19 @@
+"""``scara-ident ask``: the first step of the loop, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+QUICK = ("--starts", "1", "--duration", "4", "--model", "basic")
+
+
+def test_an_empty_folder_asks_for_a_first_motion(command, tmp_path: Path):
+    result = command("ask", tmp_path / "arm", *QUICK)
+    assert result.status == 0 and "Nothing is recorded yet" in result.out
+    assert (tmp_path / "arm" / "next" / "trajectory.csv").is_file()
+    assert json.loads((tmp_path / "arm" / "ask.json").read_text())["state"] == "record"
+
+
+def test_effects_are_those_of_the_virtual_arm(command, tmp_path: Path):
+    assert "--virtual" in command("ask", tmp_path, "--effect", "spring").err

@@ -1,0 +1,61 @@
+"""What is told to be done next."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis import diagnose
+from scara_ident.diagnosis.next_steps import ASKED_MOTION, next_steps
+from scara_ident.effects.position import Spring
+from scara_ident.robot.robot import load_robot
+from tests.diagnosis.asked import PAIR, open_diagnosis
+from tests.diagnosis.made import BANDS, exact_runs, with_torque
+
+REPEAT = "record every trajectory at least twice"
+
+
+@pytest.fixture(scope="module")
+def lean():
+    """A model that lacks nothing, on runs without repetition or validation."""
+    return diagnose(load_robot(), exact_runs()[::2], bands=BANDS, catalogue=())
+
+
+def test_what_the_recordings_lack_is_asked_for(lean):
+    found = {item.question: item for item in next_steps(lean)}
+    assert found["the noise floor"].motion == REPEAT
+    length = sum(np.ptp(run.time) for run in exact_runs()[::2])
+    assert found["the noise floor"].seconds == pytest.approx(length, rel=0.01)
+    assert found["whether the result holds elsewhere"].motion.endswith("give it with --validate")
+
+
+def test_what_no_motion_settles_names_the_experiment(lean):
+    found = {item.question.partition(" or ")[0]: item.motion for item in next_steps(lean)}
+    assert found["constant_payload"] == "recordings with and without the payload"
+    assert "drive off" in found["asymmetric_coulomb"]
+
+
+def test_a_remainder_that_depends_on_a_signal_asks_for_a_motion_and_another_for_half_the_speed():
+    runs = with_torque(exact_runs(), 1, lambda motion: 0.03 * np.sin(5.0 * motion.q[1]))
+    found = diagnose(load_robot(), runs, bands=BANDS, catalogue=())
+    first, *others = next_steps(found)
+    assert first.question == "what is left on joint2, over position of joint2"
+    assert first.motion == ASKED_MOTION and first.sigma_before is not None
+    assert REPEAT not in [item.motion for item in others]
+    bare = replace(found, unexplained=replace(found.unexplained, signals=()))
+    assert "at half the speed" in next_steps(bare)[0].motion
+
+
+def test_rivals_ask_for_a_motion_and_an_effect_for_the_experiment_that_shows_it():
+    first = next_steps(open_diagnosis())[0]
+    entry = first.entry()
+    assert {"question", "motion", "sigma_before", "sigma_after", "seconds"} <= entry.keys()
+    assert entry["question"] == PAIR and entry["motion"] == ASKED_MOTION and entry["sigma_after"] is None
+    assert 0.0 <= entry["sigma_before"] < 4.0 and entry["seconds"] == 15.0
+    assert first.sentence().startswith(f"{PAIR[:1].upper()}{PAIR[1:]}: {ASKED_MOTION} designs a motion (15 s); ")
+    runs = with_torque(exact_runs(3)[:4], 1, lambda motion: 0.05 * motion.q[1])
+    found = diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),))
+    motions = {item.question: item.motion for item in next_steps(found)}
+    assert motions["to confirm spring of joint2"] == Spring().experiment

@@ -1,0 +1,52 @@
+"""What a diagnosis leaves open."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis import Unexplained
+from scara_ident.diagnosis.questions import noise_density, question_of, questions, suspects_in_model
+from scara_ident.errors import UsageError
+from scara_ident.files import plain
+from tests.diagnosis.asked import PAIR, open_diagnosis
+from tests.diagnosis.made import NOISE
+
+
+def test_an_effect_that_may_be_another_is_asked_for_first():
+    first = questions(open_diagnosis())[0]
+    assert first.kind == "rivals" and first.text == PAIR
+    spring, tilt = first.suspects
+    assert spring == suspects_in_model(open_diagnosis())[0]
+    # Both are of a size that the recordings have: the tilt's gravity for the spring's torque.
+    assert abs(spring.value[0]) == pytest.approx(0.05, rel=0.2) and len(tilt.value) > 1
+
+
+def test_a_remainder_is_asked_for_over_its_signals():
+    left = Unexplained("joint2", ("position of joint2",), 0.03, 0.5)
+    second = questions(replace(open_diagnosis(), unexplained=left))[1]
+    assert (second.kind, second.joint, second.signals, second.size) == ("unexplained", "joint2", left.signals, 0.03)
+
+
+def test_questions_are_the_same_from_a_file():
+    for question in questions(open_diagnosis()):
+        again = question_of(json.loads(json.dumps(plain(question.entry()))))
+        assert plain(again.entry()) == plain(question.entry())
+        assert again.suspects == question.suspects
+
+
+def test_an_effect_of_a_file_that_is_not_installed_is_said():
+    entry = questions(open_diagnosis())[0].entry()
+    entry["suspects"][0]["effect"] = "gremlin"
+    with pytest.raises(UsageError, match="gremlin"):
+        question_of(entry)
+
+
+def test_the_noise_is_that_of_the_recordings():
+    # White noise of one sample each 4 ms; blocks of time may scatter somewhat more than it.
+    white = np.array(NOISE) ** 2 / 250.0
+    ratio = noise_density(open_diagnosis()) / white
+    assert np.all(ratio > 0.8) and np.all(ratio < 2.0)

@@ -1,0 +1,67 @@
+"""The motion that tells: within its limits, as sure as promised, and what a random one does not do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis import diagnose
+from scara_ident.diagnosis.answerability import inquire, known_rows
+from scara_ident.diagnosis.candidates import CandidateColumns
+from scara_ident.diagnosis.questions import questions
+from scara_ident.effects.position import Spring
+from scara_ident.effects.tilt import BaseTilt
+from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.estimation.observations import observe
+from scara_ident.excitation import Effort, design_excitation, excitation_dict
+from scara_ident.excitation.tell import told
+from scara_ident.identification.usable import usable_in_bands
+from scara_ident.simulation import ReferenceMotion
+from tests.diagnosis.asked import PAIR, open_diagnosis, recorded, small_runs
+from tests.diagnosis.made import BANDS
+
+EFFORT = Effort(starts=1, rounds=0, seed=2, processes=1)
+
+
+@pytest.fixture(scope="module")
+def asked():
+    found = open_diagnosis()
+    inquiry = inquire(found, questions(found)[:1])
+    return inquiry, design_excitation(found.before.model, duration=6.0, harmonics=6, tell=inquiry, effort=EFFORT)
+
+
+def test_the_motion_keeps_its_limits_and_is_said_to_tell(asked):
+    _, design = asked
+    assert all(limit.kept for limit in design.reached)
+    content = excitation_dict(design)
+    (entry,) = content["tells"]
+    assert entry["question"] == PAIR and content["criterion"] == {"name": "tell"}
+    assert entry["sigma_before"] < 4.0 and entry["sigma_after"] > 10.0
+    # More of the same small motion would not.
+    same = told(asked[0], [part.motion for part in open_diagnosis().search.data.stretches[:1]])
+    assert same[0].after < 2.0 * same[0].before + 0.1
+
+
+def test_what_was_promised_is_seen_and_the_effect_is_told(asked):
+    inquiry, design = asked
+    time = np.linspace(0.0, 6.0, 3001)
+    trajectory = design.trajectories[0]
+    new = recorded(ReferenceMotion("asked", trajectory.joints, time, *trajectory.at(time)))[:1]
+    runs = (*small_runs(), *new)
+    model = open_diagnosis().before.model
+    data, _, _ = usable_in_bands(model, runs, (), BANDS)
+    seen = known_rows(inquiry, CandidateColumns(observe(model, data)))
+    (now,) = type(inquiry)(inquiry.scene, inquiry.questions, inquiry.in_model, inquiry.noise, BANDS, seen).sigmas()
+    # Ends and rest are left out of the rows, and the low-pass has no sharp edge.
+    assert now == pytest.approx(design.tells[0].after, rel=0.15)
+    found = diagnose(model.robot, runs, bands=BANDS, catalogue=(Spring(), BaseTilt()))
+    (effect,) = found.effects
+    assert (effect.effect, effect.joint, effect.confounded_with) == ("spring", "joint1", ())
+
+
+def test_goals_that_exclude_each_other_are_said(asked):
+    model = asked[0].scene.model
+    with pytest.raises(UsageError, match="without a criterion of its own"):
+        design_excitation(model, tell=asked[0], trajectories=2)
+    with pytest.raises(ScaraIdentError, match="left no question"):
+        design_excitation(model, tell=inquire(open_diagnosis(), []))

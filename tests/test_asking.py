@@ -1,0 +1,115 @@
+"""The loop in a folder: what it writes, that nothing new changes nothing, and that a run that was killed is gone on with."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from scara_ident import asking
+from scara_ident.asking import Asked, Settings, ask, key_of, read_asked, still_open, worth_recording
+from scara_ident.diagnosis.answerability import inquire
+from scara_ident.diagnosis.questions import Question, questions
+from scara_ident.errors import ScaraIdentError
+from scara_ident.excitation import Effort
+from scara_ident.excitation.tell import Told
+from scara_ident.recording.recording import write_recording
+from scara_ident.robot.robot import load_robot
+from tests.diagnosis.asked import PAIR, open_diagnosis, small_runs
+
+QUICK = Settings(load_robot(), duration=4.0, effort=Effort(starts=1, rounds=0, processes=1))
+
+
+class KilledError(Exception):
+    """Stands for the end of the process."""
+
+
+def contents(folder: Path) -> dict[str, tuple[bytes, int]]:
+    return {
+        path.relative_to(folder).as_posix(): (path.read_bytes(), path.stat().st_mtime_ns)
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Recordings, and a diagnosis of them that was made once."""
+    (tmp_path / "recordings").mkdir()
+    for item in small_runs():
+        write_recording(item, tmp_path / "recordings" / f"{item.name}.parquet")
+    monkeypatch.setattr(asking, "diagnose", lambda *_, **__: open_diagnosis())
+    monkeypatch.setattr(asking, "diagnosis_report", lambda path, _: path.write_text("a report", encoding="utf-8"))
+    return tmp_path
+
+
+def test_a_killed_run_is_gone_on_with_and_a_second_one_touches_nothing(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+):
+    def killed(*_: object, **__: object) -> None:
+        raise KilledError
+
+    for name in ("write_json", "design_excitation", "write_joint_trajectory"):
+        with monkeypatch.context() as patch:
+            patch.setattr(asking, name, killed)
+            with pytest.raises(KilledError):
+                ask(folder, QUICK)
+    # What a process that could not clean up leaves.
+    (folder / "next" / ".scara-ident-left").mkdir(parents=True)
+    with monkeypatch.context() as patch:
+        # Its recordings were diagnosed before it was killed.
+        patch.setattr(asking, "diagnose", killed)
+        found = ask(folder, QUICK)
+    assert found.state == "record" and PAIR in found.words and found.asked[0] == PAIR
+    once = contents(folder)
+    named = {f"next/{name}" for name in asking.FILES} | {"diagnosis.json", "report.html", "ask.json"}
+    assert set(once) == named | {f"recordings/{item.name}.parquet" for item in small_runs()}
+    assert ask(folder, QUICK) == found == read_asked(folder)
+    assert contents(folder) == once
+    tells = json.loads((folder / "next" / "excitation.json").read_text())["tells"]
+    assert tells[0]["question"] == PAIR and tells[0]["sigma_after"] > tells[0]["sigma_before"]
+    # Without a stop in between it comes to the same.
+    (folder / "ask.json").unlink()
+    ask(folder, QUICK)
+    again = contents(folder)
+    assert (
+        again["next/trajectory.csv"][0] == once["next/trajectory.csv"][0]
+        and again["ask.json"][0] == once["ask.json"][0]
+    )
+
+
+def test_a_question_that_recordings_did_not_answer_is_not_asked_for_ever():
+    first, *_ = questions(open_diagnosis())
+    general = Question("parameter", "value of a", parameter="a", size=1.0)
+    hidden = Question("below_limit", "what these recordings hardly show", first.suspects)
+    inquiry = replace(inquire(open_diagnosis(), []), questions=(first, hidden, general))
+    assert first in still_open(inquiry, "explained", {PAIR: 1})
+    assert first not in still_open(inquiry, "explained", {PAIR: 2})
+    assert (key_of(first), key_of(hidden), key_of(general)) == (PAIR, "below_limit", "parameter")
+    once = {"parameter": 1, "below_limit": 1}
+    assert still_open(inquiry, "explained", once) == [first]
+    assert still_open(inquiry, "undecided", once) == [first, hidden, general]
+
+
+def test_only_a_motion_that_makes_surer_is_recorded():
+    one = Question("parameter", "a", parameter="a", size=1.0)
+    told = [Told(one, 1.0, 8.0), Told(one, 1.0, 4.0), Told(one, 7.0, 8.0)]
+    assert worth_recording(told) == told[:1]
+
+
+def test_where_nothing_is_open_it_says_so_and_no_motion_is_left(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    (folder / "next").mkdir()
+    (folder / "next" / "trajectory.csv").write_text("an old one", encoding="utf-8")
+    monkeypatch.setattr(asking, "still_open", lambda *_: [])
+    assert ask(folder, QUICK).state == "settled"
+    assert not (folder / "next" / "trajectory.csv").exists()
+
+
+def test_a_note_that_is_none_is_said(tmp_path: Path):
+    (tmp_path / "ask.json").write_text("[]", encoding="utf-8")
+    with pytest.raises(ScaraIdentError, match="remove it to begin again"):
+        read_asked(tmp_path)
+    assert read_asked(tmp_path / "nowhere") is None
+    assert Asked("x").state is None
