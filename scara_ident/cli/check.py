@@ -10,7 +10,7 @@ import typer
 from scara_ident.cli import options
 from scara_ident.cli.console import check_report, result_console, table
 
-Result = Annotated[Path, typer.Argument(metavar="RESULT", help="identification.json of this arm.")]
+Result = Annotated[Path, typer.Argument(metavar="RESULT", help="identification.json or diagnosis.json of this arm.")]
 
 
 def check(
@@ -42,14 +42,14 @@ def check(
     from scara_ident.cli.joint_values import joint_numbers, joint_ranges
     from scara_ident.errors import ScaraIdentError
     from scara_ident.files import write_json, written_together
-    from scara_ident.robot.robot import load_robot
     from scara_ident.use.check import check as run
     from scara_ident.use.check import check_dict, read_motion
     from scara_ident.use.joint_limits import joint_limits
     from scara_ident.use.known_model import read_known_model
 
     check_report(output, "check")
-    arm = load_robot(robot)
+    known = read_known_model(result, robot)
+    arm = known.robot
     limits = joint_limits(
         arm,
         ranges=joint_ranges(ranges, "--range"),
@@ -58,7 +58,6 @@ def check(
         torques=joint_numbers(torques, "--torque"),
         powers=joint_numbers(powers, "--power"),
     )
-    known = read_known_model(result, arm)
     found = run(known, read_motion(trajectory, known), limits)
     content = check_dict(found)
     console = result_console(content, json)

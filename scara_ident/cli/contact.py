@@ -13,7 +13,9 @@ from scara_ident.cli.console import READING_SHARE, check_report, progress, resul
 
 def contact(
     recordings: options.Recordings,
-    result: Annotated[Path, typer.Argument(metavar="RESULT", help="identification.json of this arm.")],
+    result: Annotated[
+        Path, typer.Argument(metavar="RESULT", help="identification.json or diagnosis.json of this arm.")
+    ],
     free: Annotated[
         list[str],
         typer.Option("--free", metavar="RECORDING", help="Without contact: thresholds are taken from it; repeatable."),
@@ -31,13 +33,12 @@ def contact(
 
     from scara_ident.files import write_json, written_together
     from scara_ident.recording.recording import read_usable
-    from scara_ident.robot.robot import load_robot
     from scara_ident.use.contact import contact_observer, contacts_dict, look_for_contact
     from scara_ident.use.known_model import read_known_model
 
     check_report(output, "contact")
-    arm = load_robot(robot)
-    known = read_known_model(result, arm)
+    known = read_known_model(result, robot)
+    arm = known.robot
     with progress() as work:
         work("reading recordings", 0.0)
         quiet, notes = read_usable(free, arm)

@@ -20,6 +20,8 @@ from scara_ident.estimation import Estimate
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.estimation.information import Information, weighted
 from scara_ident.estimation.observations import Observations
+from scara_ident.files import path_fault
+from scara_ident.model import MODELS
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.robot.description import check_description
 from scara_ident.robot.robot import Robot, build_robot, load_robot
@@ -115,9 +117,11 @@ def read_identified(path: Path | str, robot: Path | str | None = None) -> Identi
         In one line: the file cannot be read or is none of these, or its robot is not to be had.
     """
     path = Path(path)
-    content = _read(path)
+    content = read_content(path)
     known = content[KEY]
     arm = _robot(known["robot"], path) if robot is None else load_robot(robot)
+    if content["model"] not in MODELS.names():
+        raise ScaraIdentError(f"{path}: model {content['model']!r} is not known here; install the package that adds it")
     base = build_model(arm, content["model"])
     model = _with_effects(base, known, path)
     parameters = content["parameters"]
@@ -143,12 +147,21 @@ def read_identified(path: Path | str, robot: Path | str | None = None) -> Identi
     )
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_content(path: Path) -> dict[str, Any]:
+    """Return what an ``identification.json`` or ``diagnosis.json`` holds.
+
+    Raises
+    ------
+    ScaraIdentError
+        In one line, if it cannot be read or is none of these.
+    """
+    if (fault := path_fault(path)) is not None:
+        raise ScaraIdentError(fault)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ScaraIdentError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError:
+    except (ValueError, RecursionError):
         raise ScaraIdentError(f"{path}: not JSON; give an identification.json or diagnosis.json") from None
     if not isinstance(content, dict) or not {KEY, "model", "parameters"} <= set(content):
         raise ScaraIdentError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +13,9 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation.estimate import joint_errors
+from scara_ident.export.result import read_content, read_identified
 from scara_ident.identification.identify import Identification
-from scara_ident.model import MODELS
-from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
@@ -83,62 +82,33 @@ def known_model(found: Identification | Diagnosis) -> KnownModel:
     return KnownModel(estimate.model, estimate.value, tuple(bands), rms)
 
 
-def read_known_model(path: Path | str, robot: Robot) -> KnownModel:
-    """Read the model of an ``identification.json``.
+def read_known_model(path: Path | str, robot: Path | None = None) -> KnownModel:
+    """Read the model of an ``identification.json``, or of a ``diagnosis.json`` with the effects found.
 
     Parameters
     ----------
     path : path
-    robot : Robot
-        The one that was identified.
+    robot : path, optional
+        A robot description to take instead of the one that the result was found with.
 
     Raises
     ------
     ScaraIdentError
-        In one line: it cannot be read, is no such file, or is of another robot or model.
+        In one line: it cannot be read, is no such file, is of another robot, or leaves a parameter open.
     """
-    content = _read(Path(path))
-    if content.get("effects"):
-        raise ScaraIdentError(
-            f"{path}: has effects, which are not read from a file; give the identification.json of the same recordings"
-        )
-    try:
-        name, rows = str(content["model"]), {str(row["name"]): row["value"] for row in content["parameters"]}
-    except (KeyError, TypeError):
-        raise ScaraIdentError(f"{path}: no model in it; give the identification.json that identify wrote") from None
-    if name not in MODELS.names():
-        raise ScaraIdentError(f"{path}: model {name!r} is not known here; install the package that adds it")
-    model = build_model(robot, name)
-    if set(rows) != set(model.names):
-        unlike = sorted(set(rows) ^ set(model.names))
-        raise ScaraIdentError(
-            f"{path}: parameter {unlike[0]!r} is not of both the file and the model {name} of {robot.name}; give the "
-            "--robot that was identified"
-        )
-    value = np.array([rows[each] for each in model.names], dtype=float)
-    if not np.all(np.isfinite(value)):
-        missing = [each for each, x in zip(model.names, value, strict=True) if not np.isfinite(x)]
-        raise ScaraIdentError(f"{path}: parameter {missing[0]!r} has no value; record motion that determines it")
-    bands = content.get("band_hz") or {}
-    return KnownModel(model, value, tuple(bands.get(joint) for joint in robot.joints), _rms(content, robot.joints))
-
-
-def _read(path: Path) -> Mapping[str, Any]:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScaraIdentError(
-            f"{path}: cannot be read: {error.strerror or error}; give an identification.json"
-        ) from None
-    except ValueError:
-        raise ScaraIdentError(f"{path}: not JSON; give the identification.json that identify wrote") from None
-    if not isinstance(content, dict):
-        raise ScaraIdentError(f"{path}: no model in it; give the identification.json that identify wrote")
-    return content
+    found, content = read_identified(path, robot), read_content(Path(path))
+    if found.undetermined.any():
+        missing = found.model.names[int(np.argmax(found.undetermined))]
+        raise ScaraIdentError(f"{path}: parameter {missing!r} has no value; record motion that determines it")
+    bands, joints = content.get("band_hz") or {}, found.robot.joints
+    return KnownModel(found.model, found.value, tuple(bands.get(joint) for joint in joints), _rms(content, joints))
 
 
 def _rms(content: Mapping[str, Any], joints: Sequence[str]) -> Array:
     """Return the rms error over the recordings held out, else over those fitted, all counted alike; NaN where none is told."""
+    whole = content.get("validation") or content.get("training")
+    if whole:
+        return np.array([whole["after_unfiltered"][joint] for joint in joints], dtype=float)
     errors = content.get("errors") or {}
     runs = [run for run in (errors.get("validation") or errors.get("training") or {}).values() if run]
     found = np.full(len(joints), np.nan)

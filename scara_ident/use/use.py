@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RecordingError, RobotError, ScaraIdentError, UsageError
+from scara_ident.errors import RecordingError, RobotError, UsageError
 from scara_ident.motion.prepared import prepare
 from scara_ident.progress import Tell, silent
 from scara_ident.recording.recording import Recording
@@ -89,29 +87,6 @@ class Use:
             name: np.sqrt(np.mean([run[place].rms ** 2 for run in self.runs], axis=0))
             for place, name in enumerate(names)
         }
-
-
-def read_result(path: Path) -> dict[str, Any]:
-    """Read an ``identification.json`` or a ``diagnosis.json``.
-
-    Raises
-    ------
-    ScaraIdentError
-        In one line, if it cannot be read or is none.
-    """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScaraIdentError(
-            f"{path}: cannot be read: {error.strerror or error}; give the result of identify"
-        ) from None
-    except ValueError:
-        content = None
-    if not isinstance(content, dict) or "parameters" not in content:
-        raise ScaraIdentError(
-            f"{path}: no parameters in it; give the identification.json or diagnosis.json that was written"
-        )
-    return content
 
 
 def used_model(content: Mapping[str, Any], robot: Robot) -> UsedModel:

@@ -7,13 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
+from scara_ident.files import plain
+from scara_ident.report.identification import identification_dict
 from scara_ident.robot.robot import load_robot
+from tests.report.simulated import made, run
 from tests.simulation.made import swing
-from tests.use.made import content
+
+SPRING = {"stiffness": {"value": 0.4, "std": 0.01}, "rest_position": {"value": 0.1, "std": None}}
 
 
 def test_the_command_writes_the_table_and_the_report(command, tmp_path: Path) -> None:
-    (tmp_path / "diagnosis.json").write_text(json.dumps(content()), encoding="utf-8")
+    found = identification_dict(made([run("OJD_1", 1), run("OJD_2", 2)], bands=[15.0, 15.0]))
+    content = found | {"effects": [{"effect": "spring", "joint": "joint1", "parameters": SPRING}]}
+    (tmp_path / "diagnosis.json").write_text(json.dumps(plain(content)), encoding="utf-8")
     motion = swing(load_robot(), 0.5)
     columns = {"time": motion.time}
     for kind in ("position", "velocity", "acceleration"):

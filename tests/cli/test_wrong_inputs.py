@@ -144,6 +144,18 @@ OTHERS = [
     ("excite --robot endless.urdf", 1, ("endless.urdf: joint 'joint1' has no position limits", "give <limit")),
     ("demo --seed=-1", 2, ("--seed", "greater than or equal to 0")),
     ("demo extra", 2, ("unexpected extra argument", "see scara-ident demo --help")),
+    # what is done with a result
+    ("use", 2, ("RESULT", "see scara-ident use --help")),
+    ("use missing.json", 1, ("missing.json: cannot be read",)),
+    ("use text_1.csv", 1, ("text_1.csv: not JSON", "give an identification.json or diagnosis.json")),
+    ("check missing.csv missing.json", 1, ("missing.json: cannot be read",)),
+    ("contact good_1.csv missing.json --free good_1.csv", 1, ("missing.json: cannot be read",)),
+    ("export missing.json --to c", 1, ("missing.json: cannot be read",)),
+    ("export missing.json --to word", 2, ("--to", "'word' is not one of 'urdf', 'mjcf'")),
+    ("fleet nothing", 1, ("nothing",)),
+    ("fleet missing", 2, ("missing: no such folder",)),
+    ("ask good_1.csv", 1, ("good_1.csv",)),
+    ("excite --tell missing.json", 1, ("missing.json: cannot be read", "give a diagnosis.json")),
     # base and paper
     ("base extra", 2, ("unexpected extra argument", "extra", "see scara-ident base --help")),
     ("base --robot", 2, ("--robot", "requires an argument")),
@@ -215,7 +227,7 @@ def test_a_wrong_input_is_one_line_and_changes_nothing(
 ):
     monkeypatch.chdir(wrong)
     given = words.split()
-    if "--output" not in given and given[0] not in ("inspect", "identfy"):
+    if "--output" not in given and given[0] not in ("inspect", "identfy", "ask"):
         given[1:1] = ["--output", str(results)]
     before = state(wrong), state(results)
     answer = command(*given)

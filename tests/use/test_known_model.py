@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import ScaraIdentError
-from scara_ident.robot.robot import load_robot
 from scara_ident.use.known_model import KnownModel, read_known_model
 from tests.arms import motion, sines
 
 
 def test_a_file_gives_the_model_that_was_identified(known: KnownModel, result_file: Path):
-    read = read_known_model(result_file, load_robot())
+    read = read_known_model(result_file)
     assert read.model.name == "complete"
     np.testing.assert_array_equal(read.value, known.value)
     assert read.bands == known.bands
@@ -40,10 +39,12 @@ def test_parts_add_up_to_the_torque_of_the_estimate(identified, known: KnownMode
     [
         (None, "cannot be read"),
         ("[", "not JSON"),
-        ({}, "no model in it"),
-        ({"effects": [{"effect": "spring"}]}, "effects, which are not read"),
-        ({"model": "mine"}, "model 'mine' is not known"),
-        ({"parameters": [{"name": "P_d1", "value": 1.0}]}, "give the --robot that was identified"),
+        ({}, "holds no model"),
+        ({"model": "mine"}, "model 'mine'"),
+        (
+            {"parameters": [{"name": "P_d1", "joint": None, "meaning": "", "value": 1.0, "std": 1.0}]},
+            "--robot of the arm",
+        ),
         ("null", "parameter 'P_d2' has no value"),
     ],
 )
@@ -51,7 +52,7 @@ def test_another_file_is_one_line(result_file: Path, tmp_path: Path, change, sai
     path = tmp_path / "identification.json"
     content = json.loads(result_file.read_text())
     if change == "null":
-        content["parameters"][1]["value"] = None
+        content["parameters"][1] |= {"value": None, "std": None, "undetermined": True}
     elif change == {}:
         content = {}
     elif isinstance(change, dict):
@@ -59,6 +60,6 @@ def test_another_file_is_one_line(result_file: Path, tmp_path: Path, change, sai
     if change is not None:
         path.write_text(change if change == "[" else json.dumps(content))
     with pytest.raises(ScaraIdentError, match=said) as caught:
-        read_known_model(path, load_robot())
+        read_known_model(path)
     assert "\n" not in str(caught.value)
     assert str(path) in str(caught.value)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.errors import UsageError
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
 from scara_ident.use import use, used_model
-from scara_ident.use.use import read_result
 from tests.simulation.made import swing
 from tests.use.made import content
 
@@ -26,7 +23,7 @@ def test_the_effect_wins_in_tracking_and_in_rollouts() -> None:
     assert found.rollouts["effects"][-1, 0] < 0.5 * found.rollouts["identified"][-1, 0]
 
 
-def test_what_is_no_result_is_refused_in_one_line(tmp_path: Path) -> None:
+def test_what_is_no_result_is_refused_in_one_line() -> None:
     arm = virtual_arm()
     with pytest.raises(UsageError, match=r"identified for panda, the robot given is scara03"):
         used_model(content() | {"robot": "panda"}, arm.robot)
@@ -34,8 +31,3 @@ def test_what_is_no_result_is_refused_in_one_line(tmp_path: Path) -> None:
         used_model(content() | {"model": "mine"}, arm.robot)
     with pytest.raises(UsageError, match="no parameters are in it"):
         used_model({"robot": "scara03"}, arm.robot)
-    with pytest.raises(ScaraIdentError, match="cannot be read"):
-        read_result(tmp_path / "none.json")
-    (tmp_path / "other.json").write_text("[1, 2", encoding="utf-8")
-    with pytest.raises(ScaraIdentError, match="no parameters in it"):
-        read_result(tmp_path / "other.json")
