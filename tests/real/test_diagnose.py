@@ -86,7 +86,7 @@ def test_what_is_found_on_half_of_the_ur10e_holds_on_recordings_that_nothing_saw
     """
     arm = shared_path("data", "ur10e")
     one, other = measured.halves(read_recordings([arm], load_robot(arm / "robot.yaml")))
-    found = measured.direction(arm, "basic", other[:4], one[:4])
+    found = measured.direction(arm, "basic", other, one)
     ratios = {(item["effect"], item["joint"]): item["ratio"] for item in found["effects"]}
     assert {(name, joint) for name, joint in ratios if name == "transmission_loss"} == {
         ("transmission_loss", "shoulder_lift_joint"),
