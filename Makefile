@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 demo: $(STAMP)
 	$(BIN)/scara-ident demo --output demo-output
 
-# While working: a minute or so. Before a change lands: everything.
+# While working: three minutes. Before a change lands: everything.
 check: lint types fast
 
 test: lint types unit

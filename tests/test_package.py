@@ -16,6 +16,8 @@ import pytest
 
 from tests.shared import PATIENCE, ROOT
 
+pytestmark = pytest.mark.slow
+
 PACKAGE = ROOT / "scara_ident"
 
 

@@ -14,6 +14,8 @@ from scara_ident.recording.recording import read_recordings
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import virtual_arm
 
+pytestmark = pytest.mark.slow
+
 BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 
 

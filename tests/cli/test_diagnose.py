@@ -5,8 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from scara_ident.recording.recording import write_recording
 from tests.diagnosis.made import held_out_run, virtual_runs
+
+pytestmark = pytest.mark.slow
 
 EFFECT = "spring:joint1"
 

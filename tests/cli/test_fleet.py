@@ -9,6 +9,8 @@ import pytest
 
 from tests.fleet.made import write_fleet
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:

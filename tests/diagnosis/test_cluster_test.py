@@ -13,6 +13,8 @@ from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.estimation.observations import JointRows
 
+pytestmark = pytest.mark.slow
+
 ROWS = 13
 
 

@@ -19,6 +19,8 @@ from scara_ident.errors import UsageError
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, RATE, complete, exact_runs, held_out_run, virtual_runs, with_torque
 
+pytestmark = pytest.mark.slow
+
 ROBOT = load_robot()
 DELAYS = (TimeDelay(), Spring(), Stribeck(), AsymmetricFriction())
 

@@ -26,6 +26,8 @@ from scara_ident.simulation import parse_effect, simulate, virtual_arm
 from tests.arms import noisy, recorded_torque, recording, rnea, sines
 from tests.diagnosis.made import NOISE, exact_runs, multisine, step_beside, with_torque
 
+pytestmark = pytest.mark.slow
+
 UR5_BANDS = (10.0,) * 6
 UR5_LOSS = (0.1, 0.07, 0.0, 0.0, 0.0, 0.0)
 WEIGHTS = 1.0 / np.array(NOISE)

@@ -21,6 +21,8 @@ from scara_ident.report.pictures import diagnosis_pictures
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import held_out_run, virtual_runs
 
+pytestmark = pytest.mark.slow
+
 HIDDEN = "spring:joint1"
 Counts = dict[str, Counter[Hashable]]
 

@@ -8,6 +8,8 @@ from scara_ident.effects import CATALOGUE, Effect, EffectTerm, SpectralLine
 from scara_ident.robot.robot import load_robot
 from tests.effects.scenes import scene_of
 
+pytestmark = pytest.mark.slow
+
 # What they take besides: what came before, time, or the name of the recording.
 MORE_THAN_A_STATE = {
     "presliding", "warm_up", "offset_drift", "vibration", "payload_change", "time_delay", "joint_elasticity", "backlash",

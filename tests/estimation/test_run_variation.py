@@ -18,6 +18,8 @@ from scara_ident.robot.robot import load_robot
 from tests.arms import noisy, recorded_torque, recording
 from tests.diagnosis.made import NOISE, RATE, multisine, observed
 
+pytestmark = pytest.mark.slow
+
 ROBOT = load_robot()
 TRUTH = np.array(table5_parameters("OJD"))
 FRICTION = [TRUTH[5 + 4 * j : 9 + 4 * j] for j in range(2)]

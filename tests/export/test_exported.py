@@ -13,6 +13,8 @@ from scara_ident.export.exported import export_model, write_exported
 from scara_ident.export.forms import FORMS
 from tests.export.identified import NOISE, model_torque, states
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("effects", [False, True], ids=["plain", "effects"])
 @pytest.mark.parametrize("arm", ["scara", "ur5", "panda"])

@@ -7,6 +7,8 @@ from scara_ident.export.exported import export_model, write_exported
 from scara_ident.motion.motion import Motion
 from tests.export.identified import model_torque
 
+pytestmark = pytest.mark.slow
+
 mujoco = pytest.importorskip("mujoco", reason="needs MuJoCo, from the extra 'test'")
 
 

@@ -16,6 +16,8 @@ from scara_ident.fleet.table import COLUMNS, fleet_table
 from scara_ident.robot.robot import load_robot
 from tests.fleet.made import DATES, WORN
 
+pytestmark = pytest.mark.slow
+
 # Seconds after which another process hangs.
 PATIENCE = 300.0
 

@@ -26,6 +26,8 @@ from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import example_urdf, noisy, recorded_torque, recording, sines
 
+pytestmark = pytest.mark.slow
+
 RATE = 500.0
 SIGMA = (0.020, 0.008)
 # Table 5, column OJD: P_d1..P_d5, a01..a31, a02..a32, p_o1, p_o2.

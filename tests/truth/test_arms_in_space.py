@@ -11,6 +11,8 @@ from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import example_urdf
 from tests.truth.scenes import ROTORS, Added, Array, formula_run
 
+pytestmark = pytest.mark.slow
+
 REDUCTION, LOSS = 100.0, 0.08
 
 

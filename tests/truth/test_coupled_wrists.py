@@ -9,6 +9,8 @@ from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.robot.robot import load_robot
 from tests.truth.scenes import Array, formula_run
 
+pytestmark = pytest.mark.slow
+
 WRISTS = ["wrist_2_joint", "wrist_3_joint"]
 SHAFT = {"inertia": 0.08, "viscous": 0.6, "coulomb": 0.7}
 

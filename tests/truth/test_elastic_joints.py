@@ -13,6 +13,8 @@ from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
 from tests.effects.scenes import wandering
 
+pytestmark = pytest.mark.slow
+
 SECONDS, RATE = 14.0, 500.0
 
 

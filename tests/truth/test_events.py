@@ -13,6 +13,8 @@ from scara_ident.robot.robot import load_robot
 from tests.truth.pushes import pushed
 from tests.truth.scenes import formula_run
 
+pytestmark = pytest.mark.slow
+
 ROBOT = load_robot("ur5")
 # 7 to 27 N m on the first joint.
 PUSHES = (("run1", 4.0, 5.5, (25.0, 20.0, 0.0)), ("run3", 7.0, 7.8, (-30.0, 25.0, 10.0)))

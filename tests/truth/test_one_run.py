@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.robot.robot import load_robot
 from tests.truth.scenes import Array, formula_run
+
+pytestmark = pytest.mark.slow
 
 WRISTS = ("wrist_2_joint", "wrist_3_joint")
 VISCOUS, COULOMB = 1.5, 2.0

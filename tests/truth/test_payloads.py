@@ -19,6 +19,8 @@ from scara_ident.motion.prepared import prepare
 from scara_ident.robot.robot import load_robot
 from tests.truth.scenes import formula_run, payload_torque
 
+pytestmark = pytest.mark.slow
+
 PAYLOAD = pin.Inertia(1.2, np.array([0.08, -0.05, 0.12]), np.diag([0.004, 0.003, 0.005]))
 
 

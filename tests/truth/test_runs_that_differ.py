@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.identification.identify import identify
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from tests.estimation.test_run_variation import errors, runs
+
+pytestmark = pytest.mark.slow
 
 STEP = 2.0 * np.pi / 2**12
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.robot.robot import load_robot
 from tests.arms import noisy, recorded_torque, recording
 from tests.diagnosis.made import NOISE, multisine
 from tests.estimation.test_run_variation import TRUTH
+
+pytestmark = pytest.mark.slow
 
 FRICTION = [(*TRUTH[5 + 4 * j : 9 + 4 * j], 0.0) for j in range(2)]
 

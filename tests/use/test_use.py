@@ -10,6 +10,8 @@ from scara_ident.use import use, used_model
 from tests.simulation.made import swing
 from tests.use.made import content
 
+pytestmark = pytest.mark.slow
+
 
 def test_the_effect_wins_in_tracking_and_in_rollouts() -> None:
     arm = virtual_arm()
