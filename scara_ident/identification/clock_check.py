@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.estimation.information import orthonormal, weighted
 from scara_ident.estimation.observations import Observations
 
 # A drift is said where it is this many standard deviations from none, ...
@@ -36,19 +39,28 @@ def clock_drift(value: Array, observations: Observations) -> str | None:
         return None
     noise = np.array([rows.rms(value) for rows in observations.joints])
     weight = np.where(noise > 0.0, 1.0 / np.where(noise > 0.0, noise, 1.0), 0.0)
-    columns, others = [], []
+    models, lags, others = [], [], []
     for j, rows in enumerate(observations.joints):
-        own = np.zeros((observations.parameters, rows.table.shape[1]))
-        own[rows.columns] = rows.table[:-1]
         left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
         delays, growing = _delayed(value, observations, j)
-        columns.append(weight[j] * np.vstack([own, delays]))
+        models.append(rows.table[:-1] * weight[j])
+        lags.append(weight[j] * delays)
         others.append(weight[j] * np.vstack([growing, left]))
-    # What parameters and one delay for each recording explain is none of the drift's.
-    matrix, right = np.hstack(columns).T, np.hstack(others).T
-    size = np.linalg.norm(matrix, axis=0)
-    matrix = matrix / np.where(size > 0.0, size, 1.0)
-    growing, left = (right - matrix @ np.linalg.lstsq(matrix, right)[0]).T
+    # What parameters and one delay for each recording explain is none of the drift's: the model's columns are projected out
+    # by the triangular factor that is known, the delays by their few products.
+    root = orthonormal(weighted(observations.by_joint, weight).regressor_factor)
+
+    def in_model(signals: Sequence[Array]) -> Array:
+        own = zip(observations.joints, models, signals, strict=True)
+        return np.asarray(sum(root[rows.columns].T @ (model @ signal.T) for rows, model, signal in own))
+
+    lag, right = np.hstack(lags), np.hstack(others)
+    shared, told = in_model(lags), in_model(others)
+    products, score = lag @ lag.T - shared.T @ shared, lag @ right.T - shared.T @ told
+    late = np.linalg.pinv(products, rcond=1e-9, hermitian=True) @ score
+    known = root @ (told - shared @ late)
+    by_model = [known[rows.columns].T @ model for rows, model in zip(observations.joints, models, strict=True)]
+    growing, left = right - np.hstack(by_model) - late.T @ lag
     block = np.concatenate(
         [np.repeat(np.arange(len(rows.starts) - 1), np.diff(rows.starts)) for rows in observations.joints]
     )
