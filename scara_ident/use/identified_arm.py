@@ -95,6 +95,10 @@ def simulated(found: Sequence[Entry]) -> tuple[tuple[tuple[Effect, Entry], ...],
         if kind is None or not known:
             missing.append(item["effect"])
             continue
+        rest = item["parameters"].get("rest_position")
+        if rest is not None and (rest.get("std") is None or not np.isfinite(rest["std"])):
+            # It is the model's offset in other words, which the arm has: with both it would count twice.
+            known["rest_position"] = 0.0
         effect = kind(joint=None if kind.whole_arm == "always" else item["joint"])
         made.append((replace(effect, **known), item))
     return tuple(made), tuple(missing)

@@ -90,16 +90,23 @@ def needed_torque(arm: VirtualArm, effects: Sequence[Effect], motion: ReferenceM
     feed = np.asarray(torque / arm.scale[:, None])
     if not effects:
         return feed
+    scale = np.maximum(np.ptp(motion.position, axis=1), np.finfo(float).eps)[:, None]
     for faster in FASTER:
+        stiff = replace(ideal(arm), controller=arm.controller.faster(faster))
+        tried, learned, least = feed, feed, np.inf
         try:
-            learned = feed
-            stiff = replace(ideal(arm), controller=arm.controller.faster(faster))
-            for _ in range(ROUNDS):
-                learned = simulate(stiff, motion, effects=effects, feed=learned, rate=RATE).true.effort
-            return learned
+            for _ in range(ROUNDS + 1):
+                run = simulate(stiff, motion, effects=effects, feed=tried, rate=RATE)
+                error = float(np.sqrt(np.mean(((run.motion.position - run.true.position) / scale) ** 2)))
+                if error >= least:
+                    # What is faster than the controller, as a ripple, it makes worse.
+                    break
+                learned, least, tried = tried, error, run.true.effort
         except ScaraIdentError as error:
             # An elastic joint bears no fast controller.
             lost = error
+            continue
+        return learned
     raise lost
 
 

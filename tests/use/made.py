@@ -17,7 +17,7 @@ def content() -> dict[str, Any]:
         column.entry(value=value, std=1e-3 * abs(value)) | {"before": value}
         for column, value in zip(model.columns, _complete_parameters(arm), strict=True)
     ]
-    spring = {"stiffness": {"value": 0.4, "std": 0.01}, "rest_position": {"value": 0.1, "std": None}}
+    spring = {"stiffness": {"value": 0.4, "std": 0.01}, "rest_position": {"value": 0.1, "std": 0.01}}
     return {
         "robot": "scara03", "model": "complete", "parameters": entries, "band_hz": {"joint1": 25.0, "joint2": 25.0},
         "effects": [{"effect": "spring", "joint": "joint1", "parameters": spring}],

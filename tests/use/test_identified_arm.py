@@ -57,3 +57,11 @@ def test_effects_of_a_diagnosis_become_those_of_the_virtual_arm() -> None:
     ]
     assert [item for _, item in pairs] == found[:2]
     assert missing == ("drive_coupling",)
+
+
+def test_a_rest_position_that_is_the_models_offset_counts_once() -> None:
+    stiffness = {"value": 0.5, "std": 0.01}
+    for std, rest in ((0.01, 0.2), (None, 0.0), (np.inf, 0.0)):
+        told = {"stiffness": stiffness, "rest_position": {"value": 0.2, "std": std}}
+        ((spring, _),), _ = simulated([{"effect": "spring", "joint": "joint1", "parameters": told}])
+        assert spring.rest_position == rest

@@ -47,3 +47,13 @@ def test_an_arm_made_of_its_parameters_is_the_arm() -> None:
     same = arm_with(arm.robot, dict(zip(names, _complete_parameters(arm), strict=True)))
     motion = at_ticks(trial_motion(arm))
     np.testing.assert_allclose(needed_torque(same, (), motion), needed_torque(arm, (), motion), rtol=1e-9, atol=1e-9)
+
+
+def test_a_ripple_faster_than_the_controller_does_not_spoil_what_is_fed_forward() -> None:
+    arm = ideal(scara())
+    ripple = parse_effect("torque_ripple:joint2:order=2,amplitude=0.05").resolve(arm)
+    motion = trial_motion(arm, 1)
+    motion = at_ticks(motion.at(motion.time[:3000]))
+    feeds = {"without": needed_torque(arm, (), motion), "with": needed_torque(arm, [ripple], motion)}
+    found = {item.name: item.rms for item in tracked(arm, [ripple], motion, feeds)}
+    assert np.all(found["with"] < 1.1 * found["without"])
