@@ -22,8 +22,9 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from random import Random
 
@@ -200,12 +201,12 @@ def fuzz(
                     stray.unlink() if stray.is_file() else shutil.rmtree(stray)
 
 
-def _forked(make: object) -> str:
+def _forked(make: Callable[[], str]) -> str:
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
         try:
-            os.write(writer, make().encode())  # type: ignore[operator]
+            os.write(writer, make().encode())
         except BaseException as error:
             os.write(writer, f"NOT MADE: {type(error).__name__}: {error}".encode())
         finally:
@@ -221,20 +222,15 @@ def _forked(make: object) -> str:
 
 def import_program() -> None:
     """Import what the commands import while they run, once for all inputs."""
-    import h5py  # noqa: F401
-    import polars  # noqa: F401
-    import rosbags.highlevel  # noqa: F401
-    import scipy.io
-    import scipy.stats  # noqa: F401
-
-    import scara_ident.cli.main
-    import scara_ident.excitation.known
-    import scara_ident.export.robots
-    import scara_ident.identification.identify
-    import scara_ident.inspection.inspection
-    import scara_ident.report.html
-    import scara_ident.report.pictures
-    import scara_ident.simulation  # noqa: F401
+    for name in (
+        *("h5py", "polars", "rosbags.highlevel", "scipy.io", "scipy.stats"),
+        *(
+            f"scara_ident.{room}"
+            for room in ("cli.main", "excitation.known", "export.robots", "identification.identify")
+        ),
+        *(f"scara_ident.{room}" for room in ("inspection.inspection", "report.html", "report.pictures", "simulation")),
+    ):
+        import_module(name)
 
 
 def kills(count: int, seed: int) -> Counter[str]:

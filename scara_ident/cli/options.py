@@ -75,7 +75,7 @@ def limited(command: Callable[..., Any]) -> Callable[..., Any]:
     """Return a command with the option ``--max-memory`` beside its own."""
 
     @wraps(command)
-    def run(*arguments: Any, max_memory: float | None = None, **more: Any) -> Any:
+    def limited(*arguments: Any, max_memory: float | None = None, **more: Any) -> Any:
         set_limit(max_memory)
         return command(*arguments, **more)
 
@@ -83,9 +83,11 @@ def limited(command: Callable[..., Any]) -> Callable[..., Any]:
     types = get_type_hints(command, include_extras=True)
     own = [each.replace(annotation=types[each.name]) for each in signature(command).parameters.values()]
     extra = Parameter("max_memory", Parameter.KEYWORD_ONLY, default=None, annotation=MaxMemory)
-    run.__signature__ = Signature([*own, extra])  # type: ignore[attr-defined]
+    # typer asks for both; a function's type has no signature.
+    run: Any = limited
+    run.__signature__ = Signature([*own, extra])
     run.__annotations__ = {**types, "max_memory": MaxMemory}
-    return run
+    return limited
 
 
 class Command(TyperCommand):

@@ -15,7 +15,7 @@ from scara_ident.errors import RecordingError, UsageError
 from scara_ident.recording.files import IMPORTERS
 
 if TYPE_CHECKING:
-    from fsspec import AbstractFileSystem  # type: ignore[import-untyped]
+    from fsspec import AbstractFileSystem
 
 INSTALL = 'install it with: pip install "scara-ident[fleet]"'
 _DATE = re.compile(r"(?<![0-9])((?:19|20)[0-9]{2})-?([01][0-9])-?([0-3][0-9])(?![0-9])")
@@ -82,7 +82,7 @@ def file_system(folder: str) -> tuple[AbstractFileSystem, str]:
         If it has no such scheme, or the library for it is not installed.
     """
     try:
-        from fsspec.core import url_to_fs  # type: ignore[import-untyped]
+        from fsspec.core import url_to_fs
 
         fs, path = url_to_fs(folder)
     except ImportError as error:

@@ -245,7 +245,7 @@ class OnlineIdentifier:
 
         def write(place: Path) -> None:
             with place.open("wb") as file:
-                np.savez(file, **state)  # type: ignore[arg-type]
+                np.savez(file, allow_pickle=False, **state)
 
         write_whole(path, write)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -151,8 +152,8 @@ def csv(
     return write
 
 
-def bag(made: Columns, names: Sequence[str] = ARM, **how: object) -> Callable[[Path], Path]:
-    return lambda folder: write_bag(folder / "run_1", made, names=names, **how)  # type: ignore[arg-type]
+def bag(made: Columns, names: Sequence[str] = ARM, **how: Any) -> Callable[[Path], Path]:
+    return lambda folder: write_bag(folder / "run_1", made, names=names, **how)
 
 
 def apart(made: Columns, groups: Sequence[tuple[Sequence[str], float]]) -> Callable[[Path], Path]:
