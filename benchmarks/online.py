@@ -1,6 +1,7 @@
 """Identification beside a controller: updates a second, and how far apart false alarms are.
 
-Run ``python benchmarks/online.py [--hours H]``. False alarms are counted in noise alone, asked for once in an hour.
+Run ``python benchmarks/online.py [--hours H] [--seed S] [--only speed|alarms]``. False alarms are counted in noise
+alone, asked for once in an hour.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from scara_ident.online import OnlineIdentifier, OnlineSettings
 from scara_ident.robot.robot import load_robot
 
 SECONDS, NOISE_SHARE = 40.0, 0.05
+BLOCKS = (64, 512, 2048, 8192)
 
 
 def motion_of(model: TorqueModel, rate: float, seconds: float) -> Motion:
@@ -48,23 +50,26 @@ def speed(name: str | None) -> None:
     for sample in zip(*samples, strict=True):
         single.update(*sample)
     cpu, wall = time.process_time() - start[0], time.perf_counter() - start[1]
-    blocks = OnlineIdentifier(model, sigma, OnlineSettings(block=512))
-    start = time.process_time(), time.perf_counter()
-    blocks.update_block(motion.q, motion.v, motion.a, effort)
-    spent = time.process_time() - start[0]
     count, n = motion.samples, model.robot.n
     print(
-        f"{model.robot.name}: {n} joints, {len(model.columns)} parameters: {count / cpu:.0f} single updates/s ({count / wall:.0f} on "
-        f"the clock), blocks {n * count / spent / 1e6:.2f} million rows/s; load {os.getloadavg()[0]:.1f}"
+        f"{model.robot.name}: {n} joints, {len(model.columns)} parameters: {count / cpu:.0f} single updates/s "
+        f"({count / wall:.0f} on the clock); load {os.getloadavg()[0]:.1f}"
     )
+    for block in BLOCKS:
+        blocks = OnlineIdentifier(model, sigma, OnlineSettings(block=block, window=10.0))
+        start = time.process_time(), 0.0
+        blocks.update_block(motion.q, motion.v, motion.a, effort)
+        spent = time.process_time() - start[0]
+        print(f"  blocks of {block}: {n * count / spent / 1e6:.2f} million rows/s")
 
 
-def false_alarms(hours: float) -> None:
-    model, rate = build_model(load_robot(), "basic"), 100.0
+def false_alarms(hours: float, seed: int) -> None:
+    """Count alarms in noise alone; the chart counts blocks, here of one second each, whatever the rate."""
+    model, rate = build_model(load_robot(), "basic"), 50.0
     settings = OnlineSettings(rate=rate, block=50, false_alarms=1.0, window=2.0, memory=3600.0)
     motion = motion_of(model, rate, 300.0)
     clean, sigma = torque_of(model, motion)
-    online, random, alarms = OnlineIdentifier(model, sigma, settings), np.random.default_rng(3), 0
+    online, random, alarms = OnlineIdentifier(model, sigma, settings), np.random.default_rng(seed), 0
     rounds = max(1, round(hours * 3600.0 / 300.0))
     for _ in range(rounds):
         effort = clean + sigma[:, None] * random.standard_normal(clean.shape)
@@ -75,10 +80,13 @@ def false_alarms(hours: float) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=100.0)
+    parser.add_argument("--seed", type=int, default=3)
+    parser.add_argument("--only", choices=("speed", "alarms"))
     options = parser.parse_args()
-    for name in (None, "panda"):
+    for name in (None, "panda") if options.only != "alarms" else ():
         speed(name)
-    false_alarms(options.hours)
+    if options.only != "speed":
+        false_alarms(options.hours, options.seed)
 
 
 if __name__ == "__main__":
