@@ -177,7 +177,8 @@ def _draw_panel(axis: Axes, panel: Panel, plot: Plot) -> None:
         axis.set_aspect("equal", adjustable="datalim")
     # Limits are found only when asked for; from here on they stay.
     axis.autoscale_view()
-    axis.autoscale(False)
+    # Where scales are to be equal, one of them must give way.
+    axis.autoscale(plot.equal)
     for layer in panel.layers:
         if layer not in fitted:
             _draw_layer(axis, layer)

@@ -66,3 +66,9 @@ def test_a_picture_that_cannot_be_written_is_one_line_and_leaves_nothing(tmp_pat
         draw(tmp_path / "a.docx", "", [[line(Line([0.0, 1.0], [0.0, 1.0], "blue"))]])
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_equal_scales_are_drawn_without_a_word(tmp_path: Path, caplog: pytest.LogCaptureFixture):
+    wide = Plot("x [m]", (Panel("y [m]", (Line([0.0, 9.0], [0.0, 1.0], "blue"),), limits=(-1.0, 1.0)),), equal=True)
+    draw(tmp_path / "equal.png", "", [[single("name", "title", "", wide)]])
+    assert caplog.text == ""
