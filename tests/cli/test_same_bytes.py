@@ -1,0 +1,31 @@
+"""The same recordings give the same bytes, wherever the program runs."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PLACES = (
+    {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "LC_ALL": "C", "TZ": "UTC", "PYTHONHASHSEED": "0"},
+    {"OMP_NUM_THREADS": "4", "OPENBLAS_NUM_THREADS": "4", "LC_ALL": "C.UTF-8", "TZ": "Asia/Kathmandu", "PYTHONHASHSEED": "4242"},
+)  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [("identify", "--method", "consistent"), ("diagnose",)], ids=" ".join)
+def test_threads_locale_time_zone_and_hash_seed_change_no_byte(words: tuple[str, ...], folder: Path, tmp_path: Path):
+    written = []
+    for k, place in enumerate(PLACES):
+        output = tmp_path / str(k)
+        subprocess.run(
+            [sys.executable, "-m", "scara_ident", *words, *sorted(folder.glob("OJD*")), "--validate", *folder.glob("CI*"),
+             "--output", output],
+            env={**os.environ, **place}, check=True, capture_output=True,
+        )  # fmt: skip
+        written.append({path.name: path.read_bytes() for path in output.iterdir()})
+    assert len(written[0]) > 0
+    assert written[0] == written[1]
