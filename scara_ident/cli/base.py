@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isnan
+
 from scara_ident.cli import options
 from scara_ident.cli.console import result_console, table
 
@@ -20,9 +22,10 @@ def base(robot: options.Robot = None, output: options.Output = None, json: optio
     for body in content["bodies"]:
         bodies.add_row(str(body["number"]), body["joint"], body["link"], f"{body['reduction']:g}")
     console.print(bodies)
-    rows = table(f"{arm.name}: {content['count']} base parameters", "name", "unit", "made of")
+    rows = table(f"{arm.name}: {content['count']} base parameters", "name", "URDF", "unit", "made of", right=("URDF",))
     for row in content["base_parameters"]:
-        rows.add_row(row["name"], row["unit"], row["expression"])
+        value = "" if isnan(row["urdf"]) else f"{row['urdf']:.4g}"
+        rows.add_row(row["name"], value, row["unit"], row["expression"])
     console.print(rows)
     console.print(f"never enter the torque: {', '.join(content['never_enter']) or 'none'}")
     console.print(f"enter only in sums: {', '.join(content['only_in_sums']) or 'none'}")

@@ -6,6 +6,7 @@ from typing import Any
 
 from scara_ident.model.base_parameters import check_base_parameters
 from scara_ident.model.terms.rigid_body import rigid_body
+from scara_ident.model.urdf_values import urdf_base_values
 from scara_ident.robot.robot import Robot
 
 
@@ -15,6 +16,7 @@ def base_dict(robot: Robot) -> dict[str, Any]:
     base = term.base
     check = check_base_parameters(robot, base)
     names = base.standard_names
+    stated = urdf_base_values(robot, term)
     return {
         "robot": robot.name,
         "bodies": [
@@ -27,6 +29,7 @@ def base_dict(robot: Robot) -> dict[str, Any]:
                 "name": column.name,
                 "joint": column.joint,
                 "unit": column.unit,
+                "urdf": stated[k],
                 "expression": base.expression(k),
                 "made_of": {names[i]: base.grouping[k, i] for i in range(len(names)) if base.grouping[k, i] != 0.0},
             }

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pytest
 
 from scara_ident.files import plain
+from scara_ident.model.terms.rigid_body import rigid_body
 from scara_ident.report.base import base_dict
 from scara_ident.robot.robot import load_robot
 from tests.arms import example_urdf
@@ -19,6 +21,10 @@ def test_the_scara03_is_told():
     first = content["base_parameters"][0]
     assert first["expression"] == "I1zz + 0.1089 m2 + 10000 Jm1"
     np.testing.assert_allclose([first["made_of"][name] for name in ("I1zz", "m2", "Ia1")], [1.0, 0.1089, 1.0])
+    robot = load_robot()
+    values = dict(zip(rigid_body(robot).base.standard_names, robot.standard_parameters(), strict=True))
+    for row in content["base_parameters"]:
+        assert row["urdf"] == pytest.approx(sum(share * values[name] for name, share in row["made_of"].items()))
     assert [body["link"] for body in content["bodies"]] == ["link1", "link2"]
     assert content["check"]["passed"] is True
     assert content["check"]["rank"] == 5
@@ -30,3 +36,7 @@ def test_every_standard_parameter_is_alone_in_sums_or_never_there():
     groups = [alone, set(content["only_in_sums"]), set(content["never_enter"])]
     assert sum(len(group) for group in groups) == 22
     assert len(set.union(*groups)) == 22
+    # Nobody stated its rotors' inertia.
+    rotors = [any(name.startswith("Ia") for name in row["made_of"]) for row in content["base_parameters"]]
+    assert any(rotors)
+    assert [bool(np.isnan(row["urdf"])) for row in content["base_parameters"]] == rotors
