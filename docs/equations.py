@@ -1,4 +1,7 @@
-"""Turn the equations of a page into MathML while the site is built, so that a browser draws them offline."""
+"""Turn the equations of a page into MathML while the site is built, so that a browser draws them offline.
+
+A Python-Markdown extension, named in mkdocs.yml; it goes after pymdownx.arithmatex, which finds the equations.
+"""
 
 from __future__ import annotations
 
@@ -7,22 +10,36 @@ import re
 from typing import Any
 
 from latex2mathml.converter import convert
-from mkdocs.exceptions import PluginError
+from markdown import Extension, Markdown
+from markdown.postprocessors import Postprocessor
 
 _EQUATION = re.compile(
     r'<(?P<tag>span|div) class="arithmatex">\\(?P<open>[(\[])(?P<tex>.*?)\\[)\]]</(?P=tag)>', re.DOTALL
 )
 
 
-def on_page_content(content: str, *, page: Any, **_: Any) -> str:
-    """Replace every equation of a page; called by MkDocs."""
+def _drawn(found: re.Match[str]) -> str:
+    tex = html.unescape(found["tex"]).strip()
+    result = str(convert(tex, display="block" if found["open"] == "[" else "inline"))
+    if "\\" in result:
+        raise ValueError(f"an equation that cannot be drawn: {tex}")
+    return result
 
-    def replace(found: re.Match[str]) -> str:
-        tex = html.unescape(found["tex"]).strip()
-        display = "block" if found["open"] == "[" else "inline"
-        result = str(convert(tex, display=display))
-        if "\\" in result:
-            raise PluginError(f"{page.file.src_path}: an equation that cannot be drawn: {tex}")
-        return result
 
-    return _EQUATION.sub(replace, content)
+class _Equations(Postprocessor):
+    def run(self, text: str) -> str:
+        """Replace every equation of a page."""
+        return _EQUATION.sub(_drawn, text)
+
+
+class EquationsExtension(Extension):
+    """Equations as MathML."""
+
+    def extendMarkdown(self, md: Markdown) -> None:
+        """Come after all that puts HTML in its place."""
+        md.postprocessors.register(_Equations(md), "equations", -10)
+
+
+def makeExtension(**settings: Any) -> EquationsExtension:
+    """Return the extension; called by Python-Markdown."""
+    return EquationsExtension(**settings)

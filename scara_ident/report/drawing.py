@@ -79,12 +79,12 @@ def draw(path: Path, title: str, rows: Sequence[Sequence[Figure]]) -> None:
     write_whole(path, write)
 
 
-def canvas(title: str, rows: Sequence[Sequence[Figure]]) -> Canvas:
-    """Return figures in rows as one picture, see `draw`."""
+def canvas(title: str, rows: Sequence[Sequence[Figure]], *, least_width: float = LEAST_WIDTH) -> Canvas:
+    """Return figures in rows as one picture of at least a width, inches, see `draw`."""
     from matplotlib.figure import Figure as Canvas
 
     rows = [row for row in rows if row]
-    width = max(LEAST_WIDTH, LEAST_COLUMN * max((len(row) for row in rows), default=1))
+    width = max(least_width, LEAST_COLUMN * max((len(row) for row in rows), default=1))
     told: set[str] = set()
     legends = []
     for row in rows:
