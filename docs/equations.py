@@ -19,11 +19,12 @@ _EQUATION = re.compile(
 
 
 def _drawn(found: re.Match[str]) -> str:
-    tex = html.unescape(found["tex"]).strip()
-    result = str(convert(tex, display="block" if found["open"] == "[" else "inline"))
+    tex, block = html.unescape(found["tex"]).strip(), found["open"] == "["
+    result = str(convert(tex, display="block" if block else "inline"))
     if "\\" in result:
         raise ValueError(f"an equation that cannot be drawn: {tex}")
-    return result
+    # A long one scrolls on a narrow screen, by the keyboard too.
+    return f'<div class="equation" role="group" aria-label="Equation" tabindex="0">{result}</div>' if block else result
 
 
 class _Equations(Postprocessor):

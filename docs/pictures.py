@@ -77,7 +77,7 @@ def report(folder: Path) -> None:
             simulate L1 CI --seed 7 {hidden} --output test
             diagnose train --validate test --output out""",
     )
-    photographed(folder / "out" / "report.html", "report", 900)
+    photographed(folder / "out" / "report.html", "report", 1300)
 
 
 def tutorial_effect(folder: Path) -> None:

@@ -153,7 +153,7 @@ def _draw_figure(canvas: Canvas, figure: Figure, corner: tuple[float, float], wi
         axis = axes(PIXEL * panel.height, sharex=found[0] if found else None)
         _draw_panel(axis, panel, drawing)
         # Every tick takes its time: the lines of the grid are marks enough.
-        axis.tick_params(labelsize=7, left=False, bottom=False, labelbottom=panel is drawing.panels[-1])
+        axis.tick_params(which="both", labelsize=7, left=False, bottom=False, labelbottom=panel is drawing.panels[-1])
         handles |= dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
         found.append(axis)
         y -= PIXEL * panel.height + GAP

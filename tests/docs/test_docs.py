@@ -174,6 +174,12 @@ def test_every_command_that_a_page_names_exists_and_has_its_options(page: Path) 
         assert not unknown, " ".join(words)
 
 
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_picture_of_a_page_is_there_and_has_words(page: Path) -> None:
+    shown = re.findall(r"!\[([^\]]*)\]\(([^)]+)\)", page.read_text(encoding="utf-8"))
+    assert [(words, place) for words, place in shown if not words or not (page.parent / place).is_file()] == []
+
+
 def test_the_makefile_has_what_pages_say_to_make() -> None:
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
     for page in PAGES:
