@@ -23,7 +23,7 @@ from scara_ident.robot.robot import embedded_urdf
 
 FIGURES = Path(__file__).resolve().parent / "figures"
 CHROMIUM = Path("/usr/bin/chromium")
-SHADES, WIDEST = 96, 1100
+SHADES, WIDEST = 256, 1100
 
 
 def run(folder: Path, commands: str) -> None:
@@ -77,7 +77,7 @@ def report(folder: Path) -> None:
             simulate L1 CI --seed 7 {hidden} --output test
             diagnose train --validate test --output out""",
     )
-    photographed(folder / "out" / "report.html", "report", 1300)
+    photographed(folder / "out" / "report.html", "report", 1420)
 
 
 def tutorial_effect(folder: Path) -> None:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from importlib.util import module_from_spec, spec_from_file_location
-from types import ModuleType
-
 import pytest
 
+from docs import gallery
 from scara_ident.effects import CATALOGUE
 from tests.shared import ROOT
 
@@ -14,20 +12,11 @@ FIGURES = ROOT / "docs" / "figures"
 PAGE = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
 
 
-@pytest.fixture(scope="module")
-def gallery() -> ModuleType:
-    spec = spec_from_file_location("gallery", ROOT / "docs" / "gallery.py")
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_the_page_is_what_the_classes_say_today(gallery: ModuleType):
+def test_the_page_is_what_the_classes_say_today():
     assert gallery.page(gallery.computed_in(PAGE)) == PAGE, "run: python docs/gallery.py --words"
 
 
-def test_every_effect_has_its_section_its_picture_and_what_it_is_taken_for(gallery: ModuleType):
+def test_every_effect_has_its_section_its_picture_and_what_it_is_taken_for():
     computed = gallery.computed_in(PAGE)
     assert set(computed) == {effect.name for effect in CATALOGUE}
     for effect in CATALOGUE:
@@ -37,7 +26,7 @@ def test_every_effect_has_its_section_its_picture_and_what_it_is_taken_for(galle
     assert {path.stem for path in (FIGURES / "effects").glob("*.png")} == set(computed)
 
 
-def test_a_word_that_a_class_changes_makes_the_page_stale(gallery: ModuleType, monkeypatch: pytest.MonkeyPatch):
+def test_a_word_that_a_class_changes_makes_the_page_stale(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(type(CATALOGUE[0]), "experiment", "something else")
     assert gallery.page(gallery.computed_in(PAGE)) != PAGE
 
