@@ -74,7 +74,9 @@ def test_the_wheel_says_what_it_needs_and_brings_the_command(wheel: Path):
     required = {line.split(":")[1].strip() for line in said.splitlines() if line.startswith("Requires-Dist")}
     always = {name for name in required if "extra ==" not in name}
     # A user needs no tools of developers.
-    assert not [name for name in always if name.startswith(("pytest", "mkdocs", "zensical", "mypy", "ruff", "playwright"))]
+    assert not [
+        name for name in always if name.startswith(("pytest", "mkdocs", "zensical", "mypy", "ruff", "playwright"))
+    ]
 
 
 # In a package's metadata and in imports some names differ.
