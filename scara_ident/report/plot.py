@@ -328,9 +328,15 @@ class Figure:
     def spec(self) -> dict[str, Any]:
         """Return what the page draws."""
         variants = {
-            ",".join(map(str, key)): {**drawing.spec(), "label": self.title} for key, drawing in self.variants.items()
+            ",".join(map(str, key)): {**drawing.spec(), "label": self.title or _said(drawing)}
+            for key, drawing in self.variants.items()
         }
         return {"by": list(self.by), "variants": variants}
+
+
+def _said(drawing: Drawing) -> str:
+    """What a figure without a title shows, for those who hear it."""
+    return ", ".join(panel.label for panel in drawing.panels) if isinstance(drawing, Plot) else "table of colours"
 
 
 def single(name: str, title: str, words: str, drawing: Drawing, *, quiet: bool = False) -> Figure:

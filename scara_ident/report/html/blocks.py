@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from scara_ident.arrays import Array
-from scara_ident.report.plot import Figure
+from scara_ident.report.plot import Figure, packed
 
 
 @dataclass(frozen=True)
@@ -140,31 +140,59 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """The moving arm: positions of its joints in a plane, shape (frames, points, 2), every ``period`` seconds.
+    """The moving arm: positions of its joints in a plane or in space, every ``period`` seconds.
 
     Attributes
     ----------
     name : str
         Unique on the page.
-    frames : ndarray
+    frames : ndarray, shape (frames, points, 2 or 3)
         m.
     period : float
         s.
     axes : tuple of str
-        Names of the plane's axes.
+        Names of the axes, two or three.
     """
 
     kind: ClassVar[str] = "arm"
     name: str
     frames: Array
     period: float
-    axes: tuple[str, str] = ("x", "y")
+    axes: tuple[str, ...] = ("x", "y")
+
+    @property
+    def spatial(self) -> bool:
+        """Whether it moves in space."""
+        return len(self.axes) == 3
 
     def spec(self) -> dict[str, Any]:
-        """Return what the page draws."""
+        """Return what the page draws: coordinates one after the other, points of a frame, frame by frame."""
         low, high = self.frames.min(axis=(0, 1)).tolist(), self.frames.max(axis=(0, 1)).tolist()
-        frames = [[[round(float(x), 4) for x in point] for point in frame] for frame in self.frames]
-        return {"frames": frames, "period": self.period, "low": low, "high": high, "axes": self.axes}
+        points, frames = self.frames.shape[1], packed(self.frames.ravel())
+        return {"points": points, "frames": frames, "period": self.period, "low": low, "high": high, "axes": self.axes}
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What a joint's error was and what it became."""
+
+    joint: str
+    before: float
+    after: float
+    unit: str
+
+    def share(self, value: float) -> float:
+        """Return a value as a share of the larger of the two."""
+        return value / (max(self.before, self.after) or 1.0)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Before and after as a pair of bars for each joint, every joint on its own scale."""
+
+    kind: ClassVar[str] = "gains"
+    title: str
+    each: tuple[Gain, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +212,7 @@ class Beside:
     blocks: tuple[Block, Block]
 
 
-Block = Paragraph | Heading | Listing | Table | Scale | Group | Arm | Folded | Beside
+Block = Paragraph | Heading | Listing | Table | Scale | Group | Arm | Gains | Folded | Beside
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -204,6 +232,14 @@ def chance(probability: float) -> str:
 def count(size: int, noun: str) -> str:
     """Return how many of something there are, such as ``1 recording``."""
     return f"{size} {noun}" if size == 1 else f"{size} {noun}s"
+
+
+def information_words(log_det: float | None, condition: float | None) -> str:
+    """Say what the motion tells of the parameters, by the two numbers of Indri et al. (2002)."""
+    return (
+        f"What the motion tells of all parameters together: J_d = ln det HᵀH = {number(log_det, 4)}, the more the better. How "
+        f"evenly: the condition J_k = cond HᵀH = {number(condition)}, small where no parameter is hidden behind others."
+    )
 
 
 def superscripts(unit: str) -> str:

@@ -91,7 +91,11 @@ def _motion(found: Check) -> list[Block]:
     panels = [tuple(_panel(found, j, kind) for kind in _KINDS) for j in range(found.known.robot.n)]
     figure = Figure("signals", "Over time", "", {(j,): Plot("time [s]", each) for j, each in enumerate(panels)}, (0,))
     selector = Selector("joint", tuple(found.known.robot.joints))
-    recorded = " Thin: the torque that was recorded." if found.recorded_rms is not None else ""
+    recorded = (
+        " Thin: recorded torque, which is the effort in the file times its gain."
+        if found.recorded_rms is not None
+        else ""
+    )
     return [Paragraph(f"Dashed: limits.{recorded}"), Group("signals-group", (figure,), (selector,))]
 
 

@@ -19,6 +19,8 @@ from scara_ident.report.html.blocks import (
     Block,
     Cell,
     Folded,
+    Gain,
+    Gains,
     Heading,
     Paragraph,
     Table,
@@ -46,6 +48,7 @@ from scara_ident.report.traces import FittedContext, Trace, traces
 from scara_ident.threads import one_blas_thread
 
 KINDS = (("validation", "held out"), ("training", "training"))
+PICTURED = (("validation", "held-out"), ("training", "training"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +151,12 @@ def _story(context: DiagnosisContext) -> list[Block]:
 
 def _title(effect: FoundEffect) -> str:
     return effect.effect if effect.joint is None else f"{effect.effect} on {effect.joint}"
+
+
+def _said(effect: FoundEffect) -> str:
+    """An effect in a sentence; the name of a joint stays as it is."""
+    words = effect.effect.replace("_", " ")
+    return words if effect.joint is None else f"{words} on {effect.joint}"
 
 
 def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]:
@@ -330,12 +339,24 @@ def diagnosis_report(path: Path, context: DiagnosisContext) -> None:
     )
     verdict = _verdict(diagnosis, content["summary"])
     warn = diagnosis.verdict in ("unexplained", "undecided")
-    Page(f"Diagnosis of {diagnosis.robot.name}", subtitle, verdict, found, warn).write(path)
+    title = f"Diagnosis of {diagnosis.robot.name}"
+    Page(title, subtitle, verdict, found, warn, _picture(context)).write(path)
+
+
+def _picture(context: DiagnosisContext) -> Gains | None:
+    """Before and after at a glance, on held-out recordings where there are any; nothing where nothing was found."""
+    if not context.diagnosis.effects:
+        return None
+    kind, words = next(each for each in PICTURED if context.content[each[0]]["before"])
+    before, after = (context.content[kind][when] for when in ("before", "after"))
+    each = [Gain(joint, before[joint], after[joint], context.unit(joint)) for joint in before if before[joint]]
+    title = f"Rms residual on {words} recordings, without and with what was found; every joint on its own scale"
+    return Gains(title, tuple(each))
 
 
 def _verdict(diagnosis: Diagnosis, summary: Sequence[str]) -> tuple[str, ...]:
     """The verdict in a sentence, then what it rests on."""
-    found = " and ".join(_title(effect).replace("_", " ") for effect in diagnosis.effects)
+    found = " and ".join(_said(effect) for effect in diagnosis.effects)
     if diagnosis.verdict in ("complete", "undecided"):
         # The first of the sentences says so already.
         return tuple(summary)

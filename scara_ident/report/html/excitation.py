@@ -1,4 +1,4 @@
-"""The report of an excitation trajectory: the motion within its limits, and the arm moving in the plane."""
+"""The report of an excitation trajectory: the motion within its limits, and the moving arm."""
 
 from __future__ import annotations
 
@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from scara_ident.arrays import Array
 from scara_ident.motion.motion import Motion
 from scara_ident.report.html.blocks import (
-    Arm,
     Beside,
     Block,
     Cell,
@@ -22,19 +20,17 @@ from scara_ident.report.html.blocks import (
     Table,
     Tag,
     count,
+    information_words,
     name,
     number,
     superscripts,
 )
+from scara_ident.report.html.moving_arm import moving_arm
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection, Section, notes_section
 from scara_ident.report.plot import Figure, Grid, Layer, Level, Line, Mark, Panel, Plot, single
-from scara_ident.robot.kinematics import farthest_point
 from scara_ident.robot.robot import Robot
 
-# Pictures of the arm per second, and at the most.
-FRAME_RATE = 25.0
-MOST_FRAMES = 750
 # Points at which a motion is drawn, at the most.
 MOST_POINTS = 4000
 
@@ -63,15 +59,16 @@ class ExcitationContext:
 
 
 def _motion(k: int, context: ExcitationContext) -> list[Block]:
-    """One trajectory: the arm in its plane, what the data will cover, and signals over time."""
+    """One trajectory: the moving arm, what the data will cover, and signals over time."""
     robot, motion = context.robot, context.motions[k]
     bounds = {limit: float(each["bound"]) for limit, each in context.limits if each.get("bound") is not None}
     figures = [_joint_figure(robot, motion, j, k, bounds) for j in range(robot.n)]
     covers = [_cover_figure(robot, motion, j, k, bounds) for j in range(robot.n)]
     torque = "" if motion.torque is None else " The torque is what the design foresees."
     cover = Group(f"cover-group-{k}", covers, (), "two" if robot.n > 2 else "")
+    arm = moving_arm(robot, motion, f"arm-{k}")
     return [
-        Beside((arm_in_plane(robot, motion, f"arm-{k}"), cover)),
+        *((arm, cover) if arm.spatial else (Beside((arm, cover)),)),
         Paragraph(f"Over time; dashed: the limits.{torque}"),
         Group(f"motion-group-{k}", figures, (), "two"),
     ]
@@ -90,6 +87,12 @@ def _limits(context: ExcitationContext) -> list[Block]:
     return [words, Table(("limit", "reached", "bound", "unit", "used"), rows, (1, 2))] if rows else []
 
 
+def _information(context: ExcitationContext) -> list[Block]:
+    """The two criteria of a motion."""
+    log_det, condition = (context.content.get(key) for key in ("log_det", "condition"))
+    return [] if log_det is None else [Paragraph(information_words(log_det, condition))]
+
+
 def excitation_report(path: Path, content: Mapping[str, Any], robot: Robot, motions: Sequence[Motion]) -> None:
     """Write the report of designed trajectories as one HTML file; arguments are those of `ExcitationContext`.
 
@@ -100,9 +103,8 @@ def excitation_report(path: Path, content: Mapping[str, Any], robot: Robot, moti
     """
     context = ExcitationContext(content, robot, motions)
     broken = [limit for limit, each in context.limits if (each.get("share") or 0.0) > 1.0]
-    criteria = f"J_d {number(content.get('log_det'), 4)}, J_k {number(content.get('condition'))}"
     verdict = list(content.get("summary") or ()) or [
-        f"{criteria} in {number(content.get('duration'))} s.",
+        f"A motion of {number(content.get('duration'))} s.",
         f"Broken limits: {', '.join(broken)}." if broken else "All limits hold.",
     ]
     sections: list[Section] = [
@@ -115,9 +117,7 @@ def excitation_report(path: Path, content: Mapping[str, Any], robot: Robot, moti
         subtitle += f"; {count(content['harmonics'], 'harmonic')}"
     if content.get("model"):
         subtitle += f"; parameters of the {content['model']} model"
-    if content.get("log_det") is not None:
-        subtitle += f"; {criteria.replace('J_d', 'J_d (information)').replace('J_k', 'J_k (condition)')}"
-    sections.append(NamedSection("limits", "Limits", _limits))
+    sections += [NamedSection("limits", "Limits", _limits), NamedSection("information", "Information", _information)]
     sections.append(notes_section(lambda context: context.content.get("notes"), "Notes"))
     found = parts("excitation", sections, context)
     Page(f"Excitation of {robot.name}", subtitle, verdict, found, bool(broken)).write(path)
@@ -171,56 +171,6 @@ def _joint_limits(robot: Robot, j: int, bounds: Mapping[str, float]) -> tuple[fl
     )
     lower, upper, speed, torque = (bounds.get(f"{robot.joints[j]}.{kind}", float(own[j])) for kind, own in kinds)
     return lower, upper, speed, torque
-
-
-def arm_in_plane(robot: Robot, motion: Motion, name: str) -> Arm:
-    """Return the arm's joints over time in the coordinate plane in which they move most.
-
-    Parameters
-    ----------
-    robot : Robot
-    motion : Motion
-    name : str
-        Unique on the page.
-    """
-    count = int(min(MOST_FRAMES, max(2, motion.time[-1] - motion.time[0]) * FRAME_RATE))
-    places = np.linspace(0, motion.samples - 1, count).astype(int)
-    points = joint_points(robot, motion.q[:, places])
-    spread = np.ptp(points.reshape(-1, 3), axis=0)
-    plane = sorted(np.argsort(-spread, kind="stable")[:2].tolist())
-    period = float(motion.time[-1] - motion.time[0]) / (count - 1)
-    return Arm(name, points[:, :, plane], period, ("xyz"[plane[0]], "xyz"[plane[1]]))
-
-
-def joint_points(robot: Robot, q: Array) -> Array:
-    """Return where the base, the joints and the arm's end are.
-
-    Parameters
-    ----------
-    robot : Robot
-    q : ndarray, shape (n, N)
-        In the robot's order, rad or m.
-
-    Returns
-    -------
-    ndarray, shape (N, points, 3)
-        m, in the base frame, from the base outwards.
-    """
-    import pinocchio as pin
-
-    model = robot.model
-    data = model.createData()
-    last = model.njoints - 1
-    end = farthest_point(robot)
-    neutral, velocity = pin.neutral(model), np.zeros(model.nv)
-    frames = []
-    for column in q.T:
-        velocity[robot.order] = column
-        # From neutral, a displacement of the joints is their position, continuous joints included.
-        pin.forwardKinematics(model, data, pin.integrate(model, neutral, velocity))
-        points = [placement.translation.copy() for placement in data.oMi]
-        frames.append([*points, data.oMi[last].act(end)])
-    return np.array(frames)
 
 
 def _bounded(limits: Mapping[str, Any], name: str = "") -> Iterator[tuple[str, Mapping[str, Any]]]:

@@ -51,7 +51,7 @@ def _arms(fleet: Fleet) -> list[Block]:
                 "–" if surest is None else chance(surest),
                 Cell(_diagnosis(item), "words"),
                 f"{len(dates)}",
-                dates[-1] if dates else "–",
+                Cell(dates[-1] if dates else "–", "unit"),
                 f"{len(item.faults)}",
             ]
         )
@@ -126,7 +126,7 @@ def _plots(fleet: Fleet, item: ArmReport, joint: str | None) -> list[Plot]:
             layers.append(Mark(start - 0.5, "vermillion"))
         unit = known[0][1].unit
         label = quantity if unit == "1" else f"{quantity} [{superscripts(unit)}]"
-        plot = Plot("", (Panel(label, layers, 120),), small=True, names=item.known.dates)
+        plot = Plot("", (Panel(label, layers, 120),), (-0.5, len(dates) - 0.5), small=True, names=item.known.dates)
         found.append((not since, plot))
     return [plot for _, plot in sorted(found, key=lambda pair: pair[0])]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.identification.identify import Identification, undetermined
-from scara_ident.report.html.blocks import Block, Heading, Paragraph, count
+from scara_ident.report.html.blocks import Block, Heading, Paragraph, count, information_words
 from scara_ident.report.html.events import events_blocks
 from scara_ident.report.html.friction import friction_group
 from scara_ident.report.html.page import Page, parts
@@ -79,6 +79,7 @@ def _parameters(context: IdentificationContext) -> list[Block]:
     blocks: list[Block] = [
         Paragraph(f"Standard deviations from {STD_WORDS.get(estimate.std_kind, estimate.std_kind)}. {SYMBOLS}"),
         parameter_table(estimate),
+        Paragraph(information_words(context.identification.log_det, context.identification.condition)),
         Heading("Correlation"),
         *([Paragraph(f"Strongest: {', '.join(pairs)}.")] if pairs else []),
         correlation_group(estimate),
@@ -107,7 +108,7 @@ def _variation(context: IdentificationContext) -> Sequence[Block]:
 def _friction_curves(context: IdentificationContext) -> list[Block]:
     """Friction over velocity; nothing where the model has none."""
     group = friction_group(context.identification.estimate, context.sets["fitted"])
-    words = "Where the strip below is dark the data hold many samples; beyond it the curve is an extrapolation. The dots are the measured torque less everything but friction, over velocity, ± 2 standard errors."
+    words = "Where the strip below is dark the data hold many samples; beyond it the curve is an extrapolation. The dots are the measured torque, which is the recorded one within the band, less everything but friction, over velocity, ± 2 standard errors."
     return [] if group is None else [Paragraph(words), group]
 
 
@@ -153,8 +154,7 @@ def identification_report(path: Path, context: IdentificationContext) -> None:
     fitted, held_out = identification.training, identification.validation
     subtitle = (
         f"{identification.model.name} model, {len(identification.model.columns)} parameters, {identification.estimate.method}; "
-        f"{count(len(fitted.data.recordings), 'recording')}, {fitted.samples} samples fitted, {count(len(held_out.data.recordings), 'recording')} held out; "
-        f"J_d (information) {identification.log_det:.2f}, J_k (condition) {identification.condition:.3g}"
+        f"{count(len(fitted.data.recordings), 'recording')}, {fitted.samples} samples fitted, {count(len(held_out.data.recordings), 'recording')} held out"
     )
     verdict = (_headline(identification), *sentences(identification))
     title = f"Identification of {identification.model.robot.name}"

@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from scara_ident.errors import ScaraIdentError
 from scara_ident.files import write_text
-from scara_ident.report.html.blocks import Arm, Beside, Block, Folded, Group
+from scara_ident.report.html.blocks import Arm, Beside, Block, Folded, Gains, Group
 from scara_ident.report.html.section import Kind, Section, added_sections
 
 
@@ -38,6 +38,8 @@ class Page:
     parts : sequence of Part
     warn : bool
         Whether the verdict is bad news.
+    picture : Gains, optional
+        Beside the verdict.
     """
 
     title: str
@@ -45,6 +47,7 @@ class Page:
     verdict: Sequence[str]
     parts: Sequence[Part]
     warn: bool = False
+    picture: Gains | None = None
 
     def render(self) -> str:
         """Return the whole file's text."""

@@ -51,7 +51,7 @@ def remainder_group(robot: Robot, remainder: Unexplained, traces: Sequence[Trace
         figures.append(single(f"remainder-{k}", f"{remainder.joint}: what is left over {name}", "", plot))
     if len(signals) == 2:
         words = (
-            f"Mean of the residual [{unit}]; blue: measured torque is above the prediction, vermillion: below; "
+            f"Mean of the residual [{unit}]; blue: measured torque, the recorded one within the band, is above the prediction, vermillion: below; "
             "grey: too few samples."
         )
         names = [f"{name} [{length}]" for name, _, length in found]

@@ -76,7 +76,7 @@ def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None], pref
         Figure(
             f"{prefix}frequency",
             "Spectrum over frequency",
-            "Amplitude density of recorded torque and of what is left of it, nothing filtered; the area reaches to the highest line of each bin. In the shade, beyond the band, the prediction carries the noise of the position.",
+            "Amplitude density of recorded torque, which is the effort in the file times its gain, and of what is left of it, nothing filtered; the area reaches to the highest line of each bin. In the shade, beyond the band, the prediction carries the noise of the position.",
             by_time,
             (0, 1),
         ),

@@ -101,7 +101,7 @@ def _telling(robot: Robot, chapter: Chapter) -> Figure | None:
         words += ", in the direction of motion"
     words += "."
     if chapter.own is not None:
-        words += " Above: torque that the rest of the model leaves to the effect. Below: the residual; before the effect came in, other parameters had bent to stand for it."
+        words += " Above: measured torque, which is the recorded one within the band, less what the rest of the model predicts. Below: the residual; before the effect came in, other parameters had bent to stand for it."
     return single(name, f"{robot.joints[j]} over {label}", words, plot)
 
 

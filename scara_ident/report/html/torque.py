@@ -21,8 +21,8 @@ MOST_SAMPLES = 1_500_000
 # Times left out that are shorter than this share of a recording are not marked.
 LEAST_SEEN = 400
 WORDS = (
-    "Recorded torque as it is; measured and predicted torque within the band that the estimate used; below, their difference, "
-    "faded out towards rest as in the estimate."
+    "Recorded: the effort in the file times its gain, as it is. Measured: the same within the band that the estimate used, as "
+    "is predicted torque. Below, measured less predicted, faded out towards rest as in the estimate."
 )
 
 

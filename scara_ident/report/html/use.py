@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from scara_ident.report.html.blocks import Block, Cell, Group, Paragraph, Table, name, number, superscripts
+from scara_ident.report.html.blocks import Block, Cell, Group, Paragraph, Table, count, name, number, superscripts
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection, Section
-from scara_ident.report.plot import Grid, Line, Panel, Plot, single, style
+from scara_ident.report.plot import Dots, Grid, Layer, Line, Panel, Plot, single, style
 from scara_ident.report.use import WORDS, use_dict
 from scara_ident.use import Use
 
@@ -43,7 +43,7 @@ def _tracking(context: UseContext) -> list[Block]:
         rows.append([name(WORDS[key]), *cells])
     head = ["rms tracking error", *(f"{joint} [{superscripts(units[joint])}]" for joint in context.joints)]
     words = (
-        f"{len(result.runs)} virtual arms, drawn about the model by its standard deviations, follow a motion of "
+        f"{count(len(result.runs), 'virtual arm')} drawn about the model by its standard deviations: how well a motion is followed of "
         f"{result.motion.duration:.3g} s that played no part in the identification. Bars: share of the PID's own error."
     )
     figures = []
@@ -73,10 +73,12 @@ def _rollouts(context: UseContext) -> list[Block]:
     finite = np.isfinite(next(iter(result.rollouts.values()))).all(axis=1)
     figures = []
     for j, joint in enumerate(context.joints):
-        lines = []
+        lines: list[Layer] = []
         for k, (key, values) in enumerate(result.rollouts.items()):
             color, dash = style(k)
-            lines.append(Line(np.array(result.horizons)[finite], values[finite, j], color, WORDS[key], 2.0, dash))
+            x, y = np.array(result.horizons)[finite], values[finite, j]
+            # One horizon alone makes no line.
+            lines += [Line(x, y, color, WORDS[key], 2.0, dash), Dots(x, y, color, radius=3.5)]
         panel = Panel(f"distance [{superscripts(units[joint])}]", lines, 220)
         figures.append(single(f"rollout-{j}", joint, "", Plot("time since the start [s]", (panel,))))
     return [Paragraph(words), Table(head, rows, range(1, len(head))), Group("rollout-group", figures, (), "two")]

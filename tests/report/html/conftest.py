@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis import diagnose
+from scara_ident.diagnosis import Diagnosis, diagnose
 from scara_ident.effects.position import Spring
 from scara_ident.files import plain
 from scara_ident.identification.compare import compare
@@ -25,10 +25,21 @@ from scara_ident.report.html import (
     identification_report,
     paper_report,
 )
+from scara_ident.report.html.check import check_report
+from scara_ident.report.html.contact import contact_report
+from scara_ident.report.html.fleet import fleet_report
+from scara_ident.report.html.use import use_report
 from scara_ident.robot.robot import load_robot
+from scara_ident.use.check import Check, check
+from scara_ident.use.contact import ContactFindings, contact_observer, look_for_contact
+from scara_ident.use.joint_limits import joint_limits
+from scara_ident.use.known_model import known_model
 from tests.arms import noisy, recorded_torque, recording, sines
-from tests.report.simulated import made, run
+from tests.report.html.made_fleet import made_fleet
+from tests.report.simulated import made, run, swinging
+from tests.report.test_use import result as used
 from tests.shared import PATIENCE
+from tests.use.quiet import known_ur5, pushed, quiet, ur5
 
 
 @pytest.fixture(scope="session")
@@ -54,13 +65,18 @@ def _with_spring(name: str, motion: int, seed: int):
 
 
 @pytest.fixture(scope="session")
-def diagnosed(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("diagnosed") / "report.html"
+def diagnosis() -> Diagnosis:
     fit = [_with_spring(f"{name}_{k}", motion, 10 * motion + k) for motion, name in enumerate("ABC") for k in (1, 2)]
     held_out = [_with_spring("D_1", 7, 77)]
     found = diagnose(load_robot(), fit, validation=held_out, bands=[15.0, 15.0], catalogue=(Spring(),))
     assert [(effect.effect, effect.joint) for effect in found.effects] == [("spring", "joint1")]
-    diagnosis_report(path, DiagnosisContext(found))
+    return found
+
+
+@pytest.fixture(scope="session")
+def diagnosed(diagnosis, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("diagnosed") / "report.html"
+    diagnosis_report(path, DiagnosisContext(diagnosis))
     return path
 
 
@@ -87,6 +103,64 @@ def excited(tmp_path_factory) -> Path:
     return path
 
 
+def _in_space() -> Motion:
+    """A UR5 on a sine of every joint."""
+    time = np.linspace(0.0, 10.0, 1001)
+    omega = 2.0 * np.pi * np.linspace(0.1, 0.3, 6)[:, None]
+    return Motion("X", "X", time, np.sin(omega * time), omega * np.cos(omega * time), -(omega**2) * np.sin(omega * time), None, 100.0)  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def turning(tmp_path_factory) -> Path:
+    """The page of a motion of an arm that leaves every plane."""
+    path = tmp_path_factory.mktemp("turning") / "report.html"
+    excitation_report(path, {"log_det": 70.0, "condition": 2e5, "duration": 10.0}, ur5(), [_in_space()])
+    return path
+
+
+@pytest.fixture(scope="session")
+def checked(result) -> Check:
+    """A motion on which joint 1 needs more torque than it has."""
+    known = known_model(result)
+    return check(known, [swinging(np.zeros((2, 1000)))], joint_limits(known.robot, torques={"joint1": 0.3}))
+
+
+@pytest.fixture(scope="session")
+def checked_page(checked, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("checked") / "report.html"
+    check_report(path, checked)
+    return path
+
+
+@pytest.fixture(scope="session")
+def touched() -> ContactFindings:
+    """A UR5 without contact, and pushed at its tool."""
+    observer = contact_observer(known_ur5(), [quiet(seed, 12.0) for seed in range(2)])
+    push = pushed(quiet(7, 12.0), np.array([60.0, 0.0, 60.0]), 6.0, 7.0)
+    return look_for_contact(observer, [quiet(9, 12.0), push])
+
+
+@pytest.fixture(scope="session")
+def touched_page(touched, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("touched") / "report.html"
+    contact_report(path, touched)
+    return path
+
+
+@pytest.fixture(scope="session")
+def fleet_page(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("fleet") / "report.html"
+    fleet_report(path, made_fleet())
+    return path
+
+
+@pytest.fixture(scope="session")
+def used_page(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("used") / "report.html"
+    use_report(path, used())
+    return path
+
+
 @pytest.fixture(scope="session")
 def printed(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("printed") / "report.html"
@@ -95,13 +169,20 @@ def printed(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def pages(identified, diagnosed, compared, excited, printed) -> dict[str, Path]:
+def pages(
+    identified, diagnosed, compared, excited, turning, printed, checked_page, touched_page, used_page, fleet_page
+) -> dict[str, Path]:
     return {
         "identification": identified,
         "diagnosis": diagnosed,
         "comparison": compared,
         "excitation": excited,
+        "excitation in space": turning,
         "paper": printed,
+        "check": checked_page,
+        "contact": touched_page,
+        "use": used_page,
+        "fleet": fleet_page,
     }
 
 

@@ -37,7 +37,7 @@ def test_words_agree_with_their_number_and_exponents_are_raised():
 def test_the_moving_arm_stays_within_the_limits_it_states():
     frames = np.random.default_rng(0).normal(size=(7, 3, 2))
     spec = Arm("arm", frames, 0.1).spec()
-    drawn = np.array(spec["frames"])
+    drawn = np.array(spec["frames"]).reshape(7, spec["points"], 2)
     np.testing.assert_allclose(drawn, frames, atol=5.1e-5)
     assert np.all(drawn >= np.array(spec["low"]) - 1e-4)
     assert np.all(drawn <= np.array(spec["high"]) + 1e-4)

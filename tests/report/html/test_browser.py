@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from tests.report.html.test_page import PAGES
@@ -17,10 +18,27 @@ EMPTY = """() => [...document.querySelectorAll("[data-figure], [data-arm]")].fil
 }).map((figure) => figure.dataset.figure || figure.dataset.arm)"""
 
 
+# Whether colours have contrast takes a minute on long pages: there `benchmarks/accessibility.py` looks.
+LONG = ("identification", "paper")
+NOT_OF_LONG = {"rules": {rule: {"enabled": False} for rule in ("color-contrast", "target-size")}}
+
+
+def barriers(page, kind: str) -> list[str]:
+    """What axe-core finds, but for the words within figures."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python").Axe()
+    options = {"resultTypes": ["violations"], **(NOT_OF_LONG if kind in LONG else {})}
+    found = axe.run(page, context={"exclude": [["svg"]]}, options=options).response["violations"]
+    unnamed = page.locator("svg:not([aria-label]), svg[aria-label='']").count()
+    return [f"{item['id']}: {item['nodes'][0]['html']}" for item in found] + ["svg without a name"] * unnamed
+
+
 @pytest.mark.parametrize("kind", PAGES)
 def test_every_figure_is_drawn_whatever_is_chosen(pages, opened, kind):
     page = opened(pages[kind])
     assert page.evaluate(EMPTY) == []
+    # Half of the kinds on a wide light page, half on a narrow dark one.
+    if kind in PAGES[::2]:
+        assert barriers(page, kind) == []
     for select in page.query_selector_all("select[data-place]"):
         for place in range(select.evaluate("select => select.options.length")):
             select.select_option(index=place)
@@ -74,6 +92,9 @@ def test_the_pointer_reads_values(identified, opened):
     page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 60)
     words = page.locator(".tip").inner_text()
     assert all(word in words for word in ("time [s]", "measured", "predicted", "residual"))
+    # On paper nothing points.
+    page.emulate_media(media="print")
+    assert not page.locator(".tip").is_visible()
 
 
 def test_a_number_in_the_table_shows_its_recording(identified, opened):
@@ -126,9 +147,12 @@ def test_dark_light_and_print_differ_in_colours_only(identified, opened):
 
 @pytest.mark.parametrize("kind", PAGES)
 def test_a_phone_shows_a_page_without_scrolling_sideways(pages, opened, kind):
-    page = opened(pages[kind], viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+    page = opened(pages[kind], **phone, color_scheme="dark")
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     assert page.evaluate(EMPTY) == []
+    if kind in PAGES[1::2]:
+        assert barriers(page, kind) == []
 
 
 def test_on_paper_figures_are_drawn_for_its_width_and_details_unfold(diagnosed, opened):
@@ -144,18 +168,14 @@ def test_on_paper_figures_are_drawn_for_its_width_and_details_unfold(diagnosed, 
     assert page.evaluate(widths) == before
 
 
-def test_the_ticks_of_an_axis_have_the_same_decimals(identified, opened):
-    page = opened(identified)
+def test_the_ticks_of_an_axis_have_the_same_decimals_and_names_stand_instead_of_numbers(excited, opened):
+    page = opened(excited)
     for low, high in ((-0.0123, 0.0181), (0.0002, 0.0018), (-3.0, 4.0), (1000.2, 1000.9), (2e-6, 9e-6)):
         words = page.evaluate(
             f"(() => {{ const ticks = Plot.linearTicks({low}, {high}, 8); return ticks.map(([v]) => Plot.tickWords(ticks)(v)); }})()"
         )
         assert len(set(words)) == len(words) >= 4
         assert len({len(word.partition(".")[2]) for word in words if word != "0" and "e" not in word}) <= 1
-
-
-def test_names_instead_of_numbers_stand_along_an_axis(identified, opened):
-    page = opened(identified)
     words = page.evaluate(
         """() => {
           const names = ["P_d1", "P_d2", "a01"], host = document.createElement("div");
@@ -169,14 +189,11 @@ def test_names_instead_of_numbers_stand_along_an_axis(identified, opened):
     assert [word for word in words if word in ("P_d1", "P_d2", "a01", "0", "2")] == ["P_d1", "P_d2", "a01"]
 
 
-def test_the_arms_plane_has_its_scale(excited, opened):
-    words = opened(excited).locator("[data-arm] svg").text_content()
+def test_the_arm_moves_in_a_plane_with_its_scale(excited, opened):
+    page = opened(excited)
+    words = page.locator("[data-arm] svg").text_content()
     assert "x [m]" in words
     assert "y [m]" in words
-
-
-def test_the_arm_moves(excited, opened):
-    page = opened(excited)
     before = page.locator("polyline.arm").get_attribute("points")
     page.locator("[data-arm] button").click()
     page.wait_for_function(f"document.querySelector('polyline.arm').getAttribute('points') !== '{before}'")
@@ -193,3 +210,37 @@ def test_an_animation_frame_from_before_the_click_does_not_stop_the_arm(excited,
     page.locator("[data-arm] button").click()
     page.wait_for_function(f"document.querySelector('polyline.arm').getAttribute('points') !== '{before}'")
     page.locator("[data-arm] button").click()
+
+
+def _view_of_space(page) -> tuple[float, float]:
+    view = page.locator(".views > div").first
+    return tuple(float(view.get_attribute(f"data-{angle}")) for angle in ("azimuth", "elevation"))
+
+
+def test_the_arm_in_space_turns_by_pointer_keys_and_buttons_and_keeps_its_lengths(turning, opened):
+    page = opened(turning)
+    assert page.locator(".views > div").count() == 2
+    field = page.locator(".views .plot").first
+    field.scroll_into_view_if_needed()
+    start, box = _view_of_space(page), field.bounding_box()
+    page.mouse.move(box["x"] + 100, box["y"] + 150)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 160, box["y"] + 170, steps=3)
+    page.mouse.up()
+    turned = _view_of_space(page)
+    assert turned[0] - start[0] == pytest.approx(-60 * 180 / box["width"], abs=0.2)
+    assert turned[1] - start[1] == pytest.approx(20 * 180 / box["width"], abs=0.2)
+    field.focus()
+    page.keyboard.press("Home")
+    assert _view_of_space(page) == start
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowDown")
+    assert _view_of_space(page) == (start[0] - 15, start[1] + 15)
+    ends = []
+    for word in ("side", "front", "top"):
+        page.locator(".views button", has_text=word).first.click()
+        points = page.locator(".views polyline.arm").first.get_attribute("points").split()
+        ends.append(np.subtract(*([float(x) for x in points[k].split(",")] for k in (-1, 0))))
+    # Seen along y, x and z, what two views have in common is drawn alike: x right and z up, y right and z up, x right and y up.
+    (x, z), (y, z_again), (x_again, minus_y) = ends
+    assert (x, z, -minus_y) == pytest.approx((x_again, z_again, y), abs=0.3)

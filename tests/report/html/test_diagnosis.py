@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.html.diagnosis import _verdict
 from tests.report.html.document import data_of, document
 
 
@@ -39,3 +44,21 @@ def test_above_the_residual_stands_the_law_of_the_effect_and_what_is_measured_of
         (layer,) = [layer for layer in panels[0]["layers"] if layer.get("name") == name]
         pairs = [(x, y) for x, y in zip(layer["x"], layer["y"], strict=True) if y is not None]
         assert np.polyfit(*np.array(pairs).T, 1)[0] == pytest.approx(0.05, abs=0.01)
+
+
+def test_the_bars_of_the_headline_are_the_numbers_of_the_json(diagnosed, diagnosis):
+    """Before and after on held-out recordings, to every digit."""
+    content = diagnosis_dict(diagnosis)["validation"]
+    shown = re.findall(r'data-gain="(\w+)" data-before="([^"]+)" data-after="([^"]+)"', diagnosed.read_text())
+    assert [joint for joint, *_ in shown] == list(content["before"]) == ["joint1", "joint2"]
+    for joint, *pair in shown:
+        told = [content[when][joint] for when in ("before", "after")]
+        np.testing.assert_allclose([float(value) for value in pair], told, rtol=1e-9)
+    words = document(diagnosed).words
+    assert words.index("held-out recordings, without and with what was found") < words.index("Before and after")
+
+
+def test_a_joints_name_stays_whole_in_the_verdict(diagnosis):
+    effect = replace(diagnosis.effects[0], effect="torque_ripple", joint="shoulder_pan_joint")
+    first, *_ = _verdict(replace(diagnosis, effects=(effect,)), ())
+    assert "torque ripple on shoulder_pan_joint" in first

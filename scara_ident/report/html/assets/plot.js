@@ -223,7 +223,10 @@ const Plot = (() => {
     const sx = (v) => left + ((v - x0) / (x1 - x0)) * inner;
     const geometry = [];
     let y = TOP, body = "";
+    // Words longer than their axis stand above it.
+    const above = spec.panels.some((panel) => panel.label.length * 6.3 > panel.height);
     for (const panel of spec.panels) {
+      if (above) y += 17;
       const height = panel.height * (width < 480 && !small ? 0.85 : 1);
       const shown = panel.ready.filter((layer) => !state.hidden.has(layer.name));
       let range = panel.range ? [...panel.range] : null;
@@ -273,7 +276,8 @@ const Plot = (() => {
       }
       body += `<rect class="frame" x="${left}" y="${top}" width="${inner}" height="${height}"/>`;
       const middle = top + height / 2;
-      body += `<text class="axis" transform="translate(${small ? 11 : 13} ${middle}) rotate(-90)" text-anchor="middle">${escape(panel.label)}</text>`;
+      const place = above ? `x="${left}" y="${top - 6}"` : `transform="translate(${small ? 11 : 13} ${middle}) rotate(-90)" text-anchor="middle"`;
+      body += `<text class="axis" ${place}>${escape(panel.label)}</text>`;
       geometry.push({top, height, shown, y0, y1, log: panel.log});
       y += height + GAP;
     }
@@ -352,5 +356,5 @@ const Plot = (() => {
     return null;
   }
 
-  return {draw, number, escape, lowerBound, linearTicks, tickWords};
+  return {draw, number, escape, unpack, lowerBound, linearTicks, tickWords};
 })();

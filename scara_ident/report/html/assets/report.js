@@ -1,4 +1,4 @@
-// The page: figures with their selectors, zoom, read-out, theme, and the moving arm.
+// The page: figures with their selectors, zoom, read-out and theme.
 "use strict";
 
 (() => {
@@ -212,66 +212,6 @@
     };
   }
 
-  // The arm in its plane, both axes of one scale: a slider of time, and a button that moves it.
-  function arm(element) {
-    const data = content.arms[element.dataset.arm], host = element.querySelector(".plot");
-    const slider = element.querySelector("input"), button = element.querySelector("button"), clock = element.querySelector("output");
-    const {frames, period, axes} = data;
-    const reach = Math.max(data.high[0] - data.low[0], data.high[1] - data.low[1], 1e-3), pad = 0.06 * reach;
-    // Neither side shorter than a third of the other: a motion along a line still is a picture.
-    const half = [0, 1].map((k) => Math.max(0.5 * (data.high[k] - data.low[k]) + pad, reach / 6));
-    const low = [0, 1].map((k) => 0.5 * (data.low[k] + data.high[k]) - half[k]), high = low.map((v, k) => v + 2 * half[k]);
-    const left = 54, top = 8, bottom = 36, room = Math.max(220, Math.min(450, (host.clientWidth || 516) - left - 12));
-    const scale = Math.min(room / (high[0] - low[0]), 400 / (high[1] - low[1]));
-    const inner = scale * (high[0] - low[0]), height = scale * (high[1] - low[1]);
-    const at = ([x, y]) => [left + (x - low[0]) * scale, top + (high[1] - y) * scale];
-    const point = (p) => at(p).map((v) => v.toFixed(1)).join(",");
-    const ends = frames.map((f) => point(f[f.length - 1]));
-    let grid = "";
-    const xTicks = Plot.linearTicks(low[0], high[0], inner / 70), yTicks = Plot.linearTicks(low[1], high[1], height / 45);
-    const xWords = Plot.tickWords(xTicks), yWords = Plot.tickWords(yTicks);
-    for (const [v] of xTicks) {
-      const px = at([v, 0])[0].toFixed(1);
-      grid += `<line class="grid" x1="${px}" x2="${px}" y1="${top}" y2="${top + height}"/><text class="tick" x="${px}" y="${top + height + 15}" text-anchor="middle">${xWords(v)}</text>`;
-    }
-    for (const [v] of yTicks) {
-      const py = at([0, v])[1].toFixed(1);
-      grid += `<line class="grid" x1="${left}" x2="${left + inner}" y1="${py}" y2="${py}"/><text class="tick" x="${left - 6}" y="${py}" dy=".32em" text-anchor="end">${yWords(v)}</text>`;
-    }
-    const words = `<text class="axis" x="${left + inner / 2}" y="${top + height + bottom - 5}" text-anchor="middle">${axes[0]} [m]</text><text class="axis" transform="translate(13 ${top + height / 2}) rotate(-90)" text-anchor="middle">${axes[1]} [m]</text>`;
-    host.innerHTML = `<svg viewBox="0 0 ${(left + inner + 12).toFixed(0)} ${(top + height + bottom).toFixed(0)}" role="img" aria-label="the arm in its plane">${grid}<rect class="frame" x="${left}" y="${top}" width="${inner}" height="${height}"/>${words}<path class="line" style="--c:var(--c-grey)" stroke-width="1" d="M${ends.join("L")}"/><polyline class="trail"/><polyline class="arm"/><g class="joints"></g></svg>`;
-    const line = host.querySelector(".arm"), trail = host.querySelector(".trail"), joints = host.querySelector(".joints");
-    const second = Math.max(1, Math.round(1 / period));
-    const show = (k) => {
-      const points = frames[k].map(point);
-      line.setAttribute("points", points.join(" "));
-      trail.setAttribute("points", ends.slice(Math.max(0, k - second), k + 1).join(" "));
-      joints.innerHTML = points.map((p, i) => {
-        const [x, y] = p.split(",");
-        return i ? `<circle class="pin" r="5" cx="${x}" cy="${y}"/>` : `<rect class="pin" x="${x - 7}" y="${y - 7}" width="14" height="14"/>`;
-      }).join("");
-      clock.textContent = `${(k * period).toFixed(1)} s`;
-      slider.value = k;
-    };
-    let began = null;
-    const step = (now) => {
-      if (began === null) return;
-      // The time of a frame may lie before that of the click that asked for it.
-      show(Math.floor(Math.max(0, now - began) / 1000 / period) % frames.length);
-      requestAnimationFrame(step);
-    };
-    slider.max = frames.length - 1;
-    slider.oninput = () => { began = null; button.textContent = "▶ move"; show(+slider.value); };
-    button.onclick = () => {
-      const running = began !== null;
-      began = running ? null : performance.now() - 1000 * period * slider.value;
-      button.textContent = running ? "▶ move" : "❚❚ stop";
-      if (!running) requestAnimationFrame(step);
-    };
-    show(0);
-    element.dataset.drawn = "true";
-  }
-
   for (const element of document.querySelectorAll("[data-figure]")) {
     const figure = new Figure(element);
     figures.set(figure.id, figure);
@@ -307,7 +247,7 @@
     while (waiting.length && performance.now() < until) waiting.shift().draw();
     if (waiting.length) setTimeout(some); else document.documentElement.dataset.ready = "true";
   };
-  document.querySelectorAll("[data-arm]").forEach(arm);
+  document.querySelectorAll("[data-arm]").forEach((element) => MovingArm.show(element, content.arms[element.dataset.arm]));
   some();
   window.report = {figures};
 })();
