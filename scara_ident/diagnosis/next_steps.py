@@ -54,7 +54,7 @@ class NextStep:
 
     def sentence(self) -> str:
         """Say it for a person."""
-        said = f"{self.question[:1].upper()}{self.question[1:]}: "
+        said = f"{capital(self.question)}: "
         if self.asked is None:
             return f"{said}{self.motion}{'' if self.seconds is None else f' ({self.seconds:.0f} s)'}."
         now = "" if self.sigma_before is None else f"; {self.sigma_before:.2g} standard errors apart so far"
@@ -156,3 +156,9 @@ def _significant(decision: Decision, diagnosis: Diagnosis) -> bool:
     if not effect.corrects_data(member) and effect.negligible(scene, member, decision.examination.value) is not None:
         return False
     return decision.examination.p_value * diagnosis.search.tried < diagnosis.search.step.criteria.family_error
+
+
+def capital(words: str) -> str:
+    """Begin a sentence with a capital, unless it begins with a name, such as that of a joint or a link."""
+    first = words.partition(" ")[0]
+    return words if any(sign in first for sign in "_0123456789") else words[:1].upper() + words[1:]

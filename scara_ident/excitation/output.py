@@ -200,8 +200,7 @@ def summary(design: Design) -> list[str]:
     broken = [each.name for each in design.reached if not each.kept]
     condition = np.sqrt(design.condition)
     return [
-        f"{what} of {design.trajectories[0].duration:g} s: ln det {design.log_det:.2f} over {design.samples} samples"
-        f"{'' if count == 1 else ' each'}, condition of the regressor {condition:.4g}.",
+        f"{what} of {design.trajectories[0].duration:g} s for {', '.join(design.model.robot.joints)}.",
         f"Limits broken: {', '.join(broken)}."
         if broken
         else f"All limits hold, at {design.verified} samples and between them.",
@@ -210,6 +209,8 @@ def summary(design: Design) -> list[str]:
             for item in design.tells
         ),
         f"Held back by {', '.join(held)}." if held else "No limit holds it back: use more harmonics.",
+        f"Information: ln det {design.log_det:.2f} over {design.samples} samples{'' if count == 1 else ' each'}, condition of the "
+        f"regressor {condition:.4g}.",
     ]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.next_steps import ASKED_MOTION, next_steps
+from scara_ident.diagnosis.next_steps import ASKED_MOTION, capital, next_steps
 from scara_ident.effects.position import Spring
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.asked import PAIR, open_diagnosis
@@ -59,3 +59,9 @@ def test_rivals_ask_for_a_motion_and_an_effect_for_the_experiment_that_shows_it(
     found = diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),))
     motions = {item.question: item.motion for item in next_steps(found)}
     assert motions["to confirm spring of joint2"] == Spring().experiment
+
+
+def test_a_sentence_begins_with_a_capital_unless_it_begins_with_a_name():
+    assert capital("spring or offset") == "Spring or offset"
+    assert capital("shoulder_pan_joint: friction") == "shoulder_pan_joint: friction"
+    assert capital("joint1: friction") == "joint1: friction"
