@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -21,7 +21,7 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation.design import Design, design_excitation
 from scara_ident.excitation.known import read_diagnosis
 from scara_ident.excitation.output import excitation_dict, write_joint_trajectory, write_trajectory
-from scara_ident.excitation.search import Effort
+from scara_ident.excitation.search import Effort, Progress
 from scara_ident.excitation.tell import SURE, Told
 from scara_ident.files import write_json, written_together
 from scara_ident.model.model import build_model
@@ -138,12 +138,12 @@ def ask(folder: Path, settings: Settings, work: Work | None = None) -> Asked:
         for question in before.asked if before is not None and before.inputs != inputs else ():
             times[question] = times.get(question, 0) + 1
         if not recordings:
-            return _first(folder, settings, Asked(inputs, times=times))
+            return _first(folder, settings, Asked(inputs, times=times), work)
         _diagnosed(folder, settings, recordings, work.part(0.0, 0.6))
         before = Asked(inputs, times=times)
         _note(folder, before)
     work("designing the next motion", 0.6)
-    return _designed(folder, settings, recordings, before)
+    return _designed(folder, settings, recordings, before, work.part(0.6, 1.0))
 
 
 def _complete(folder: Path, asked: Asked) -> bool:
@@ -181,10 +181,10 @@ def _note(folder: Path, asked: Asked) -> Asked:
     return asked
 
 
-def _first(folder: Path, settings: Settings, asked: Asked) -> Asked:
+def _first(folder: Path, settings: Settings, asked: Asked, work: Work) -> Asked:
     """Ask for a motion that tells much of everything, where nothing was recorded."""
     model = build_model(settings.robot, settings.model)
-    design = design_excitation(model, duration=settings.duration, effort=settings.effort)
+    design = design_excitation(model, duration=settings.duration, effort=settings.effort, progress=_told(work))
     words = "Nothing is recorded yet: record next/trajectory.csv, twice, into recordings/."
     _written(folder, design)
     return _note(folder, replace(asked, state="record", words=words))
@@ -199,7 +199,7 @@ def _diagnosed(folder: Path, settings: Settings, recordings: Sequence[Path], wor
         write_json(place / "diagnosis.json", {**content, "notes": [*useless, *content["notes"]]})
 
 
-def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], asked: Asked) -> Asked:
+def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], asked: Asked, work: Work) -> Asked:
     content = read_diagnosis(folder / "diagnosis.json")
     read, _ = read_usable(recordings, settings.robot)
     inquiry = inquiry_of(content, settings.robot, read)
@@ -210,7 +210,9 @@ def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], aske
         words = f"Asked {MOST_ASKED} times and still open: {'; '.join(tired)}." if tired else "Nothing is open."
         return _note(folder, replace(asked, state="untold" if tired else "settled", words=words))
     inquiry = inquiry_of({**content, "next": [item.entry() for item in left]}, settings.robot, read)
-    design = design_excitation(inquiry.scene.model, duration=settings.duration, tell=inquiry, effort=settings.effort)
+    design = design_excitation(
+        inquiry.scene.model, duration=settings.duration, tell=inquiry, effort=settings.effort, progress=_told(work)
+    )
     told = worth_recording(design.tells)
     if not told:
         _removed(folder)
@@ -224,6 +226,12 @@ def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], aske
     )
     keys = tuple(dict.fromkeys(key_of(item.question) for item in told))
     return _note(folder, replace(asked, state="record", words=words, asked=keys))
+
+
+def _told(work: Work) -> Callable[[Progress], None]:
+    """Tell of every search of a design."""
+    work("designing: search 1")
+    return lambda state: work(f"designing: search {state.done} of {state.total} done", state.done / state.total)
 
 
 def key_of(question: Question) -> str:

@@ -49,13 +49,16 @@ def ask(
         if not virtual or found.state != "record" or made >= steps:
             return
         from scara_ident.simulation import parse_effect, read_trajectory, simulate, virtual_arm, write_simulation
+        from scara_ident.simulation.first_run import compiled_first
 
         real = virtual_arm(arm)
         asked = read_trajectory(folder / "next" / "trajectory.csv", arm)
         taken = {path.stem.rpartition("_")[0] for path in recordings_in(folder)}
         name = next(word for word in (f"asked{k}" for k in count(1)) if word not in taken)
-        with written_together(folder / "recordings") as place:
+        with progress() as whole, written_together(folder / "recordings") as place:
+            work = compiled_first(real, whole)
             for repetition in (1, 2):
+                work(f"simulating {name}, run {repetition}", 0.5 * (repetition - 1))
                 done = simulate(
                     real, replace(asked, name=name), effects=[parse_effect(text) for text in effect or ()], seed=seed,
                     repetition=repetition,

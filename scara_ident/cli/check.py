@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from scara_ident.cli import options
-from scara_ident.cli.console import check_report, result_console, table
+from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, table, writing
 
 Result = Annotated[Path, typer.Argument(metavar="RESULT", help="identification.json or diagnosis.json of this arm.")]
 
@@ -41,14 +41,16 @@ def check(
     """Say whether an arm can run a motion, what limits it, and what energy it takes; exit status 1 if it cannot."""
     from scara_ident.cli.joint_values import joint_numbers, joint_ranges
     from scara_ident.errors import ScaraIdentError
-    from scara_ident.files import write_json, written_together
+    from scara_ident.files import write_json
     from scara_ident.use.check import check as run
     from scara_ident.use.check import check_dict, read_motion
     from scara_ident.use.joint_limits import joint_limits
     from scara_ident.use.known_model import read_known_model
 
     check_report(output, "check")
-    known = read_known_model(result, robot)
+    with progress() as work:
+        work("reading the model")
+        known = read_known_model(result, robot)
     arm = known.robot
     limits = joint_limits(
         arm,
@@ -58,7 +60,11 @@ def check(
         torques=joint_numbers(torques, "--torque"),
         powers=joint_numbers(powers, "--power"),
     )
-    found = run(known, read_motion(trajectory, known), limits)
+    with progress() as work:
+        work("reading the motion")
+        motion = read_motion(trajectory, known)
+        work("looking at every limit", READING_SHARE)
+        found = run(known, motion, limits)
     content = check_dict(found)
     console = result_console(content, json)
     rows = table("limits", "limit", "reached", "bound", "at [s]", "used", right=("reached", "bound", "at [s]", "used"))
@@ -76,8 +82,10 @@ def check(
         from scara_ident.report.html.check import check_figures
         from scara_ident.report.html.check import check_report as write_report
 
-        with written_together(output) as place:
+        with writing(output) as (place, work):
+            work("drawing check.png")
             draw(place / "check.png", f"Torque and power along {found.name}", check_figures(found))
+            work("drawing report.html", 0.7)
             write_report(place / "report.html", found)
             write_json(place / "check.json", content)
         console.written(output, "check.json", "report.html", "check.png")

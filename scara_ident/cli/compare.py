@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scara_ident.cli import options
-from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings
+from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings, writing
 
 
 def compare(
@@ -16,7 +16,7 @@ def compare(
     verbose: options.Verbose = False,
 ) -> None:
     """Set every trajectory's parameters against every trajectory."""
-    from scara_ident.files import write_json, written_together
+    from scara_ident.files import write_json
     from scara_ident.identification.compare import compare as run
     from scara_ident.recording.recording import read_usable
     from scara_ident.report.comparison import comparison_dict
@@ -40,7 +40,7 @@ def compare(
     if output is not None:
         from scara_ident.report.html import comparison_report
 
-        with written_together(output) as place:
+        with writing(output) as (place, _):
             comparison_report(place / "report.html", content)
             write_json(place / "comparison.json", content)
         console.written(output, "comparison.json", "report.html")

@@ -97,6 +97,16 @@ def progress() -> Iterator[Work]:
         yield Work(tell)
 
 
+@contextmanager
+def writing(folder: Path) -> Iterator[tuple[Path, Work]]:
+    """Write results whole or not at all, see `written_together`; yields their place, and who is told of each."""
+    from scara_ident.files import written_together
+
+    with progress() as work, written_together(folder) as place:
+        work("writing")
+        yield place, work
+
+
 def check_report(output: Path | None, kind: Kind) -> None:
     """Refuse, before the work, a folder that cannot be written into and a report that cannot be made."""
     from scara_ident.files import check_output

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from scara_ident.cli import options
-from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, table
+from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, table, writing
 
 
 def contact(
@@ -31,16 +31,16 @@ def contact(
     """Find contact with the arm in recordings: when, on which joints, and the force at the tool or the link."""
     import numpy as np
 
-    from scara_ident.files import write_json, written_together
+    from scara_ident.files import write_json
     from scara_ident.recording.recording import read_usable
     from scara_ident.use.contact import contact_observer, contacts_dict, look_for_contact
     from scara_ident.use.known_model import read_known_model
 
     check_report(output, "contact")
-    known = read_known_model(result, robot)
-    arm = known.robot
     with progress() as work:
-        work("reading recordings", 0.0)
+        work("reading the model and recordings")
+        known = read_known_model(result, robot)
+        arm = known.robot
         quiet, notes = read_usable(free, arm)
         watched, more = read_usable(recordings, arm)
         work("taking thresholds", READING_SHARE)
@@ -62,8 +62,10 @@ def contact(
         from scara_ident.report.drawing import draw
         from scara_ident.report.html.contact import contact_figures, contact_report
 
-        with written_together(output) as place:
+        with writing(output) as (place, work):
+            work("drawing contact.png")
             draw(place / "contact.png", f"External torque on {arm.name}", contact_figures(found))
+            work("drawing report.html", 0.7)
             contact_report(place / "report.html", found)
             write_json(place / "contacts.json", content)
         console.written(output, "contacts.json", "report.html", "contact.png")

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from scara_ident.cli import options
-from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings
+from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings, writing
 
 
 def _known(names: str | None) -> str | None:
@@ -50,7 +50,7 @@ def diagnose(
     """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
     from scara_ident.diagnosis import diagnose as run
     from scara_ident.effects import effects_named
-    from scara_ident.files import write_json, write_text, written_together
+    from scara_ident.files import write_json, write_text
     from scara_ident.recording.recording import read_usable
     from scara_ident.report.diagnosis import diagnosis_dict
     from scara_ident.report.diagnosis_markdown import diagnosis_markdown
@@ -88,9 +88,11 @@ def diagnose(
         from scara_ident.report.pictures import diagnosis_pictures, remove_stale
 
         context = DiagnosisContext(result)
-        with written_together(output) as place:
+        with writing(output) as (place, work):
+            work("drawing pictures")
             pictures = diagnosis_pictures(place, context)
             write_text(place / "diagnosis.md", diagnosis_markdown(result, pictures))
+            work("drawing report.html", 0.6)
             diagnosis_report(place / "report.html", context)
             write_json(place / "diagnosis.json", content)
         remove_stale(output, [name for _, name in pictures])

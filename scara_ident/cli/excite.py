@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from scara_ident.cli import options
-from scara_ident.cli.console import check_report, progress, result_console
+from scara_ident.cli.console import check_report, progress, result_console, writing
 
 # Share of a design that its searches take; the rest is the verification of limits.
 SEARCHES_SHARE = 0.97
@@ -89,7 +89,7 @@ def excite(
     from scara_ident.excitation.design import SAMPLES, check_size
     from scara_ident.excitation.known import read_diagnosis, read_parameters
     from scara_ident.excitation.output import check_rate, file_names
-    from scara_ident.files import write_json, written_together
+    from scara_ident.files import write_json
     from scara_ident.identification.identify import known_information
     from scara_ident.model.model import build_model
     from scara_ident.recording.recording import read_usable
@@ -121,10 +121,11 @@ def excite(
     check_size(count, arm.n, trajectories, SAMPLES)
     check_rate(rate, count / duration)
     nominal = None if parameters is None else read_parameters(parameters, equation)
-    recorded, useless = read_usable(known or (), arm)
-    prior = known_information(equation, recorded, PAPER_SAMPLES / duration) if recorded else None
-    inquiry = None if asked is None else inquiry_of(asked, arm, recorded)
     with progress() as work:
+        work("reading what is known")
+        recorded, useless = read_usable(known or (), arm)
+        prior = known_information(equation, recorded, PAPER_SAMPLES / duration) if recorded else None
+        inquiry = None if asked is None else inquiry_of(asked, arm, recorded)
 
         def told(state: Progress) -> None:
             words = f"search {state.done} of {state.total} done, best so far {-state.cost:.2f}"
@@ -151,14 +152,16 @@ def excite(
     console.say(content["summary"])
     console.print(limit_table(design))
     console.note([*useless, *content["notes"]])
-    with written_together(output) as folder:
+    with writing(output) as (folder, work):
         for trajectory, csv, yaml in zip(
             design.trajectories, file_names(design, ".csv"), file_names(design, ".yaml"), strict=True
         ):
             write_trajectory(trajectory, folder / csv, rate)
             write_joint_trajectory(trajectory, folder / yaml)
+        work("drawing excitation.png", 0.1)
         design_picture(folder / "excitation.png", design)
         motions = [design.motion(k, PAPER_SAMPLES / duration) for k in range(trajectories)]
+        work("drawing report.html", 0.6)
         excitation_report(folder / "report.html", content, arm, motions)
         write_json(folder / "excitation.json", content)
     trajectory_files = (*file_names(design, ".csv"), *file_names(design, ".yaml"))

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from scara_ident.cli import options
-from scara_ident.cli.console import result_console, table
+from scara_ident.cli.console import progress, result_console, table
 
 
 def export(
@@ -34,8 +34,13 @@ def export(
     from scara_ident.files import check_output
 
     check_output(output)
-    found = read_identified(result, robot)
-    content = write_exported(found, export_model(found, to), output, str(result))
+    with progress() as work:
+        work("reading the model")
+        found = read_identified(result, robot)
+        work(f"writing {to}", 0.2)
+        exported = export_model(found, to)
+        work("predicting with what was written", 0.5)
+        content = write_exported(found, exported, output, str(result))
     console = result_console(content, json)
     console.note(content["notes"])
     kinds = list(content["errors"])

@@ -62,7 +62,9 @@ def fleet(
     if rows.row_count:
         console.print(rows)
     console.note(str(fault) for fault in found.faults)
-    write_fleet(output, found, fleet_table(found))
+    with progress() as work:
+        work("drawing report.html")
+        write_fleet(output, found, fleet_table(found))
     console.written(output, "fleet.parquet", "report.html")
     if found.faults:
         count = len(found.faults)

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from scara_ident.cli import options
-from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings
+from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings, writing
 
 
 def identify(
@@ -31,7 +31,7 @@ def identify(
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
     from scara_ident.estimation.consistent.options import ConsistentOptions
-    from scara_ident.files import slug, write_json, written_together
+    from scara_ident.files import slug, write_json
     from scara_ident.identification.identify import identified_arm
     from scara_ident.identification.identify import identify as run
     from scara_ident.recording.recording import read_usable
@@ -72,11 +72,13 @@ def identify(
         arm_found = identified_arm(result)
         context = IdentificationContext(result)
         urdf, mjcf = (f"{slug(arm.name, 'robot')}_identified.{suffix}" for suffix in ("urdf", "xml"))
-        with written_together(output) as place:
+        with writing(output) as (place, work):
             if arm_found is not None:
                 notes = [export_urdf(arm_found, place / urdf), export_mjcf(arm_found, place / mjcf)]
                 console.note(dict.fromkeys(chain.from_iterable(notes)))
+            work("drawing torque.png", 0.2)
             torque_picture(place / "torque.png", context)
+            work("drawing report.html", 0.5)
             identification_report(place / "report.html", context)
             write_json(place / "identification.json", content)
         models = (urdf, mjcf) if arm_found is not None else ()

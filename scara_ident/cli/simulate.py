@@ -42,6 +42,7 @@ def simulate(
     from scara_ident.robot.robot import load_robot
     from scara_ident.simulation import parse_effect, virtual_arm, write_simulation
     from scara_ident.simulation import simulate as simulate_run
+    from scara_ident.simulation.first_run import compiled_first
     from scara_ident.simulation.named import named_motion
 
     check_output(output)
@@ -55,7 +56,8 @@ def simulate(
         if each.recording not in (None, *made):
             raise UsageError(f"{each.name}: no recording {each.recording!r}; there will be {', '.join(made)}")
     console = output_console()
-    with progress() as work:
+    with progress() as whole:
+        work = compiled_first(arm, whole)
         for place, motion in enumerate(motions):
             for repetition in range(1, repetitions + 1):
                 done = (place * repetitions + repetition - 1) / (len(motions) * repetitions)

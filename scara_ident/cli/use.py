@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from scara_ident.cli import options
-from scara_ident.cli.console import check_report, progress, result_console, table
+from scara_ident.cli.console import check_report, progress, result_console, table, writing
 
 
 def use(
@@ -33,7 +33,7 @@ def use(
 ) -> None:
     """Say what the model wins: fed forward on virtual arms, and in simulation beside recordings."""
     from scara_ident.export.result import read_content, read_identified
-    from scara_ident.files import write_json, written_together
+    from scara_ident.files import write_json
     from scara_ident.recording.recording import read_usable
     from scara_ident.report.html.use import use_report
     from scara_ident.report.use import WORDS, use_dict
@@ -57,7 +57,7 @@ def use(
     console.print(rows)
     console.say(content["summary"])
     if output is not None:
-        with written_together(output) as place:
+        with writing(output) as (place, _):
             use_report(place / "report.html", found)
             write_json(place / "use.json", content)
         console.written(output, "use.json", "report.html")

@@ -32,6 +32,14 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     return cast(Callable[P, R], dispatcher)
 
 
+def at_hand(function: Callable[..., object]) -> bool:
+    """Return whether a compiled function runs at once: it ran in this process, or its machine code is on disk."""
+    if getattr(function, "overloads", None) != {}:
+        return True
+    kept = getattr(getattr(function, "_cache", None), "_cache_file", None)
+    return kept is not None and hasattr(kept, "_load_index") and bool(kept._load_index())
+
+
 @cache
 def _stamp() -> str:
     digest = hashlib.sha256()

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.simulation.compiled import compiled
+from scara_ident.simulation.compiled import at_hand, compiled
 from scara_ident.simulation.external import SAME, until_change
 from scara_ident.simulation.forces import Room, State, make_room
 from scara_ident.simulation.integrate import Stages, first_stage, make_stages, make_state, step
@@ -193,6 +193,11 @@ def track(
         np.ascontiguousarray(feed), start, controlled, out,
     )  # fmt: skip
     return out, -1 - status
+
+
+def at_once() -> bool:
+    """Return whether `track` runs at once, without being compiled first."""
+    return at_hand(_track)
 
 
 def velocity_filter(rate: float, cutoff: float, damping: float = 1.0) -> Array:

@@ -16,6 +16,7 @@ from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
+from scara_ident.simulation.first_run import compiled_first
 from scara_ident.simulation.reference import ReferenceMotion
 from scara_ident.use.identified_arm import Entry, arm_with, simulated
 from scara_ident.use.rollout import HORIZONS, rollout_errors
@@ -155,6 +156,7 @@ def use(
     pairs, missing = simulated(model.found)
     progress("feed-forward torques", 0.0)
     bare, whole = arm_with(model.robot, model.before), arm_with(model.robot, model.after)
+    progress = compiled_first(whole, progress)
     pairs = tuple((effect.resolve(whole), item) for effect, item in pairs)
     effects = tuple(effect for effect, _ in pairs)
     wanted = at_ticks(trial_motion(whole, seed) if motion is None else motion)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import pytest
 
+from scara_ident.cli import console, progress_bar
 from scara_ident.cli.main import run
+from scara_ident.progress import Tell
 from scara_ident.recording.recording import write_recording
 from tests.report.simulated import run as simulate
 
@@ -37,6 +41,20 @@ def command(capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
         return Outcome(status, captured.out, captured.err)
 
     return call
+
+
+@pytest.fixture
+def steps(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The steps that a terminal would be told of."""
+    told: list[str] = []
+
+    @contextmanager
+    def shown(terminal) -> Iterator[Tell]:
+        yield lambda step, done: told.append(step) if 0.0 <= done <= 1.0 else told.append(f"{step}: {done}")
+
+    monkeypatch.setattr(console, "errors_console", lambda: SimpleNamespace(is_terminal=True))
+    monkeypatch.setattr(progress_bar, "shown", shown)
+    return told
 
 
 @pytest.fixture(scope="session")

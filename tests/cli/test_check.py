@@ -12,10 +12,14 @@ from tests.use.conftest import identified, result_file
 __all__ = ["identified", "result_file"]
 
 
-def test_a_motion_that_can_be_run(command, folder: Path, result_file: Path, tmp_path: Path):
+def test_a_motion_that_can_be_run(command, steps, folder: Path, result_file: Path, tmp_path: Path):
     done = command("check", folder / "OJD_2.parquet", result_file, "--output", tmp_path)
     assert done.status == 0
     assert "It can be run." in done.out
+    assert steps == [
+        "reading the model", "reading the motion", "looking at every limit", "writing", "drawing check.png",
+        "drawing report.html",
+    ]  # fmt: skip
     content = json.loads((tmp_path / "check.json").read_text())
     assert content["runs"] is True
     assert content["limits"]["joint1.torque"]["bound"] == 2.0

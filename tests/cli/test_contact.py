@@ -28,9 +28,13 @@ def pushed(folder: Path, tmp_path: Path) -> Path:
     return path
 
 
-def test_a_push_is_found_and_written(command, folder: Path, result_file: Path, pushed: Path, tmp_path: Path):
+def test_a_push_is_found_and_written(command, steps, folder: Path, result_file: Path, pushed: Path, tmp_path: Path):
     words = ["contact", pushed, result_file, "--free", folder / "OJD_1.parquet", "--free", folder / "OJD_2.parquet"]
     done = command(*words, "--output", tmp_path / "out")
+    assert steps == [
+        "reading the model and recordings", "taking thresholds", "looking for contact", "writing", "drawing contact.png",
+        "drawing report.html",
+    ]  # fmt: skip
     assert done.status == 0
     assert "1 contact in 12 s of motion" in done.out
     content = json.loads((tmp_path / "out" / "contacts.json").read_text())

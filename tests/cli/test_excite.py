@@ -72,9 +72,10 @@ def test_start_limits_block_and_known_torques_are_heeded(command, tmp_path: Path
 
 
 @pytest.mark.slow
-def test_recordings_at_hand_count(command, tmp_path: Path, folder: Path):
+def test_recordings_at_hand_count(command, steps, tmp_path: Path, folder: Path):
     alone = command("excite", *QUICK, "--json", "--output", tmp_path)
     filled = command("excite", *QUICK, "--json", "--known", folder / "OJD_1.parquet", "--output", tmp_path)
+    assert {"reading what is known", "search 1", "drawing excitation.png", "drawing report.html"} <= set(steps)
     before, after = json.loads(alone.out), json.loads(filled.out)
     assert before["log_det_with_prior"] is None
     assert after["log_det_with_prior"] > max(after["log_det"], before["log_det"])

@@ -19,8 +19,9 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_file_and_what_it_costs(command, result: Path, tmp_path: Path):
+def test_the_file_and_what_it_costs(command, steps, result: Path, tmp_path: Path):
     done = command("export", result, "--to", "mjcf", "--output", tmp_path)
+    assert steps == ["reading the model", "writing mjcf", "predicting with what was written"]
     assert done.status == 0
     content = json.loads((tmp_path / "export.json").read_text())
     assert {path.name for path in tmp_path.iterdir()} == {*content["files"], "export.json"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import re
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from scara_ident.simulation import compiled as module
-from scara_ident.simulation.compiled import SOURCES, compiled
+from scara_ident.simulation.compiled import SOURCES, at_hand, compiled
 
 ROOM = Path(module.__file__).parent
 
@@ -47,3 +48,15 @@ def test_a_change_of_any_source_changes_the_stamp(changed: str, tmp_path: Path, 
     with (tmp_path / changed).open("a") as file:
         file.write("\n")
     assert module._stamp.__wrapped__() != before
+
+
+def test_whether_a_function_runs_at_once_is_known_before_it_is_called(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "small_loop.py").write_text("def twice(x: float) -> float:\n    return 2.0 * x\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    twice = importlib.import_module("small_loop").twice
+    found = compiled(twice)
+    assert not at_hand(found)
+    assert found(2.0) == 4.0
+    assert at_hand(found)
+    # In another process it would be read from disk.
+    assert at_hand(compiled(twice))
