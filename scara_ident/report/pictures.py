@@ -9,12 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from scara_ident.arrays import Array
 from scara_ident.excitation.design import Design
 from scara_ident.excitation.parallel import map_in_order
 from scara_ident.excitation.tool import tool_motion, tool_of
 from scara_ident.report.drawing import draw
 from scara_ident.report.html.diagnosis import DiagnosisContext
 from scara_ident.report.html.identification import IdentificationContext
+from scara_ident.report.html.moving_arm import ROUNDING
 from scara_ident.report.html.remainder import remainder_group
 from scara_ident.report.html.story import chapter_group, moment_group
 from scara_ident.report.html.torque import torque_plot
@@ -132,8 +134,8 @@ def remove_stale(folder: Path, written: Sequence[str]) -> None:
 def design_picture(path: Path, design: Design) -> None:
     """Draw a design.
 
-    Joint positions in time, velocity over position of every joint with its limits, the tool's path in the two
-    directions in which it reaches farthest, and every parameter's std per unit of torque noise: with all parameters
+    Joint positions in time, velocity over position of every joint with its limits, the tool's path in
+    its plane or from above and from the side, and every parameter's std per unit of torque noise: with all parameters
     estimated, beside that with all others known, or beside what was known before.
 
     Parameters
@@ -157,7 +159,7 @@ def design_figures(design: Design) -> tuple[str, list[list[Figure]]]:
         f"{design.model.robot.name}: {names} - ln det {design.log_det:.2f}, "
         f"cond of the regressor {np.sqrt(design.condition):.3g} ({design.model.name} model)"
     )
-    return title, [[_motion(design), _phases(design)], [_path(design)], [_parameters(design)]]
+    return title, [[_motion(design), _phases(design)], _paths(design), [_parameters(design)]]
 
 
 def _motion(design: Design) -> Figure:
@@ -183,18 +185,36 @@ def _phases(design: Design) -> Figure:
     return single("phases", "Phase portraits and limits", "", Plot("position, share of the range", (panel,)))
 
 
-def _path(design: Design) -> Figure:
+def _paths(design: Design) -> list[Figure]:
     tool = design.limits.tool or tool_of(design.model.robot)
     time = np.linspace(0.0, design.trajectories[0].duration, POINTS)
-    paths = [tool_motion(tool, *each.at(time)).position for each in design.trajectories]
+    return path_views([tool_motion(tool, *each.at(time)).position for each in design.trajectories], tool.name)
+
+
+def path_views(paths: Sequence[Array], tool: str) -> list[Figure]:
+    """Return a path in its plane, or one that leaves it from above and from the side.
+
+    Parameters
+    ----------
+    paths : sequence of ndarray, shape (3, N)
+        m.
+    tool : str
+    """
     reach = np.ptp(np.concatenate(paths, axis=1), axis=1)
-    first, second = sorted(np.argsort(reach, kind="stable")[1:])
-    layers: list[Layer] = []
-    for k, path in enumerate(paths):
-        layers.append(Line(path[first], path[second], "blue", "", 1.0, DASHES[k % len(DASHES)], path=True))
-        layers.append(Dots(path[first, :1], path[second, :1], "blue", radius=5.0))
-    plot = Plot(f"{'xyz'[first]} [m]", (Panel(f"{'xyz'[second]} [m]", layers, 300),), equal=True)
-    return single("path", f"Path of {tool.name} (dot: start)", "", plot)
+    side = 0 if reach[0] >= reach[1] else 1
+    flat = sorted(np.argsort(reach, kind="stable")[1:].tolist())
+    views = [("", *flat)]
+    if min(reach) > ROUNDING * max(reach):
+        views = [(" from above", 0, 1), (" from the side", side, 2)]
+    found = []
+    for words, first, second in views:
+        layers: list[Layer] = []
+        for k, path in enumerate(paths):
+            layers.append(Line(path[first], path[second], "blue", "", 1.0, DASHES[k % len(DASHES)], path=True))
+            layers.append(Dots(path[first, :1], path[second, :1], "blue", radius=5.0))
+        plot = Plot(f"{'xyz'[first]} [m]", (Panel(f"{'xyz'[second]} [m]", layers, 300),), equal=True)
+        found.append(single(f"path-{first}{second}", f"Path of {tool}{words} (dot: start)", "", plot))
+    return found
 
 
 def _parameters(design: Design) -> Figure:

@@ -19,6 +19,7 @@ from scara_ident.report.pictures import (
     MOST_RECORDINGS,
     design_picture,
     diagnosis_pictures,
+    path_views,
     remove_stale,
     torque_picture,
 )
@@ -114,3 +115,19 @@ def test_a_design_is_a_picture(tmp_path: Path):
     with pytest.raises(ScaraIdentError, match="cannot be written"):
         design_picture(tmp_path / "preview.docx", design)
     assert [path.name for path in tmp_path.iterdir()] == ["new"]
+
+
+def test_a_path_in_a_plane_has_one_view_and_one_in_space_two():
+    """A circle in the plane x, z, and the same one tilted out of it."""
+    angle = np.linspace(0.0, 6.0, 50)
+    flat = np.array([np.cos(angle), np.full(50, 0.3), np.sin(angle)])
+    deep = flat + np.array([[0.0], [0.5], [0.0]]) * np.cos(angle)
+    assert [view.name for view in path_views([flat], "tool0")] == ["path-02"]
+    above, side = path_views([deep], "tool0")
+    assert (above.title, side.title) == (
+        "Path of tool0 from above (dot: start)",
+        "Path of tool0 from the side (dot: start)",
+    )
+    panel = side.variants[()].panels[0]
+    assert panel.label == "z [m]"
+    np.testing.assert_array_equal(panel.layers[0].x, deep[0])
