@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.observations import Observations
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, prepare
 from scara_ident.robot.robot import load_robot
