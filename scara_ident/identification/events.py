@@ -23,6 +23,8 @@ from scara_ident.threads import one_blas_thread
 
 # Events closer than this are one; as much is left out on either side, because the ends are known to that, s.
 MARGIN = 0.1
+# Time stamps are known to rounding only, s.
+ROUNDING = 1e-6
 # A constant force at the tool explains at least this share of the squared residual of a contact there.
 FITS = 0.75
 # States at which the tool's Jacobian is taken.
@@ -179,7 +181,7 @@ def _left_out(item: PreparedRecording, events: Sequence[Event]) -> PreparedRecor
         time = part.stretch.time - item.recording.time[0]
         inside = np.zeros(len(time), dtype=bool)
         for event in events:
-            inside |= (time >= event.start - MARGIN) & (time <= event.stop + MARGIN)
+            inside |= (time >= event.start - MARGIN - ROUNDING) & (time <= event.stop + MARGIN + ROUNDING)
         same = np.array_equal(inside, part.left_out) or not (np.any(inside) or np.any(part.left_out))
         parts.append(part if same else replace(part, left_out=inside if np.any(inside) else False))
     return (
