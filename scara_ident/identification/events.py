@@ -31,6 +31,8 @@ FITS = 0.75
 STATES = 40
 # Two lists hold the same event where their times overlap by this share.
 SAME = 0.5
+# Events that are said in words: a long file may have hundreds.
+MOST_SAID = 20
 # Another joint is named with an event if it stands out by this share of what would make it one.
 SHARED = 0.45
 # Share of a repetition's residual at the same place that makes it the motion's doing.
@@ -94,6 +96,14 @@ class Event:
         if np.isinf(self.score):
             return f"{self.recording} is explained much worse than the recordings fitted ({self.kind}): {where}{more}{done}"
         return f"{self.recording}: {self.kind} from {self.start:.2f} to {self.stop:.2f} s, {where}{more}{force}{done}"
+
+
+def event_notes(robot: Robot, events: Sequence[Event]) -> list[str]:
+    """Return events in words, of very many those that stand out most."""
+    least = sorted((event.score for event in events), reverse=True)[:MOST_SAID]
+    said = [event for event in events if event.score >= least[-1]][:MOST_SAID] if least else []
+    more = [f"{len(events) - len(said)} more events are listed in the result"] if len(events) > len(said) else []
+    return [*(event.sentence(robot) for event in said), *more]
 
 
 @one_blas_thread()

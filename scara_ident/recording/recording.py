@@ -201,10 +201,8 @@ def _kept(long: LongFile, robot: Robot, *, need_effort: bool) -> Recording:
     said = [next(own for part in parts for own in part.findings if own.kind == kind) for kind in findings]
     kept = int(starts[-1])
     if kept < long.samples:
-        where = f"{kept} of its {long.samples} samples are kept, in {len(parts)} windows spread over it"
-        said.append(
-            Finding("long", f"{where}; what has to see samples side by side looks at these", long.samples - kept)
-        )
+        where = f"of its {long.samples} samples {kept} are looked at, in {len(parts)} windows spread over it"
+        said.append(Finding("long", f"too long to hold: {where}; identify estimates from all", long.samples - kept))
     said += [Finding("refused", f"{error}; that window is left out") for error in errors[:1]]
     return replace(
         parts[0],

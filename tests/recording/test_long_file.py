@@ -85,5 +85,5 @@ def test_windows_are_spread_over_the_file_and_all_of_a_shorter_one(robot, gappy)
     assert len(kept.time) == sum(stop - start for start, stop in kept.long.windows)
     assert (kept.time[0], len(stretches(kept))) == (0.0, 8)
     (finding,) = (finding for finding in kept.findings if finding.kind == "long")
-    assert "of its 10000 samples are kept, in 8 windows" in finding.message
+    assert "of its 10000 samples" in finding.message
     assert "gap" not in {finding.kind for finding in kept.findings}
