@@ -14,7 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.memory import check_memory
 from scara_ident.recording.audit.samples import GAP_STEPS
+from scara_ident.recording.files.parquet_csv import PER_VALUE
 from scara_ident.recording.files.parquet_rows import read_rows, row_groups, seekable
 
 # Longer parts of a recording are cut: no work of it needs more memory than this many samples take.
@@ -85,12 +87,16 @@ def long_file(path: Path, time: str, names: Sequence[str]) -> LongFile | None:
     ------
     RecordingError
         If the file is damaged.
+    MemoryLimit
+        If one of its groups of rows takes more memory than may be taken.
     """
     if path.suffix.lower() != ".parquet" or path.is_dir():
         return None
-    samples = sum(row_groups(path))
+    groups = row_groups(path)
+    samples = sum(groups)
     if samples <= LONGEST_WHOLE or not seekable(path, time, names):
         return None
+    check_memory(path, PER_VALUE * len(names) * max(groups))
     return LongFile(path, tuple(cut_long([0, *_gaps(path, time, samples), samples])))
 
 

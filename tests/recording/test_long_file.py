@@ -6,8 +6,11 @@ from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
+from scara_ident.errors import MemoryLimit
+from scara_ident.memory import set_limit
 from scara_ident.motion.motion import stretches
 from scara_ident.recording import long_file
 from scara_ident.recording.long_file import LongFile, cut_long
@@ -42,6 +45,18 @@ def test_a_file_is_read_in_parts_from_its_length_on_if_it_can_be(robot, gappy, t
     assert again is not None
     assert again.bounds == found.bounds
     assert read_recording(save(tmp_path / "short_2.parquet", columns(4_000)), robot).long is None
+
+
+def test_a_file_of_one_huge_group_of_rows_is_refused_where_it_takes_too_much_memory(tmp_path):
+    set_limit(0.05)
+    try:
+        path = save(tmp_path / "a.parquet", {"time": np.arange(2_000_000) / 1e3})
+        assert find(path, "time", ["time"]) is not None
+        pl.DataFrame({"time": np.zeros(3_000_000)}).write_parquet(path, row_group_size=3_000_000)
+        with pytest.raises(MemoryLimit, match=r"a\.parquet: .*--max-memory"):
+            find(path, "time", ["time"])
+    finally:
+        set_limit(None)
 
 
 def test_pieces_are_those_that_the_whole_is_cut_into(robot, gappy, monkeypatch):

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from scara_ident.arrays import Array
-from scara_ident.memory import check_memory
-from scara_ident.recording.files.parquet_csv import PER_VALUE, damaged_table, numbers
+from scara_ident.recording.files.parquet_csv import damaged_table, numbers
 
 _MAGIC = b"PAR1"
 # Fields of the footer and of a group of rows.
@@ -74,12 +73,9 @@ def read_rows(path: Path, names: Sequence[str], start: int, stop: int) -> dict[s
     ------
     RecordingError
         A damaged file.
-    MemoryLimit
-        If one of its groups of rows takes more memory than may be taken.
     """
     import polars as pl
 
-    check_memory(path, PER_VALUE * len(names) * max(row_groups(path), default=0))
     try:
         rows = pl.scan_parquet(path, glob=False, hive_partitioning=False).select(names).slice(start, stop - start)
         frame = rows.collect()
