@@ -21,8 +21,8 @@ from scara_ident.recording.files.parquet_rows import read_rows, row_groups, seek
 
 # Longer parts of a recording are cut: no work of it needs more memory than this many samples take.
 MOST_SAMPLES = 60_000
-# A file of more samples is read in parts. Prepared with its regressor at every sample, this many take 0.3 GB of a two-joint
-# arm and 2 GB of a seven-joint one.
+# A file of more samples is read in parts. As many at once take 0.6 GB of a two-joint arm and 1.7 GB of a seven-joint one
+# (benchmarks/streaming.py), what a small machine has.
 LONGEST_WHOLE = 500_000
 # Samples that are read at once, and samples that are kept for what has to see samples side by side, in so many windows.
 PART = 4 * MOST_SAMPLES
