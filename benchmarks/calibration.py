@@ -27,7 +27,7 @@ from scipy.stats import beta
 
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.fitted_model import FittedModel
-from scara_ident.estimation.observations import JointRows
+from scara_ident.estimation.joint_rows import JointRows
 
 Array = NDArray[np.float64]
 BLOCKS = (6, 12, 50, 300)

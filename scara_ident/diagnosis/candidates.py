@@ -10,7 +10,8 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
-from scara_ident.estimation.observations import JointRows, Observations, observe
+from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.position_noise import noisier
 from scara_ident.motion.prepared import PreparedStretch

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Rows
 from scara_ident.estimation.information import orthonormal, weighted
-from scara_ident.estimation.observations import JointRows
+from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.threads import THREADS, side_by_side
 
 # What a block leaves to the others of a direction is at least this share: less is rounding.

@@ -17,7 +17,7 @@ from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, 
 from scara_ident.diagnosis.unknowns import Unknown, unknowns_of
 from scara_ident.effects import Scene, Tie
 from scara_ident.estimation.information import Information, merge, weighted
-from scara_ident.estimation.observations import JointRows
+from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.threads import one_blas_thread, side_by_side
 
 # Steps of Gauss and Newton; most fits settle in three, and a search has further ones. A tied effect comes from far away.

@@ -18,7 +18,8 @@ from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.gain import gains
 from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.effects import Scene
-from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.observations import Observations
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.prepared import PreparedData
 

@@ -39,6 +39,9 @@ def noise_bias(observations: Observations, weights: Array, value: Array) -> Arra
     if max(noise_shares(observations.data), default=0.0) < NEGLIGIBLE:
         return None
     again = informations(observations.model, noisier(observations.data))
+    if observations.kept is not None:
+        # What is compared is of the same samples.
+        value = weighted(observations.kept.by_joint, weights).solve().value
     return np.asarray(weighted(again, weights).solve().value - value)
 
 

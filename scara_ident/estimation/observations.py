@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.estimation.information import Information, merge
+from scara_ident.estimation.joint_rows import JointRows, joined
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.manners import Frozen
 from scara_ident.model.model import TorqueModel
@@ -27,62 +28,6 @@ from scara_ident.threads import THREADS, side_by_side
 
 # Columns of every joint at every sample of a stretch, (k, N) each.
 Raw = tuple[Array, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class JointRows:
-    """Rows of one joint within its band, in the order of time, recording after recording.
-
-    Attributes
-    ----------
-    columns : ndarray of int, shape (k,)
-        The model's columns that act on the joint.
-    table : ndarray, shape (k + 1, N)
-        These columns, then the torque.
-    starts : ndarray of int, shape (blocks + 1,)
-        Where each block of time begins.
-    counts : ndarray, shape (blocks,)
-        Samples that the rows of each block stand for.
-    """
-
-    columns: NDArray[np.intp]
-    table: Array
-    starts: NDArray[np.intp]
-    counts: Array
-
-    def information(self, parameters: int, blocks: slice = slice(None)) -> Information:
-        """Return the triangular factor of consecutive blocks among all parameters of the model."""
-        starts, counts = self.starts[:-1][blocks], self.counts[blocks]
-        if not len(starts):
-            return Information.empty(parameters)
-        stop = self.starts[1:][blocks][-1]
-        own = Information.empty(len(self.columns)).absorb_columns(self.table[:, starts[0] : stop])
-        return Information(own.factor, float(np.sum(counts))).embed(self.columns, parameters)
-
-    @property
-    def samples(self) -> float:
-        """Samples that all rows stand for."""
-        return float(np.sum(self.counts))
-
-    def rms(self, value: Array) -> float:
-        """Return the rms of what parameters leave of the torque, as the triangular factor has it; 0 without rows."""
-        left = self.table[-1] - value[self.columns] @ self.table[:-1]
-        return float(np.sqrt(left @ left / self.samples)) if self.samples else 0.0
-
-    def part(self, blocks: NDArray[np.intp]) -> JointRows:
-        """Return some of the blocks, in their order."""
-        if np.array_equal(blocks, np.arange(len(self.counts))):
-            return self
-        sizes = np.diff(self.starts)[blocks]
-        rows = [np.arange(self.starts[b], self.starts[b + 1]) for b in blocks]
-        chosen = np.concatenate(rows) if rows else np.zeros(0, dtype=np.intp)
-        starts = np.concatenate([[0], np.cumsum(sizes)])
-        return JointRows(self.columns, self.table[:, chosen], starts, self.counts[blocks])
-
-    def faded(self, shares: Array) -> JointRows:
-        """Return the rows with each block weighted to count for a share of its samples, shares of shape (blocks,)."""
-        size = np.repeat(np.sqrt(shares), np.diff(self.starts))
-        return JointRows(self.columns, self.table * size, self.starts, self.counts * shares)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,6 +43,8 @@ class Observations(Frozen):
         Recording of each block.
     raw : tuple of tuple of tuple of ndarray, each of shape (k, N)
         For every recording, stretch and joint the columns at every sample, not filtered.
+    kept : Observations or None
+        Those whose rows are of the samples in `data` alone, where the rows hold all of longer files; None where they hold no more.
     """
 
     model: TorqueModel
@@ -105,6 +52,12 @@ class Observations(Frozen):
     joints: tuple[JointRows, ...]
     owner: NDArray[np.intp]
     raw: tuple[tuple[Raw, ...], ...]
+    kept: Observations | None = None
+
+    @property
+    def in_memory(self) -> Observations:
+        """The observations whose rows are those of `data` and `raw`."""
+        return self if self.kept is None else self.kept
 
     def leading(self, model: TorqueModel) -> Observations:
         """Return the observations of a model whose terms are the first of this one's."""
@@ -146,6 +99,7 @@ class Observations(Frozen):
             joints=tuple(joint.part(blocks) for joint in self.joints),
             owner=owner.astype(np.intp),
             raw=tuple(self.raw[k] for k in places),
+            kept=None if self.kept is None else self.kept.of(places),
         )
 
     @cached_property
@@ -193,8 +147,10 @@ class Observations(Frozen):
 
     @property
     def samples(self) -> int:
-        """Samples on the uniform time grids."""
-        return sum(part.samples for part in self.data.stretches)
+        """Samples on the uniform time grids, and in long files."""
+        whole = [None if self.kept is None else item.recording.long for item in self.data.recordings]
+        own = (sum(part.samples for part in item.stretches) for item in self.data.recordings)
+        return sum(count if long is None else long.samples for count, long in zip(own, whole, strict=True))
 
     @property
     def row_step(self) -> tuple[int, ...]:
@@ -278,23 +234,8 @@ def observe(model: TorqueModel, data: PreparedData, known: Observations | None =
         return _observed(model, item) if same is None else (same.raw[0], same.joints)
 
     parts = side_by_side(of_recording, data.recordings)
-    rows = [part for _, part in parts]
-    owner = [np.full(len(part[0].counts), k) for k, part in enumerate(rows)]
-    joints = []
-    for j, own in enumerate(model.active):
-        each = [part[j] for part in rows]
-        ends = np.cumsum([0, *(item.table.shape[1] for item in each)])
-        starts = [item.starts[:-1] + end for item, end in zip(each, ends[:-1], strict=True)]
-        joints.append(
-            JointRows(
-                own,
-                np.concatenate([np.zeros((len(own) + 1, 0)), *(item.table for item in each)], axis=1),
-                np.concatenate([*starts, ends[-1:]]).astype(np.intp),
-                np.concatenate([np.zeros(0), *(item.counts for item in each)]),
-            )
-        )
-    whole = np.concatenate([np.zeros(0), *owner]).astype(np.intp)
-    return Observations(model, data, tuple(joints), whole, tuple(raw for raw, _ in parts))
+    joints, owner = joined([part for _, part in parts], model.active)
+    return Observations(model, data, joints, owner, tuple(raw for raw, _ in parts))
 
 
 def _key(item: PreparedRecording) -> tuple[int, ...]:

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import joint_noise, orthonormal, weighted
-from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.observations import Observations
 from scara_ident.threads import one_blas_thread
 
 # Blocks whose rms is that many times the noise floor begin to be bounded, and are given up. White noise of ten rows in a block

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.variance_components import components, expected
 from scara_ident.model.terms.friction import Friction, Offset
 from scara_ident.robot.robot import Robot
@@ -193,7 +194,8 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
         Parameters of all these columns.
     """
     runs = len(observations.data.recordings)
-    if runs < LEAST_RUNS:
+    # Of long files the rows are not beside the samples that the directions are made of.
+    if runs < LEAST_RUNS or observations.kept is not None:
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
 

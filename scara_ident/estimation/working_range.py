@@ -82,7 +82,7 @@ def told_directions(observations: Observations, value: Array) -> Told | None:
     if range_ is None:
         return None
     joints = observations.by_joint
-    rows = np.array([joint.table.shape[1] for joint in observations.joints])
+    rows = np.array([joint.independent for joint in observations.joints])
     noise = np.array([max(part.rms(value), LEAST_NOISE * part.torque_rms) or 1.0 for part in joints])
     # A row stands for several samples, and has their noise.
     step = np.array([part.rows for part in joints]) / np.maximum(rows, 1)

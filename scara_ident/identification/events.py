@@ -23,12 +23,16 @@ from scara_ident.threads import one_blas_thread
 
 # Events closer than this are one; as much is left out on either side, because the ends are known to that, s.
 MARGIN = 0.1
+# Time stamps are known to rounding only, s.
+ROUNDING = 1e-6
 # A constant force at the tool explains at least this share of the squared residual of a contact there.
 FITS = 0.75
 # States at which the tool's Jacobian is taken.
 STATES = 40
 # Two lists hold the same event where their times overlap by this share.
 SAME = 0.5
+# Events that are said in words: a long file may have hundreds.
+MOST_SAID = 20
 # Another joint is named with an event if it stands out by this share of what would make it one.
 SHARED = 0.45
 # Share of a repetition's residual at the same place that makes it the motion's doing.
@@ -92,6 +96,14 @@ class Event:
         if np.isinf(self.score):
             return f"{self.recording} is explained much worse than the recordings fitted ({self.kind}): {where}{more}{done}"
         return f"{self.recording}: {self.kind} from {self.start:.2f} to {self.stop:.2f} s, {where}{more}{force}{done}"
+
+
+def event_notes(robot: Robot, events: Sequence[Event]) -> list[str]:
+    """Return events in words, of very many those that stand out most."""
+    least = sorted((event.score for event in events), reverse=True)[:MOST_SAID]
+    said = [event for event in events if event.score >= least[-1]][:MOST_SAID] if least else []
+    more = [f"{len(events) - len(said)} more events are listed in the result"] if len(events) > len(said) else []
+    return [*(event.sentence(robot) for event in said), *more]
 
 
 @one_blas_thread()
@@ -179,7 +191,7 @@ def _left_out(item: PreparedRecording, events: Sequence[Event]) -> PreparedRecor
         time = part.stretch.time - item.recording.time[0]
         inside = np.zeros(len(time), dtype=bool)
         for event in events:
-            inside |= (time >= event.start - MARGIN) & (time <= event.stop + MARGIN)
+            inside |= (time >= event.start - MARGIN - ROUNDING) & (time <= event.stop + MARGIN + ROUNDING)
         same = np.array_equal(inside, part.left_out) or not (np.any(inside) or np.any(part.left_out))
         parts.append(part if same else replace(part, left_out=inside if np.any(inside) else False))
     return (

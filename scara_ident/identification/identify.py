@@ -26,13 +26,14 @@ from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.arguments import Recordings, model_of, recordings_of
 from scara_ident.identification.channel_check import channel_faults, refuse_exchanged
 from scara_ident.identification.clock_check import clock_drift
-from scara_ident.identification.events import Event, find_events, without_events
+from scara_ident.identification.events import Event, event_notes, find_events
+from scara_ident.identification.long_recordings import with_all_samples
 from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
 from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.repeatability import repeatability
-from scara_ident.progress import Tell, log_notes, silent
+from scara_ident.progress import Tell, Work, log_notes, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.recording.shared_samples import shared_samples
 from scara_ident.robot.robot import Robot
@@ -197,14 +198,18 @@ def identify(
     # With a wrong sign or exchanged joints nothing is explained anywhere.
     robust = None if faults else robust_fit(training)
     events = () if robust is None else find_events(training, robust.value)
-    training = without_events(training, events)
+    steady = None if robust is None else robust.value
+    training, events, more = with_all_samples(training, events, steady, Work(progress, 0.6, 0.7))
+    notes += more
     progress("estimating", 0.7)
     noise = repeatability(data)
     estimate, history = estimate_by(method, training, options)
-    differs = None if robust is None else disagreement(estimate, robust)
+    # Both of the same samples.
+    plain = estimate if training.kept is None else estimate_by(method, training.kept, options)[0]
+    differs = None if robust is None else disagreement(plain, robust)
     events += () if faults else held_out_events(estimate.value, training, validated)
-    drift = None if faults else clock_drift(estimate.value, training)
-    notes += [event.sentence(robot) for event in events] + [said for said in (differs, drift) if said is not None]
+    drift = None if faults else clock_drift(estimate.value, training.in_memory)
+    notes += event_notes(robot, events) + [said for said in (differs, drift) if said is not None]
     if isinstance(estimate, ConsistentEstimate):
         notes += estimate.notes
     log_notes(_LOG, notes)

@@ -15,10 +15,9 @@ from scara_ident.manners import Frozen
 from scara_ident.motion.low_pass import differentiate
 from scara_ident.motion.spline import cubic_spline
 from scara_ident.recording.audit.samples import GAP_STEPS
+from scara_ident.recording.long_file import cut_long
 from scara_ident.recording.recording import Recording
 
-# Longer parts are cut, so that memory does not grow with the length of a recording.
-MOST_SAMPLES = 60_000
 # A time step that differs by less than this share from the median is not jitter.
 UNIFORM_TOLERANCE = 1e-3
 
@@ -141,7 +140,7 @@ def stretches(recording: Recording) -> tuple[Stretch, ...]:
     median = float(np.median(step))
     # Nothing is interpolated across a gap.
     cuts = np.flatnonzero(step > GAP_STEPS * median) + 1
-    bounds = _cut_long([0, *cuts.tolist(), len(recording.time)])
+    bounds = cut_long(sorted({0, *cuts.tolist(), *recording.cuts, len(recording.time)}))
     found = []
     for start, stop in pairwise(bounds):
         if stop - start < 4:
@@ -150,15 +149,6 @@ def stretches(recording: Recording) -> tuple[Stretch, ...]:
     if not found:
         raise RecordingError(f"{recording.path or recording.name}: no four samples in a row without a gap in time")
     return tuple(found)
-
-
-def _cut_long(bounds: Sequence[int]) -> list[int]:
-    """Divide parts that are too long into equal ones."""
-    found = [bounds[0]]
-    for start, stop in pairwise(bounds):
-        pieces = -(-(stop - start) // MOST_SAMPLES)
-        found += [start + (stop - start) * k // pieces for k in range(1, pieces + 1)]
-    return found
 
 
 def _uniform(recording: Recording, start: int, stop: int, median: float) -> Stretch:

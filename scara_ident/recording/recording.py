@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import glob
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -13,14 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RecordingError, UsageError
-from scara_ident.files import real_path
+from scara_ident.errors import RecordingError
 from scara_ident.manners import Reported
 from scara_ident.recording.audit import Finding, Samples, audit
 from scara_ident.recording.columns import recording_columns
-from scara_ident.recording.files import IMPORTERS, column_names, is_bag_folder, is_recording, read_columns, shares_clock
+from scara_ident.recording.files import column_names, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
+from scara_ident.recording.files.parquet_rows import read_rows
+from scara_ident.recording.long_file import LongFile, long_file
 from scara_ident.recording.one_clock import on_one_clock
+from scara_ident.recording.paths import recording_name, recording_paths
 from scara_ident.recording.wanted import lacking_numbers, optional_channels, refuse_missing
 from scara_ident.robot.signal_map import SIGNALS, Channel, Channels, contract_channels
 
@@ -58,6 +59,10 @@ class Recording(Reported, told_by="recording"):
         What the audit saw in the file and did about it.
     path : Path or None
         The file that it was read from.
+    long : LongFile or None
+        The file, where it is too long to hold and this is only what is kept of it; see `read_parts`.
+    cuts : tuple of int
+        Samples before which a part of a long file is cut, as the whole is.
 
     Raises
     ------
@@ -78,6 +83,8 @@ class Recording(Reported, told_by="recording"):
     link_position: Array | None = None
     findings: tuple[Finding, ...] = ()
     path: Path | None = None
+    long: LongFile | None = None
+    cuts: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -112,11 +119,6 @@ def split_name(stem: str) -> tuple[str, int]:
     return (match[1], int(match[2])) if match else (stem, 1)
 
 
-def recording_name(path: Path) -> str:
-    """Return the name of a recording: the stem of its file, or the name of its folder."""
-    return real_path(path).name if path.is_dir() else path.stem
-
-
 def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) -> Recording:
     """Read a recording and audit it.
 
@@ -133,6 +135,7 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
     Returns
     -------
     Recording
+        Of a Parquet file of more than `scara_ident.recording.long_file.LONGEST_WHOLE` samples windows spread over it.
 
     Raises
     ------
@@ -143,12 +146,76 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
     channels = robot.channels or contract_channels(robot.joints)
     shared = shares_clock(path, channels.time.column)
     names = column_names(path, channels.topic)
+    placed = (channel.column for signal in SIGNALS for channel in channels.of(signal))
+    used = [channels.time.column, *(column for column in placed if column in names)]
+    long = None if shared else long_file(path, channels.time.column, used)
+    if long is not None:
+        return _kept(long, robot, need_effort=need_effort)
 
     def read(wanted: Sequence[str]) -> dict[str, Array]:
         return read_columns(path, wanted, channels.topic)
 
     found = recording_of(path, names, read, robot, channels, need_effort=need_effort, shared_clock=shared)
     return replace(found, path=path)
+
+
+def read_parts(long: LongFile, robot: Robot) -> Iterator[Recording | RecordingError]:
+    """Read a long file part by part, all of it; a part that the audit refuses is given as what is wrong with it."""
+    for bounds in long.parts:
+        try:
+            yield _rows_of(long, bounds, robot, need_effort=True)
+        except RecordingError as error:
+            yield error
+
+
+def _rows_of(long: LongFile, bounds: Sequence[int], robot: Robot, *, need_effort: bool) -> Recording:
+    channels = robot.channels or contract_channels(robot.joints)
+
+    def read(wanted: Sequence[str]) -> dict[str, Array]:
+        return read_rows(long.path, wanted, bounds[0], bounds[-1])
+
+    names = column_names(long.path)
+    found = recording_of(long.path, names, read, robot, channels, need_effort=need_effort, bounds=bounds)
+    return replace(found, path=long.path, long=long)
+
+
+def _kept(long: LongFile, robot: Robot, *, need_effort: bool) -> Recording:
+    """Read what is kept of a long file; windows that the audit refuses are left out, unless all are."""
+    parts: list[Recording] = []
+    errors = []
+    for bounds in long.windows:
+        try:
+            parts.append(_rows_of(long, bounds, robot, need_effort=need_effort))
+        except RecordingError as error:
+            errors.append(error)
+    if not parts:
+        raise errors[0]
+    starts = np.cumsum([0, *(len(part.time) for part in parts)])
+    cuts = [[start, *(start + cut for cut in part.cuts)] for start, part in zip(starts, parts, strict=False)]
+
+    def together(signal: str) -> Array | None:
+        values = [getattr(part, signal) for part in parts]
+        return None if any(value is None for value in values) else np.concatenate(values, axis=1)
+
+    findings = dict.fromkeys(finding.kind for part in parts for finding in part.findings)
+    said = [next(own for part in parts for own in part.findings if own.kind == kind) for kind in findings]
+    kept = int(starts[-1])
+    if kept < long.samples:
+        where = f"of its {long.samples} samples {kept} are looked at, in {len(parts)} windows spread over it"
+        said.append(Finding("long", f"too long to hold: {where}; identify estimates from all", long.samples - kept))
+    said += [Finding("refused", f"{error}; that window is left out") for error in errors[:1]]
+    return replace(
+        parts[0],
+        time=np.concatenate([part.time for part in parts]),
+        position=np.concatenate([part.position for part in parts], axis=1),
+        effort=together("effort"),
+        velocity=together("velocity"),
+        acceleration=together("acceleration"),
+        temperature=together("temperature"),
+        link_position=together("link_position"),
+        findings=tuple(said),
+        cuts=tuple(int(cut) for cut in chain.from_iterable(cuts))[1:],
+    )
 
 
 def recording_of(
@@ -160,6 +227,7 @@ def recording_of(
     *,
     need_effort: bool = True,
     shared_clock: bool = False,
+    bounds: Sequence[int] = (0,),
 ) -> Recording:
     """Make a recording of columns, wherever they are, and audit it.
 
@@ -178,6 +246,8 @@ def recording_of(
         See `read_recording`.
     shared_clock : bool
         Whether rows may hold only some of the channels.
+    bounds : sequence of int
+        Of the rows of a long file the first that is given, and those at which its pieces begin and end.
 
     Raises
     ------
@@ -204,20 +274,21 @@ def recording_of(
         time=time,
         position=rows(channels.position),
         effort=rows(channels.effort) if need_effort else None,
-        row=np.arange(1, len(time) + 1),
+        row=np.arange(1, len(time) + 1) + bounds[0],
     )
     samples, audited = audit(samples)
+    place = samples.row - 1 - bounds[0]
     findings += audited
     signals = {"effort": samples.effort}
     for signal, places in optional.items():
-        values = rows(places)[:, samples.row - 1] if samples.count < len(time) else rows(places)
+        values = rows(places)[:, place] if samples.count < len(time) else rows(places)
         if np.isfinite(values).all():
             signals[signal] = values
         else:
             findings.append(lacking_numbers(samples, signal, [channel.column for channel in places], values))
     if second:
         signals["link_position"] = link = np.full_like(samples.position, np.nan)
-        link[list(second)] = rows(list(second.values()))[:, samples.row - 1]
+        link[list(second)] = rows(list(second.values()))[:, place]
     if signals["effort"] is not None:
         signals["effort"] = signals["effort"] * robot.effort_gain[:, None]
 
@@ -232,6 +303,8 @@ def recording_of(
         position=samples.position,
         findings=tuple(findings),
         path=None,
+        long=None,
+        cuts=tuple(np.searchsorted(samples.row, np.asarray(bounds[1:-1]) + 1).tolist()),
         **signals,
     )
 
@@ -295,24 +368,6 @@ def read_usable(
     return tuple(found), notes
 
 
-def recording_paths(words: Sequence[Path | str]) -> tuple[Path, ...]:
-    """List the files that words on a command line stand for; see `read_recordings`."""
-    found: dict[Path, Path] = {}
-    stems: dict[str, Path] = {}
-    for word in words:
-        for path in _paths(str(word)):
-            real = real_path(path)
-            if real in found:
-                continue
-            name = recording_name(path)
-            if name in stems:
-                raise RecordingError(
-                    f"{stems[name]} and {path}: two recordings named {name!r}; rename one, results are listed by name"
-                )
-            found[real] = stems[name] = path
-    return tuple(found.values())
-
-
 def write_recording(recording: Recording, path: Path | str, *, effort_gain: Array | None = None) -> None:
     """Write a recording to a file, whole or not at all.
 
@@ -330,41 +385,3 @@ def write_recording(recording: Recording, path: Path | str, *, effort_gain: Arra
         Another suffix, or a place that cannot be written to.
     """
     write_columns(Path(path), recording_columns(recording, effort_gain))
-
-
-def _paths(word: str) -> list[Path]:
-    path = Path(word)
-    if path.is_dir() and not is_bag_folder(path):
-        found = _in_folder(path)
-        if not found:
-            raise RecordingError(
-                f"{path}: no .parquet or .csv file in this folder, nor another recording ({_others()}); "
-                "name one that holds recordings"
-            )
-        return found
-    if path.exists():
-        return [path]
-    if not glob.has_magic(word) or path.is_symlink():
-        raise UsageError(f"{word}: {'a link that leads to no file' if path.is_symlink() else 'no such file or folder'}")
-    matches = [Path(match) for match in sorted(glob.glob(word, recursive=True), key=_natural)]
-    if not matches:
-        raise UsageError(f"{word}: no file matches")
-    found = []
-    for match in matches:
-        found += [match] if is_recording(match) else _in_folder(match) if match.is_dir() else []
-    if not found:
-        raise RecordingError(f"{word}: matches {len(matches)} files but no .parquet or .csv file ({_others()})")
-    return found
-
-
-def _others() -> str:
-    return ", ".join([*IMPORTERS.names()[2:], "rosbag2 folder"])
-
-
-def _in_folder(folder: Path) -> list[Path]:
-    files = [f for f in folder.iterdir() if is_recording(f) and f.name[0] != "."]
-    return sorted(files, key=lambda file: _natural(file.name))
-
-
-def _natural(text: str) -> list[tuple[int, str]]:
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"([0-9]+)", text)]

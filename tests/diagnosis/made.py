@@ -17,7 +17,8 @@ from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Effect
 from scara_ident.estimation import Estimate, wls
-from scara_ident.estimation.observations import JointRows, Observations, observe
+from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.motion import motion_of, stretches

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.fitted_model import FittedModel
-from scara_ident.estimation.observations import JointRows
+from scara_ident.estimation.joint_rows import JointRows
 
 pytestmark = pytest.mark.slow
 

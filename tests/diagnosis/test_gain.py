@@ -8,7 +8,7 @@ import pytest
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.gain import gains
-from scara_ident.estimation.observations import JointRows
+from scara_ident.estimation.joint_rows import JointRows
 from tests.diagnosis.made import dense_rows, uneven_blocks
 
 

@@ -10,7 +10,7 @@ from scara_ident.diagnosis.candidate_tests import Examination, examine
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.noise_check import without_noise
-from scara_ident.estimation.observations import JointRows
+from scara_ident.estimation.joint_rows import JointRows
 
 BLOCKS, ROWS = 100, 12
 LENGTH = BLOCKS * ROWS

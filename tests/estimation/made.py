@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.estimation.joint_rows import JointRows, joined
+from scara_ident.estimation.observations import Observations
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, prepare
 from scara_ident.robot.robot import load_robot
@@ -47,21 +48,10 @@ def _prepared(model: TorqueModel, name: str, u: Array) -> PreparedRecording:
 def together(items: Sequence[Observations]) -> Observations:
     """Return the observations of several recordings as those of one set of data."""
     data = PreparedData(tuple(one for item in items for one in item.data.recordings), items[0].data.bands)
-    joints = []
-    for rows in zip(*(item.joints for item in items), strict=True):
-        ends = np.cumsum([0, *(part.table.shape[1] for part in rows)])
-        starts = [part.starts[:-1] + end for part, end in zip(rows, ends[:-1], strict=True)]
-        joints.append(
-            JointRows(
-                rows[0].columns,
-                np.concatenate([part.table for part in rows], axis=1),
-                np.concatenate([*starts, ends[-1:]]),
-                np.concatenate([part.counts for part in rows]),
-            )
-        )
+    joints, _ = joined([item.joints for item in items], items[0].model.active)
     firsts = np.cumsum([0, *(len(item.data.recordings) for item in items)])
     owner = np.concatenate([item.owner + first for item, first in zip(items, firsts[:-1], strict=True)])
-    return Observations(items[0].model, data, tuple(joints), owner, tuple(raw for item in items for raw in item.raw))
+    return Observations(items[0].model, data, joints, owner, tuple(raw for item in items for raw in item.raw))
 
 
 def rows(rng: np.random.Generator, model: TorqueModel, count: int) -> Array:

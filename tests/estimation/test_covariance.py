@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from scara_ident.estimation.covariance import Covariance, block_covariance
 from scara_ident.estimation.information import merge
-from scara_ident.estimation.observations import JointRows
+from scara_ident.estimation.joint_rows import JointRows
 
 
 def white(rng: np.random.Generator, count: int) -> np.ndarray:

@@ -9,7 +9,15 @@ import pytest
 
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import robust_fit
-from scara_ident.identification.events import Event, find_events, left_out, same_events, without_events
+from scara_ident.identification.events import (
+    MOST_SAID,
+    Event,
+    event_notes,
+    find_events,
+    left_out,
+    same_events,
+    without_events,
+)
 from scara_ident.identification.identify import identify
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
@@ -91,3 +99,16 @@ def test_a_repetition_with_the_like_makes_it_the_motions_doing():
     both = [pushed(ROBOT, run, FORCE, START, STOP) for run in (plain[0], again)]
     observations = observed([*both, *plain[1:]])
     assert find_events(observations, robust_fit(observations).value) == ()
+
+
+def test_of_very_many_events_the_strongest_are_said():
+    scores = np.random.default_rng(0).permutation(MOST_SAID + 5)
+    events = [
+        Event("a", float(k), k + 0.5, ("joint1",), 1.0, "unknown", float(score)) for k, score in enumerate(scores)
+    ]
+    notes = event_notes(ROBOT, events)
+    assert len(notes) == MOST_SAID + 1
+    assert notes[:-1] == [event.sentence(ROBOT) for event in events if event.score >= 5.0]
+    assert notes[-1] == "5 more events are listed in the result"
+    assert event_notes(ROBOT, events[:2]) == [event.sentence(ROBOT) for event in events[:2]]
+    assert event_notes(ROBOT, []) == []

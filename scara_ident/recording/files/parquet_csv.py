@@ -68,7 +68,7 @@ def column_names(path: Path) -> tuple[str, ...]:
     except csv.Error as error:
         raise RecordingError(f"{path}: its first line is no header ({error}); put the column names there") from error
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
-        raise _damaged(path, error) from error
+        raise damaged_table(path, error) from error
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise RecordingError(f"{path}: column {twice[0]!r} stands in the header twice; rename one of them")
@@ -104,8 +104,8 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
             _check_parquet(path, names)
             frame = pl.read_parquet(path, columns=list(names), glob=False, hive_partitioning=False)
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
-        raise _damaged(path, error) from error
-    return {name: _numbers(path, frame[name]) for name in names}
+        raise damaged_table(path, error) from error
+    return {name: numbers(path, frame[name]) for name in names}
 
 
 def write_columns(path: Path, columns: Mapping[str, Array]) -> None:
@@ -205,7 +205,8 @@ def _points(frame: pl.DataFrame, *, decimal_comma: bool) -> pl.DataFrame:
     return frame.with_columns(pl.all().str.replace(",", ".", literal=True)) if decimal_comma else frame
 
 
-def _numbers(path: Path, series: pl.Series) -> Array:
+def numbers(path: Path, series: pl.Series) -> Array:
+    """Return a column as float64, NaN where it has no value; dates and times of day in s since the first."""
     import polars as pl
 
     if series.dtype == pl.String:
@@ -294,7 +295,8 @@ def _short(text: str) -> str:
     return repr(text if len(text) <= LONGEST_WORD else f"{text[:LONGEST_WORD]}...")
 
 
-def _damaged(path: Path, error: BaseException) -> RecordingError:
+def damaged_table(path: Path, error: BaseException) -> RecordingError:
+    """Return the error that says that a table is not whole."""
     kind = path.suffix.lower().lstrip(".")
     reason = (str(error).strip() or type(error).__name__).splitlines()[0]
     return RecordingError(f"{path}: not a whole {kind} file ({reason}); copy or record it again")

@@ -111,13 +111,9 @@ def strongest_pairs(estimate: Estimate, most: int = 4, least: float = 0.9) -> li
 def cheap_history(observations: Observations) -> History:
     """Return the course of a recursive estimate in few steps."""
     size = max(1, -(-observations.blocks // MOST_STEPS))
-    edges = np.append(np.arange(0, observations.blocks, size), observations.blocks)
-    joints = tuple(
-        replace(joint, starts=joint.starts[edges], counts=np.add.reduceat(joint.counts, edges[:-1]))
-        for joint in observations.joints
-    )
+    joints = tuple(joint.grouped(size) for joint in observations.joints)
     with one_blas_thread():
-        return rls(replace(observations, joints=joints, owner=observations.owner[edges[:-1]]))[1]
+        return rls(replace(observations, joints=joints, owner=observations.owner[::size]))[1]
 
 
 def convergence_group(estimate: Estimate, history: History, observations: Observations) -> Group:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from scara_ident.estimation import ConsistentEstimate
 from scara_ident.estimation.consistent.bodies import smallest_eigenvalue_share
-from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.observations import Observations
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import PreparedData

@@ -18,7 +18,8 @@ from scara_ident.estimation.consistent.shape import (
     distance_to_cone,
     lubricated_p_value,
 )
-from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.observations import Observations
 from scara_ident.motion.prepared import PreparedData
 from tests.arms import motion
 from tests.estimation.consistent.arms import moving, observed, scara, stroke, truth

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import RecordingError
-from scara_ident.recording.recording import read_recording, read_recordings, recording_paths
+from scara_ident.recording.paths import recording_paths
+from scara_ident.recording.recording import read_recording, read_recordings
 from scara_ident.robot.robot import load_robot
 from tests.made_recordings import save
 from tests.recording.files.formats import (

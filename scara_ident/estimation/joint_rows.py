@@ -1,0 +1,124 @@
+"""Rows of one joint's equation in blocks of time, and how many of them are made few without losing what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.estimation.information import Information, triangular
+
+
+@dataclass(frozen=True, eq=False)
+class JointRows:
+    """Rows of one joint within its band, in the order of time, recording after recording.
+
+    Attributes
+    ----------
+    columns : ndarray of int, shape (k,)
+        The model's columns that act on the joint.
+    table : ndarray, shape (k + 1, N)
+        These columns, then the torque.
+    starts : ndarray of int, shape (blocks + 1,)
+        Where each block of time begins.
+    counts : ndarray, shape (blocks,)
+        Samples that the rows of each block stand for.
+    sizes : ndarray, shape (blocks,), or None
+        Rows of each block before they became a triangular factor; None where they stand as they were.
+    """
+
+    columns: NDArray[np.intp]
+    table: Array
+    starts: NDArray[np.intp]
+    counts: Array
+    sizes: Array | None = None
+
+    @property
+    def independent(self) -> float:
+        """Number of rows, before any became a triangular factor."""
+        return float(self.table.shape[1] if self.sizes is None else np.sum(self.sizes))
+
+    def information(self, parameters: int, blocks: slice = slice(None)) -> Information:
+        """Return the triangular factor of consecutive blocks among all parameters of the model."""
+        starts, counts = self.starts[:-1][blocks], self.counts[blocks]
+        if not len(starts):
+            return Information.empty(parameters)
+        stop = self.starts[1:][blocks][-1]
+        own = Information.empty(len(self.columns)).absorb_columns(self.table[:, starts[0] : stop])
+        return Information(own.factor, float(np.sum(counts))).embed(self.columns, parameters)
+
+    @property
+    def samples(self) -> float:
+        """Samples that all rows stand for."""
+        return float(np.sum(self.counts))
+
+    def rms(self, value: Array) -> float:
+        """Return the rms of what parameters leave of the torque, as the triangular factor has it; 0 without rows."""
+        left = self.table[-1] - value[self.columns] @ self.table[:-1]
+        return float(np.sqrt(left @ left / self.samples)) if self.samples else 0.0
+
+    def part(self, blocks: NDArray[np.intp]) -> JointRows:
+        """Return some of the blocks, in their order."""
+        if np.array_equal(blocks, np.arange(len(self.counts))):
+            return self
+        lengths = np.diff(self.starts)[blocks]
+        rows = [np.arange(self.starts[b], self.starts[b + 1]) for b in blocks]
+        chosen = np.concatenate(rows) if rows else np.zeros(0, dtype=np.intp)
+        starts = np.concatenate([[0], np.cumsum(lengths)])
+        sizes = None if self.sizes is None else self.sizes[blocks]
+        return JointRows(self.columns, self.table[:, chosen], starts, self.counts[blocks], sizes)
+
+    def faded(self, shares: Array) -> JointRows:
+        """Return the rows with each block weighted to count for a share of its samples, shares of shape (blocks,)."""
+        size = np.repeat(np.sqrt(shares), np.diff(self.starts))
+        return replace(self, table=self.table * size, counts=self.counts * shares)
+
+    def grouped(self, size: int) -> JointRows:
+        """Return the rows with so many neighbouring blocks as one, each the triangular factor of its rows where that is less.
+
+        Products of columns, and so every least-squares quantity that looks at blocks as a whole, are those of the rows.
+        """
+        edges = np.append(np.arange(0, len(self.counts), size), len(self.counts))
+        held = np.diff(self.starts).astype(float) if self.sizes is None else self.sizes
+        parts = [self.table[:, a:b] for a, b in pairwise(self.starts[edges])]
+        most = len(self.table)
+        tables = [part if part.shape[1] <= most else triangular(part.T).T for part in parts]
+        starts = np.cumsum([0, *(table.shape[1] for table in tables)])
+        table = np.concatenate([np.zeros((most, 0)), *tables], axis=1)
+        counts, sizes = (np.add.reduceat(each, edges[:-1]) if len(each) else each for each in (self.counts, held))
+        return JointRows(self.columns, table, starts, counts, sizes)
+
+
+def joined(
+    parts: Sequence[Sequence[JointRows]], columns: Sequence[NDArray[np.intp]]
+) -> tuple[tuple[JointRows, ...], NDArray[np.intp]]:
+    """Return the rows of several recordings one after the other, joint by joint, and which recording each block is of.
+
+    Parameters
+    ----------
+    parts : sequence of sequence of JointRows
+        Of each recording, of each joint.
+    columns : sequence of ndarray of int, shape (k,)
+        The model's columns that act on each joint.
+    """
+    joints = []
+    for j, own in enumerate(columns):
+        each = [part[j] for part in parts]
+        ends = np.cumsum([0, *(rows.table.shape[1] for rows in each)])
+        starts = [rows.starts[:-1] + end for rows, end in zip(each, ends[:-1], strict=True)]
+        sizes = [np.diff(rows.starts).astype(float) if rows.sizes is None else rows.sizes for rows in each]
+        joints.append(
+            JointRows(
+                own,
+                np.concatenate([np.zeros((len(own) + 1, 0)), *(rows.table for rows in each)], axis=1),
+                np.concatenate([*starts, ends[-1:]]).astype(np.intp),
+                np.concatenate([np.zeros(0), *(rows.counts for rows in each)]),
+                np.concatenate(sizes) if any(rows.sizes is not None for rows in each) else None,
+            )
+        )
+    owner = [np.full(len(part[0].counts), k) for k, part in enumerate(parts)]
+    return tuple(joints), np.concatenate([np.zeros(0), *owner]).astype(np.intp)

@@ -1,0 +1,73 @@
+"""Which files words on a command line stand for."""
+
+from __future__ import annotations
+
+import glob
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from scara_ident.errors import RecordingError, UsageError
+from scara_ident.files import real_path
+from scara_ident.recording.files import IMPORTERS, is_bag_folder, is_recording
+
+
+def recording_name(path: Path) -> str:
+    """Return the name of a recording: the stem of its file, or the name of its folder."""
+    return real_path(path).name if path.is_dir() else path.stem
+
+
+def recording_paths(words: Sequence[Path | str]) -> tuple[Path, ...]:
+    """List the files that words on a command line stand for (see `read_recordings`)."""
+    found: dict[Path, Path] = {}
+    stems: dict[str, Path] = {}
+    for word in words:
+        for path in _paths(str(word)):
+            real = real_path(path)
+            if real in found:
+                continue
+            name = recording_name(path)
+            if name in stems:
+                raise RecordingError(
+                    f"{stems[name]} and {path}: two recordings named {name!r}; rename one, results are listed by name"
+                )
+            found[real] = stems[name] = path
+    return tuple(found.values())
+
+
+def _paths(word: str) -> list[Path]:
+    path = Path(word)
+    if path.is_dir() and not is_bag_folder(path):
+        found = _in_folder(path)
+        if not found:
+            raise RecordingError(
+                f"{path}: no .parquet or .csv file in this folder, nor another recording ({_others()}); "
+                "name one that holds recordings"
+            )
+        return found
+    if path.exists():
+        return [path]
+    if not glob.has_magic(word) or path.is_symlink():
+        raise UsageError(f"{word}: {'a link that leads to no file' if path.is_symlink() else 'no such file or folder'}")
+    matches = [Path(match) for match in sorted(glob.glob(word, recursive=True), key=_natural)]
+    if not matches:
+        raise UsageError(f"{word}: no file matches")
+    found = []
+    for match in matches:
+        found += [match] if is_recording(match) else _in_folder(match) if match.is_dir() else []
+    if not found:
+        raise RecordingError(f"{word}: matches {len(matches)} files but no .parquet or .csv file ({_others()})")
+    return found
+
+
+def _others() -> str:
+    return ", ".join([*IMPORTERS.names()[2:], "rosbag2 folder"])
+
+
+def _in_folder(folder: Path) -> list[Path]:
+    files = [f for f in folder.iterdir() if is_recording(f) and f.name[0] != "."]
+    return sorted(files, key=lambda file: _natural(file.name))
+
+
+def _natural(text: str) -> list[tuple[int, str]]:
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"([0-9]+)", text)]

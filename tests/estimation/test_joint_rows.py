@@ -1,0 +1,56 @@
+"""Rows in blocks of time: grouped and joined they say what they said apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scara_ident.estimation.information import merge
+from scara_ident.estimation.joint_rows import JointRows, joined
+
+COLUMNS = np.array([0, 2, 3])
+
+
+def rows(seed: int, blocks: int = 7, length: int = 3) -> JointRows:
+    table = np.random.default_rng(seed).standard_normal((4, blocks * length))
+    return JointRows(COLUMNS, table, np.arange(blocks + 1) * length, np.full(blocks, 10.0 * length))
+
+
+def gram(item: JointRows, parameters: int = 5) -> np.ndarray:
+    factor = item.information(parameters).factor
+    return factor.T @ factor
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 9])
+def test_grouped_blocks_keep_products_counts_and_number_of_rows_and_no_more_rows_than_columns(size):
+    item = rows(0)
+    once = item.grouped(size)
+    assert once.starts[-1] == once.table.shape[1] <= len(once.counts) * len(item.table)
+    assert len(once.counts) == -(-7 // size)
+    assert (once.samples, once.independent) == (item.samples, item.independent) == (210.0, 21.0)
+    assert gram(once) == pytest.approx(gram(item), rel=1e-12, abs=1e-12)
+    for block in range(len(once.counts)):
+        apart = item.information(5, slice(block * size, (block + 1) * size))
+        factor = once.information(5, slice(block, block + 1))
+        assert factor.rows == apart.rows
+        assert factor.residual_sum(np.ones(5)) == pytest.approx(apart.residual_sum(np.ones(5)), rel=1e-12)
+
+
+def test_what_is_grouped_again_was_never_apart():
+    once, twice = rows(1).grouped(4), rows(1).grouped(2).grouped(2)
+    assert np.array_equal(once.counts, twice.counts)
+    assert np.array_equal(once.sizes, twice.sizes)
+    assert gram(once) == pytest.approx(gram(twice), rel=1e-12, abs=1e-12)
+    assert once.part(np.array([1])).independent == once.faded(np.ones(2)).part(np.array([1])).independent == 9.0
+
+
+def test_joined_rows_stand_one_after_the_other_with_their_owners():
+    first, second = rows(2), rows(3).grouped(3)
+    (both,), owner = joined([[first], [second]], [COLUMNS])
+    assert owner.tolist() == [0] * 7 + [1] * 3
+    assert both.independent == 42.0
+    whole = merge([first.information(5), second.information(5)])
+    assert gram(both) == pytest.approx(whole.factor.T @ whole.factor, rel=1e-12, abs=1e-12)
+    (none,), nobody = joined([], [COLUMNS])
+    assert none.table.shape == (4, 0)
+    assert len(nobody) == none.samples == 0
