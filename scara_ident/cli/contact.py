@@ -31,13 +31,13 @@ def contact(
     """Find contact with the arm in recordings: when, on which joints, and the force at the tool or the link."""
     import numpy as np
 
+    from scara_ident.export.result import read_identified
     from scara_ident.files import write_json, written_together
     from scara_ident.recording.recording import read_usable
     from scara_ident.use.contact import contact_observer, contacts_dict, look_for_contact
-    from scara_ident.use.known_model import read_known_model
 
     check_report(output, "contact")
-    known = read_known_model(result, robot)
+    known = read_identified(result, robot, determined=True)
     arm = known.robot
     with progress() as work:
         work("reading recordings", 0.0)

@@ -14,10 +14,10 @@ from scara_ident.export.c_header import c_header, c_name
 from scara_ident.export.casadi_module import casadi_module
 from scara_ident.export.forms import FORMS, Said, friction_said, offset_said, possible_standard, said_by, with_code
 from scara_ident.export.friction import JointFriction, JointSideFriction, joint_side
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.export.mjcf import mjcf_text
 from scara_ident.export.mujoco_module import mujoco_module
 from scara_ident.export.pinocchio_module import pinocchio_module
-from scara_ident.export.result import IdentifiedModel
 from scara_ident.export.ros2 import ros2_text
 from scara_ident.export.traced_model import TracedModel, trace_model
 from scara_ident.export.urdf import urdf_text

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, RobotError, UsageError
+from scara_ident.export.identified_model import Entry, IdentifiedModel
 from scara_ident.motion.prepared import prepare
 from scara_ident.progress import Tell, silent
 from scara_ident.recording.recording import Recording
-from scara_ident.robot.robot import Robot
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.reference import ReferenceMotion
-from scara_ident.use.identified_arm import Entry, arm_with, simulated
+from scara_ident.use.identified_arm import arm_with, arms_of, by_name, simulated
 from scara_ident.use.rollout import HORIZONS, rollout_errors
-from scara_ident.use.tracking import Tracked, at_ticks, needed_torque, tracked, urdf_torque
+from scara_ident.use.tracking import Tracked, at_ticks, foreseen_torque, needed_torque, tracked, urdf_torque
 from scara_ident.use.trial_motion import trial_motion
 
 # Arms that may be the true one, drawn about the model.
@@ -29,37 +28,12 @@ HALVINGS = 6
 
 
 @dataclass(frozen=True, eq=False)
-class UsedModel:
-    """A model as its result file tells it.
-
-    Attributes
-    ----------
-    robot : Robot
-    before, after : mapping of str to float
-        Parameters of the complete model's names, without and with the effects found.
-    std : mapping of str to float
-        Their standard deviations; what is not determined is left out.
-    found : sequence of Entry
-        The effects, as in ``diagnosis.json``.
-    bands : tuple of float or None, one per joint
-        In which it was found, Hz.
-    """
-
-    robot: Robot
-    before: Mapping[str, float]
-    after: Mapping[str, float]
-    std: Mapping[str, float]
-    found: Sequence[Entry]
-    bands: tuple[float | None, ...]
-
-
-@dataclass(frozen=True, eq=False)
 class Use:
     """What `use` found.
 
     Attributes
     ----------
-    model : UsedModel
+    model : IdentifiedModel
     motion : ReferenceMotion
         That the arms followed.
     runs : tuple of tuple of Tracked
@@ -72,7 +46,7 @@ class Use:
         Effects that the virtual arm had, and names of those found that it cannot have.
     """
 
-    model: UsedModel
+    model: IdentifiedModel
     motion: ReferenceMotion
     runs: tuple[tuple[Tracked, ...], ...]
     horizons: tuple[float, ...]
@@ -89,38 +63,8 @@ class Use:
         }
 
 
-def used_model(content: Mapping[str, Any], robot: Robot) -> UsedModel:
-    """Take a model from the content of ``identification.json`` or ``diagnosis.json``.
-
-    Parameters
-    ----------
-    content : mapping
-    robot : Robot
-        That it was identified for.
-
-    Raises
-    ------
-    UsageError
-        If it is no such content, or of another robot or model.
-    """
-    try:
-        entries, name = list(content["parameters"]), str(content["robot"])
-        after = {item["name"]: float(item["value"]) for item in entries if item["value"] is not None}
-        std = {item["name"]: float(item["std"]) for item in entries if item.get("std") is not None}
-        before = after | {item["name"]: float(item["before"]) for item in entries if item.get("before") is not None}
-        found = list(content.get("effects", ()))
-        bands = {**dict.fromkeys(robot.joints), **(content.get("band_hz") or {})}
-    except (KeyError, TypeError, ValueError, AttributeError):
-        raise UsageError("no parameters are in it; expected an identification.json or a diagnosis.json") from None
-    if name != robot.name:
-        raise UsageError(f"it was identified for {name}, the robot given is {robot.name}; give that one by --robot")
-    if content.get("model") not in ("complete", "reduced", "basic"):
-        raise UsageError(f"its model {content.get('model')!r} is none that the virtual arm has")
-    return UsedModel(robot, before, after, std, found, tuple(bands[joint] for joint in robot.joints))
-
-
 def use(
-    model: UsedModel,
+    model: IdentifiedModel,
     motion: ReferenceMotion | None = None,
     recordings: Sequence[Recording] = (),
     *,
@@ -134,7 +78,7 @@ def use(
 
     Parameters
     ----------
-    model : UsedModel
+    model : IdentifiedModel
     motion : ReferenceMotion, optional
         By default from pose to pose within the limits.
     recordings : sequence of Recording, optional
@@ -150,18 +94,20 @@ def use(
     ------
     RobotError
         If no arm with these parameters can move.
+    UsageError
+        If the virtual arm has no such model.
     """
     random = np.random.default_rng(seed)
     pairs, missing = simulated(model.found)
     progress("feed-forward torques", 0.0)
-    bare, whole = arm_with(model.robot, model.before), arm_with(model.robot, model.after)
+    bare, whole = arms_of(model)
     pairs = tuple((effect.resolve(whole), item) for effect, item in pairs)
     effects = tuple(effect for effect, _ in pairs)
     wanted = at_ticks(trial_motion(whole, seed) if motion is None else motion)
     feeds: dict[str, Array | None] = {"pid": None, "urdf": urdf_torque(whole, wanted)}
     feeds["identified"] = needed_torque(bare, (), wanted)
     if effects:
-        feeds["effects"] = needed_torque(whole, effects, wanted)
+        feeds["effects"] = needed_torque(whole, effects, wanted, foreseen_torque(model, wanted))
     runs = []
     for k in range(DRAWS):
         progress("following the motion", 0.2 + 0.5 * k / DRAWS)
@@ -182,12 +128,13 @@ def use(
     return Use(model, wanted, tuple(runs), HORIZONS, rollouts, effects, missing)
 
 
-def _drawn(model: UsedModel, whole: VirtualArm, random: np.random.Generator) -> VirtualArm:
+def _drawn(model: IdentifiedModel, whole: VirtualArm, random: np.random.Generator) -> VirtualArm:
     """Draw an arm about the model."""
-    step = {name: std * random.normal() for name, std in model.std.items() if name in model.after}
+    value = by_name(model, model.value)
+    step = {name: std * random.normal() for name, std in by_name(model, model.std).items() if name in value}
     for share in 0.5 ** np.arange(HALVINGS):
         try:
-            moved = {name: value + share * step.get(name, 0.0) for name, value in model.after.items()}
+            moved = {name: x + share * step.get(name, 0.0) for name, x in value.items()}
             return replace(arm_with(model.robot, moved), controller=whole.controller)
         except RobotError:
             continue
