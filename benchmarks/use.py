@@ -30,8 +30,9 @@ from scara_ident.motion.prepared import prepare
 from scara_ident.report.use import total
 from scara_ident.use.identified_arm import arms_of, simulated
 from scara_ident.use.rollout import HORIZONS, rollout_errors
-from scara_ident.use.tracking import at_ticks, foreseen_torque, needed_torque, tracked, urdf_torque
+from scara_ident.use.tracking import at_ticks, tracked
 from scara_ident.use.trial_motion import trial_motion
+from scara_ident.use.use import fed_forward
 
 # Effects that a drive can act against; those of sensors alone are none.
 KINDS = (
@@ -67,12 +68,7 @@ def on_one_arm(robot: str, kind: str, seed: int, folder: Path) -> dict[str, Any]
     bare, whole = arms_of(model)
     found = tuple(effect.resolve(whole) for effect, _ in pairs)
     motion = at_ticks(trial_motion(whole, seed))
-    feeds = {
-        "pid": None,
-        "urdf": urdf_torque(whole, motion),
-        "identified": needed_torque(bare, (), motion),
-        "effects": needed_torque(whole, found, motion, foreseen_torque(model, motion)),
-    }
+    feeds = {"pid": None, **fed_forward(model, motion, bare, whole, found)}
     errors = {item.name: item.rms for item in tracked(made.arm, made.effects, motion, feeds, seed)}
     held = made.held_out[0]
     (part, *_) = prepare([held], model.bands).stretches

@@ -44,6 +44,10 @@ class Use:
         ``identified`` and ``effects``: rms distance from recordings; empty without any.
     effects, missing : tuple
         Effects that the virtual arm had, and names of those found that it cannot have.
+    drawn : tuple of (VirtualArm, tuple of Effect)
+        The arms that followed, with their effects.
+    feeds : mapping of str to ndarray of shape (n, N)
+        Torque fed forward, on the effort side; none for ``pid``.
     """
 
     model: IdentifiedModel
@@ -53,6 +57,8 @@ class Use:
     rollouts: Mapping[str, Array]
     effects: tuple[Effect, ...]
     missing: tuple[str, ...]
+    drawn: tuple[tuple[VirtualArm, tuple[Effect, ...]], ...]
+    feeds: Mapping[str, Array]
 
     def rms(self) -> dict[str, Array]:
         """Return the rms tracking error of every joint over all drawn arms, by feed-forward."""
@@ -68,6 +74,7 @@ def use(
     motion: ReferenceMotion | None = None,
     recordings: Sequence[Recording] = (),
     *,
+    arms: int = DRAWS,
     seed: int = 0,
     progress: Tell = silent,
 ) -> Use:
@@ -83,6 +90,8 @@ def use(
         By default from pose to pose within the limits.
     recordings : sequence of Recording, optional
         With effort; simulated arms with the same torques are compared with them.
+    arms : int, optional
+        How many are drawn.
     seed : int, optional
     progress : callable, optional
 
@@ -104,15 +113,13 @@ def use(
     pairs = tuple((effect.resolve(whole), item) for effect, item in pairs)
     effects = tuple(effect for effect, _ in pairs)
     wanted = at_ticks(trial_motion(whole, seed) if motion is None else motion)
-    feeds: dict[str, Array | None] = {"pid": None, "urdf": urdf_torque(whole, wanted)}
-    feeds["identified"] = needed_torque(bare, (), wanted)
-    if effects:
-        feeds["effects"] = needed_torque(whole, effects, wanted, foreseen_torque(model, wanted))
-    runs = []
-    for k in range(DRAWS):
-        progress("following the motion", 0.2 + 0.5 * k / DRAWS)
+    feeds = fed_forward(model, wanted, bare, whole, effects)
+    runs, drawn = [], []
+    for k in range(arms):
+        progress("following the motion", 0.2 + 0.5 * k / arms)
         arm, own = _drawn(model, whole, random), tuple(_drawn_effect(*pair, whole, random) for pair in pairs)
-        runs.append(tracked(arm, own, wanted, feeds, seed + k))
+        drawn.append((arm, own))
+        runs.append(tracked(arm, own, wanted, {"pid": None, **feeds}, seed + k))
     rollouts = {}
     if recordings:
         progress("rolling out", 0.7)
@@ -125,7 +132,28 @@ def use(
         for name, (which, having) in variants.items():
             each = np.array([rollout_errors(which, having, part) for part in parts])
             rollouts[name] = np.sqrt(np.nanmean(each**2, axis=0))
-    return Use(model, wanted, tuple(runs), HORIZONS, rollouts, effects, missing)
+    return Use(model, wanted, tuple(runs), HORIZONS, rollouts, effects, missing, tuple(drawn), feeds)
+
+
+def fed_forward(
+    model: IdentifiedModel, motion: ReferenceMotion, bare: VirtualArm, whole: VirtualArm, effects: Sequence[Effect]
+) -> dict[str, Array]:
+    """Return the torque that each model feeds forward, shape (n, N): ``urdf``, ``identified`` and, where any, ``effects``.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+    motion : ReferenceMotion
+        At the ticks of the controller.
+    bare, whole : VirtualArm
+        See `arms_of`.
+    effects : sequence of Effect
+        The effects found, as the virtual arm has them.
+    """
+    feeds = {"urdf": urdf_torque(whole, motion), "identified": needed_torque(bare, (), motion)}
+    if effects:
+        feeds["effects"] = needed_torque(whole, effects, motion, foreseen_torque(model, motion))
+    return feeds
 
 
 def _drawn(model: IdentifiedModel, whole: VirtualArm, random: np.random.Generator) -> VirtualArm:
