@@ -29,7 +29,7 @@ from scara_ident.export.identified_model import identified_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.report.use import total
 from scara_ident.use.identified_arm import arms_of, simulated
-from scara_ident.use.rollout import HORIZONS, rollout_errors
+from scara_ident.use.rollout import HORIZONS, rollout_errors, virtual_free
 from scara_ident.use.tracking import at_ticks, tracked
 from scara_ident.use.trial_motion import trial_motion
 from scara_ident.use.use import fed_forward
@@ -74,8 +74,8 @@ def on_one_arm(robot: str, kind: str, seed: int, folder: Path) -> dict[str, Any]
     (part, *_) = prepare([held], model.bands).stretches
     place = HORIZONS.index(HORIZON)
     drift = {
-        "identified": rollout_errors(bare, (), part)[place],
-        "effects": rollout_errors(whole, found, part)[place],
+        "identified": rollout_errors(virtual_free(bare, ()), part)[place],
+        "effects": rollout_errors(virtual_free(whole, found), part)[place],
     }
     return {
         "robot": robot, "kind": kind, "seed": seed, "verdict": told.verdict, "missing": list(missing),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.effects import EffectTerm
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.information import Information, weighted
@@ -94,6 +95,23 @@ class IdentifiedModel:
         return {
             name: item.rms(value) if item.rows else None for name, item in zip(self.robot.joints, rows, strict=True)
         }
+
+    def without_effects(self) -> IdentifiedModel:
+        """Return the model as it was before the effects were found, on the same observations."""
+        base = TorqueModel(
+            self.model.name, self.robot, tuple(term for term in self.model.terms if not isinstance(term, EffectTerm))
+        )
+        own = np.arange(len(self.before))
+        return replace(
+            self,
+            model=base,
+            value=self.before,
+            std=self.std[own],
+            undetermined=self.undetermined[own],
+            training=tuple(item.select(own) for item in self.training),
+            validation=tuple(item.select(own) for item in self.validation),
+            found=(),
+        )
 
     def torque_parts(self, motion: Motion) -> dict[str, Array]:
         """Return the torque along a motion by what it comes from, recorded side, shape (n, N) each; their sum is the torque.

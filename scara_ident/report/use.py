@@ -19,6 +19,8 @@ WORDS = {
     "urdf": "with the URDF fed forward",
     "identified": "with the identified model",
     "effects": "with the effects found",
+    "mujoco_identified": "in MuJoCo with the identified model",
+    "mujoco_effects": "in MuJoCo with the effects found",
 }
 
 
@@ -122,6 +124,8 @@ def sentences(result: Use) -> list[str]:
             for j, (joint, value) in enumerate(zip(result.model.robot.joints, rows[place], strict=True))
         )
         said.append(f"Simulated {WORDS[name]} the arm is off after {result.horizons[place]:g} s by {ends}.")
+    if result.not_mujoco:
+        said.append(f"Not simulated in MuJoCo: {result.not_mujoco}.")
     if result.missing:
         said.append(f"Not simulated: {', '.join(result.missing)}.")
     return said

@@ -8,16 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RecordingError, RobotError, UsageError
+from scara_ident.errors import RecordingError, RobotError, ScaraIdentError, UsageError
 from scara_ident.export.identified_model import Entry, IdentifiedModel
-from scara_ident.motion.prepared import prepare
+from scara_ident.motion.prepared import PreparedStretch, prepare
 from scara_ident.progress import Tell, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.reference import ReferenceMotion
 from scara_ident.use.identified_arm import arm_with, arms_of, by_name, simulated
-from scara_ident.use.rollout import HORIZONS, rollout_errors
+from scara_ident.use.mujoco_arm import Free, mujoco_arm
+from scara_ident.use.rollout import HORIZONS, rollout_errors, virtual_free
 from scara_ident.use.tracking import Tracked, at_ticks, foreseen_torque, needed_torque, tracked, urdf_torque
 from scara_ident.use.trial_motion import trial_motion
 
@@ -41,7 +42,10 @@ class Use:
     horizons : tuple of float
         s.
     rollouts : mapping of str to ndarray of shape (len(horizons), n)
-        ``identified`` and ``effects``: rms distance from recordings; empty without any.
+        ``identified`` and ``effects`` in the virtual arm, ``mujoco_identified`` and ``mujoco_effects`` in MuJoCo: rms distance
+        from recordings; empty without any.
+    not_mujoco : str
+        Why there is none in MuJoCo; empty where there is, or without recordings.
     effects, missing : tuple
         Effects that the virtual arm had, and names of those found that it cannot have.
     drawn : tuple of (VirtualArm, tuple of Effect)
@@ -55,6 +59,7 @@ class Use:
     runs: tuple[tuple[Tracked, ...], ...]
     horizons: tuple[float, ...]
     rollouts: Mapping[str, Array]
+    not_mujoco: str
     effects: tuple[Effect, ...]
     missing: tuple[str, ...]
     drawn: tuple[tuple[VirtualArm, tuple[Effect, ...]], ...]
@@ -120,19 +125,34 @@ def use(
         arm, own = _drawn(model, whole, random), tuple(_drawn_effect(*pair, whole, random) for pair in pairs)
         drawn.append((arm, own))
         runs.append(tracked(arm, own, wanted, {"pid": None, **feeds}, seed + k))
-    rollouts = {}
+    rollouts: dict[str, Array] = {}
+    not_mujoco = ""
     if recordings:
         progress("rolling out", 0.7)
         parts = [part for part in prepare(recordings, model.bands).stretches if part.usable]
         if not parts or any(part.stretch.torque is None for part in parts):
             raise RecordingError(f"{recordings[0].name}: too short, or without effort, to roll out with; record longer")
-        variants: dict[str, tuple[VirtualArm, Sequence[Effect]]] = {"identified": (bare, ())}
+        rollouts["identified"] = _over(parts, virtual_free(bare, ()))
         if effects:
-            variants["effects"] = (whole, effects)
-        for name, (which, having) in variants.items():
-            each = np.array([rollout_errors(which, having, part) for part in parts])
-            rollouts[name] = np.sqrt(np.nanmean(each**2, axis=0))
-    return Use(model, wanted, tuple(runs), HORIZONS, rollouts, effects, missing, tuple(drawn), feeds)
+            rollouts["effects"] = _over(parts, virtual_free(whole, effects))
+        progress("rolling out in MuJoCo", 0.85)
+        variants = {"mujoco_identified": model.without_effects()} | ({"mujoco_effects": model} if model.found else {})
+        for name, which in variants.items():
+            try:
+                with mujoco_arm(which) as free:
+                    rollouts[name] = _over(parts, free)
+            except ScaraIdentError as error:
+                not_mujoco = str(error)
+    return Use(model, wanted, tuple(runs), HORIZONS, rollouts, not_mujoco, effects, missing, tuple(drawn), feeds)
+
+
+def _over(parts: Sequence[PreparedStretch], free: Free) -> Array:
+    """Return the rms of rollout errors over stretches, shape (len(horizons), n)."""
+    each = np.array([rollout_errors(free, part) for part in parts])
+    # No stretch may be long enough for the longest horizon.
+    count = np.sum(~np.isnan(each), axis=0)
+    square = np.nansum(each**2, axis=0)
+    return np.sqrt(np.divide(square, count, out=np.full(square.shape, np.nan), where=count > 0))
 
 
 def fed_forward(

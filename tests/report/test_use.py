@@ -27,7 +27,9 @@ def result() -> Use:
         "effects": np.array([[0.01, 0.02], [np.nan, np.nan]]),
     }
     spring = parse_effect("spring:joint1:stiffness=0.4").resolve(arm)
-    return Use(with_spring(), trial_motion(arm), (runs,), (0.2, 0.5), rollouts, (spring,), ("drive_coupling",), (), {})
+    return Use(
+        with_spring(), trial_motion(arm), (runs,), (0.2, 0.5), rollouts, "", (spring,), ("drive_coupling",), (), {}
+    )
 
 
 def test_the_json_holds_the_rms_of_every_feed_forward_and_only_rollouts_that_were_long_enough() -> None:
