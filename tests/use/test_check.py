@@ -10,13 +10,17 @@ import pytest
 
 from scara_ident.export.identified_model import IdentifiedModel, identified_model
 from scara_ident.identification.identify import identify
+from scara_ident.model.model import build_model
 from scara_ident.motion.motion import Motion
 from scara_ident.recording.recording import write_recording
-from scara_ident.simulation import simulate, virtual_arm
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import ideal, simulate, virtual_arm
+from scara_ident.simulation.truth import _complete_parameters
 from scara_ident.use.check import check, check_dict, read_motion, slowed
 from scara_ident.use.joint_limits import joint_limits
 from tests.arms import recording
 from tests.simulation.made import swing
+from tests.use.made import known_as
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +54,25 @@ def test_torque_power_and_energy_are_the_virtual_arms_within_5_percent(rehearsed
     # Noise, and what is missed about reversals.
     assert np.all(found.recorded_rms > run.arm.torque_noise)
     assert np.all(found.recorded_rms < 2.0 * run.arm.torque_noise)
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_torque_and_energy_of_six_and_seven_joints_are_the_virtual_arms_within_5_percent(name: str):
+    arm = virtual_arm(load_robot(name))
+    model = build_model(arm.robot, "complete")
+    known = known_as(model, np.array(_complete_parameters(arm)))
+    wanted = swing(arm.robot, 2.5, 0.5)
+    time = slice(None, None, 2)
+    signals = (getattr(wanted, word)[:, time] for word in ("position", "velocity", "acceleration"))
+    found = check(known, [Motion("swing", "swing", wanted.time[time], *signals, None, 500.0)], joint_limits(arm.robot))
+    (own,) = found.drives
+    # Run as it would be: with that torque fed forward. What the controller adds is what was not foreseen.
+    run = simulate(ideal(arm), wanted.at(wanted.time[time]), feed=own.torque, rate=500.0).true
+    peak = np.abs(run.effort).max(axis=1)
+    assert np.all(np.sqrt(np.mean((own.torque - run.effort) ** 2, axis=1)) < 0.05 * peak)
+    assert found.energy.rms_torque == pytest.approx(np.sqrt(np.mean(run.effort**2, axis=1)), rel=0.05)
+    power = run.effort * run.velocity / arm.robot.row_scale[:, None]
+    assert found.energy.given.sum() == pytest.approx(np.trapezoid(np.maximum(power, 0.0), dx=0.002).sum(), rel=0.05)
 
 
 def test_the_limiting_joint_and_time_are_named(rehearsed):
