@@ -152,7 +152,7 @@ def _over(parts: Sequence[PreparedStretch], free: Free) -> Array:
     # No stretch may be long enough for the longest horizon.
     count = np.sum(~np.isnan(each), axis=0)
     square = np.nansum(each**2, axis=0)
-    return np.sqrt(np.divide(square, count, out=np.full(square.shape, np.nan), where=count > 0))
+    return np.asarray(np.sqrt(np.divide(square, count, out=np.full(square.shape, np.nan), where=count > 0)))
 
 
 def fed_forward(
