@@ -28,7 +28,8 @@ from scara_ident.effects import effects_named
 from scara_ident.export.c_header import c_name
 from scara_ident.export.exported import export_model, write_exported
 from scara_ident.export.forms import Said
-from scara_ident.export.result import IdentifiedModel, read_identified
+from scara_ident.export.identified_model import IdentifiedModel
+from scara_ident.export.result import read_identified
 from scara_ident.files import write_json
 from scara_ident.identification.identify import identify
 from scara_ident.motion.motion import Motion

@@ -25,14 +25,14 @@ from virtual_sets import simulate_set
 
 from scara_ident import diagnose
 from scara_ident.errors import ScaraIdentError
+from scara_ident.export.identified_model import identified_model
 from scara_ident.motion.prepared import prepare
-from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.use import total
-from scara_ident.use import used_model
-from scara_ident.use.identified_arm import arm_with, simulated
-from scara_ident.use.rollout import HORIZONS, rollout_errors
-from scara_ident.use.tracking import at_ticks, needed_torque, tracked, urdf_torque
+from scara_ident.use.identified_arm import arms_of, simulated
+from scara_ident.use.rollout import HORIZONS, rollout_errors, virtual_free
+from scara_ident.use.tracking import at_ticks, tracked
 from scara_ident.use.trial_motion import trial_motion
+from scara_ident.use.use import fed_forward
 
 # Effects that a drive can act against; those of sensors alone are none.
 KINDS = (
@@ -60,31 +60,26 @@ HORIZON = 0.2
 def on_one_arm(robot: str, kind: str, seed: int, folder: Path) -> dict[str, Any] | None:
     """Return what every feed-forward leaves on one arm; None where the effect was not found."""
     made = simulate_set(kind, seed, robot, folder / f"{robot}_{seed}", ASKED)
-    told = diagnosis_dict(diagnose(made.robot, made.training))
-    pairs, missing = simulated(told["effects"])
+    told = diagnose(made.robot, made.training)
+    model = identified_model(told)
+    pairs, missing = simulated(model.found)
     if not pairs:
         return None
-    model = used_model(told, made.robot)
-    bare, whole = arm_with(made.robot, model.before), arm_with(made.robot, model.after)
+    bare, whole = arms_of(model)
     found = tuple(effect.resolve(whole) for effect, _ in pairs)
     motion = at_ticks(trial_motion(whole, seed))
-    feeds = {
-        "pid": None,
-        "urdf": urdf_torque(whole, motion),
-        "identified": needed_torque(bare, (), motion),
-        "effects": needed_torque(whole, found, motion),
-    }
+    feeds = {"pid": None, **fed_forward(model, motion, bare, whole, found)}
     errors = {item.name: item.rms for item in tracked(made.arm, made.effects, motion, feeds, seed)}
     held = made.held_out[0]
     (part, *_) = prepare([held], model.bands).stretches
     place = HORIZONS.index(HORIZON)
     drift = {
-        "identified": rollout_errors(bare, (), part)[place],
-        "effects": rollout_errors(whole, found, part)[place],
+        "identified": rollout_errors(virtual_free(bare, ()), part)[place],
+        "effects": rollout_errors(virtual_free(whole, found), part)[place],
     }
     return {
-        "robot": robot, "kind": kind, "seed": seed, "verdict": told["verdict"], "missing": list(missing),
-        "found": [f"{item['effect']} {item['joint'] or ''}".strip() for item in told["effects"]],
+        "robot": robot, "kind": kind, "seed": seed, "verdict": told.verdict, "missing": list(missing),
+        "found": [f"{item['effect']} {item['joint'] or ''}".strip() for item in model.found],
         "tracking": {name: total(value, errors["pid"]) for name, value in errors.items()},
         "rms": {name: value.tolist() for name, value in errors.items()},
         "rollout": {name: value.tolist() for name, value in drift.items()},

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from scara_ident.excitation.search import Effort
     from scara_ident.export.robots import export_mjcf, export_urdf
     from scara_ident.identification.compare import Comparison, compare
-    from scara_ident.identification.identify import Identification, identified_arm, identify
+    from scara_ident.identification.identify import Identification, identify
     from scara_ident.model.base_parameters import BaseParameters, check_base_parameters, find_base_parameters
     from scara_ident.model.model import TorqueModel, build_model
     from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
@@ -82,7 +82,7 @@ _NAMES = {
     "estimation.recursive": ("rls",),
     "estimation.consistent.estimator": ("ConsistentEstimate", "consistent"),
     "estimation.consistent.options": ("ConsistentOptions",),
-    "identification.identify": ("Identification", "identified_arm", "identify"),
+    "identification.identify": ("Identification", "identify"),
     "identification.compare": ("Comparison", "compare"),
     "effects.catalogue": ("available_effects", "effects_named"),
     "effects.effect": ("Effect",),

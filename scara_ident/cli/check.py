@@ -41,16 +41,16 @@ def check(
     """Say whether an arm can run a motion, what limits it, and what energy it takes; exit status 1 if it cannot."""
     from scara_ident.cli.joint_values import joint_numbers, joint_ranges
     from scara_ident.errors import ScaraIdentError
+    from scara_ident.export.result import read_identified
     from scara_ident.files import write_json
     from scara_ident.use.check import check as run
     from scara_ident.use.check import check_dict, read_motion
     from scara_ident.use.joint_limits import joint_limits
-    from scara_ident.use.known_model import read_known_model
 
     check_report(output, "check")
     with progress() as work:
         work("reading the model")
-        known = read_known_model(result, robot)
+        known = read_identified(result, robot, determined=True)
     arm = known.robot
     limits = joint_limits(
         arm,

@@ -31,15 +31,15 @@ def contact(
     """Find contact with the arm in recordings: when, on which joints, and the force at the tool or the link."""
     import numpy as np
 
+    from scara_ident.export.result import read_identified
     from scara_ident.files import write_json
     from scara_ident.recording.recording import read_usable
     from scara_ident.use.contact import contact_observer, contacts_dict, look_for_contact
-    from scara_ident.use.known_model import read_known_model
 
     check_report(output, "contact")
     with progress() as work:
         work("reading the model and recordings")
-        known = read_known_model(result, robot)
+        known = read_identified(result, robot, determined=True)
         arm = known.robot
         quiet, notes = read_usable(free, arm)
         watched, more = read_usable(recordings, arm)

@@ -50,11 +50,13 @@ def diagnose(
     """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
     from scara_ident.diagnosis import diagnose as run
     from scara_ident.effects import effects_named
+    from scara_ident.export.identified_model import identified_model
     from scara_ident.files import write_json, write_text
     from scara_ident.recording.recording import read_usable
     from scara_ident.report.diagnosis import diagnosis_dict
     from scara_ident.report.diagnosis_markdown import diagnosis_markdown
     from scara_ident.report.told.diagnosis import tables
+    from scara_ident.report.use import worth_dict
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "diagnosis")
@@ -74,7 +76,11 @@ def diagnose(
             catalogue=None if effects is None else effects_named(*_parted(effects)),
             progress=work.part(READING_SHARE, 1.0),
         )
-    content = diagnosis_dict(result)
+        worth = None
+        if output is not None and result.effects:
+            work("what the effects cost", 1.0)
+            worth = worth_dict(identified_model(result))
+    content = diagnosis_dict(result, worth)
     console = result_console(content, json)
     if verbose:
         show_recordings(console, (*training, *held_out))
@@ -87,11 +93,11 @@ def diagnose(
         from scara_ident.report.html import DiagnosisContext, diagnosis_report
         from scara_ident.report.pictures import diagnosis_pictures, remove_stale
 
-        context = DiagnosisContext(result)
+        context = DiagnosisContext(result, worth)
         with writing(output) as (place, work):
             work("drawing pictures")
             pictures = diagnosis_pictures(place, context)
-            write_text(place / "diagnosis.md", diagnosis_markdown(result, pictures))
+            write_text(place / "diagnosis.md", diagnosis_markdown(result, pictures, worth))
             work("drawing report.html", 0.6)
             diagnosis_report(place / "report.html", context)
             write_json(place / "diagnosis.json", content)

@@ -29,7 +29,7 @@ def export(
     json: options.Json = False,
 ) -> None:
     """Write the identified arm for other programs, with what its error becomes there."""
-    from scara_ident.export.exported import export_model, write_exported
+    from scara_ident.export.exported import export_model, said_lines, write_exported
     from scara_ident.export.result import read_identified
     from scara_ident.files import check_output
 
@@ -53,9 +53,7 @@ def export(
         values = (content["errors"][kind][joint] for kind in kinds)
         errors.add_row(joint, *("-" if x is None else f"{x:.4g}" for x in values), found.robot.torque_unit(j))
     console.print(errors)
-    for kind in kinds[1:]:
-        for item in content["missing"][kind]:
-            console.print(f"{words[kind]}: cannot say {item['what']}: {item['why']}")
-        if content["refitted"][kind]:
-            console.print(f"{words[kind]}: fitted again to the same recordings: {', '.join(content['refitted'][kind])}")
+    for kind, said in zip(kinds[1:], (exported.alone, exported.beside), strict=False):
+        for line in said_lines(words[kind], said) if said is not None else ():
+            console.print(line)
     console.written(output, *content["files"], "export.json")

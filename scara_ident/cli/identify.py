@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import chain
 from typing import Annotated, Literal
 
 import typer
@@ -31,8 +30,7 @@ def identify(
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
     from scara_ident.estimation.consistent.options import ConsistentOptions
-    from scara_ident.files import slug, write_json
-    from scara_ident.identification.identify import identified_arm
+    from scara_ident.files import write_json, write_text
     from scara_ident.identification.identify import identify as run
     from scara_ident.recording.recording import read_usable
     from scara_ident.report.identification import identification_dict, sentences
@@ -65,21 +63,20 @@ def identify(
     console.print(bands_said(result))
     console.say(sentences(result))
     if output is not None:
-        from scara_ident.export.robots import export_mjcf, export_urdf
+        from scara_ident.export.identified_model import identified_model
+        from scara_ident.export.robots import robot_files
         from scara_ident.report.html import IdentificationContext, identification_report
         from scara_ident.report.pictures import torque_picture
 
-        arm_found = identified_arm(result)
         context = IdentificationContext(result)
-        urdf, mjcf = (f"{slug(arm.name, 'robot')}_identified.{suffix}" for suffix in ("urdf", "xml"))
+        models, notes = robot_files(identified_model(result))
+        console.note(notes)
         with writing(output) as (place, work):
-            if arm_found is not None:
-                notes = [export_urdf(arm_found, place / urdf), export_mjcf(arm_found, place / mjcf)]
-                console.note(dict.fromkeys(chain.from_iterable(notes)))
+            for name, text in models.items():
+                write_text(place / name, text)
             work("drawing torque.png", 0.2)
             torque_picture(place / "torque.png", context)
             work("drawing report.html", 0.5)
             identification_report(place / "report.html", context)
             write_json(place / "identification.json", content)
-        models = (urdf, mjcf) if arm_found is not None else ()
         console.written(output, "identification.json", "report.html", "torque.png", *models)

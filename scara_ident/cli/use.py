@@ -32,18 +32,17 @@ def use(
     json: options.Json = False,
 ) -> None:
     """Say what the model wins: fed forward on virtual arms, and in simulation beside recordings."""
-    from scara_ident.export.result import read_content, read_identified
+    from scara_ident.export.result import read_identified
     from scara_ident.files import write_json
     from scara_ident.recording.recording import read_usable
     from scara_ident.report.html.use import use_report
     from scara_ident.report.use import WORDS, use_dict
     from scara_ident.simulation.named import named_motion
     from scara_ident.use import use as run
-    from scara_ident.use import used_model
 
     check_report(output, "use")
-    arm = read_identified(result, robot).robot
-    model = used_model(read_content(result), arm)
+    model = read_identified(result, robot)
+    arm = model.robot
     motion = None if trajectory is None else named_motion(trajectory, arm)
     with progress() as work:
         given, useless = read_usable(recording or (), arm, needed=False)

@@ -14,14 +14,14 @@ from scara_ident.export.c_header import c_header, c_name
 from scara_ident.export.casadi_module import casadi_module
 from scara_ident.export.forms import FORMS, Said, friction_said, offset_said, possible_standard, said_by, with_code
 from scara_ident.export.friction import JointFriction, JointSideFriction, joint_side
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.export.mjcf import mjcf_text
 from scara_ident.export.mujoco_module import mujoco_module
 from scara_ident.export.pinocchio_module import pinocchio_module
-from scara_ident.export.result import IdentifiedModel
 from scara_ident.export.ros2 import ros2_text
 from scara_ident.export.traced_model import TracedModel, trace_model
 from scara_ident.export.urdf import urdf_text
-from scara_ident.files import write_json, write_text, written_together
+from scara_ident.files import slug, write_json, write_text, written_together
 from scara_ident.model.terms import Friction, Offset, RigidBody
 
 
@@ -107,6 +107,13 @@ def exported_dict(found: IdentifiedModel, exported: Exported, source: str) -> di
     }  # fmt: skip
 
 
+def said_lines(word: str, said: Said) -> list[str]:
+    """Say what a form cannot say and what was fitted again for that; ``word`` is the form."""
+    lines = [f"{word}: cannot say {what}: {why}" for what, why in said.missing]
+    again = f"{word}: fitted again to the same recordings: {', '.join(said.refitted)}"
+    return [*lines, again] if said.refitted else lines
+
+
 def about_lines(found: IdentifiedModel, said: Said) -> tuple[str, ...]:
     """Say what a file's reader should know: errors, and what is missing."""
     kind = "held out" if found.held_out[0] == "validation" else "on the recordings fitted"
@@ -127,12 +134,12 @@ Parts = tuple[dict[str, str], Said | None, tuple[str, ...]]
 
 def _urdf(found: IdentifiedModel, standard: Array, alone: Said, *, rotors_told: bool = False) -> Parts:
     text, notes = urdf_text(found.robot, standard, friction_said(found, alone.value), rotors_told=rotors_told)
-    return {f"{found.robot.name}_identified.urdf": text}, None, notes
+    return {f"{_stem(found)}.urdf": text}, None, notes
 
 
 def _ros2(found: IdentifiedModel, standard: Array, alone: Said) -> Parts:
     text, notes = urdf_text(found.robot, standard, rotors_told=True)
-    urdf = f"{found.robot.name}_identified.urdf"
+    urdf = f"{_stem(found)}.urdf"
     armature = standard[10 * found.robot.n :]
     name = f"{c_name(found.robot.name)}_ros2.yaml"
     about = about_lines(found, alone)
@@ -160,8 +167,11 @@ def _mjcf(found: IdentifiedModel, standard: Array, alone: Said) -> Parts:
     beside = said_by(with_code(FORMS["mjcf"]), found, standard)
     friction, further = _divided(found, beside.value, offset=False)
     module = mujoco_module(further, friction, offset_said(found, beside.value), about_lines(found, beside))
-    name = found.robot.name
-    return {f"{name}_identified.xml": text, f"{c_name(name)}_mujoco.py": module}, beside, notes
+    return {f"{_stem(found)}.xml": text, f"{c_name(found.robot.name)}_mujoco.py": module}, beside, notes
+
+
+def _stem(found: IdentifiedModel) -> str:
+    return f"{slug(found.robot.name, 'robot')}_identified"
 
 
 _WITH_BODIES: dict[str, Callable[[IdentifiedModel, Array, Said], Parts]] = {

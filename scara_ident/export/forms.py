@@ -15,7 +15,7 @@ from scara_ident.estimation.consistent.problem import Problem
 from scara_ident.estimation.consistent.solution import least_squares_arm, nearest_arm, solve_joints
 from scara_ident.estimation.information import Information
 from scara_ident.export.friction import JointFriction
-from scara_ident.export.result import IdentifiedModel
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.export.traced_model import NOT_OF_STATE
 from scara_ident.model.terms import Friction, Offset, RigidBody, Term
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.estimation.estimate import Estimate
-from scara_ident.model.terms import Friction
 from scara_ident.robot.robot import Robot
 
 
@@ -22,46 +20,10 @@ class JointFriction:
         Recorded torque, N m (N); NaN where it is not known.
     viscous : ndarray, shape (n,)
         Recorded torque per speed of the joint, N m s/rad (N s/m, N m s/m); NaN where it is not known.
-    left_out : tuple of str
-        Parameters of the model that neither format can hold.
     """
 
     coulomb: Array
     viscous: Array
-    left_out: tuple[str, ...] = ()
-
-
-def friction_of(estimate: Estimate) -> JointFriction | None:
-    """Read Coulomb and viscous friction from an estimate.
-
-    Returns
-    -------
-    JointFriction or None
-        None where the model has no friction. A coefficient that the model lacks, or that the data leave open,
-        is NaN. Every other column beside the rigid body's is in ``left_out``.
-    """
-    model = estimate.model
-    term = next((term for term in model.terms if isinstance(term, Friction)), None)
-    if term is None:
-        return None
-    place = model.place(term)
-    known = np.where(estimate.undetermined, np.nan, estimate.value)[place].reshape(model.robot.n, len(term.powers))
-
-    def coefficient(power: int) -> Array:
-        return known[:, term.powers.index(power)] if power in term.powers else np.full(model.robot.n, np.nan)
-
-    higher = tuple(
-        column.name
-        for k, column in enumerate(term.columns)
-        if term.powers[k % len(term.powers)] > 1  # columns go joint by joint
-    )
-    others = tuple(
-        column.name
-        for other in model.terms
-        if other is not term and other is not model.rigid_body
-        for column in other.columns
-    )
-    return JointFriction(coefficient(0), coefficient(1), higher + others)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +53,6 @@ def joint_side(robot: Robot, friction: JointFriction | None) -> JointSideFrictio
     if friction is None:
         return JointSideFriction(np.full(robot.n, np.nan), np.full(robot.n, np.nan), ())
     notes: list[str] = []
-    if friction.left_out:
-        notes.append(f"left out, as the format has no place for it: {', '.join(friction.left_out)}")
     found: list[Array] = []
     for word, values in (("Coulomb", friction.coulomb), ("viscous", friction.viscous)):
         given = np.asarray(values, dtype=float)

@@ -1,11 +1,11 @@
-"""An identified model as a result file holds it: what it was found on, and what rebuilds it without the recordings."""
+"""An identified model in its result file: what it was found on, and what rebuilds it without the recordings."""
 
 from __future__ import annotations
 
 import base64
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,9 @@ from scara_ident.effects import EFFECTS, Effect, EffectTerm, Member, Scene
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
-from scara_ident.estimation.information import Information, weighted
+from scara_ident.estimation.information import Information
 from scara_ident.estimation.observations import Observations
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.files import path_fault
 from scara_ident.model import MODELS
 from scara_ident.model.model import TorqueModel, build_model
@@ -29,60 +30,6 @@ from scara_ident.robot.robot import Robot, build_robot, load_robot
 KEY = "rebuild"
 # Values of an effect's options that a file can hold.
 PLAIN = (bool, int, float, str, tuple, frozenset)
-
-
-@dataclass(frozen=True, eq=False)
-class IdentifiedModel:
-    """A model with its parameters, and what its observations said.
-
-    Attributes
-    ----------
-    model : TorqueModel
-        With the effects that were found as further terms.
-    value : ndarray, shape (p,)
-    undetermined : ndarray of bool, shape (p,)
-    weights : ndarray, shape (n,)
-        Of each joint's rows in the estimate.
-    training, validation : tuple of Information
-        Per joint, within the band; validation has no rows where nothing was held out.
-    standard : ndarray, shape (11 n,), or None
-        Of the arm that the estimate belongs to, where it was estimated with one.
-    removed : tuple of str
-        Effects that were found and taken out of the recordings.
-    """
-
-    model: TorqueModel
-    value: Array
-    undetermined: NDArray[np.bool_]
-    weights: Array
-    training: tuple[Information, ...]
-    validation: tuple[Information, ...]
-    standard: Array | None
-    removed: tuple[str, ...] = ()
-
-    @property
-    def robot(self) -> Robot:
-        """The robot."""
-        return self.model.robot
-
-    @property
-    def information(self) -> Information:
-        """All training rows as the estimate weighted them."""
-        return weighted(self.training, self.weights)
-
-    @property
-    def held_out(self) -> tuple[str, tuple[Information, ...]]:
-        """What errors are of: ``validation``, or ``training`` where nothing was held out."""
-        if any(item.rows for item in self.validation):
-            return "validation", self.validation
-        return "training", self.training
-
-    def errors(self, value: Array) -> dict[str, float | None]:
-        """Return the rms of what parameters leave of the torque on each joint, held out where something was."""
-        rows = self.held_out[1]
-        return {
-            name: item.rms(value) if item.rows else None for name, item in zip(self.robot.joints, rows, strict=True)
-        }
 
 
 def rebuild_entry(estimate: Estimate, training: Observations, validation: Observations) -> dict[str, Any]:
@@ -102,19 +49,21 @@ def rebuild_entry(estimate: Estimate, training: Observations, validation: Observ
     }
 
 
-def read_identified(path: Path | str, robot: Path | str | None = None) -> IdentifiedModel:
-    """Read an ``identification.json`` or ``diagnosis.json``.
+def read_identified(path: Path | str, robot: Path | str | None = None, *, determined: bool = False) -> IdentifiedModel:
+    """Read the model of an ``identification.json``, or of a ``diagnosis.json`` with the effects found.
 
     Parameters
     ----------
     path : path
     robot : path, optional
         A robot description to take instead of the one that the result was found with, where that has moved.
+    determined : bool, optional
+        Whether every parameter must be determined.
 
     Raises
     ------
     ScaraIdentError
-        In one line: the file cannot be read or is none of these, or its robot is not to be had.
+        In one line: the file cannot be read or is none of these, its robot is not to be had, or it leaves a parameter open.
     """
     path = Path(path)
     content = read_content(path)
@@ -134,17 +83,40 @@ def read_identified(path: Path | str, robot: Path | str | None = None) -> Identi
         kind: tuple(_unpacked(item, own, len(parameters)) for item, own in zip(rows, model.active, strict=True))
         for kind, rows in known["observations"].items()
     }
-    in_model = {term.name for term in model.terms}
+    open_ = np.array([bool(item.get("undetermined", item["std"] is None)) for item in parameters])
+    if determined and open_.any():
+        missing = model.names[int(np.argmax(open_))]
+        raise ScaraIdentError(f"{path}: parameter {missing!r} has no value; record motion that determines it")
+    bands = content.get("band_hz") or {}
     return IdentifiedModel(
         model=model,
         value=_array([item["value"] for item in parameters]),
-        undetermined=np.array([bool(item.get("undetermined", item["std"] is None)) for item in parameters]),
+        std=np.where(open_, np.nan, _array([item["std"] for item in parameters])),
+        before=_array([item.get("before", item["value"]) for item in parameters[: len(base.columns)]]),
+        undetermined=open_,
         weights=_array(known["weights"]),
         training=observations["training"],
         validation=observations["validation"],
         standard=None if known["standard"] is None else _array(known["standard"]),
-        removed=tuple(item["effect"] for item in content.get("effects", ()) if item["effect"] not in in_model),
+        bands=tuple(bands.get(joint) for joint in arm.joints),
+        rms=_rms(content, arm.joints),
+        found=tuple(content.get("effects", ())),
     )
+
+
+def _rms(content: Mapping[str, Any], joints: Sequence[str]) -> Array:
+    """Return the rms error over the recordings held out, else over those fitted, all counted alike; NaN where none is told."""
+    whole = content.get("validation") or content.get("training")
+    if whole:
+        return np.array([whole["after_unfiltered"][joint] for joint in joints], dtype=float)
+    errors = content.get("errors") or {}
+    runs = [run for run in (errors.get("validation") or errors.get("training") or {}).values() if run]
+    found = np.full(len(joints), np.nan)
+    for j, joint in enumerate(joints):
+        told = [float(run[joint]["rms_unfiltered"]) for run in runs if run.get(joint)]
+        if told:
+            found[j] = float(np.sqrt(np.mean(np.square(told))))
+    return found
 
 
 def read_content(path: Path) -> dict[str, Any]:

@@ -2,37 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
-from scara_ident.errors import EstimationError
-from scara_ident.estimation.consistent.estimator import ConsistentEstimate
-from scara_ident.export.friction import friction_of
-from scara_ident.export.mjcf import mjcf_text
-from scara_ident.export.urdf import urdf_text
+from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.errors import EstimationError, ScaraIdentError
+from scara_ident.export.exported import export_model, said_lines
+from scara_ident.export.forms import possible_standard
+from scara_ident.export.identified_model import IdentifiedModel, identified_model
 from scara_ident.files import write_text
-from scara_ident.identification.identify import Identification, identified_arm
+from scara_ident.identification.identify import Identification
 
 
-def export_urdf(found: Identification | ConsistentEstimate, path: Path | str) -> tuple[str, ...]:
+def export_urdf(found: Identification | Diagnosis, path: Path | str) -> tuple[str, ...]:
     """Write the identified arm as a URDF: the robot's own file with other inertials and joint dynamics.
+
+    Friction is fitted again to what the format has of it, see `scara_ident.export.forms`.
 
     Parameters
     ----------
-    found : Identification or ConsistentEstimate
-        What `identify` or `consistent` returned.
+    found : Identification or Diagnosis
+        What `identify` or `diagnose` returned.
     path : path
         File to write, whole or not at all.
 
     Returns
     -------
     tuple of str
-        What a person should know of what the format cannot hold.
+        What a person should know, and what the format cannot say.
 
     Raises
     ------
     EstimationError
-        If no arm can have the identified parameters.
+        If no arm can have the identified parameters, or nearly.
     ScaraIdentError
         If a link cannot exist, or a file cannot be read or written.
 
@@ -44,23 +46,44 @@ def export_urdf(found: Identification | ConsistentEstimate, path: Path | str) ->
     >>> result = identify(robot, [run.recording], method="consistent")
     >>> notes = export_urdf(result, "identified.urdf"), export_mjcf(result, "identified.xml")
     """
-    return _export(urdf_text, found, path)
+    return _export(found, "urdf", Path(path))
 
 
-def export_mjcf(found: Identification | ConsistentEstimate, path: Path | str) -> tuple[str, ...]:
+def export_mjcf(found: Identification | Diagnosis, path: Path | str) -> tuple[str, ...]:
     """Write the identified arm as a model of MuJoCo.
 
     Parameters, results and errors are those of `export_urdf`; MuJoCo takes no moving link without mass.
     """
-    return _export(mjcf_text, found, path)
+    return _export(found, "mjcf", Path(path))
 
 
-def _export(
-    text_of: Callable[..., tuple[str, tuple[str, ...]]], found: Identification | ConsistentEstimate, path: Path | str
-) -> tuple[str, ...]:
-    arm = identified_arm(found) if isinstance(found, Identification) else found
-    if arm is None:
-        raise EstimationError("no arm can have the identified parameters; identify with the method consistent")
-    text, notes = text_of(arm.model.robot, arm.standard, friction_of(arm))
-    write_text(Path(path), text)
+def robot_files(found: IdentifiedModel) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Return the arm's URDF and MJCF by file name, those that can be written, and what a person should know of them."""
+    try:
+        standard, notes = possible_standard(found)
+    except EstimationError as error:
+        return {}, (f"no URDF and no MJCF is written: {error}",)
+    files: dict[str, str] = {}
+    told = [*notes]
+    for to in ("urdf", "mjcf"):
+        try:
+            name, text, more = _model_file(replace(found, standard=standard), to)
+        except ScaraIdentError as error:
+            told.append(f"no {to.upper()} is written: {error}")
+        else:
+            files[name] = text
+            told += more
+    return files, tuple(dict.fromkeys(told))
+
+
+def _export(found: Identification | Diagnosis, to: str, path: Path) -> tuple[str, ...]:
+    _, text, notes = _model_file(identified_model(found), to)
+    write_text(path, text)
     return notes
+
+
+def _model_file(found: IdentifiedModel, to: str) -> tuple[str, str, tuple[str, ...]]:
+    """Return name and text of a form's model file, without the code beside it, and what to know of it."""
+    exported = export_model(found, to)
+    name, text = next(iter(exported.files.items()))
+    return name, text, (*exported.notes, *said_lines(to.upper(), exported.alone))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.export.result import IdentifiedModel
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.model.terms import Friction, Offset
 from scara_ident.motion.motion import Motion
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.estimation import Estimate, History, JointError
-from scara_ident.estimation.consistent.estimator import ConsistentEstimate, physical_consistency, possible_arm
+from scara_ident.estimation.consistent.estimator import ConsistentEstimate, physical_consistency
 from scara_ident.estimation.consistent.feasibility import PhysicalConsistency
 from scara_ident.estimation.consistent.options import ConsistentOptions
 from scara_ident.estimation.estimate import paper_criteria
@@ -217,19 +217,6 @@ def identify(
     return Identification(
         estimate, history, data.bands, training, validated, noise, log_det, condition, tuple(notes), events
     )
-
-
-def identified_arm(identification: Identification) -> ConsistentEstimate | None:
-    """Return the estimate with all standard parameters of the links, None where no such arm is known to exist.
-
-    Where least squares belongs to an arm that can exist, that arm has its parameters.
-    """
-    estimate = identification.estimate
-    if isinstance(estimate, ConsistentEstimate):
-        return estimate
-    if not identification.physical_consistency.possible:
-        return None
-    return possible_arm(identification.training, estimate)
 
 
 def known_information(model: TorqueModel, recordings: Sequence[Recording], rate: float) -> Information:

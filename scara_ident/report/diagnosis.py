@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,8 +28,15 @@ from scara_ident.robot.rotors import GUESS_FACTOR
 NEAR = 1.3
 
 
-def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return the content of ``diagnosis.json``."""
+def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return the content of ``diagnosis.json``.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    worth : mapping, optional
+        What `scara_ident.report.use.worth_dict` says of the effects found.
+    """
     joints = diagnosis.robot.joints
     nominal = urdf_values(diagnosis.after.model)
     suspects = {item.candidate: item for item in suspects_in_model(diagnosis)}
@@ -111,6 +118,7 @@ def diagnosis_dict(diagnosis: Diagnosis) -> dict[str, Any]:
         "candidates": [_candidate(decision, diagnosis) for decision in best_by_label(diagnosis.search.decisions)],
         "tried": diagnosis.search.tried,
         "unexplained": _unexplained(diagnosis),
+        "worth": worth,
         "notes": list(diagnosis.notes),
         KEY: rebuild_entry(diagnosis.after, diagnosis.training_after, diagnosis.validation_after),
     }

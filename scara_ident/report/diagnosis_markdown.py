@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,9 @@ from scara_ident.estimation.run_variation import unit_of_kind
 from scara_ident.report.diagnosis import diagnosis_dict
 
 
-def diagnosis_markdown(diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]] = ()) -> str:
+def diagnosis_markdown(
+    diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]] = (), worth: Mapping[str, Any] | None = None
+) -> str:
     """Return the story as Markdown.
 
     Parameters
@@ -20,8 +22,10 @@ def diagnosis_markdown(diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]]
     diagnosis : Diagnosis
     pictures : sequence of (str, str), optional
         Title and file name of figures that stand beside it; see `scara_ident.report.pictures`.
+    worth : mapping, optional
+        See `diagnosis_dict`.
     """
-    content = diagnosis_dict(diagnosis)
+    content = diagnosis_dict(diagnosis, worth)
     lines = [f"# Diagnosis of {diagnosis.robot.name}: {diagnosis.verdict}", ""]
     lines += [f"{sentence}  " for sentence in content["summary"]]
     for kind in ("training", "validation"):
@@ -66,6 +70,8 @@ def diagnosis_markdown(diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]]
             f"| {row['effect']} | {', '.join(row['absorbed_by'])} | {row['opened_by']} |"
             for row in content["not_identifiable"]
         ]
+    if content["worth"] is not None:
+        lines += ["", "## What the effects cost", "", *content["worth"]["summary"]]
     return "\n".join(lines) + "\n"
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.errors import ScaraIdentError
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.use import Use
+from scara_ident.use.worth import EffectWorth, worth
 
 # What is fed forward, in words.
 WORDS = {
@@ -15,6 +19,8 @@ WORDS = {
     "urdf": "with the URDF fed forward",
     "identified": "with the identified model",
     "effects": "with the effects found",
+    "mujoco_identified": "in MuJoCo with the identified model",
+    "mujoco_effects": "in MuJoCo with the effects found",
 }
 
 
@@ -43,25 +49,70 @@ def use_dict(result: Use) -> dict[str, Any]:
     }
 
 
+def worth_dict(model: IdentifiedModel) -> dict[str, Any]:
+    """Return what ``diagnosis.json`` holds under ``worth``: tracking errors with and without the effects found.
+
+    Where that cannot be said ``tracking`` is None, and ``why`` says why.
+    """
+    try:
+        found = worth(model)
+    except ScaraIdentError as error:
+        return {"tracking": None, "why": str(error), "summary": [f"What the effects cost is not told: {error}."]}
+    robot = model.robot
+
+    def by_joint(errors: Array) -> dict[str, float]:
+        return dict(zip(robot.joints, errors.tolist(), strict=True))
+
+    return {
+        "summary": [_shares_said(found.rms), *(_cost_said(item, found.rms) for item in found.each)],
+        "trajectory": {"name": found.motion.name, "duration": found.motion.duration},
+        "tracking": {name: by_joint(errors) for name, errors in found.rms.items()},
+        "effects": [
+            {
+                "effect": item.entry["effect"],
+                "joint": item.entry["joint"],
+                "pid_without_it": by_joint(item.alone),
+                "fed_without_it": None if item.not_fed is None else by_joint(item.not_fed),
+            }
+            for item in found.each
+        ],
+        "not_simulated": list(found.missing),
+        "units": dict(zip(robot.joints, map(robot.position_unit, range(robot.n)), strict=True)),
+        "why": None,
+    }
+
+
+def _cost_said(item: EffectWorth, rms: Mapping[str, Array]) -> str:
+    alone = rms["pid"]
+    where = f" of {item.entry['joint']}" if item.entry["joint"] else ""
+    said = f"{item.entry['effect']}{where}: without it the PID alone would leave {total(item.alone, alone):.0%} of its error"
+    if item.not_fed is None:
+        return f"{said}."
+    return (
+        f"{said}; fed forward with all else it leaves {total(rms['effects'], alone):.0%}, and all else without it "
+        f"{total(item.not_fed, alone):.0%}."
+    )
+
+
 def total(errors: Array, alone: Array) -> float:
     """Return one number for all joints: the rms of each joint's error over that of the PID alone."""
     return float(np.sqrt(np.mean((errors / np.maximum(alone, np.finfo(float).tiny)) ** 2)))
 
 
+def _shares_said(rms: Mapping[str, Array]) -> str:
+    shares = {name: total(value, rms["pid"]) for name, value in rms.items() if name != "pid"}
+    last = (
+        f", {WORDS['effects']} {shares['effects']:.0%}." if "effects" in shares else "; no effects were found to add."
+    )
+    return (
+        f"Of the PID's tracking error {WORDS['urdf']} leaves {shares['urdf']:.0%}, {WORDS['identified']} "
+        f"{shares['identified']:.0%}{last}"
+    )
+
+
 def sentences(result: Use) -> list[str]:
     """Say in words what was won."""
-    rms = result.rms()
-    alone = rms["pid"]
-    shares = {name: total(value, alone) for name, value in rms.items() if name != "pid"}
-    said = [
-        f"Of the PID's tracking error {WORDS['urdf']} leaves {shares['urdf']:.0%}, {WORDS['identified']} "
-        f"{shares['identified']:.0%}"
-        + (
-            f", {WORDS['effects']} {shares['effects']:.0%}."
-            if "effects" in shares
-            else "; no effects were found to add."
-        )
-    ]
+    said = [_shares_said(result.rms())]
     for name, rows in result.rollouts.items():
         place = int(np.argmin(np.abs(np.array(result.horizons) - 0.2)))
         if not np.all(np.isfinite(rows[place])):
@@ -73,6 +124,8 @@ def sentences(result: Use) -> list[str]:
             for j, (joint, value) in enumerate(zip(result.model.robot.joints, rows[place], strict=True))
         )
         said.append(f"Simulated {WORDS[name]} the arm is off after {result.horizons[place]:g} s by {ends}.")
+    if result.not_mujoco:
+        said.append(f"Not simulated in MuJoCo: {result.not_mujoco}.")
     if result.missing:
         said.append(f"Not simulated: {', '.join(result.missing)}.")
     return said

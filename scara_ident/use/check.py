@@ -12,6 +12,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.files import column_names
@@ -20,7 +21,6 @@ from scara_ident.robot.robot import Robot
 from scara_ident.simulation.reference import read_trajectory
 from scara_ident.use.energy import Drive, Energy, drive, energy_of
 from scara_ident.use.joint_limits import JointLimits, Margin, margins
-from scara_ident.use.known_model import KnownModel
 
 # A margin below so many rms errors of the model is close.
 CLOSE = 2.0
@@ -36,7 +36,7 @@ class Check:
 
     Attributes
     ----------
-    known : KnownModel
+    known : IdentifiedModel
     limits : JointLimits
     drives : tuple of Drive
         The motion, stretch by stretch, with its torque.
@@ -44,7 +44,7 @@ class Check:
     energy : Energy
     """
 
-    known: KnownModel
+    known: IdentifiedModel
     limits: JointLimits
     drives: tuple[Drive, ...]
     margins: tuple[Margin, ...]
@@ -77,7 +77,7 @@ class Check:
         return np.asarray(np.sqrt(np.mean(np.concatenate(left, axis=1) ** 2, axis=1))) if left else None
 
 
-def read_motion(path: Path | str, known: KnownModel) -> tuple[Motion, ...]:
+def read_motion(path: Path | str, known: IdentifiedModel) -> tuple[Motion, ...]:
     """Read a motion as stretches without gaps.
 
     Parameters
@@ -85,7 +85,7 @@ def read_motion(path: Path | str, known: KnownModel) -> tuple[Motion, ...]:
     path : path
         A ``trajectory.csv`` with position, velocity and acceleration, which is taken as it is; or a recording, whose
         positions are low-passed and differentiated as they were for the identification.
-    known : KnownModel
+    known : IdentifiedModel
 
     Raises
     ------
@@ -116,14 +116,14 @@ def read_motion(path: Path | str, known: KnownModel) -> tuple[Motion, ...]:
     return tuple(found)
 
 
-def check(known: KnownModel, motions: Sequence[Motion], limits: JointLimits) -> Check:
+def check(known: IdentifiedModel, motions: Sequence[Motion], limits: JointLimits) -> Check:
     """Foresee torque, power and energy of a motion, and compare them with limits.
 
     At a standstill friction is left out: it may take or give up to Coulomb's.
 
     Parameters
     ----------
-    known : KnownModel
+    known : IdentifiedModel
     motions : sequence of Motion, at least one
         Stretches of one motion.
     limits : JointLimits
@@ -144,7 +144,7 @@ def slowed(motion: Motion, share: float) -> Motion:
     )
 
 
-def _speed_share(known: KnownModel, limits: JointLimits, drives: Sequence[Drive]) -> float | None:
+def _speed_share(known: IdentifiedModel, limits: JointLimits, drives: Sequence[Drive]) -> float | None:
     every = max(1, sum(each.motion.samples for each in drives) // MOST_SAMPLES)
     motions = [_every(each.motion, every) for each in drives]
 

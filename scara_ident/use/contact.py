@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, ScaraIdentError
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.kinematics import tool_frame
 from scara_ident.robot.robot import Robot
@@ -23,7 +24,6 @@ from scara_ident.use.external_torque import (
     ObserverSettings,
     observe_recording,
 )
-from scara_ident.use.known_model import KnownModel
 
 # Share of the samples whose speed is below the usual largest.
 USUAL = 0.99
@@ -57,7 +57,7 @@ class ContactObserver:
 
     Parameters
     ----------
-    known : KnownModel
+    known : IdentifiedModel
     settings : ObserverSettings
     alarm : Alarm
     velocity : bool
@@ -67,11 +67,11 @@ class ContactObserver:
     --------
     ::
 
-        observer = contact_observer(known_model(identify(robot, recordings)), free, rate=1.0)
+        observer = contact_observer(identified_model(identify(robot, recordings)), free, rate=1.0)
         reading = observer.update(q, v, effort)  # every millisecond
     """
 
-    def __init__(self, known: KnownModel, settings: ObserverSettings, alarm: Alarm, *, velocity: bool) -> None:
+    def __init__(self, known: IdentifiedModel, settings: ObserverSettings, alarm: Alarm, *, velocity: bool) -> None:
         self.known, self.settings, self.alarm, self.velocity = known, settings, alarm, velocity
         self.external = ExternalTorque(known, settings)
 
@@ -103,7 +103,7 @@ class ContactObserver:
 
 
 def contact_observer(
-    known: KnownModel, free: Sequence[Recording], *, rate: float = 1.0, bandwidth: float = BANDWIDTH
+    known: IdentifiedModel, free: Sequence[Recording], *, rate: float = 1.0, bandwidth: float = BANDWIDTH
 ) -> ContactObserver:
     """Make an observer with thresholds from recordings without contact.
 
@@ -111,7 +111,7 @@ def contact_observer(
 
     Parameters
     ----------
-    known : KnownModel
+    known : IdentifiedModel
     free : sequence of Recording
         Motion like that to be watched, without contact; best not what the model was identified from.
     rate : float

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.motion.motion import Motion
-from scara_ident.use.known_model import KnownModel
 
 # A power of the other sign below this share of the largest is rounding.
 ROUNDING = 1e-9
@@ -23,7 +23,7 @@ class Drive:
     ----------
     motion : Motion
     parts : mapping of str to ndarray, shape (n, N)
-        Torque by what it comes from, recorded side, see `KnownModel.torque_parts`.
+        Torque by what it comes from, recorded side, see `IdentifiedModel.torque_parts`.
     row_scale : ndarray, shape (n,)
         Recorded torque per torque at the joint.
     """
@@ -82,7 +82,7 @@ class Energy:
         return np.asarray(sum((self.work[name] for name in self.heat), np.zeros_like(self.given)))
 
 
-def drive(known: KnownModel, motion: Motion) -> Drive:
+def drive(known: IdentifiedModel, motion: Motion) -> Drive:
     """Return torque and power of the drives along a motion."""
     return Drive(motion, known.torque_parts(motion), known.robot.row_scale)
 

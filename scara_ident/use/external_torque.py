@@ -9,9 +9,9 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.model.terms import Friction, Offset, RigidBody, Term
 from scara_ident.motion.motion import Motion
-from scara_ident.use.known_model import KnownModel
 from scara_ident.use.momentum import arm_momentum
 
 # Cut-off of the observer, and of the low-pass on positions and efforts where velocities are not given, Hz.
@@ -57,7 +57,7 @@ class ExternalTorque:
 
     Parameters
     ----------
-    known : KnownModel
+    known : IdentifiedModel
     settings : ObserverSettings
 
     Attributes
@@ -72,7 +72,7 @@ class ExternalTorque:
         Effects of the model that take more than position and velocity, and are no part of it.
     """
 
-    def __init__(self, known: KnownModel, settings: ObserverSettings) -> None:
+    def __init__(self, known: IdentifiedModel, settings: ObserverSettings) -> None:
         robot = known.robot
         self.robot, self.settings = robot, settings
         self.arm = arm_momentum(known)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RobotError
+from scara_ident.errors import RobotError, UsageError
+from scara_ident.export.identified_model import Entry, IdentifiedModel
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import Robot
 from scara_ident.simulation.arm import VirtualArm
@@ -17,14 +18,35 @@ from scara_ident.simulation.defaults import placed_poles, virtual_arm
 from scara_ident.simulation.effects import EFFECTS, Effect
 from scara_ident.simulation.spatial import mass_and_bias
 
-# An effect as ``diagnosis.json`` has it.
-Entry = Mapping[str, Any]
+# Models whose parameters the virtual arm has.
+_MODELS = ("complete", "reduced", "basic")
 # Standard parameters of a body by kind: mass, first moments, moments of inertia.
 _KINDS = (slice(0, 1), slice(1, 4), slice(4, 10))
 # A kind of parameter that the URDF has none of counts as this share of the kind's largest one on the arm.
 _LEAST_SHARE = 1e-3
 # Random poses at which the inertia must be positive.
 _POSES = 64
+
+
+def arms_of(model: IdentifiedModel) -> tuple[VirtualArm, VirtualArm]:
+    """Return the virtual arms with a model's parameters, before and after the effects found, which they are without.
+
+    Raises
+    ------
+    UsageError
+        If the virtual arm has no such model.
+    RobotError
+        See `arm_with`.
+    """
+    if model.model.name not in _MODELS:
+        raise UsageError(f"its model {model.model.name!r} is none that the virtual arm has")
+    bare, whole = (arm_with(model.robot, by_name(model, value)) for value in (model.before, model.value))
+    return bare, whole
+
+
+def by_name(model: IdentifiedModel, value: Array) -> dict[str, float]:
+    """Return numbers of a model's first parameters by name; what is not known is left out."""
+    return {name: float(x) for name, x in zip(model.model.names, value, strict=False) if np.isfinite(x)}
 
 
 def arm_with(robot: Robot, parameters: Mapping[str, float]) -> VirtualArm:

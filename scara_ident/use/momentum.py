@@ -10,8 +10,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.robot.robot import Robot
-from scara_ident.use.known_model import KnownModel
 
 # Least mass that a body stands for, kg, and how much more than another parameter a mass is held to what is wanted: a body
 # without mass has no centre of mass.
@@ -71,7 +71,7 @@ class ArmMomentum:
         return full
 
 
-def arm_momentum(known: KnownModel) -> ArmMomentum:
+def arm_momentum(known: IdentifiedModel) -> ArmMomentum:
     """Return the momentum of an identified arm.
 
     Of all standard parameters that have the identified base parameters those nearest to the URDF's are taken; torque,

@@ -12,25 +12,35 @@ from scara_ident.motion.prepared import PreparedStretch
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.simulate import free_motion
+from scara_ident.use.mujoco_arm import Free
 
 # Starts along a recording, at the most.
 STARTS = 40
 HORIZONS = (0.05, 0.1, 0.2, 0.5)
 
 
-def rollout_errors(
-    arm: VirtualArm, effects: Sequence[Effect], part: PreparedStretch, horizons: Sequence[float] = HORIZONS
-) -> Array:
+def virtual_free(arm: VirtualArm, effects: Sequence[Effect]) -> Free:
+    """Return the free motion of a virtual arm; effects that depend on the time since a run began start anew each time."""
+
+    def free(q: Array, v: Array, torque: Array, rate: float) -> Array:
+        duration = (torque.shape[1] - 1) / rate
+        try:
+            return free_motion(arm, q, v, duration, torque=torque, effects=effects, rate=rate)[1].position
+        except ScaraIdentError:
+            return np.full_like(torque, np.inf)
+
+    return free
+
+
+def rollout_errors(free: Free, part: PreparedStretch, horizons: Sequence[float] = HORIZONS) -> Array:
     """Return how far a simulated arm is from the recorded one some time after both were at the same state.
 
     From many places of a recording where all joints move the arm goes on with the recorded torque alone, without a controller.
 
     Parameters
     ----------
-    arm : VirtualArm
-        With a model's parameters.
-    effects : sequence of Effect
-        That the model has. Those that depend on the time since the run began start anew with every rollout.
+    free : Free
+        Of the simulated arm: `virtual_free` or `mujoco_arm`.
     part : PreparedStretch
         Of a recording with effort; its filtered motion gives the states.
     horizons : sequence of float, optional
@@ -47,18 +57,14 @@ def rollout_errors(
     # At rest dry friction is anything that holds the joint, which no state tells.
     moving = np.flatnonzero(np.all(part.used, axis=0))
     moving = moving[moving < part.samples - part.trim - longest]
+    square = np.zeros((len(horizons), len(motion.q)))
     if not len(moving):
-        return np.full((len(horizons), arm.robot.n), np.nan)
+        return np.full(square.shape, np.nan)
     places = moving[np.unique(np.linspace(0, len(moving) - 1, STARTS).astype(int))]
     steps = np.array([round(horizon * rate) for horizon in horizons])
-    square = np.zeros((len(horizons), arm.robot.n))
     for k in places:
-        torque = part.torque[:, k : k + longest + 1]
-        try:
-            _, true = free_motion(
-                arm, motion.q[:, k], motion.v[:, k], longest / rate, torque=torque, effects=effects, rate=rate
-            )
-        except ScaraIdentError:
+        position = free(motion.q[:, k], motion.v[:, k], part.torque[:, k : k + longest + 1], rate)
+        if not np.all(np.isfinite(position)):
             return np.full(square.shape, np.inf)
-        square += ((true.position[:, steps] - motion.q[:, k + steps]) ** 2).T
+        square += ((position[:, steps] - motion.q[:, k + steps]) ** 2).T
     return np.sqrt(square / len(places))

@@ -9,6 +9,8 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import ScaraIdentError
+from scara_ident.export.identified_model import IdentifiedModel
+from scara_ident.motion.motion import Motion
 from scara_ident.simulation.arm import VirtualArm, ideal
 from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.inverse_dynamics import inverse_dynamics
@@ -67,7 +69,16 @@ def urdf_torque(arm: VirtualArm, motion: ReferenceMotion) -> Array:
     return np.asarray(torque / arm.scale[:, None])
 
 
-def needed_torque(arm: VirtualArm, effects: Sequence[Effect], motion: ReferenceMotion) -> Array:
+def foreseen_torque(model: IdentifiedModel, motion: ReferenceMotion) -> Array:
+    """Return the torque that a model with the effects found foresees, shape (n, N), at the samples of the motion."""
+    signals = motion.position, motion.velocity, motion.acceleration
+    known = replace(model, value=np.nan_to_num(model.value))
+    return known.torque(Motion(motion.name, motion.name, motion.time, *signals, None, RATE))
+
+
+def needed_torque(
+    arm: VirtualArm, effects: Sequence[Effect], motion: ReferenceMotion, first: Array | None = None
+) -> Array:
     """Return the torque that lets an arm follow a motion, shape (n, N), on the effort side.
 
     Without effects it is inverse dynamics. With them an ideal arm, without encoder steps, follows the motion in simulation
@@ -80,6 +91,8 @@ def needed_torque(arm: VirtualArm, effects: Sequence[Effect], motion: ReferenceM
     effects : sequence of Effect
     motion : ReferenceMotion
         At the ticks of the controller, see `at_ticks`.
+    first : ndarray, shape (n, N), optional
+        Fed forward at first where there are effects; inverse dynamics without them by default.
 
     Raises
     ------
@@ -90,6 +103,7 @@ def needed_torque(arm: VirtualArm, effects: Sequence[Effect], motion: ReferenceM
     feed = np.asarray(torque / arm.scale[:, None])
     if not effects:
         return feed
+    feed = feed if first is None else first
     scale = np.maximum(np.ptp(motion.position, axis=1), np.finfo(float).eps)[:, None]
     for faster in FASTER:
         stiff = replace(ideal(arm), controller=arm.controller.faster(faster))

@@ -21,13 +21,15 @@ SLOWER, ATTEMPTS = 0.8, 12
 RATE = 1000.0
 
 
-def trial_motion(arm: VirtualArm, seed: int = 0) -> ReferenceMotion:
+def trial_motion(arm: VirtualArm, seed: int = 0, *, poses: int = POSES) -> ReferenceMotion:
     """Return a motion through random poses and back, quintic between them, slow enough for the torque limits.
 
     Parameters
     ----------
     arm : VirtualArm
     seed : int, optional
+    poses : int, optional
+        How many it goes through.
 
     Raises
     ------
@@ -38,13 +40,13 @@ def trial_motion(arm: VirtualArm, seed: int = 0) -> ReferenceMotion:
     lower = np.where(np.isfinite(robot.lower), robot.lower, -REACH)
     upper = np.where(np.isfinite(robot.upper), robot.upper, REACH)
     middle, half = 0.5 * (lower + upper), np.minimum(0.5 * RANGE_SHARE * (upper - lower), REACH)
-    poses = middle[:, None] + half[:, None] * random.uniform(-1.0, 1.0, (robot.n, POSES))
-    poses = np.concatenate([poses, poses[:, :1]], axis=1)
+    places = middle[:, None] + half[:, None] * random.uniform(-1.0, 1.0, (robot.n, poses))
+    places = np.concatenate([places, places[:, :1]], axis=1)
     usual = np.where(robot.prismatic, SLIDE_SPEED, SPEED)
     speed = SPEED_SHARE * np.minimum(robot.velocity_limit, usual)
     limit = EFFORT_SHARE * robot.torque_limit
     for slower in SLOWER ** np.arange(ATTEMPTS):
-        motion = _through(arm, poses, slower * speed)
+        motion = _through(arm, places, slower * speed)
         some = slice(None, None, 20)
         torque = inverse_dynamics(
             arm, arm.bodies, motion.position[:, some], motion.velocity[:, some], motion.acceleration[:, some]

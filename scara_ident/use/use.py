@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RecordingError, RobotError, UsageError
-from scara_ident.motion.prepared import prepare
+from scara_ident.errors import RecordingError, RobotError, ScaraIdentError, UsageError
+from scara_ident.export.identified_model import Entry, IdentifiedModel
+from scara_ident.motion.prepared import PreparedStretch, prepare
 from scara_ident.progress import Tell, silent
 from scara_ident.recording.recording import Recording
-from scara_ident.robot.robot import Robot
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.first_run import compiled_first
 from scara_ident.simulation.reference import ReferenceMotion
-from scara_ident.use.identified_arm import Entry, arm_with, simulated
-from scara_ident.use.rollout import HORIZONS, rollout_errors
-from scara_ident.use.tracking import Tracked, at_ticks, needed_torque, tracked, urdf_torque
+from scara_ident.use.identified_arm import arm_with, arms_of, by_name, simulated
+from scara_ident.use.mujoco_arm import Free, mujoco_arm
+from scara_ident.use.rollout import HORIZONS, rollout_errors, virtual_free
+from scara_ident.use.tracking import Tracked, at_ticks, foreseen_torque, needed_torque, tracked, urdf_torque
 from scara_ident.use.trial_motion import trial_motion
 
 # Arms that may be the true one, drawn about the model.
@@ -30,37 +30,12 @@ HALVINGS = 6
 
 
 @dataclass(frozen=True, eq=False)
-class UsedModel:
-    """A model as its result file tells it.
-
-    Attributes
-    ----------
-    robot : Robot
-    before, after : mapping of str to float
-        Parameters of the complete model's names, without and with the effects found.
-    std : mapping of str to float
-        Their standard deviations; what is not determined is left out.
-    found : sequence of Entry
-        The effects, as in ``diagnosis.json``.
-    bands : tuple of float or None, one per joint
-        In which it was found, Hz.
-    """
-
-    robot: Robot
-    before: Mapping[str, float]
-    after: Mapping[str, float]
-    std: Mapping[str, float]
-    found: Sequence[Entry]
-    bands: tuple[float | None, ...]
-
-
-@dataclass(frozen=True, eq=False)
 class Use:
     """What `use` found.
 
     Attributes
     ----------
-    model : UsedModel
+    model : IdentifiedModel
     motion : ReferenceMotion
         That the arms followed.
     runs : tuple of tuple of Tracked
@@ -68,18 +43,28 @@ class Use:
     horizons : tuple of float
         s.
     rollouts : mapping of str to ndarray of shape (len(horizons), n)
-        ``identified`` and ``effects``: rms distance from recordings; empty without any.
+        ``identified`` and ``effects`` in the virtual arm, ``mujoco_identified`` and ``mujoco_effects`` in MuJoCo: rms distance
+        from recordings; empty without any.
+    not_mujoco : str
+        Why there is none in MuJoCo; empty where there is, or without recordings.
     effects, missing : tuple
         Effects that the virtual arm had, and names of those found that it cannot have.
+    drawn : tuple of (VirtualArm, tuple of Effect)
+        The arms that followed, with their effects.
+    feeds : mapping of str to ndarray of shape (n, N)
+        Torque fed forward, on the effort side; none for ``pid``.
     """
 
-    model: UsedModel
+    model: IdentifiedModel
     motion: ReferenceMotion
     runs: tuple[tuple[Tracked, ...], ...]
     horizons: tuple[float, ...]
     rollouts: Mapping[str, Array]
+    not_mujoco: str
     effects: tuple[Effect, ...]
     missing: tuple[str, ...]
+    drawn: tuple[tuple[VirtualArm, tuple[Effect, ...]], ...]
+    feeds: Mapping[str, Array]
 
     def rms(self) -> dict[str, Array]:
         """Return the rms tracking error of every joint over all drawn arms, by feed-forward."""
@@ -90,41 +75,12 @@ class Use:
         }
 
 
-def used_model(content: Mapping[str, Any], robot: Robot) -> UsedModel:
-    """Take a model from the content of ``identification.json`` or ``diagnosis.json``.
-
-    Parameters
-    ----------
-    content : mapping
-    robot : Robot
-        That it was identified for.
-
-    Raises
-    ------
-    UsageError
-        If it is no such content, or of another robot or model.
-    """
-    try:
-        entries, name = list(content["parameters"]), str(content["robot"])
-        after = {item["name"]: float(item["value"]) for item in entries if item["value"] is not None}
-        std = {item["name"]: float(item["std"]) for item in entries if item.get("std") is not None}
-        before = after | {item["name"]: float(item["before"]) for item in entries if item.get("before") is not None}
-        found = list(content.get("effects", ()))
-        bands = {**dict.fromkeys(robot.joints), **(content.get("band_hz") or {})}
-    except (KeyError, TypeError, ValueError, AttributeError):
-        raise UsageError("no parameters are in it; expected an identification.json or a diagnosis.json") from None
-    if name != robot.name:
-        raise UsageError(f"it was identified for {name}, the robot given is {robot.name}; give that one by --robot")
-    if content.get("model") not in ("complete", "reduced", "basic"):
-        raise UsageError(f"its model {content.get('model')!r} is none that the virtual arm has")
-    return UsedModel(robot, before, after, std, found, tuple(bands[joint] for joint in robot.joints))
-
-
 def use(
-    model: UsedModel,
+    model: IdentifiedModel,
     motion: ReferenceMotion | None = None,
     recordings: Sequence[Recording] = (),
     *,
+    arms: int = DRAWS,
     seed: int = 0,
     progress: Tell = silent,
 ) -> Use:
@@ -135,11 +91,13 @@ def use(
 
     Parameters
     ----------
-    model : UsedModel
+    model : IdentifiedModel
     motion : ReferenceMotion, optional
         By default from pose to pose within the limits.
     recordings : sequence of Recording, optional
         With effort; simulated arms with the same torques are compared with them.
+    arms : int, optional
+        How many are drawn.
     seed : int, optional
     progress : callable, optional
 
@@ -151,45 +109,82 @@ def use(
     ------
     RobotError
         If no arm with these parameters can move.
+    UsageError
+        If the virtual arm has no such model.
     """
     random = np.random.default_rng(seed)
     pairs, missing = simulated(model.found)
     progress("feed-forward torques", 0.0)
-    bare, whole = arm_with(model.robot, model.before), arm_with(model.robot, model.after)
+    bare, whole = arms_of(model)
     progress = compiled_first(whole, progress)
     pairs = tuple((effect.resolve(whole), item) for effect, item in pairs)
     effects = tuple(effect for effect, _ in pairs)
     wanted = at_ticks(trial_motion(whole, seed) if motion is None else motion)
-    feeds: dict[str, Array | None] = {"pid": None, "urdf": urdf_torque(whole, wanted)}
-    feeds["identified"] = needed_torque(bare, (), wanted)
-    if effects:
-        feeds["effects"] = needed_torque(whole, effects, wanted)
-    runs = []
-    for k in range(DRAWS):
-        progress("following the motion", 0.2 + 0.5 * k / DRAWS)
+    feeds = fed_forward(model, wanted, bare, whole, effects)
+    runs, drawn = [], []
+    for k in range(arms):
+        progress("following the motion", 0.2 + 0.5 * k / arms)
         arm, own = _drawn(model, whole, random), tuple(_drawn_effect(*pair, whole, random) for pair in pairs)
-        runs.append(tracked(arm, own, wanted, feeds, seed + k))
-    rollouts = {}
+        drawn.append((arm, own))
+        runs.append(tracked(arm, own, wanted, {"pid": None, **feeds}, seed + k))
+    rollouts: dict[str, Array] = {}
+    not_mujoco = ""
     if recordings:
         progress("rolling out", 0.7)
         parts = [part for part in prepare(recordings, model.bands).stretches if part.usable]
         if not parts or any(part.stretch.torque is None for part in parts):
             raise RecordingError(f"{recordings[0].name}: too short, or without effort, to roll out with; record longer")
-        variants: dict[str, tuple[VirtualArm, Sequence[Effect]]] = {"identified": (bare, ())}
+        rollouts["identified"] = _over(parts, virtual_free(bare, ()))
         if effects:
-            variants["effects"] = (whole, effects)
-        for name, (which, having) in variants.items():
-            each = np.array([rollout_errors(which, having, part) for part in parts])
-            rollouts[name] = np.sqrt(np.nanmean(each**2, axis=0))
-    return Use(model, wanted, tuple(runs), HORIZONS, rollouts, effects, missing)
+            rollouts["effects"] = _over(parts, virtual_free(whole, effects))
+        progress("rolling out in MuJoCo", 0.85)
+        variants = {"mujoco_identified": model.without_effects()} | ({"mujoco_effects": model} if model.found else {})
+        for name, which in variants.items():
+            try:
+                with mujoco_arm(which) as free:
+                    rollouts[name] = _over(parts, free)
+            except ScaraIdentError as error:
+                not_mujoco = str(error)
+    return Use(model, wanted, tuple(runs), HORIZONS, rollouts, not_mujoco, effects, missing, tuple(drawn), feeds)
 
 
-def _drawn(model: UsedModel, whole: VirtualArm, random: np.random.Generator) -> VirtualArm:
+def _over(parts: Sequence[PreparedStretch], free: Free) -> Array:
+    """Return the rms of rollout errors over stretches, shape (len(horizons), n)."""
+    each = np.array([rollout_errors(free, part) for part in parts])
+    # No stretch may be long enough for the longest horizon.
+    count = np.sum(~np.isnan(each), axis=0)
+    square = np.nansum(each**2, axis=0)
+    return np.asarray(np.sqrt(np.divide(square, count, out=np.full(square.shape, np.nan), where=count > 0)))
+
+
+def fed_forward(
+    model: IdentifiedModel, motion: ReferenceMotion, bare: VirtualArm, whole: VirtualArm, effects: Sequence[Effect]
+) -> dict[str, Array]:
+    """Return the torque that each model feeds forward, shape (n, N): ``urdf``, ``identified`` and, where any, ``effects``.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+    motion : ReferenceMotion
+        At the ticks of the controller.
+    bare, whole : VirtualArm
+        See `arms_of`.
+    effects : sequence of Effect
+        The effects found, as the virtual arm has them.
+    """
+    feeds = {"urdf": urdf_torque(whole, motion), "identified": needed_torque(bare, (), motion)}
+    if effects:
+        feeds["effects"] = needed_torque(whole, effects, motion, foreseen_torque(model, motion))
+    return feeds
+
+
+def _drawn(model: IdentifiedModel, whole: VirtualArm, random: np.random.Generator) -> VirtualArm:
     """Draw an arm about the model."""
-    step = {name: std * random.normal() for name, std in model.std.items() if name in model.after}
+    value = by_name(model, model.value)
+    step = {name: std * random.normal() for name, std in by_name(model, model.std).items() if name in value}
     for share in 0.5 ** np.arange(HALVINGS):
         try:
-            moved = {name: value + share * step.get(name, 0.0) for name, value in model.after.items()}
+            moved = {name: x + share * step.get(name, 0.0) for name, x in value.items()}
             return replace(arm_with(model.robot, moved), controller=whole.controller)
         except RobotError:
             continue

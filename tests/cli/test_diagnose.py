@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from scara_ident.recording.recording import write_recording
+from scara_ident.report.html.blocks import number
 from tests.diagnosis.made import held_out_run, virtual_runs
 
 pytestmark = pytest.mark.slow
@@ -37,7 +38,22 @@ def test_it_writes_what_the_contract_says(command, tmp_path: Path):
     pictures = {f"effect_{k + 1}.png" for k in range(len(content["effects"]))}
     assert {path.name for path in out.iterdir()} == {"diagnosis.json", "diagnosis.md", "report.html", *pictures}
     assert "Found spring on joint1" in result.out
-    assert (out / "diagnosis.md").read_text().startswith("# Diagnosis of scara03")
+    story = (out / "diagnosis.md").read_text()
+    assert story.startswith("# Diagnosis of scara03")
+    # What it costs, the same in both reports and in the JSON.
+    worth = content["worth"]
+    assert set(worth["tracking"]) == {"pid", "urdf", "identified", "effects"}
+    own = worth["effects"][0]
+    assert (own["effect"], own["joint"]) == ("spring", "joint1")
+    assert worth["tracking"]["effects"]["joint1"] < min(
+        own["fed_without_it"]["joint1"], worth["tracking"]["pid"]["joint1"]
+    )
+    page = (out / "report.html").read_text()
+    assert 'id="worth"' in page
+    for said in worth["summary"]:
+        assert said in story
+    for errors in (*worth["tracking"].values(), own["pid_without_it"], own["fed_without_it"]):
+        assert number(errors["joint1"]) in page
 
 
 def test_a_band_can_be_asked_for(command, folder: Path, tmp_path: Path):

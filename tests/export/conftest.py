@@ -6,7 +6,7 @@ from types import ModuleType
 
 import pytest
 
-from scara_ident.export.result import IdentifiedModel
+from scara_ident.export.identified_model import IdentifiedModel
 from tests.export.arms import panda, scara, ur5
 from tests.export.identified import EFFECTS, identified
 from tests.shared import ROOT

@@ -6,7 +6,7 @@ import numpy as np
 
 from scara_ident.effects import EffectTerm, Scene, available_effects
 from scara_ident.estimation.information import Information
-from scara_ident.export.result import IdentifiedModel
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
@@ -69,7 +69,11 @@ def identified(
         )
 
     open_ = np.zeros(len(value), dtype=bool)
-    return IdentifiedModel(full, value, open_, np.ones(robot.n), information(1), information(2), standard)
+    return IdentifiedModel(
+        model=full, value=value, std=np.full(len(value), 0.01), before=value[: len(base.columns)], undetermined=open_,
+        weights=np.ones(robot.n), training=information(1), validation=information(2), standard=standard,
+        bands=(None,) * robot.n, rms=np.full(robot.n, NOISE),
+    )  # fmt: skip
 
 
 def model_torque(found: IdentifiedModel, value: Array, motion: Motion) -> Array:

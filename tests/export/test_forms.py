@@ -62,7 +62,7 @@ def test_friction_of_a_form_with_bodies_brakes(models):
 
 
 def test_what_is_missing_is_named_with_why(tmp_path: Path):
-    found = replace(identified(scara(tmp_path), ("warm_up", "spring"), samples=60), removed=("time_delay",))
+    found = replace(identified(scara(tmp_path), ("warm_up", "spring"), samples=60), found=({"effect": "time_delay"},))
     missing = dict(said_by(FORMS["c"], found).missing)
     assert missing == {
         "warm_up of joint2": "it does not follow from position, velocity and acceleration at the moment",

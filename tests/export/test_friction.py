@@ -6,39 +6,17 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from scara_ident.estimation.estimate import Estimate
-from scara_ident.estimation.information import Information
-from scara_ident.export.friction import JointFriction, friction_of
+from scara_ident.export.friction import JointFriction
 from scara_ident.export.urdf import urdf_text
-from scara_ident.model.model import build_model
 from scara_ident.model.terms import Friction
 from scara_ident.motion.motion import Motion
-from scara_ident.robot.robot import Robot, load_robot
+from scara_ident.robot.robot import load_robot
 from tests.export.arms import branched, random_motion
-
-
-def estimate_of(robot: Robot, name: str, values: dict[str, float], undetermined: tuple[str, ...] = ()) -> Estimate:
-    model = build_model(robot, name)
-    p = len(model.names)
-    value = np.array([values.get(key, 0.0) for key in model.names])
-    unknown = np.array([key in undetermined for key in model.names])
-    return Estimate(model, "ols", value, np.eye(p), unknown, Information.empty(p), np.ones(robot.n), "nominal")
-
-
-def test_friction_is_read_from_an_estimate_by_name() -> None:
-    values = {"a01": 0.1, "a11": 0.2, "a02": 0.3, "a12": 0.4, "a21": 9.0, "a32": 9.0, "p_o1": 9.0, "P_d1": 9.0}
-    friction = friction_of(estimate_of(load_robot(), "complete", values))
-    assert friction is not None
-    np.testing.assert_array_equal(friction.coulomb, [0.1, 0.3])
-    np.testing.assert_array_equal(friction.viscous, [0.2, 0.4])
-    assert friction.left_out == ("a21", "a31", "a22", "a32", "p_o1", "p_o2")
-    basic = friction_of(estimate_of(load_robot(), "basic", values))
-    assert basic is not None and basic.left_out == ("p_o1", "p_o2")
 
 
 def test_friction_that_the_data_leave_open_stays_the_file_s() -> None:
     robot = load_robot()
-    friction = friction_of(estimate_of(robot, "basic", {"a01": 0.1, "a12": 0.4}, undetermined=("a02", "a11")))
+    friction = JointFriction(np.array([0.1, np.nan]), np.array([np.nan, 0.4]))
     text, notes = urdf_text(robot, robot.standard_parameters(), friction)
     assert re.findall(r"<dynamics.*/>", text) == ['<dynamics friction="10.0"/>', '<dynamics damping="40.0"/>']
     assert "joint1: viscous friction is not known and was not written" in notes

@@ -12,7 +12,8 @@ import pytest
 from scara_ident.effects import available_effects
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation import Estimate
-from scara_ident.export.result import KEY, IdentifiedModel, read_identified, rebuild_entry
+from scara_ident.export.identified_model import IdentifiedModel, identified_model
+from scara_ident.export.result import KEY, read_identified, rebuild_entry
 from scara_ident.files import json_text, write_json
 from scara_ident.identification.identify import Identification
 from scara_ident.report.identification import identification_dict
@@ -46,12 +47,27 @@ def test_an_identification_reads_back_with_its_errors(found, content, read):
     np.testing.assert_array_equal(back.weights, found.estimate.weights)
     np.testing.assert_array_equal(back.standard, found.estimate.standard)
     np.testing.assert_allclose(back.information.rms(), found.estimate.information.rms(), rtol=1e-9)
+    own = identified_model(found)
+    assert (back.bands, back.found, back.undetermined.tolist()) == (own.bands, (), own.undetermined.tolist())
+    for name in ("value", "std", "before", "rms", "standard"):
+        np.testing.assert_allclose(getattr(back, name), getattr(own, name), rtol=1e-9)
+    assert back.errors(back.value) == pytest.approx(own.errors(own.value), rel=1e-9)
     assert back.held_out[0] == "validation"
     for joint, error in back.errors(back.value).items():
         assert error == pytest.approx(content["errors"]["validation"]["CI_1"][joint]["rms"], rel=1e-9)
     motion = states(found.model.robot, 0, 5)
     predicted = found.estimate.predict(motion.q.T, motion.v.T, motion.a.T).T
     np.testing.assert_allclose(model_torque(back, back.value, motion), predicted, rtol=1e-12, atol=1e-12)
+
+
+def test_a_parameter_without_a_value_is_named_where_all_are_needed(content, read, tmp_path: Path):
+    open_ = json.loads(json.dumps(content))
+    open_["parameters"][1] |= {"value": None, "std": None, "undetermined": True}
+    assert read(open_).undetermined.tolist() == [k == 1 for k in range(15)]
+    with pytest.raises(ScaraIdentError, match=r"r\.json: parameter 'P_d2' has no value; record"):
+        read_identified(tmp_path / "r.json", determined=True)
+    with pytest.raises(ScaraIdentError, match="model 'mine' is not known here"):
+        read(open_ | {"model": "mine"})
 
 
 def test_every_effect_reads_back_as_it_was(found, content, read):

@@ -10,10 +10,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from scara_ident.errors import EstimationError, ScaraIdentError
-from scara_ident.export import robots
-from scara_ident.export.robots import export_mjcf, export_urdf
-from scara_ident.identification.identify import Identification, identified_arm
+from scara_ident.errors import EstimationError
+from scara_ident.export import exported, robots
+from scara_ident.export.exported import export_model
+from scara_ident.export.forms import possible_standard
+from scara_ident.export.identified_model import identified_model
+from scara_ident.export.result import read_identified
+from scara_ident.export.robots import export_mjcf, export_urdf, robot_files
+from scara_ident.files import write_json
+from scara_ident.identification.identify import Identification
+from scara_ident.report.identification import identification_dict
 from scara_ident.robot.description import JointDescription, RobotDescription
 from scara_ident.robot.robot import Robot, build_robot
 from tests.report.simulated import made, run
@@ -34,13 +40,20 @@ def test_the_urdf_is_an_arm_with_the_identified_base_parameters(found: Identific
     term = found.model.rigid_body
     parameters = read_back(tmp_path / "arm.urdf").standard_parameters()
     value = (term.base.grouping @ parameters)[term.kept]
-    np.testing.assert_allclose(value, identified_arm(found).value[found.model.place(term)], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(value, found.estimate.value[found.model.place(term)], rtol=1e-9, atol=1e-12)
 
 
-def test_an_estimate_of_an_arm_that_can_exist_is_written_as_it_is(found: Identification, tmp_path: Path):
-    export_urdf(found, tmp_path / "one.urdf")
-    export_urdf(identified_arm(found), tmp_path / "other.urdf")
-    assert (tmp_path / "one.urdf").read_bytes() == (tmp_path / "other.urdf").read_bytes()
+def test_the_files_are_those_of_the_export_of_the_result_file(found: Identification, tmp_path: Path):
+    files, notes = robot_files(identified_model(found))
+    assert list(files) == ["scara03_identified.urdf", "scara03_identified.xml"]
+    assert "URDF: cannot say a21, a31, a22, a32: the format has no place for it" in notes
+    assert any(note.startswith("MJCF: fitted again to the same recordings: a01, a11") for note in notes)
+    write_json(tmp_path / "identification.json", identification_dict(found))
+    read = read_identified(tmp_path / "identification.json")
+    for to, (name, text) in zip(("urdf", "mjcf"), files.items(), strict=True):
+        assert export_model(read, to).files[name] == text
+    export_urdf(found, tmp_path / "arm.urdf")
+    assert (tmp_path / "arm.urdf").read_text() == files["scara03_identified.urdf"]
 
 
 def test_mujoco_and_the_urdf_have_one_mass_matrix(found: Identification, tmp_path: Path):
@@ -64,18 +77,22 @@ def test_mujoco_and_the_urdf_have_one_mass_matrix(found: Identification, tmp_pat
 
 @pytest.mark.parametrize("export", [export_urdf, export_mjcf])
 def test_no_file_is_written_of_an_arm_that_cannot_exist(export, found, tmp_path: Path, monkeypatch):
-    monkeypatch.setattr(robots, "identified_arm", lambda _: None)
-    with pytest.raises(EstimationError, match="no arm can have the identified parameters"):
+    def none(_: object) -> None:
+        raise EstimationError("no arm is found")
+
+    monkeypatch.setattr(exported, "possible_standard", none)
+    with pytest.raises(EstimationError, match="no arm is found"):
         export(found, tmp_path / "arm")
     assert list(tmp_path.iterdir()) == []
+    monkeypatch.setattr(robots, "possible_standard", none)
+    assert robot_files(identified_model(found)) == ({}, ("no URDF and no MJCF is written: no arm is found",))
 
 
-@pytest.mark.parametrize("export", [export_urdf, export_mjcf])
-def test_a_link_that_cannot_exist_keeps_the_earlier_file(export, found, tmp_path: Path):
-    arm = identified_arm(found)
-    standard = arm.standard.copy()
+def test_a_link_that_cannot_exist_is_named_and_the_other_file_told(found):
+    model = identified_model(found)
+    standard = possible_standard(model)[0].copy()
     standard[10] = -1.0
-    (tmp_path / "arm").write_text("earlier")
-    with pytest.raises(ScaraIdentError, match="link2"):
-        export(replace(arm, standard=standard), tmp_path / "arm")
-    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("arm", "earlier")]
+    files, notes = robot_files(replace(model, standard=standard))
+    assert files == {}
+    assert [note.partition(":")[0] for note in notes] == ["no URDF is written", "no MJCF is written"]
+    assert all("link2" in note for note in notes)

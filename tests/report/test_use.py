@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from scara_ident.report.use import sentences, total, use_dict
-from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, virtual_arm
-from scara_ident.use import Use, used_model
+from scara_ident.use import Use
 from scara_ident.use.tracking import Tracked
 from scara_ident.use.trial_motion import trial_motion
-from tests.use.made import content
+from tests.use.made import with_spring
 
 
 def result() -> Use:
@@ -28,8 +27,9 @@ def result() -> Use:
         "effects": np.array([[0.01, 0.02], [np.nan, np.nan]]),
     }
     spring = parse_effect("spring:joint1:stiffness=0.4").resolve(arm)
-    model = used_model(content(), load_robot())
-    return Use(model, trial_motion(arm), (runs,), (0.2, 0.5), rollouts, (spring,), ("drive_coupling",))
+    return Use(
+        with_spring(), trial_motion(arm), (runs,), (0.2, 0.5), rollouts, "", (spring,), ("drive_coupling",), (), {}
+    )
 
 
 def test_the_json_holds_the_rms_of_every_feed_forward_and_only_rollouts_that_were_long_enough() -> None:

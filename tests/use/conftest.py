@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from scara_ident.export.identified_model import IdentifiedModel, identified_model
 from scara_ident.files import plain
 from scara_ident.identification.identify import Identification
 from scara_ident.report.identification import identification_dict
-from scara_ident.use.known_model import KnownModel, known_model
 from tests.report.simulated import made, run
 
 
@@ -20,8 +20,8 @@ def identified() -> Identification:
 
 
 @pytest.fixture(scope="session")
-def known(identified: Identification) -> KnownModel:
-    return known_model(identified)
+def known(identified: Identification) -> IdentifiedModel:
+    return identified_model(identified)
 
 
 @pytest.fixture(scope="session")

@@ -8,12 +8,13 @@ from functools import cache
 import numpy as np
 import pinocchio as pin
 
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.kinematics import tool_frame
 from scara_ident.robot.robot import Robot, load_robot
-from scara_ident.use.known_model import KnownModel
 from tests.arms import recorded_torque, recording, sines
+from tests.use.made import known_as
 
 RATE, NOISE = 100.0, 0.5
 FRICTION = [(2.0, 1.0, 0.0, 0.0, 0.1)] * 6
@@ -24,7 +25,7 @@ def ur5() -> Robot:
     return load_robot("ur5")
 
 
-def known_ur5() -> KnownModel:
+def known_ur5() -> IdentifiedModel:
     """The model of these recordings, a little wrong, as if it had been identified."""
     robot = ur5()
     model = build_model(robot, "complete")
@@ -33,7 +34,7 @@ def known_ur5() -> KnownModel:
     friction = value[len(body.columns) : len(body.columns) + 24].reshape(6, 4)
     friction[:, 0], friction[:, 1] = 1.95, 1.03
     value[-6:] = 0.1
-    return KnownModel(model, value, (10.0,) * 6, np.full(6, 0.5))
+    return known_as(model, value, bands=(10.0,) * 6, rms=np.full(6, 0.5))
 
 
 def quiet(seed: int, seconds: float = 20.0) -> Recording:

@@ -8,15 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scara_ident.export.identified_model import IdentifiedModel, identified_model
 from scara_ident.identification.identify import identify
+from scara_ident.model.model import build_model
 from scara_ident.motion.motion import Motion
 from scara_ident.recording.recording import write_recording
-from scara_ident.simulation import simulate, virtual_arm
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import ideal, simulate, virtual_arm
+from scara_ident.simulation.truth import _complete_parameters
 from scara_ident.use.check import check, check_dict, read_motion, slowed
 from scara_ident.use.joint_limits import joint_limits
-from scara_ident.use.known_model import KnownModel, known_model
 from tests.arms import recording
 from tests.simulation.made import swing
+from tests.use.made import known_as
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +30,7 @@ def rehearsed(tmp_path_factory: pytest.TempPathFactory):
     runs = [simulate(arm, swing(arm.robot, 8.0, size, name), rate=500.0) for size, name in ((0.6, "a"), (0.4, "b"))]
     path = tmp_path_factory.mktemp("runs") / "b_1.parquet"
     write_recording(runs[1].recording, path)
-    return known_model(identify(arm.robot, [runs[0].recording], bands=[15.0, 15.0])), runs[1], path
+    return identified_model(identify(arm.robot, [runs[0].recording], bands=[15.0, 15.0])), runs[1], path
 
 
 def test_torque_power_and_energy_are_the_virtual_arms_within_5_percent(rehearsed):
@@ -52,6 +56,25 @@ def test_torque_power_and_energy_are_the_virtual_arms_within_5_percent(rehearsed
     assert np.all(found.recorded_rms < 2.0 * run.arm.torque_noise)
 
 
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_torque_and_energy_of_six_and_seven_joints_are_the_virtual_arms_within_5_percent(name: str):
+    arm = virtual_arm(load_robot(name))
+    model = build_model(arm.robot, "complete")
+    known = known_as(model, np.array(_complete_parameters(arm)))
+    wanted = swing(arm.robot, 2.5, 0.5)
+    time = slice(None, None, 2)
+    signals = (getattr(wanted, word)[:, time] for word in ("position", "velocity", "acceleration"))
+    found = check(known, [Motion("swing", "swing", wanted.time[time], *signals, None, 500.0)], joint_limits(arm.robot))
+    (own,) = found.drives
+    # Run as it would be: with that torque fed forward. What the controller adds is what was not foreseen.
+    run = simulate(ideal(arm), wanted.at(wanted.time[time]), feed=own.torque, rate=500.0).true
+    peak = np.abs(run.effort).max(axis=1)
+    assert np.all(np.sqrt(np.mean((own.torque - run.effort) ** 2, axis=1)) < 0.05 * peak)
+    assert found.energy.rms_torque == pytest.approx(np.sqrt(np.mean(run.effort**2, axis=1)), rel=0.05)
+    power = run.effort * run.velocity / arm.robot.row_scale[:, None]
+    assert found.energy.given.sum() == pytest.approx(np.trapezoid(np.maximum(power, 0.0), dx=0.002).sum(), rel=0.05)
+
+
 def test_the_limiting_joint_and_time_are_named(rehearsed):
     known, run, path = rehearsed
     motions = read_motion(path, known)
@@ -73,7 +96,7 @@ def test_the_limiting_joint_and_time_are_named(rehearsed):
     assert check(known, [slowed(each.motion, 1.1 * share) for each in found.drives], limits).broken
 
 
-def test_what_is_beyond_a_position_limit_cannot_be_run_slower_either(known: KnownModel):
+def test_what_is_beyond_a_position_limit_cannot_be_run_slower_either(known: IdentifiedModel):
     time = np.linspace(0.0, 2.0, 201)
     zero = np.zeros((2, 201))
     motion = Motion("still", "still", time, zero + 0.5, zero, zero, None, 100.0)
@@ -86,7 +109,7 @@ def test_what_is_beyond_a_position_limit_cannot_be_run_slower_either(known: Know
     assert check_dict(check(known, [motion], free))["limited_by"] is None
 
 
-def test_a_trajectory_is_taken_as_it_is_and_a_recording_filtered(known: KnownModel, tmp_path: Path):
+def test_a_trajectory_is_taken_as_it_is_and_a_recording_filtered(known: IdentifiedModel, tmp_path: Path):
     arm = virtual_arm()
     made = swing(arm.robot, 2.0)
     shown = recording(arm.robot, "swing", made.time, made.position, None, velocity=made.velocity, acceleration=made.acceleration)  # fmt: skip

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.use.energy import drive, energy_of
-from scara_ident.use.known_model import KnownModel
 from tests.arms import motion
 
 
@@ -20,7 +20,7 @@ def swung():
     return motion(np.sin(omega * time), omega * np.cos(omega * time), -(omega**2) * np.sin(omega * time))
 
 
-def test_what_is_given_is_taken_back_or_spent_on_parts(known: KnownModel, swung):
+def test_what_is_given_is_taken_back_or_spent_on_parts(known: IdentifiedModel, swung):
     found = energy_of([drive(known, swung)])
     np.testing.assert_allclose(found.given - found.returned, sum(found.work.values()), rtol=1e-9)
     # Friction and offset alone take anything over whole periods, when both joints and the coupling between them are counted.
@@ -29,7 +29,7 @@ def test_what_is_given_is_taken_back_or_spent_on_parts(known: KnownModel, swung)
     assert {"rigid body", "offset"}.isdisjoint(found.heat)
 
 
-def test_coulomb_and_viscous_heat_are_those_of_a_sine(known: KnownModel, swung):
+def test_coulomb_and_viscous_heat_are_those_of_a_sine(known: IdentifiedModel, swung):
     found = energy_of([drive(known, swung)])
     names, scale = known.model.names, np.abs(known.robot.row_scale)
     for j, frequency in enumerate((0.2, 0.3)):
@@ -39,7 +39,7 @@ def test_coulomb_and_viscous_heat_are_those_of_a_sine(known: KnownModel, swung):
         assert found.work["viscous friction"][j] == pytest.approx(np.pi * viscous * omega * periods, rel=1e-3)
 
 
-def test_a_negative_quadratic_part_lowers_the_heat(known: KnownModel, swung):
+def test_a_negative_quadratic_part_lowers_the_heat(known: IdentifiedModel, swung):
     value = known.value.copy()
     place = [known.model.names.index(name) for name in ("a21", "a22")]
     value[place] = -0.01
@@ -49,7 +49,7 @@ def test_a_negative_quadratic_part_lowers_the_heat(known: KnownModel, swung):
     assert np.all(found.heated < sum(found.work[f"{word} friction"] for word in ("Coulomb", "viscous", "cubic")))
 
 
-def test_stretches_add_up(known: KnownModel, swung):
+def test_stretches_add_up(known: IdentifiedModel, swung):
     whole = energy_of([drive(known, swung)])
     halves = energy_of([drive(known, swung.part(0, 10001)), drive(known, swung.part(10000, 20001))])
     np.testing.assert_allclose(halves.given, whole.given, rtol=1e-9)

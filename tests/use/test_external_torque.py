@@ -12,13 +12,13 @@ from scara_ident.effects.effect import EffectTerm
 from scara_ident.effects.parameters import Member
 from scara_ident.effects.signals import Scene
 from scara_ident.errors import UsageError
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.model.model import TorqueModel
 from scara_ident.use.external_torque import ExternalTorque, ObserverSettings, observe_recording
-from scara_ident.use.known_model import KnownModel
 from tests.arms import motion, sines
 
 
-def _exact(known: KnownModel, rate: float, outside: np.ndarray):
+def _exact(known: IdentifiedModel, rate: float, outside: np.ndarray):
     """A motion of 4 s with the torque that the model needs for it and less by what pushes; no joint stands still."""
     time = np.arange(round(4.0 * rate)) / rate
     q, v, a = sines(np.random.default_rng(3), time, 2)
@@ -28,7 +28,7 @@ def _exact(known: KnownModel, rate: float, outside: np.ndarray):
 
 
 @pytest.mark.parametrize("velocity", [True, False])
-def test_a_step_from_outside_comes_through_the_low_pass(known: KnownModel, velocity: bool):
+def test_a_step_from_outside_comes_through_the_low_pass(known: IdentifiedModel, velocity: bool):
     outside = np.array([[0.3], [-0.1]])
     time, q, v, effort = _exact(known, 1000.0, outside)
     settings = ObserverSettings(np.array([4.0, 4.0]), bandwidth=4.0)
@@ -43,7 +43,7 @@ def test_a_step_from_outside_comes_through_the_low_pass(known: KnownModel, veloc
     np.testing.assert_allclose(run.torque[:, run.settled], expected[:, run.settled], atol=1e-4 if velocity else 0.03)
 
 
-def test_any_step_is_stable_and_a_gap_begins_anew(known: KnownModel):
+def test_any_step_is_stable_and_a_gap_begins_anew(known: IdentifiedModel):
     time, q, v, effort = _exact(known, 20.0, np.zeros((2, 1)))
     observer = ExternalTorque(known, ObserverSettings(np.ones(2), bandwidth=8.0))
     assert np.abs(observe_recording(observer, "x", time, q, v, effort).torque).max() < 0.2
@@ -56,7 +56,7 @@ def test_any_step_is_stable_and_a_gap_begins_anew(known: KnownModel):
         observe_recording(observer, "x", time[:1], q[:, :1], v[:, :1], effort[:, :1])
 
 
-def test_features_are_shares_of_the_time(known: KnownModel):
+def test_features_are_shares_of_the_time(known: IdentifiedModel):
     observer = ExternalTorque(known, ObserverSettings(np.array([1.0, 1.0])))
     for v in (-0.9, -0.1, 0.0, 0.1, 0.9):
         observer.reset()
@@ -67,7 +67,7 @@ def test_features_are_shares_of_the_time(known: KnownModel):
         assert observer.features[0, 6] == pytest.approx(0.5)
 
 
-def test_an_effect_of_position_is_taken_in_and_one_of_time_left_out(known: KnownModel):
+def test_an_effect_of_position_is_taken_in_and_one_of_time_left_out(known: IdentifiedModel):
     scene = Scene(known.model, known.value, 10.0, 100.0, 10.0, np.ones(2), np.ones(2), {})
     families = {family.name: family for family in available_effects()}
     terms = [EffectTerm(families[name], Member(0, ()), scene) for name in ("spring", "offset_drift")]

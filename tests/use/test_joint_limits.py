@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import UsageError
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.use.energy import drive
 from scara_ident.use.joint_limits import joint_limits, margins
-from scara_ident.use.known_model import KnownModel
 from tests.arms import motion
 
 
-def moved(known: KnownModel):
+def moved(known: IdentifiedModel):
     """A sine of joint 1 about 0.5 rad, joint 2 at rest."""
     time, w = np.arange(4001) / 1000.0, 2.0 * np.pi * 0.5
     q = np.stack([0.5 + 0.8 * np.sin(w * time), np.zeros_like(time)])
@@ -22,7 +22,7 @@ def moved(known: KnownModel):
     return drive(known, motion(q, v, np.stack([-0.8 * w**2 * np.sin(w * time), np.zeros_like(time)])))
 
 
-def test_each_limit_has_its_extreme_and_its_time(known: KnownModel):
+def test_each_limit_has_its_extreme_and_its_time(known: IdentifiedModel):
     limits = joint_limits(
         known.robot, velocities={"joint1": 2.0}, accelerations={"joint1": 10.0}, powers={"joint1": 1e4}
     )
@@ -42,7 +42,7 @@ def test_each_limit_has_its_extreme_and_its_time(known: KnownModel):
     assert "joint2.power" not in found
 
 
-def test_torque_and_power_are_those_of_the_drive(known: KnownModel):
+def test_torque_and_power_are_those_of_the_drive(known: IdentifiedModel):
     own = moved(known)
     limits = joint_limits(known.robot, torques={"joint1": 1.0}, powers={"joint1": 50.0})
     found = {each.name: each for each in margins(known.robot, limits, [own])}
@@ -52,7 +52,7 @@ def test_torque_and_power_are_those_of_the_drive(known: KnownModel):
     assert abs(found["joint1.power"].reached) == pytest.approx(np.abs(motor).max())
 
 
-def test_an_endless_joint_has_no_share(known: KnownModel):
+def test_an_endless_joint_has_no_share(known: IdentifiedModel):
     limits = joint_limits(known.robot)
     limits = replace(limits, lower=np.array([-np.inf, -1.0]), upper=np.array([1.0, 1.0]))
     found = {each.name: each for each in margins(known.robot, limits, [moved(known)])}
@@ -69,6 +69,6 @@ def test_an_endless_joint_has_no_share(known: KnownModel):
         ({"ranges": {"joint1": (1.0, -1.0)}}, "is empty"),
     ],
 )
-def test_a_limit_that_makes_no_sense_is_one_line(known: KnownModel, given, said: str):
+def test_a_limit_that_makes_no_sense_is_one_line(known: IdentifiedModel, given, said: str):
     with pytest.raises(UsageError, match=said):
         joint_limits(known.robot, **given)

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
-from scara_ident.use.known_model import KnownModel
 from scara_ident.use.momentum import arm_momentum
 from tests.arms import motion
 from tests.simulation.made import tree
+from tests.use.made import known_as
 
 STEP = 1e-5
 
@@ -26,7 +27,7 @@ def test_it_is_that_of_the_model(name: str, tmp_path: Path):
     value = np.zeros(len(model.columns))
     # Not the URDF's: as an identification finds them.
     value[model.place(body)] = (body.base.grouping @ robot.standard_parameters())[body.kept] + 0.05 * rng.normal(size=len(body.columns))  # fmt: skip
-    arm = arm_momentum(KnownModel(model, value, (None,) * robot.n, np.full(robot.n, np.nan)))
+    arm = arm_momentum(known_as(model, value))
     q, v, a = rng.normal(size=(3, robot.n))
     after, before = (arm.at(q + h * v + 0.5 * h * h * a, v + h * a)[0] for h in (STEP, -STEP))
     torque = (after - before) / (2.0 * STEP) - arm.at(q, v)[1]
@@ -35,6 +36,6 @@ def test_it_is_that_of_the_model(name: str, tmp_path: Path):
     np.testing.assert_allclose(torque, expected, rtol=0.0, atol=1e-7 * np.abs(expected).max())
 
 
-def test_a_body_without_mass_is_no_obstacle(known: KnownModel):
+def test_a_body_without_mass_is_no_obstacle(known: IdentifiedModel):
     arm = arm_momentum(replace(known, value=np.where(np.arange(len(known.value)) < 3, 0.0, known.value)))
     assert np.all(np.isfinite(arm.at(np.ones(2), np.ones(2))))

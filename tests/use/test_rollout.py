@@ -9,7 +9,7 @@ import numpy as np
 from scara_ident.motion.prepared import prepare
 from scara_ident.simulation import parse_effect, simulate
 from scara_ident.simulation.arm import ideal
-from scara_ident.use.rollout import rollout_errors
+from scara_ident.use.rollout import rollout_errors, virtual_free
 from tests.simulation.made import scara, swing
 
 
@@ -19,12 +19,12 @@ def test_only_the_arm_with_the_effect_stays_by_the_recording() -> None:
     run = simulate(arm, swing(arm.robot, 4.0), effects=[spring])
     (part,) = prepare([replace(run.recording, effort=run.true.effort)], (30.0, 30.0)).stretches
     horizons = (0.05, 0.2)
-    own, other = (rollout_errors(arm, effects, part, horizons) for effects in ([spring], []))
+    own, other = (rollout_errors(virtual_free(arm, effects), part, horizons) for effects in ([spring], []))
     assert own.shape == (2, 2)
     # What is left is the low-pass on the states that it starts from.
     assert np.all(own < 2e-4)
     assert other[1, 0] > 10.0 * own[1, 0]
-    assert np.isnan(rollout_errors(arm, [], part, (10.0,))).all()
+    assert np.isnan(rollout_errors(virtual_free(arm, []), part, (10.0,))).all()
     # Friction that pushes takes the arm away.
     pushing = replace(arm, friction=np.array([[0.0, -60.0, 0.0, -60.0]] * 2))
-    assert np.isinf(rollout_errors(pushing, [], part, horizons)).all()
+    assert np.isinf(rollout_errors(virtual_free(pushing, []), part, horizons)).all()

@@ -25,7 +25,6 @@ from scara_ident.estimation.consistent.solution import (
     ConsistentSolution,
     StandardPrior,
     joint_weights,
-    least_squares_arm,
     nearest_arm,
     solve_joints,
 )
@@ -37,7 +36,7 @@ from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import run_variation
 from scara_ident.threads import one_blas_thread
 
-__all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "physical_consistency", "possible_arm"]
+__all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "physical_consistency"]
 
 # Directions that active constraints allow by less than this are what the solver's digits leave of forbidden ones.
 DIGITS = 1e-6
@@ -127,24 +126,6 @@ def consistent(observations: Observations, *, options: ConsistentOptions | None 
 
 
 @one_blas_thread()
-def possible_arm(observations: Observations, estimate: Estimate) -> ConsistentEstimate | None:
-    """Return an estimate by least squares with an arm that has its parameters, None where none is found.
-
-    Parameters
-    ----------
-    observations : Observations
-        The rows that it came from.
-    estimate : Estimate
-        The standard parameters are those nearest to the nominal bodies among all that have its base parameters.
-    """
-    problem = Problem(observations.model, ConsistentOptions(friction="dissipative"))
-    found = least_squares_arm(problem, estimate.information)
-    if found is None:
-        return None
-    x = nearest_arm(problem, estimate.information, found.x)
-    return _estimate(problem, observations, estimate.information, estimate.weights, estimate.method, found, x, ())
-
-
 def _estimate(
     problem: Problem,
     observations: Observations,

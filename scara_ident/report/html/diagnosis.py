@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -45,6 +45,7 @@ from scara_ident.report.html.story import chapter_group, moment_group
 from scara_ident.report.html.torque import torque_group
 from scara_ident.report.html.variation import variation_blocks
 from scara_ident.report.traces import FittedContext, Trace, traces
+from scara_ident.report.use import WORDS
 from scara_ident.threads import one_blas_thread
 
 KINDS = (("validation", "held out"), ("training", "training"))
@@ -56,11 +57,12 @@ class DiagnosisContext(FittedContext):
     """What the sections of a diagnosis draw from."""
 
     diagnosis: Diagnosis
+    worth: Mapping[str, Any] | None = None
 
     @cached_property
     def content(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
-        return diagnosis_dict(self.diagnosis)
+        return diagnosis_dict(self.diagnosis, self.worth)
 
     @cached_property
     def groups(self) -> dict[str, list[tuple[Trace, ...]]]:
@@ -305,6 +307,32 @@ def _unknowable(context: DiagnosisContext) -> list[Block]:
     return blocks
 
 
+def _worth(context: DiagnosisContext) -> list[Block]:
+    """What the effects cost in tracking, and what feeding them forward wins."""
+    found = context.worth
+    if found is None:
+        return []
+    said = [Paragraph(" ".join(found["summary"]))]
+    if found["tracking"] is None:
+        return [*said]
+    rows = [(WORDS[key], errors) for key, errors in found["tracking"].items()]
+    for item in found["effects"]:
+        title = item["effect"] if item["joint"] is None else f"{item['effect']} on {item['joint']}"
+        rows.append((f"PID alone, arm without {title}", item["pid_without_it"]))
+        if item["fed_without_it"] is not None:
+            rows.append((f"all fed forward but {title}", item["fed_without_it"]))
+    joints = context.diagnosis.robot.joints
+    head = ["rms tracking error", *(f"{joint} [{superscripts(found['units'][joint])}]" for joint in joints)]
+    cells: list[list[Cell | str]] = [
+        [name(words), *(number(errors[joint]) for joint in joints)] for words, errors in rows
+    ]
+    words = (
+        "A virtual arm with the effects, drawn about the model by its standard deviations, follows a motion of "
+        f"{found['trajectory']['duration']:.3g} s that no one has recorded."
+    )
+    return [*said, Paragraph(words), Table(head, cells, range(1, len(head)))]
+
+
 SECTIONS: tuple[Section, ...] = (
     NamedSection("gain", "Before and after", _gain),
     NamedSection("story", "The story", _story),
@@ -317,6 +345,7 @@ SECTIONS: tuple[Section, ...] = (
     NamedSection("torque-section", "Torque", _torque),
     NamedSection("candidates", "Candidates", _candidates),
     NamedSection("limits", "What cannot be known", _unknowable),
+    NamedSection("worth", "What the effects cost", _worth),
     notes_section(lambda context: context.diagnosis.notes),
 )
 

@@ -1,0 +1,174 @@
+"""An identified model, from an identification or a diagnosis at hand; `scara_ident.export.result` reads one from its file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.effects import EffectTerm
+from scara_ident.estimation.consistent.estimator import ConsistentEstimate
+from scara_ident.estimation.estimate import joint_errors
+from scara_ident.estimation.information import Information, weighted
+from scara_ident.identification.identify import Identification
+from scara_ident.model.model import TorqueModel
+from scara_ident.model.terms import Friction
+from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import Robot
+
+# An effect as ``diagnosis.json`` has it: ``effect``, ``joint`` and ``parameters`` with ``value`` and ``std``.
+Entry = Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedModel:
+    """A model with its parameters, and what its observations said.
+
+    Attributes
+    ----------
+    model : TorqueModel
+        With the effects that were found as further terms.
+    value, std : ndarray, shape (p,)
+        Of its parameters; ``std`` is NaN where they are not determined.
+    before : ndarray, shape (q,)
+        The first ``q <= p`` parameters without the effects found.
+    undetermined : ndarray of bool, shape (p,)
+    weights : ndarray, shape (n,)
+        Of each joint's rows in the estimate.
+    training, validation : tuple of Information
+        Per joint, within the band; validation has no rows where nothing was held out.
+    standard : ndarray, shape (11 n,), or None
+        Of the arm that the estimate belongs to, where it was estimated with one.
+    bands : tuple of float or None, one per joint
+        Low-pass that the estimate used, Hz.
+    rms : ndarray, shape (n,)
+        Rms error of the predicted torque, unfiltered, on recordings that were held out, else on those fitted; NaN where not
+        known.
+    found : tuple of Entry
+        The effects found.
+    """
+
+    model: TorqueModel
+    value: Array
+    std: Array
+    before: Array
+    undetermined: NDArray[np.bool_]
+    weights: Array
+    training: tuple[Information, ...]
+    validation: tuple[Information, ...]
+    standard: Array | None
+    bands: tuple[float | None, ...]
+    rms: Array
+    found: tuple[Entry, ...] = ()
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.model.robot
+
+    @property
+    def removed(self) -> tuple[str, ...]:
+        """Effects that were found and taken out of the recordings."""
+        in_model = {term.name for term in self.model.terms}
+        return tuple(item["effect"] for item in self.found if item["effect"] not in in_model)
+
+    @property
+    def information(self) -> Information:
+        """All training rows as the estimate weighted them."""
+        return weighted(self.training, self.weights)
+
+    @property
+    def held_out(self) -> tuple[str, tuple[Information, ...]]:
+        """What errors are of: ``validation``, or ``training`` where nothing was held out."""
+        if any(item.rows for item in self.validation):
+            return "validation", self.validation
+        return "training", self.training
+
+    def errors(self, value: Array) -> dict[str, float | None]:
+        """Return the rms of what parameters leave of the torque on each joint, held out where something was."""
+        rows = self.held_out[1]
+        return {
+            name: item.rms(value) if item.rows else None for name, item in zip(self.robot.joints, rows, strict=True)
+        }
+
+    def without_effects(self) -> IdentifiedModel:
+        """Return the model as it was before the effects were found, on the same observations."""
+        base = TorqueModel(
+            self.model.name, self.robot, tuple(term for term in self.model.terms if not isinstance(term, EffectTerm))
+        )
+        own = np.arange(len(self.before))
+        return replace(
+            self,
+            model=base,
+            value=self.before,
+            std=self.std[own],
+            undetermined=self.undetermined[own],
+            training=tuple(item.select(own) for item in self.training),
+            validation=tuple(item.select(own) for item in self.validation),
+            found=(),
+        )
+
+    def torque_parts(self, motion: Motion) -> dict[str, Array]:
+        """Return the torque along a motion by what it comes from, recorded side, shape (n, N) each; their sum is the torque.
+
+        The rigid bodies with the rotors, friction by power of speed, and every other term by its name.
+        """
+        found: dict[str, Array] = {}
+        columns = self.model.joint_columns(motion)
+        labels = [label for term in self.model.terms for label in _labels(term)]
+        for joint, (own, rows) in enumerate(zip(self.model.active, columns, strict=True)):
+            for column, row in zip(own, rows, strict=True):
+                part = found.setdefault(labels[column], np.zeros((self.robot.n, motion.samples)))
+                part[joint] += self.value[column] * row
+        return found
+
+    def torque(self, motion: Motion) -> Array:
+        """Return the torque along a motion, recorded side, shape (n, N)."""
+        columns = self.model.joint_columns(motion)
+        return np.array([self.value[own] @ rows for own, rows in zip(self.model.active, columns, strict=True)])
+
+
+def identified_model(found: Identification | Diagnosis) -> IdentifiedModel:
+    """Return the model of an identification, or of a diagnosis with the effects found."""
+    entries: tuple[Entry, ...] = ()
+    if isinstance(found, Diagnosis):
+        estimate, before, bands = found.after, found.before, found.search.bands
+        fitted, held_out = found.training_after, found.validation_after
+        entries = tuple(
+            {
+                "effect": item.effect,
+                "joint": item.joint,
+                "parameters": {name: dict(vars(parameter)) for name, parameter in item.parameters.items()},
+            }
+            for item in found.effects
+        )
+    else:
+        estimate = before = found.estimate
+        fitted, held_out, bands = found.training, found.validation, found.bands
+    errors = joint_errors(estimate.value, held_out if held_out.data.recordings else fitted)
+    return IdentifiedModel(
+        model=estimate.model,
+        value=estimate.value,
+        std=np.where(estimate.undetermined, np.nan, estimate.std),
+        before=before.value,
+        undetermined=estimate.undetermined,
+        weights=estimate.weights,
+        training=tuple(fitted.by_joint),
+        validation=tuple(held_out.by_joint),
+        standard=estimate.standard if isinstance(estimate, ConsistentEstimate) else None,
+        bands=tuple(bands),
+        rms=np.array([np.nan if error is None else error.rms_unfiltered for error in errors]),
+        found=entries,
+    )
+
+
+def _labels(term: Any) -> list[str]:
+    """Name what each column of a term is part of."""
+    if isinstance(term, Friction):
+        return [f"{column.meaning.partition(' of ')[0]}" for column in term.columns]
+    return [term.name.replace("_", " ")] * len(term.columns)
