@@ -23,7 +23,7 @@ def searched(left: list[np.ndarray]) -> list[Segment]:
     parts = [with_more(part, row) for part, row in zip(STRETCHES, left, strict=True)]
     noise = bounded_noise(parts, left, range(len(parts)))
     stretches = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
-    return standing_out(stretches, stretches)
+    return standing_out(stretches, lambda: stretches)
 
 
 def with_more(part: PreparedStretch, torque: np.ndarray) -> PreparedStretch:
