@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.estimate import Estimate
-from scara_ident.estimation.information import joint_noise, orthonormal, weighted
+from scara_ident.estimation.information import Information, joint_noise, orthonormal, weighted
 from scara_ident.estimation.observations import JointRows, Observations
-from scara_ident.threads import one_blas_thread
+from scara_ident.threads import one_blas_thread, side_by_side
 
 # Blocks whose rms is that many times the noise floor begin to be bounded, and are given up. White noise of ten rows in a block
 # varies by 22 %, so that neither touches it.
@@ -63,10 +63,11 @@ def robust_fit(observations: Observations) -> RobustFit:
     """
     noise = joint_noise(observations.by_joint)
     root = orthonormal(weighted(observations.by_joint, 1.0 / noise).regressor_factor)
-    joints = [
-        _sums(rows, part.regressor_factor[:, rows.columns], root[rows.columns])
-        for rows, part in zip(observations.joints, observations.by_joint, strict=True)
-    ]
+
+    def of_joint(rows: JointRows, part: Information) -> _Sums:
+        return _sums(rows, part.regressor_factor[:, rows.columns], root[rows.columns])
+
+    joints = side_by_side(of_joint, observations.joints, observations.by_joint)
     weights = [np.ones(len(joint.rows)) for joint in joints]
     point = np.zeros(root.shape[1])
 
