@@ -58,6 +58,13 @@ def test_heavy_tails_and_noise_that_remembers_are_no_event():
     assert searched(coloured) == []
 
 
+def test_least_squares_is_asked_for_only_where_something_stands_out():
+    parts, left = [with_more(part, row) for part, row in zip(STRETCHES, white(5), strict=True)], white(5)
+    noise = bounded_noise(parts, left, range(len(parts)))
+    quiet = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
+    assert standing_out(quiet, lambda: pytest.fail("nothing stands out")) == []
+
+
 def test_what_depends_on_the_motion_is_no_event():
     left = [row + 4.0 * (np.abs(part.motion.v) < 0.15) for row, part in zip(white(3), STRETCHES, strict=True)]
     assert searched(left) == []
