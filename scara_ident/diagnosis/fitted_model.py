@@ -58,7 +58,7 @@ class FittedModel:
     def basis(self) -> tuple[Array, ...]:
         """The orthonormal columns on each joint's weighted rows, shape (r, N)."""
         return tuple(
-            weight * (self.root[rows.columns].T @ rows.table[:-1])
+            ((weight * self.root[rows.columns]).T @ rows.table[:-1])
             for rows, weight in zip(self.joints, self.weights, strict=True)
         )
 
@@ -89,8 +89,9 @@ class FittedModel:
     @cached_property
     def basis_blocks(self) -> tuple[Array, ...]:
         """The orthonormal columns by block, shape (blocks, m, r), zero where a block has no row."""
+        # Row by row, so that whole rows are copied.
         return tuple(
-            np.ascontiguousarray(_by_block(basis, places).transpose(0, 2, 1))
+            np.concatenate([basis.T, np.zeros((1, len(basis)))])[places]
             for basis, places in zip(self.basis, self.in_blocks, strict=True)
         )
 

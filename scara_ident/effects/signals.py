@@ -78,9 +78,14 @@ class Scene:
 
     def armature_slopes(self, joint: int) -> Array:
         """Derivatives of `armature` by the parameters of the rigid bodies, shape (p,): 1 at the one that tells it."""
+        return np.asarray(self._alone == 10 * self.robot.n + joint, dtype=float)
+
+    @cached_property
+    def _alone(self) -> NDArray[np.intp]:
+        """The standard parameter that each of the rigid bodies' is where it is one alone, else -1, shape (p,)."""
         term = self.model.rigid_body
         alone = np.count_nonzero(term.base.grouping[term.kept], axis=1) == 1
-        return np.asarray(alone & (term.base.kept[term.kept] == 10 * self.robot.n + joint), dtype=float)
+        return np.where(alone, term.base.kept[term.kept], -1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -81,8 +81,8 @@ def order_spectrum(residual: Array, motor_angle: Array, orders: Array) -> Array:
     # The sums are also needed at twice the orders, for the products of cosine and sine.
     step = 2.0 * np.pi / (GRID_POINTS * 2.0 * float(np.max(wanted)))
     first = _transform(centred, motor_angle - low, step, wanted)
-    once = _transform(np.ones_like(centred), motor_angle - low, step, wanted)
-    twice = _transform(np.ones_like(centred), motor_angle - low, step, 2.0 * wanted)
+    both = _transform(np.ones_like(centred), motor_angle - low, step, np.concatenate([wanted, 2.0 * wanted]))
+    once, twice = both[: len(wanted)], both[len(wanted) :]
     count = float(len(centred))
     # Normal equations of cosine and sine once their means are taken out.
     cc = 0.5 * (count + twice.real) - once.real**2 / count
@@ -275,9 +275,10 @@ def _transform(weights: Array, angle: Array, step: float, orders: Array) -> NDAr
     size = int(left.max()) + 2
     grid = np.bincount(left, weights * (1.0 - share), size) + np.bincount(left + 1, weights * share, size)
     length = next_fast_len(FINENESS * size)
-    spectrum = np.conj(np.fft.rfft(grid, length))
     # Turned to the middle of the angles the transform is smooth enough to interpolate.
     spacing = 2.0 * np.pi / (length * step)
+    top = int(np.ceil(np.max(orders) / spacing)) + 2
+    spectrum = np.conj(np.fft.rfft(grid, length)[:top])
     own = np.arange(len(spectrum)) * spacing
     middle = 0.5 * (size - 1) * step
     smooth = spectrum * np.exp(-1j * own * middle)

@@ -3,7 +3,8 @@
 Each joint's rows in each block of time have a weight by their rms residual d, in units of the joint's noise floor (the
 median over blocks): Huber's first, min(1, c / d), then Tukey's bisquare, (1 - (d / k)^2)^2, which gives up what is far off
 (Huber, *Robust Statistics*, 1981; Beaton and Tukey 1974). The rows are taken in the columns that the triangular factor of
-all of them makes orthonormal, in which normal equations lose no digit.
+all of them makes orthonormal, in which normal equations lose no digit; those of a joint in as many of its own as act on it,
+of which there are half as many.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.estimate import Estimate
-from scara_ident.estimation.information import joint_noise, orthonormal, weighted
+from scara_ident.estimation.information import Information, joint_noise, orthonormal, weighted
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations
-from scara_ident.threads import one_blas_thread
+from scara_ident.threads import one_blas_thread, side_by_side
 
 # Blocks whose rms is that many times the noise floor begin to be bounded, and are given up. White noise of ten rows in a block
 # varies by 22 %, so that neither touches it.
@@ -63,15 +64,20 @@ def robust_fit(observations: Observations) -> RobustFit:
     """
     noise = joint_noise(observations.by_joint)
     root = orthonormal(weighted(observations.by_joint, 1.0 / noise).regressor_factor)
-    joints = [_sums(rows, root) for rows in observations.joints]
+
+    def of_joint(rows: JointRows, part: Information) -> _Sums:
+        return _sums(rows, part.regressor_factor[:, rows.columns], root[rows.columns])
+
+    joints = side_by_side(of_joint, observations.joints, observations.by_joint)
     weights = [np.ones(len(joint.rows)) for joint in joints]
     point = np.zeros(root.shape[1])
 
     def solved() -> Array:
         shares = [weight / sigma**2 for weight, sigma in zip(weights, noise, strict=True)]
-        pairs = list(zip(shares, joints, strict=True))
-        normal = sum((np.tensordot(share, joint.products, 1) for share, joint in pairs), np.zeros((len(point),) * 2))
-        right = sum((share @ joint.scores for share, joint in pairs), np.zeros(len(point)))
+        normal, right = np.zeros((len(point),) * 2), np.zeros(len(point))
+        for share, joint in zip(shares, joints, strict=True):
+            normal += joint.own.T @ np.tensordot(share, joint.products, 1) @ joint.own
+            right += (share @ joint.scores) @ joint.own
         # A direction that only blocks without weight know stays where it was.
         least = 1e-9 * np.trace(normal) / max(1, len(point))
         return np.linalg.solve(normal + least * np.eye(len(point)), right + least * point)
@@ -90,21 +96,27 @@ def robust_fit(observations: Observations) -> RobustFit:
 
 @dataclass(frozen=True, eq=False)
 class _Sums:
-    """Of one joint, block by block: rows (blocks,), squared torque (blocks,), scores (blocks, r), products (blocks, r, r)."""
+    """Of one joint, block by block: rows (blocks,), squared torque (blocks,), scores (blocks, k), products (blocks, k, k).
+
+    They are of the joint's own k orthonormal columns; of those of all joints these are ``own``, (k, r).
+    """
 
     rows: NDArray[np.intp]
     squares: Array
     scores: Array
     products: Array
+    own: Array
 
     def rms(self, point: Array) -> Array:
         """Return the rms residual of each block."""
-        left = self.squares - 2.0 * self.scores @ point + (self.products @ point) @ point
+        own = self.own @ point
+        left = self.squares - 2.0 * self.scores @ own + (self.products @ own) @ own
         return np.sqrt(np.maximum(left, 0.0) / np.maximum(self.rows, 1))
 
 
-def _sums(rows: JointRows, root: Array) -> _Sums:
-    half, torque = root[rows.columns].T @ rows.table[:-1], rows.table[-1]
+def _sums(rows: JointRows, factor: Array, root: Array) -> _Sums:
+    own_root = orthonormal(factor)
+    half, torque = own_root.T @ rows.table[:-1], rows.table[-1]
     bounds = rows.starts[:: max(1, -(-len(rows.counts) // MOST_BLOCKS))]
     bounds = bounds if bounds[-1] == rows.starts[-1] else np.append(bounds, rows.starts[-1])
     scores, products = np.zeros((len(bounds) - 1, len(half))), np.zeros((len(bounds) - 1, len(half), len(half)))
@@ -112,7 +124,7 @@ def _sums(rows: JointRows, root: Array) -> _Sums:
     for b, (start, stop) in enumerate(pairwise(bounds)):
         part, own = half[:, start:stop], torque[start:stop]
         squares[b], scores[b], products[b] = own @ own, part @ own, part @ part.T
-    return _Sums(np.diff(bounds), squares, scores, products)
+    return _Sums(np.diff(bounds), squares, scores, products, (factor @ own_root).T @ (factor @ root))
 
 
 def disagreement(estimate: Estimate, robust: RobustFit) -> str | None:

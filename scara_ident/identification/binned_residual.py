@@ -71,7 +71,9 @@ class Binned:
         """Return the mean residual of bins with samples bounded at so many standard deviations, shape (n, M)."""
         shape = (*self.taken.shape, self.size)
         most = (bound * self.noise)[:, None, None]
-        inside = np.clip(self.raw.reshape(shape) - self.taken[:, :, None], -most, most) * self.used.reshape(shape)
+        inside = self.raw.reshape(shape) - self.taken[:, :, None]
+        np.clip(inside, -most, most, out=inside)
+        inside *= self.used.reshape(shape)
         return np.asarray(inside.mean(axis=2) / np.maximum(self.known, 1.0 / self.size))
 
     def without(self, more: Array) -> Binned:

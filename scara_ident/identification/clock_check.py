@@ -8,7 +8,8 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import orthonormal, weighted
-from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.threads import side_by_side
 
 # A drift is said where it is this many standard deviations from none, ...
 CERTAIN = 5.0
@@ -39,13 +40,14 @@ def clock_drift(value: Array, observations: Observations) -> str | None:
         return None
     noise = np.array([rows.rms(value) for rows in observations.joints])
     weight = np.where(noise > 0.0, 1.0 / np.where(noise > 0.0, noise, 1.0), 0.0)
-    models, lags, others = [], [], []
-    for j, rows in enumerate(observations.joints):
+
+    def of_joint(j: int, rows: JointRows) -> tuple[Array, Array, Array]:
         left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
         delays, growing = _delayed(value, observations, j)
-        models.append(rows.table[:-1] * weight[j])
-        lags.append(weight[j] * delays)
-        others.append(weight[j] * np.vstack([growing, left]))
+        return rows.table[:-1] * weight[j], weight[j] * delays, weight[j] * np.vstack([growing, left])
+
+    parts = side_by_side(of_joint, range(len(observations.joints)), observations.joints)
+    models, lags, others = zip(*parts, strict=True)
     # What parameters and one delay for each recording explain is none of the drift's: the model's columns are projected out
     # by the triangular factor that is known, the delays by their few products.
     root = orthonormal(weighted(observations.by_joint, weight).regressor_factor)

@@ -9,7 +9,7 @@ Extreme Values*, 2001). Its ends are where the likelihood that the variance is l
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,27 +68,33 @@ class Segment:
     score: Array
 
 
-def standing_out(stretches: Sequence[Binned], fitted: Sequence[Binned]) -> list[Segment]:
+def standing_out(stretches: Sequence[Binned], fitted: Callable[[], Sequence[Binned]]) -> list[Segment]:
     """Return the stretches of time that stand out, in the order in which they come.
 
     Parameters
     ----------
     stretches : sequence of Binned
         Of all recordings, of parameters that no event has steered.
-    fitted : sequence of Binned
-        The same of least squares: what that explains is a state of motion that the robust fit took for an outlier.
+    fitted : callable
+        Returns the same of least squares: what that explains is a state of motion that the robust fit took for an outlier.
+        Asked only where something stands out.
     """
-    pairs = [pair for pair in zip(stretches, fitted, strict=True) if pair[0].taken.shape[1] > 1]
-    if not pairs:
+    places = [k for k, item in enumerate(stretches) if item.taken.shape[1] > 1]
+    if not places:
         return []
-    stretches, plain = [item for item, _ in pairs], [item for _, item in pairs]
-    stretches = without_trends(without_states(stretches))
+    stretches = without_trends(without_states([stretches[k] for k in places]))
     scores = _scores(stretches)
+    shown_by = [k for k, score in enumerate(scores) if any(np.any(part > 1.0) for _, part in score)]
+    if not shown_by:
+        return []
+    original, everywhere = fitted(), _bin_noise(stretches)
     found = []
-    for item, original, score in zip(stretches, plain, scores, strict=True):
-        sigma = _bin_noise(stretches, item)
-        for segment in _segments(item, score, sigma):
-            size, before = _sizes(item, original, segment)
+    for k in shown_by:
+        item = stretches[k]
+        own = _bin_noise([other for other in stretches if other.recording == item.recording])
+        sigma = np.maximum(everywhere, own)
+        for segment in _segments(item, scores[k], sigma):
+            size, before = _sizes(item, original[places[k]], segment)
             large = (size > LEAST_SIZE * sigma) & (before > LEAST_BEFORE * size)
             shown = large & (segment.score >= 1.0)
             if np.any(shown) and _local(segment) and not _novel(segment, stretches, shown):
@@ -188,14 +194,9 @@ def _limit(tops: Array, joints: int) -> float:
     return max(LEAST_SCORE, HEAVIER * float(expected))
 
 
-def _bin_noise(stretches: Sequence[Binned], item: Binned) -> Array:
-    """Return the standard deviation of single bins of each joint by their median, the larger of all's and its recording's."""
-    groups = (stretches, [other for other in stretches if other.recording == item.recording])
-    found = []
-    for group in groups:
-        each = [np.where(other.known > FILLED, np.abs(other.left), np.nan) for other in group]
-        found.append(_median(each))
-    return np.maximum(*found)
+def _bin_noise(stretches: Sequence[Binned]) -> Array:
+    """Return the standard deviation of single bins of each joint by their median, shape (n,)."""
+    return _median([np.where(item.known > FILLED, np.abs(item.left), np.nan) for item in stretches])
 
 
 def _segments(item: Binned, scores: Sequence[tuple[int, Array]], noise: Array) -> Iterator[Segment]:

@@ -127,10 +127,13 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
         owner += [len(data.recordings) + k for k in more[2]]
     noise = bounded_noise(parts, left, owner)
     stretches = [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, left, strict=True)]
-    plain = stretches
-    if fitted is None:
+
+    def plain() -> list[Binned]:
+        if fitted is not None:
+            return stretches
         least = _residuals(observations, weighted_value(observations.by_joint))[1]
-        plain = [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, least, strict=True)]
+        return [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, least, strict=True)]
+
     whole = {id(part): row for part, row in zip(parts, left, strict=True)}
     found = [
         _event(robot, data, item, whole[id(item.binned.part)], held_out=fitted is not None)

@@ -33,7 +33,7 @@ class TorqueModel(Frozen):
     robot: Robot
     terms: tuple[Term, ...]
 
-    @property
+    @cached_property
     def columns(self) -> tuple[Column, ...]:
         """The p columns of all terms."""
         return tuple(column for term in self.terms for column in term.columns)
@@ -47,7 +47,7 @@ class TorqueModel(Frozen):
         terms = ", ".join(term.name for term in self.terms)
         return f"{self.robot.name}, {self.name}: {len(self.columns)} parameters of {terms}"
 
-    @property
+    @cached_property
     def pattern(self) -> NDArray[np.bool_]:
         """Which entries of the regressor can differ from zero, shape (n, p)."""
         return np.concatenate([term.pattern for term in self.terms], axis=1)

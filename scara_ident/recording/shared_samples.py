@@ -44,6 +44,8 @@ def shared_samples(
     other, first, share : Recording, Recording, float
         A recording, the known one that it shares most with, and the share of its samples that are in known ones.
     """
+    if not len(others):
+        return
     values, owners = np.zeros(0, dtype=np.uint64), np.zeros(0, dtype=np.intp)
     for place, recording in enumerate(known):
         for hashes in _windows(recording):

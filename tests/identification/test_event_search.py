@@ -23,7 +23,7 @@ def searched(left: list[np.ndarray]) -> list[Segment]:
     parts = [with_more(part, row) for part, row in zip(STRETCHES, left, strict=True)]
     noise = bounded_noise(parts, left, range(len(parts)))
     stretches = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
-    return standing_out(stretches, stretches)
+    return standing_out(stretches, lambda: stretches)
 
 
 def with_more(part: PreparedStretch, torque: np.ndarray) -> PreparedStretch:
@@ -56,6 +56,13 @@ def test_heavy_tails_and_noise_that_remembers_are_no_event():
         for k in range(1, row.shape[1]):
             row[:, k] += np.exp(-1.0 / (0.1 * RATE)) * row[:, k - 1]
     assert searched(coloured) == []
+
+
+def test_least_squares_is_asked_for_only_where_something_stands_out():
+    parts, left = [with_more(part, row) for part, row in zip(STRETCHES, white(5), strict=True)], white(5)
+    noise = bounded_noise(parts, left, range(len(parts)))
+    quiet = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
+    assert standing_out(quiet, lambda: pytest.fail("nothing stands out")) == []
 
 
 def test_what_depends_on_the_motion_is_no_event():

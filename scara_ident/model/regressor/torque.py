@@ -1,7 +1,7 @@
 """The joint torques of bodies of known parameters as a traced recursion.
 
 Newton and Euler, outwards for the motion and inwards for force and moment (Luh, Walker, Paul 1980, "On-line
-computational scheme for mechanical manipulators"). Parameters are numbers, so that what is multiplied by a zero among
+computational scheme for mechanical manipulators"). Where parameters are numbers, what is multiplied by a zero among
 them is never traced: with base parameters, each in the place of the standard parameter that leads it, most of it.
 """
 
@@ -13,14 +13,14 @@ import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.model.regressor.recursion import Body, JointGeometry, moved, turn_matrix
-from scara_ident.model.regressor.tracing import Scalar
+from scara_ident.model.regressor.tracing import Expr, Scalar
 from scara_ident.model.regressor.vectors import ZERO, Vector, cross, dot, floats, plus, scaled, vector
 
 
 def trace_torque(
     joints: Sequence[JointGeometry],
     gravity: pin.Motion,
-    parameters: Array,
+    parameters: Sequence[Sequence[Scalar]] | Array,
     q: Sequence[Scalar],
     v: Sequence[Scalar],
     a: Sequence[Scalar],
@@ -33,7 +33,7 @@ def trace_torque(
         Joints 1.. in Pinocchio's order (a parent before its children).
     gravity : pin.Motion
         Spatial acceleration of gravity in the base frame.
-    parameters : ndarray, shape (bodies, 10)
+    parameters : sequence of (bodies, 10) numbers or Expr
         Standard parameters, inertias about the origin of the joint's frame; they need not be those of a possible body.
     q, v, a : sequence of Expr or float, one per joint
         By velocity index; numbers fold.
@@ -54,7 +54,8 @@ def trace_torque(
     torque: list[Scalar] = [0.0] * len(joints)
     for index in range(len(joints), 0, -1):
         joint, body = joints[index - 1], bodies[index]
-        own_force, own_moment = _load(body, floats(parameters[index - 1, 1:4]), parameters[index - 1])
+        own = [value if isinstance(value, Expr) else float(value) for value in parameters[index - 1]]
+        own_force, own_moment = _load(body, vector(own[1:4]), own)
         force, moment = plus(forces[index], own_force), plus(moments[index], own_moment)
         axis, position = floats(joint.axis), q[joint.velocity_index]
         torque[joint.velocity_index] = dot(axis, force if joint.prismatic else moment)
@@ -69,11 +70,10 @@ def trace_torque(
     return torque
 
 
-def _load(body: Body, first: Vector, parameters: Array) -> tuple[Vector, Vector]:
+def _load(body: Body, first: Vector, parameters: Sequence[Scalar]) -> tuple[Vector, Vector]:
     """Return the force and the moment about the frame's origin that a body's own motion takes."""
-    mass, inertia = float(parameters[0]), [float(value) for value in parameters[4:]]
-    force = plus(scaled(body.a, mass), vector(dot(row, first) for row in body.b))
+    force = plus(scaled(body.a, parameters[0]), vector(dot(row, first) for row in body.b))
     moment = cross(first, body.a)
-    for value, part in zip(inertia, body.moments, strict=True):
+    for value, part in zip(parameters[4:], body.moments, strict=True):
         moment = plus(moment, scaled(part, value))
     return force, moment

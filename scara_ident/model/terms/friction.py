@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,7 @@ class Friction(Filled):
         """Name of the term."""
         return "friction"
 
-    @property
+    @cached_property
     def columns(self) -> tuple[Column, ...]:
         """Columns joint by joint: ``a01 a11 .. a02 ..`` where the last digits are the joint's number."""
         return tuple(
@@ -115,7 +116,7 @@ class Offset(Filled):
         """Name of the term."""
         return "offset"
 
-    @property
+    @cached_property
     def columns(self) -> tuple[Column, ...]:
         """One column per joint, ``p_o1 ..``."""
         return tuple(

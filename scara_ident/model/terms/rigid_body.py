@@ -14,6 +14,10 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.model.base_parameters import BaseParameters, find_base_parameters
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
+from scara_ident.model.regressor.program import Program
+from scara_ident.model.regressor.recursion import joint_geometry
+from scara_ident.model.regressor.torque import trace_torque
+from scara_ident.model.regressor.tracing import Trace, compile_program
 from scara_ident.model.terms.constraints import Constraint, RealBodies
 from scara_ident.model.terms.term import Column, Filled, StateTorque
 from scara_ident.motion.motion import Motion
@@ -93,16 +97,37 @@ class RigidBody(Filled):
 
     def torque(self, motion: Motion, value: Array) -> Array:
         """Return the torque of parameters ``value`` (p,) on a motion, shape (n, N), without keeping any column."""
-        active = [np.flatnonzero(row) for row in self.pattern]
-        buffers = [np.empty((len(own), min(CHUNK, motion.samples))) for own in active]
-        result = np.empty((self.robot.n, motion.samples))
+        robot, program = self.robot, self._program
+        bodies, armature = self._standard(value)
+        numbers = list(map(np.asarray, bodies))
+        result = np.empty((robot.n, motion.samples))
+        buffers = np.empty((program.buffers, min(CHUNK, motion.samples)))
         for start in range(0, motion.samples, CHUNK):
-            part = motion.part(start, start + CHUNK)
-            rows = [buffer[:, : part.samples] for buffer in buffers]
-            self.fill(part, rows)
-            for joint, own in enumerate(active):
-                result[joint, start : start + CHUNK] = value[own] @ rows[joint]
+            some = slice(start, start + CHUNK)
+            states = [row[some] for part in (motion.q, motion.v, motion.a) for row in part]
+            targets = [row[some] for row in result]
+            program.evaluate([*states, *numbers], targets, buffers[:, : len(targets[0])])
+        result += armature[:, None] * motion.a
+        result *= robot.row_scale[:, None]
         return result
+
+    @cached_property
+    def _program(self) -> Program:
+        """The torque of the links by positions, velocities, accelerations and bodies, these in the order of `_standard`."""
+        robot, trace, back = self.robot, Trace(), np.argsort(self.robot.order)
+        q, v, a = ([trace.variable(int(j) + part * robot.n) for j in back] for part in range(3))
+        used = self._standard(np.ones(len(self.kept)))[0] != 0.0
+        bodies = [trace.variable(3 * robot.n + k) if one else 0.0 for k, one in enumerate(used.tolist())]
+        rows = [bodies[k : k + 10] for k in range(0, len(bodies), 10)]
+        torque = trace_torque(joint_geometry(robot.model), robot.model.gravity, rows, q, v, a)
+        return compile_program(trace, [(joint, torque[int(j)]) for joint, j in enumerate(robot.order)])
+
+    def _standard(self, value: Array) -> tuple[Array, Array]:
+        """Return the bodies' parameters, in Pinocchio's order, and the armatures, at the joints; what does not lead is zero."""
+        n = self.robot.n
+        standard = np.zeros(11 * n)
+        standard[self.base.kept[self.kept]] = value
+        return standard[: 10 * n].reshape(-1, 10)[np.argsort(self.robot.order)].ravel(), standard[10 * n :]
 
     def state_torque(self, value: Array) -> StateTorque:
         """Return the torque in one state: Pinocchio's regressor times the parameters that lead the columns.
@@ -110,10 +135,8 @@ class RigidBody(Filled):
         Those that do not lead are zero, as `find_base_parameters` has it: no torque depends on which they are.
         """
         robot, model, order = self.robot, self.robot.model, self.robot.order
-        standard = np.zeros(11 * robot.n)
-        standard[self.base.kept[self.kept]] = value
-        bodies = standard[: 10 * robot.n].reshape(-1, 10)[np.argsort(order)].ravel()
-        armature = standard[10 * robot.n :] * robot.row_scale
+        bodies, armature = self._standard(value)
+        armature = armature * robot.row_scale
         back, same_side = np.argsort(order), bool(np.all(robot.row_scale == 1.0))
         scale = robot.row_scale
         plain = bool(np.all(order == np.arange(robot.n)))
