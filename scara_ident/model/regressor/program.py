@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
@@ -37,7 +37,7 @@ class Program:
     constants: Mapping[str, float]
 
     @cached_property
-    def evaluate(self) -> Callable[[Array, Any, Array], None]:
+    def evaluate(self) -> Callable[[Sequence[Array] | Array, Any, Array], None]:
         """The code, compiled when it is first asked for."""
         namespace: dict[str, Any] = {
             "add": np.add,
@@ -54,7 +54,7 @@ class Program:
         # As arrays without dimension: a Python float would be converted in every operation.
         namespace.update({name: np.array(value) for name, value in self.constants.items()})
         exec(compile(self.source, "<traced program>", "exec"), namespace)
-        return cast(Callable[[Array, Any, Array], None], namespace["evaluate"])
+        return cast(Callable[[Sequence[Array] | Array, Any, Array], None], namespace["evaluate"])
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the compiled code out of a copy: it cannot be sent."""
