@@ -36,7 +36,8 @@ PANDA = tuple(f"panda_joint{k}" for k in range(1, 8))
 UR5 = tuple(f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"))
 # Of those that keep all rows: the most samples at which their arrays leave this machine's memory free.
 MOST_ROWS = 4_000_000
-# Above so many samples they are measured once.
+# Samples at which it is found whether one or two BLAS threads suit them; above so many they are measured once.
+PROBED = 20_000
 ONCE_FROM = 100_000
 
 
@@ -109,7 +110,7 @@ def arrays(asked: Asked) -> list[dict[str, Any]]:
     for arm, (_, names) in robots().items():
         # The BLAS threads with which each of the others is faster.
         slow = {
-            way: min((1, 2), key=lambda blas: once(asked, way, arm, 100_000, blas)["seconds"])
+            way: min((1, 2), key=lambda blas: once(asked, way, arm, PROBED, blas)["seconds"])
             for way in ("loop", "figaroh")
         }
         for samples in (10_000, 100_000, 1_000_000):
@@ -218,13 +219,18 @@ def main() -> None:
     """Measure, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--full", action="store_true", help="seven repeats for three, and the fleet of 200 arms for 20")
+    parser.add_argument("--repeats", type=int, help="in place of these")
+    parser.add_argument("--folder", type=Path, help="where the fleet's recordings are kept")
     parser.add_argument("--only", nargs="+", choices=list(TABLES), default=list(TABLES))
     parser.add_argument("--figaroh", default="build/figaroh/bin/python", help="a Python that has figaroh")
     parser.add_argument("--results", type=Path, default=RESULTS)
     options = parser.parse_args()
     held = json.loads(options.results.read_text(encoding="utf-8")) if options.results.is_file() else {}
     with tempfile.TemporaryDirectory() as folder:
-        asked = Asked(7 if options.full else 3, options.figaroh, 200 if options.full else 20, Path(folder))
+        repeats = options.repeats or (7 if options.full else 3)
+        place = options.folder or Path(folder)
+        place.mkdir(parents=True, exist_ok=True)
+        asked = Asked(repeats, options.figaroh, 200 if options.full else 20, place)
         for name, table in measured(asked, options.only):
             held[name] = table | {
                 "command": shlex.join(

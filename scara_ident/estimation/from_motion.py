@@ -12,8 +12,14 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 from scara_ident.threads import THREADS, side_by_side
 
-# Samples at a time: few enough for the cache, enough to hide the cost of a call.
-CHUNK = 4096
+# Samples at a time: enough to hide the cost of a call, and with all their columns so many numbers that the cache holds them.
+LEAST_CHUNK, MOST_CHUNK, NUMBERS = 4096, 16384, 300_000
+
+
+def chunk_of(model: TorqueModel) -> int:
+    """Return how many samples of a model are made and absorbed at a time."""
+    columns = sum(len(own) + 1 for own in model.active)
+    return min(MOST_CHUNK, max(LEAST_CHUNK, NUMBERS // columns))
 
 
 def information_of(model: TorqueModel, motion: Motion) -> tuple[Information, ...]:
@@ -56,19 +62,21 @@ def information_of(model: TorqueModel, motion: Motion) -> tuple[Information, ...
     if torque is None:
         raise RecordingError(f"{motion.name}: no effort was recorded; it is needed to identify")
 
+    chunk = min(chunk_of(model), max(1, motion.samples))
+
     def of_some(starts: Sequence[int]) -> list[Information]:
-        memory = [np.empty((len(own) + 1, min(CHUNK, motion.samples))) for own in model.active]
+        memory = [np.empty((len(own) + 1, chunk)) for own in model.active]
         found = [Information.empty(len(own)) for own in model.active]
         for start in starts:
-            part = motion.part(start, start + CHUNK)
+            part = motion.part(start, start + chunk)
             rows = [own[:, : part.samples] for own in memory]
             model.joint_columns(part, [own[:-1] for own in rows])
             for joint, own in enumerate(rows):
-                own[-1] = torque[joint, start : start + CHUNK]
+                own[-1] = torque[joint, start : start + chunk]
                 found[joint] = found[joint].absorb_columns(own)
         return found
 
-    starts = range(0, motion.samples, CHUNK)
+    starts = range(0, motion.samples, chunk)
     each = side_by_side(of_some, [starts[k::THREADS] for k in range(THREADS)])
     return tuple(
         merge(parts).embed(own, len(model.columns))

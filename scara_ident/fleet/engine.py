@@ -124,6 +124,10 @@ def started(scheduler: str | None = None, workers: int | None = None) -> Iterato
         "distributed.comm.timeouts.connect": CONNECT_SECONDS,
         # Work may start a process of its own, which a daemon may not.
         "distributed.worker.daemon": False,
+        # Else every array is asked of the system anew and given back, and every 10 ms is looked what a worker does: together
+        # as much as the work.
+        "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
+        "distributed.worker.profile.enabled": False,
     }
     log = logging.getLogger("distributed")
     level = log.level

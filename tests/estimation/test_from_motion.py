@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from scara_ident import Motion, build_model, load_robot
 from scara_ident.errors import RecordingError
-from scara_ident.estimation.from_motion import CHUNK, information_of
+from scara_ident.estimation.from_motion import LEAST_CHUNK, MOST_CHUNK, chunk_of, information_of
 from scara_ident.estimation.information import merge
 
 
 def test_chunks_give_what_all_rows_at_once_give():
-    model, samples = build_model(load_robot(), "complete"), 2 * CHUNK + 700
+    model = build_model(load_robot(), "complete")
+    assert LEAST_CHUNK < chunk_of(model) <= MOST_CHUNK
+    samples = 2 * chunk_of(model) + 700
     random = np.random.default_rng(0)
     q, v, a, torque = random.uniform(-2.0, 2.0, (4, 2, samples))
     motion = Motion("random", "random", np.arange(samples) / 1000.0, q, v, a, torque, 1000.0)
@@ -35,4 +35,4 @@ def test_without_torque_it_is_one_line():
     model = build_model(load_robot(), "basic")
     motion = Motion("still", "still", np.arange(4.0), *np.zeros((3, 2, 4)), None, 1.0)
     with pytest.raises(RecordingError, match="still: no effort was recorded"):
-        information_of(model, replace(motion))
+        information_of(model, motion)
