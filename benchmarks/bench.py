@@ -232,11 +232,9 @@ def main() -> None:
         place.mkdir(parents=True, exist_ok=True)
         asked = Asked(repeats, options.figaroh, 200 if options.full else 20, place)
         for name, table in measured(asked, options.only):
-            held[name] = table | {
-                "command": shlex.join(
-                    ["python", "benchmarks/bench.py", *(["--full"] if options.full else []), "--only", name]
-                )
-            }
+            asking = ["--full"] * options.full + (["--repeats", str(options.repeats)] if options.repeats else [])
+            command = shlex.join(["python", "benchmarks/bench.py", *asking, "--only", name])
+            held[name] = table | {"command": command}
             options.results.write_text(json.dumps(held, indent=1) + "\n", encoding="utf-8")
     PAGE.write_text(page(held), encoding="utf-8")
     print(f"written to {PAGE}")
