@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo check test style lint types compiled fast unit clean
+.PHONY: demo check test style lint types compiled fast unit bench clean
 
 demo: $(STAMP)
 	$(BIN)/scara-ident demo --output demo-output
@@ -34,6 +34,17 @@ fast: $(STAMP)
 
 unit: $(STAMP)
 	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+# Speed, beside figaroh in an environment of its own; writes docs/benchmarks.md.
+FIGAROH := build/figaroh
+
+bench: $(STAMP) $(FIGAROH)/.installed
+	$(BIN)/python benchmarks/bench.py --figaroh $(FIGAROH)/bin/python
+
+$(FIGAROH)/.installed:
+	test -x $(FIGAROH)/bin/python || $(PYTHON) -m venv $(FIGAROH)
+	$(FIGAROH)/bin/python -m pip install --quiet --disable-pip-version-check figaroh==1.0.2
+	touch $@
 
 $(STAMP): pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)

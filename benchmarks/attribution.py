@@ -12,23 +12,22 @@ command again goes on where it was stopped. Tables are printed at the end.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
-import multiprocessing
-import os
 import sys
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict
 from pathlib import Path
 
 from attribution_tables import describe, report
-from attribution_truth import Item, one_set
+from attribution_truth import Item, set_alone
 from compare_commits import sources
 from virtual_conditions import Asked
 from virtual_sets import KINDS, add_conditions, asked_for, tasks
 
 import scara_ident
+from scara_ident.fleet.engine import run_all
 
 # The package that runs, which need not be that beside this file.
 CHECKOUT = Path(scara_ident.__file__).resolve().parent.parent
@@ -41,25 +40,28 @@ def results(folder: Path) -> list[Item]:
 
 
 def run(
-    folder: Path, wanted: Sequence[tuple[str, int]], robot: str, asked: Asked, jobs: int, limit: int
-) -> Iterator[Item]:
+    folder: Path,
+    wanted: Sequence[tuple[str, int]],
+    robot: str,
+    asked: Asked,
+    limit: int,
+    scheduler: str | None,
+    jobs: int,
+    ended: Callable[[Item], None],
+) -> None:
     """Run the sets that the folder lacks, and write each as it ends."""
     folder.mkdir(parents=True, exist_ok=True)
     left = [(kind, seed) for kind, seed in wanted if not _place(folder, kind, seed).exists()]
-    for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-        os.environ.setdefault(variable, "1")
-    # Processes that are used once tell their peak memory; the server that they fork from has imported all once.
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["attribution_truth"])
-    with ProcessPoolExecutor(jobs, mp_context=context, max_tasks_per_child=1) as pool:
-        futures = {pool.submit(one_set, kind, seed, robot, asked, limit): (kind, seed) for kind, seed in left}
-        for future in as_completed(futures):
-            item = future.result()
-            place = _place(folder, *futures[future])
-            part = place.with_suffix(".part")
-            part.write_text(json.dumps(item) + "\n", encoding="utf-8")
-            part.replace(place)
-            yield item
+
+    def write(place: int, item: Item) -> None:
+        path = _place(folder, *left[place])
+        part = path.with_suffix(".part")
+        part.write_text(json.dumps(item) + "\n", encoding="utf-8")
+        part.replace(path)
+        ended(item)
+
+    work = [(kind, seed, robot, asked, limit) for kind, seed in left]
+    run_all(set_alone, work, scheduler, workers=jobs, ended=write)
 
 
 def _place(folder: Path, kind: str, seed: int) -> Path:
@@ -83,7 +85,8 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", nargs="*", choices=sorted(set(KINDS)), help="kinds to draw")
-    parser.add_argument("--jobs", type=int, default=2, help="sets side by side")
+    parser.add_argument("--jobs", type=int, default=2, help="sets side by side on this machine")
+    parser.add_argument("--scheduler", help="address of a Dask scheduler, whose workers have this folder in their path")
     parser.add_argument("--limit", type=int, default=900, help="seconds after which a diagnosis is given up")
     parser.add_argument("--output", type=Path, help="folder of the results; default: by robot, seed and sources")
     parser.add_argument("--merged", type=Path, help="JSON of all results")
@@ -100,10 +103,13 @@ def main() -> None:
     wanted = tasks(options.sets, options.seed, options.only or KINDS)
     done = sum(_place(folder, *task).exists() for task in wanted)
     print(f"{folder}: {done} of {len(wanted)} sets are there", file=sys.stderr, flush=True)
+    count = itertools.count(done + 1)
+
+    def ended(item: Item) -> None:
+        print(f"{next(count):4d} {describe(item)}", flush=True)
+
     try:
-        for item in run(folder, wanted, options.robot, asked, options.jobs, options.limit):
-            done += 1
-            print(f"{done:4d} {describe(item)}", flush=True)
+        run(folder, wanted, options.robot, asked, options.limit, options.scheduler, options.jobs, ended)
     except BrokenProcessPool:
         raise SystemExit(
             f"{folder}: a process ended before its set was done (out of memory?); run again to go on"

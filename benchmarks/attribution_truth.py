@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import resource
 import signal
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -41,6 +43,15 @@ SHARING = {"spring": ("offset",), "torque_gain_mismatch": ("inertial", "friction
 
 class OutOfTimeError(Exception):
     """A diagnosis took longer than it may."""
+
+
+def set_alone(kind: str, seed: int, robot: str, asked: Asked, limit: int) -> Item:
+    """Work on a set in a process that is used once: it can be stopped, and tells its peak memory."""
+    # The server that it is forked from has imported all once.
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["attribution_truth"])
+    with ProcessPoolExecutor(1, mp_context=context, max_tasks_per_child=1) as pool:
+        return pool.submit(one_set, kind, seed, robot, asked, limit).result()
 
 
 def one_set(kind: str, seed: int, robot: str, asked: Asked, limit: int) -> Item:

@@ -12,11 +12,9 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import time
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -28,6 +26,7 @@ from scipy.stats import beta
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.fleet.engine import run_all
 
 Array = NDArray[np.float64]
 BLOCKS = (6, 12, 50, 300)
@@ -139,7 +138,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--jobs", type=int, default=2, help="processes of this machine")
+    parser.add_argument("--scheduler", help="address of a Dask scheduler, in place of these")
     parser.add_argument("--blocks", type=int, nargs="+", choices=BLOCKS, default=list(BLOCKS))
     parser.add_argument("--check", action="store_true", help="exit with 1 where a rate is outside of what is allowed")
     parser.add_argument("--output", type=Path, help="JSON of the rates")
@@ -148,8 +148,7 @@ def main() -> None:
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     chosen = [(case, options.draws, options.seed) for case in CASES if case.blocks in options.blocks]
-    with ProcessPoolExecutor(options.jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-        found = list(pool.map(rates, chosen))
+    found = run_all(rates, [(each,) for each in chosen], options.scheduler, workers=options.jobs)
     right = report(found)
     if options.output:
         options.output.parent.mkdir(parents=True, exist_ok=True)

@@ -15,7 +15,6 @@ import json
 import os
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import distribution
@@ -33,6 +32,7 @@ from scara_ident.estimation.consistent.prior import prior_rows
 from scara_ident.estimation.consistent.problem import Problem, constraints_on
 from scara_ident.estimation.consistent.solution import least_squares_arm, nearest_arm, solve_consistent, solve_joints
 from scara_ident.estimation.information import Information, merge
+from scara_ident.fleet.engine import run_all
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.description import JointDescription, RobotDescription
@@ -292,10 +292,6 @@ def best(times: int, function: Callable[[], Any]) -> tuple[Any, float]:
     return found, shortest
 
 
-def one(job: tuple[str, str, float, int]) -> Draw:
-    return draw(*job)
-
-
 def print_tables(cases: list[dict[str, object]], times: list[dict[str, object]]) -> None:
     print("| arm | excitation | noise | impossible: OLS | consistent | parameter error: OLS | consistent ", end="")
     print("| torque error: OLS | consistent | ratio | ms: OLS | consistent | fill |")
@@ -324,7 +320,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--draws", type=int, default=50, help="random arms per case")
     parser.add_argument("--robots", nargs="+", choices=MODELS, default=list(MODELS))
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes of this machine")
+    parser.add_argument("--scheduler", help="address of a Dask scheduler, in place of these")
     parser.add_argument("--quick", action="store_true", help="four draws, two arms, no timing against all rows")
     parser.add_argument("--output", type=Path, default=Path("benchmarks/results/consistency.json"))
     arguments = parser.parse_args()
@@ -332,14 +329,10 @@ def main() -> None:
     robots = arguments.robots[:2] if arguments.quick else arguments.robots
 
     times = [] if arguments.quick else [timings(name) for name in robots]
-    cases = []
-    with ProcessPoolExecutor(arguments.workers) as pool:
-        for name in robots:
-            for excitation in EXCITATION:
-                for noise in NOISE:
-                    jobs = [(name, excitation, noise, seed) for seed in range(draws)]
-                    found = list(pool.map(one, jobs, chunksize=max(1, draws // (4 * arguments.workers))))
-                    cases.append(summary(name, excitation, noise, found))
+    each = [(name, excitation, noise) for name in robots for excitation in EXCITATION for noise in NOISE]
+    jobs = [(*case, seed) for case in each for seed in range(draws)]
+    found = run_all(draw, jobs, arguments.scheduler, workers=arguments.workers)
+    cases = [summary(*case, found[k * draws : (k + 1) * draws]) for k, case in enumerate(each)]
     print_tables(cases, times)
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     arguments.output.write_text(json.dumps({"cases": cases, "timings": times}, indent=1), encoding="utf-8")

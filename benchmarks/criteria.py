@@ -14,7 +14,6 @@ import json
 import os
 import time
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -27,6 +26,7 @@ from virtual_sets import simulate_set, tasks, write_set
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
+from scara_ident.fleet.engine import run_all
 from scara_ident.recording.recording import Recording, read_recordings
 from scara_ident.robot.robot import load_robot
 
@@ -106,24 +106,34 @@ def one_diagnosis(job: tuple[Path, tuple[str, int], str, float]) -> Item:
     return item | {"read": read, "kind": was["kind"], "true": true}
 
 
-def run(folder: Path, sets: Sequence[tuple[str, int]], names: Sequence[str], output: Path, processes: int) -> Item:
+def run(
+    folder: Path,
+    sets: Sequence[tuple[str, int]],
+    names: Sequence[str],
+    output: Path,
+    processes: int,
+    scheduler: str | None,
+) -> Item:
     """Diagnose what is not in the output yet, and return all of it."""
     results: Item = json.loads(output.read_text(encoding="utf-8")) if output.exists() else {}
-    with ProcessPoolExecutor(max_workers=processes) as pool:
 
-        def add(jobs: Sequence[tuple[str, int, str, float]]) -> None:
-            missing = [job for job in jobs if _key(*job[2:]) not in results.get(_set(*job[:2]), {})]
-            found = pool.map(one_diagnosis, [(folder, job[:2], *job[2:]) for job in missing])
-            for job, item in zip(missing, found, strict=True):
-                results.setdefault(_set(*job[:2]), {})[_key(*job[2:])] = item
-                output.parent.mkdir(parents=True, exist_ok=True)
-                output.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-                print(_set(*job[:2]), _key(*job[2:]), item["verdict"], f"{item['seconds']:.1f} s", flush=True)
+    def add(jobs: Sequence[tuple[str, int, str, float]]) -> None:
+        missing = [job for job in jobs if _key(*job[2:]) not in results.get(_set(*job[:2]), {})]
 
-        for task in sets:
-            add([(*task, AS_IT_IS, 1.0)])
-            read = results[_set(*task)][AS_IT_IS]["read"]
-            add([(*task, name, factor) for name in names if name in read for factor in FACTORS])
+        def ended(place: int, item: Item) -> None:
+            job = missing[place]
+            results.setdefault(_set(*job[:2]), {})[_key(*job[2:])] = item
+            output.parent.mkdir(parents=True, exist_ok=True)
+            output.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+            print(_set(*job[:2]), _key(*job[2:]), item["verdict"], f"{item['seconds']:.1f} s", flush=True)
+
+        work = [((folder, job[:2], *job[2:]),) for job in missing]
+        run_all(one_diagnosis, work, scheduler, workers=processes, ended=ended)
+
+    # What was read says which criteria are worth changing.
+    add([(*task, AS_IT_IS, 1.0) for task in sets])
+    read = {task: results[_set(*task)][AS_IT_IS]["read"] for task in sets}
+    add([(*task, name, factor) for task in sets for name in names if name in read[task] for factor in FACTORS])
     return results
 
 
@@ -192,7 +202,10 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=len(KINDS))
     parser.add_argument("--seed", type=int, default=11)
     parser.add_argument("--only", nargs="*", choices=NAMES, default=NAMES, metavar="NAME", help="criteria to change")
-    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--processes", type=int, default=2, help="of this machine")
+    parser.add_argument(
+        "--scheduler", help="address of a Dask scheduler whose workers share the folders, in place of these"
+    )
     parser.add_argument("--recordings", type=Path, default=Path("build/criteria"), help="folder that keeps them")
     parser.add_argument("--output", type=Path, default=Path("benchmarks/results/criteria.json"))
     parser.add_argument("--table", action="store_true", help="print the table of what the output holds, and stop")
@@ -201,7 +214,9 @@ def main() -> None:
         print("\n".join(table(json.loads(arguments.output.read_text(encoding="utf-8")), arguments.only)))
         return
     sets = tasks(arguments.sets, arguments.seed, KINDS)
-    results = run(arguments.recordings, sets, arguments.only, arguments.output, arguments.processes)
+    results = run(
+        arguments.recordings, sets, arguments.only, arguments.output, arguments.processes, arguments.scheduler
+    )
     print("\n".join(table(results, arguments.only)))
 
 

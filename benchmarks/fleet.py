@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import os
 import platform
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import rmtree
+from typing import Any
 
 import numpy as np
 
@@ -192,12 +194,11 @@ def make_large_fleet(folder: Path, arms: int) -> int:
     return arms * DATES
 
 
-def speed(folder: Path, arms: int, rounds: int) -> None:
+def measured_speed(folder: Path, arms: int, rounds: int) -> dict[str, Any]:
+    """Return recordings a second from files to the table with one and two workers, in turn."""
     count = make_large_fleet(folder / f"large{arms}", arms)
-    print(
-        f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; {count} recordings"
-    )
     seconds: dict[int, list[float]] = {1: [], 2: []}
+    changed = 0
     for _ in range(rounds):
         for workers, times in seconds.items():
             output = folder / f"out{workers}"
@@ -206,11 +207,21 @@ def speed(folder: Path, arms: int, rounds: int) -> None:
             fleet = watch_fleet(str(folder / f"large{arms}"), load_robot(), output, Settings(workers=workers))
             times.append(time.perf_counter() - start)
             changed = sum(bool(item.changes) for item in fleet.arms)
-            print(
-                f"{workers} workers: {times[-1]:.1f} s, {count / times[-1]:.1f} recordings/s, {changed} changed, load {os.getloadavg()[0]:.1f}"
-            )
+            told = f"{workers} workers: {times[-1]:.1f} s, {count / times[-1]:.1f} recordings/s, {changed} changed"
+            print(f"{told}, load {os.getloadavg()[0]:.1f}", file=sys.stderr, flush=True)
     one, two = (float(np.median(times)) for times in seconds.values())
-    print(f"medians: one {count / one:.1f}, two {count / two:.1f} recordings/s; ratio {one / two:.2f}")
+    rates = {"one": count / one, "two": count / two, "ratio": one / two}
+    return {"arms": arms, "recordings": count, "changed": changed} | rates
+
+
+def speed(folder: Path, arms: int, rounds: int) -> None:
+    print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    found = measured_speed(folder, arms, rounds)
+    print(
+        f"medians of {found['recordings']} recordings: one {found['one']:.1f}, two {found['two']:.1f} a second; ",
+        end="",
+    )
+    print(f"ratio {found['ratio']:.2f}")
 
 
 def main() -> None:

@@ -41,6 +41,9 @@ class made_once(Generic[T]):
 
 @cache
 def _controller() -> ThreadpoolController:
+    # NumPy and SciPy have a BLAS each; one that is loaded later would not be held.
+    import scipy.linalg  # noqa: F401
+
     return ThreadpoolController()
 
 

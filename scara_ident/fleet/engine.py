@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from queue import Empty, Queue
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.fleet.folder import INSTALL
@@ -16,6 +17,7 @@ from scara_ident.fleet.folder import INSTALL
 if TYPE_CHECKING:
     from distributed import Client, Future
 
+Result = TypeVar("Result")
 # A cluster that has had no worker for so long gets none any more, s; how often that is looked at.
 NO_WORKER_SECONDS = 60.0
 LOOK_SECONDS = 2.0
@@ -120,6 +122,12 @@ def started(scheduler: str | None = None, workers: int | None = None) -> Iterato
     quiet = {
         "distributed.scheduler.allowed-failures": MOST_DEATHS,
         "distributed.comm.timeouts.connect": CONNECT_SECONDS,
+        # Work may start a process of its own, which a daemon may not.
+        "distributed.worker.daemon": False,
+        # Else every array is asked of the system anew and given back, and every 10 ms is looked what a worker does: together
+        # as much as the work.
+        "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
+        "distributed.worker.profile.enabled": False,
     }
     log = logging.getLogger("distributed")
     level = log.level
@@ -152,6 +160,57 @@ def started(scheduler: str | None = None, workers: int | None = None) -> Iterato
                 yield Engine(client)
         finally:
             log.setLevel(level)
+
+
+def run_all(
+    function: Callable[..., Result],
+    items: Sequence[tuple[Any, ...]],
+    scheduler: str | None = None,
+    *,
+    workers: int | None = None,
+    ended: Callable[[int, Result], None] | None = None,
+) -> list[Result]:
+    """Call a function with each of many arguments, on processes of this machine or of a cluster.
+
+    All is done before what failed is raised. Processes of this machine are started anew, so a script calls this under
+    ``if __name__ == "__main__"``.
+
+    Parameters
+    ----------
+    function : callable
+        Of a module that the workers have too.
+    items : sequence of tuple
+        Arguments of each call; they travel, as do the results.
+    scheduler, workers
+        See `started`.
+    ended : callable, optional
+        Called here with the place and the result of each call as it ends.
+
+    Returns
+    -------
+    list
+        Results in the order of the items.
+
+    Raises
+    ------
+    Exception
+        What the first of the calls that failed raised.
+    """
+    found: list[Any] = [None] * len(items)
+
+    def take(place: int, outcome: Any) -> Iterable[Job]:
+        found[place] = outcome
+        if ended is not None and not isinstance(outcome, Exception):
+            ended(place, outcome)
+        return ()
+
+    if items:
+        with started(scheduler, workers) as engine:
+            engine.run(Job(function, item, partial(take, place)) for place, item in enumerate(items))
+    for outcome in found:
+        if isinstance(outcome, Exception):
+            raise outcome
+    return found
 
 
 def _outcome(future: Future[Any]) -> Any:

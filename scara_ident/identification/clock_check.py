@@ -8,7 +8,8 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import orthonormal, weighted
-from scara_ident.estimation.observations import JointRows, Observations
+from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.observations import Observations
 from scara_ident.threads import side_by_side
 
 # A drift is said where it is this many standard deviations from none, ...

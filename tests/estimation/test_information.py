@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from scara_ident.estimation.information import Information, merge
+from scara_ident.estimation.information import GRAM_ROWS, Information, merge
 
 
 def rows(seed: int, count: int, p: int) -> tuple[np.ndarray, np.ndarray]:
@@ -278,3 +278,35 @@ def test_shapes_that_do_not_fit_are_refused():
             empty.absorb(w, u)
     with pytest.raises(ValueError, match="nothing to merge"):
         merge([])
+
+
+def weak_rows(seed: int, count: int, condition: float) -> np.ndarray:
+    """Columns of unit size, in which one direction is weaker by a condition; the last is the torque."""
+    rng = np.random.default_rng(seed)
+    basis, _ = np.linalg.qr(rng.standard_normal((6, 6)))
+    return rng.standard_normal((count, 6)) * np.geomspace(1.0, 1.0 / condition, 6) @ basis.T
+
+
+@pytest.mark.parametrize("condition", [1e2, 1e8])
+def test_many_rows_keep_the_digits_of_a_dense_solution(condition: float):
+    table = weak_rows(0, 10 * GRAM_ROWS, condition)
+    own = Information.empty(5).absorb_columns(table.T)
+    for part in (own, Information.empty(5).absorb_columns(table[:3000].T).absorb_columns(table[3000:].T)):
+        singular = np.linalg.svd(part.factor, compute_uv=False)
+        assert_allclose(singular, np.linalg.svd(table, compute_uv=False), rtol=1e-15 * condition)
+        assert part.rows == len(table)
+        assert_allclose(np.tril(part.factor, -1), 0.0)
+
+
+def test_many_rows_unlike_the_first_are_absorbed_as_exactly(monkeypatch):
+    # At rest, then a motion: what was known is no scale for what comes.
+    table = weak_rows(1, 2 * GRAM_ROWS, 10.0)
+    still = table[:GRAM_ROWS] * np.array([1e-9, 1.0, 0.0, 1.0, 1e-9, 1.0])
+    rows = np.vstack([still, table])
+    quick = Information.empty(5).absorb_columns(still.T).absorb_columns(table.T)
+    nothing = Information.empty(5).absorb_columns(np.zeros((6, GRAM_ROWS))).absorb_columns(rows.T)
+    monkeypatch.setattr("scara_ident.estimation.information.GRAM_ROWS", 10**9)
+    exact = Information.empty(5).absorb_columns(rows.T)
+    for one in (quick, nothing):
+        assert_allclose(gram(one), gram(exact), atol=1e-13 * gram(exact).max())
+        assert_allclose(one.solve().value, exact.solve().value, rtol=1e-12)

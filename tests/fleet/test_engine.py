@@ -11,7 +11,7 @@ import pytest
 
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.fleet import engine as module
-from scara_ident.fleet.engine import Engine, Job, started
+from scara_ident.fleet.engine import Engine, Job, run_all, started
 
 
 def double(x: int) -> int:
@@ -39,6 +39,18 @@ def test_what_raises_hands_on_its_exception_and_what_follows_is_done(cluster, tm
         engine.run([Job(double, (3,), then), Job(double, (-1,), then), Job(die_once, (flag,), then)])
         engine.run([])
     assert sorted(str(item) for item in found) == ["12", "6", "lived", "negative"]
+
+
+def test_many_calls_give_their_results_in_order_and_raise_when_all_is_done(cluster):
+    seen: dict[int, int] = {}
+    address = cluster.scheduler_address
+    assert run_all(double, [(k,) for k in range(5)], address, ended=seen.__setitem__) == [0, 2, 4, 6, 8]
+    assert seen == {k: 2 * k for k in range(5)}
+    seen.clear()
+    with pytest.raises(ValueError, match="negative"):
+        run_all(double, [(-1,), (4,)], address, ended=seen.__setitem__)
+    assert seen == {1: 8}
+    assert run_all(double, []) == []
 
 
 def test_without_workers_all_that_is_left_is_refused(monkeypatch):

@@ -108,23 +108,27 @@ class RegressorKernel(Frozen):
         targets : mapping of int to ndarray (samples,)
             Where to write the entry of row r and column k, at ``r p + k``, for all that `pattern` holds.
         """
-        states = self._states(q, v, a)
-        samples = states.shape[1]
+        states = [row for part in self._parts(q, v, a) for row in part]
+        samples = len(states[0])
         buffers = np.empty((self._program.buffers, min(_CHUNK, samples)))
         for start in range(0, samples, _CHUNK):
             stop = min(start + _CHUNK, samples)
             parts = {place: target[start:stop] for place, target in targets.items()}
-            self._program.evaluate(states[:, start:stop], parts, buffers[:, : stop - start])
+            self._program.evaluate([row[start:stop] for row in states], parts, buffers[:, : stop - start])
 
     def _states(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
         """Return the three inputs as one array (3 nv, samples)."""
+        return np.concatenate(self._parts(q, v, a))
+
+    def _parts(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> list[Array]:
+        """Return the three inputs as arrays (nv, samples)."""
         traced = any(np.asarray(values).dtype == object for values in (q, v, a))
         parts = [np.asarray(values, dtype=object if traced else np.float64) for values in (q, v, a)]
         for name, part in zip("qva", parts, strict=True):
             if part.ndim != 2 or part.shape[0] != self.nv or part.shape != parts[0].shape:
                 shapes = ", ".join(str(part.shape) for part in parts)
                 raise ValueError(f"{name}: expected ({self.nv}, samples), the same for q, v and a; given {shapes}")
-        return np.concatenate(parts)
+        return parts
 
 
 def build_kernel(model: pin.Model, columns: Sequence[int] | NDArray[np.intp] | None = None) -> RegressorKernel:

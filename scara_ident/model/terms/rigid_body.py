@@ -67,9 +67,11 @@ class RigidBody(Filled):
         """Write the columns that links and rotors lead."""
         robot = self.robot
         if self.kernel is not None:
-            back = np.argsort(robot.order)
-            targets = {entry: rows[joint][place] for entry, joint, place in self._targets}
-            self.kernel.fill(motion.q[back], motion.v[back], motion.a[back], targets)
+            states = (motion.q, motion.v, motion.a)
+            if np.any(robot.order != np.arange(robot.n)):
+                back = np.argsort(robot.order)
+                states = (motion.q[back], motion.v[back], motion.a[back])
+            self.kernel.fill(*states, {entry: rows[joint][place] for entry, joint, place in self._targets})
         for joint, place in self._rotors:
             rows[joint][place] = motion.a[joint]
         for joint, scale in enumerate(robot.row_scale):

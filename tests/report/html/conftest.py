@@ -11,6 +11,7 @@ import pytest
 
 from scara_ident.diagnosis import Diagnosis, diagnose
 from scara_ident.effects.position import Spring
+from scara_ident.export.identified_model import identified_model
 from scara_ident.files import plain
 from scara_ident.identification.compare import compare
 from scara_ident.motion.motion import Motion
@@ -33,7 +34,6 @@ from scara_ident.robot.robot import load_robot
 from scara_ident.use.check import Check, check
 from scara_ident.use.contact import ContactFindings, contact_observer, look_for_contact
 from scara_ident.use.joint_limits import joint_limits
-from scara_ident.use.known_model import known_model
 from tests.arms import noisy, recorded_torque, recording, sines
 from tests.report.html.made_fleet import made_fleet
 from tests.report.simulated import made, run, swinging
@@ -121,7 +121,7 @@ def turning(tmp_path_factory) -> Path:
 @pytest.fixture(scope="session")
 def checked(result) -> Check:
     """A motion on which joint 1 needs more torque than it has."""
-    known = known_model(result)
+    known = identified_model(result)
     return check(known, [swinging(np.zeros((2, 1000)))], joint_limits(known.robot, torques={"joint1": 0.3}))
 
 
