@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from scara_ident.errors import UsageError
 
 Range = tuple[float, float]
+Triple = tuple[float, float, float]
 
 
 def joint_numbers(words: Sequence[str] | None, option: str) -> dict[str, float]:
@@ -29,6 +30,18 @@ def joint_ranges(words: Sequence[str] | None, option: str) -> dict[str, Range]:
 def numbers(word: str | None, option: str) -> list[float] | None:
     """Read numbers parted by commas; None where nothing is given."""
     return None if word is None else [_number(text, option, word) for text in word.split(",")]
+
+
+def boxes(words: Sequence[str] | None, option: str) -> list[tuple[Triple, Triple]]:
+    """Read ``X,Y,Z,DX,DY,DZ`` words of an option: centres and edges."""
+    found = []
+    for word in words or ():
+        values = numbers(word, option) or []
+        if len(values) != 6:
+            raise UsageError(f"{option} {word}: expected X,Y,Z,DX,DY,DZ, such as 0.6,0,0.2,0.4,0.4,0.4")
+        x, y, z, *edges = values
+        found.append(((x, y, z), (edges[0], edges[1], edges[2])))
+    return found
 
 
 def _parted(word: str, option: str) -> tuple[str, str]:
