@@ -87,7 +87,7 @@ def excite(
     """Design an excitation trajectory within the limits of the joints, the motors and the tool."""
     import numpy as np
 
-    from scara_ident.cli.joint_values import boxes, joint_numbers, joint_ranges, numbers
+    from scara_ident.cli.joint_values import joint_numbers, motion_limits, numbers
     from scara_ident.diagnosis.answerability import inquiry_of
     from scara_ident.errors import UsageError
     from scara_ident.estimation.estimate import PAPER_SAMPLES
@@ -98,7 +98,6 @@ def excite(
         default_harmonics,
         design_excitation,
         excitation_dict,
-        limits_of,
         nominal_parameters,
         write_joint_trajectory,
         write_trajectory,
@@ -133,20 +132,20 @@ def excite(
     equation = build_model(arm, (model or "complete") if asked is None else str(asked["model"]))
     goal = None if asked is not None else criterion_of(criterion or "logdet", equation, wanted or ())
     place = numbers(start, "--start")
-    limits = limits_of(
+    limits = motion_limits(
         arm,
-        ranges=joint_ranges(ranges, "--range"),
-        velocities=joint_numbers(velocities, "--velocity"),
-        accelerations=joint_numbers(accelerations, "--acceleration"),
-        jerks=joint_numbers(jerks, "--jerk"),
-        torques=joint_numbers(torques, "--torque"),
+        ranges=ranges,
+        velocities=velocities,
+        accelerations=accelerations,
+        jerks=jerks,
+        torques=torques,
+        boxes=box,
+        floor=floor,
+        clearance=clearance,
+        share=share,
+        tool=tool,
         tool_acceleration=tool_acceleration,
         tool_speed=np.inf if tool_speed is None else tool_speed,
-        floor=-np.inf if floor is None else floor,
-        boxes=boxes(box, "--box"),
-        clearance=clearance,
-        tool=tool,
-        share=share,
     )
     durations = durations_of(duration or 25.0, trajectories)
     longest = max(durations)

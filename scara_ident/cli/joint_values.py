@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from scara_ident.errors import UsageError
+
+if TYPE_CHECKING:
+    from scara_ident.excitation import Limits
+    from scara_ident.robot.robot import Robot
 
 Range = tuple[float, float]
 Triple = tuple[float, float, float]
@@ -32,7 +38,35 @@ def numbers(word: str | None, option: str) -> list[float] | None:
     return None if word is None else [_number(text, option, word) for text in word.split(",")]
 
 
-def boxes(words: Sequence[str] | None, option: str) -> list[tuple[Triple, Triple]]:
+def motion_limits(
+    robot: Robot,
+    *,
+    ranges: Sequence[str] | None,
+    velocities: Sequence[str] | None,
+    accelerations: Sequence[str] | None,
+    jerks: Sequence[str] | None,
+    torques: Sequence[str] | None,
+    boxes: Sequence[str] | None,
+    floor: float | None,
+    **more: Any,
+) -> Limits:
+    """Return the limits of a motion from the words of their options; ``more`` are arguments of `limits_of`."""
+    from scara_ident.excitation import limits_of
+
+    return limits_of(
+        robot,
+        ranges=joint_ranges(ranges, "--range"),
+        velocities=joint_numbers(velocities, "--velocity"),
+        accelerations=joint_numbers(accelerations, "--acceleration"),
+        jerks=joint_numbers(jerks, "--jerk"),
+        torques=joint_numbers(torques, "--torque"),
+        boxes=_boxes(boxes, "--box"),
+        floor=-math.inf if floor is None else floor,
+        **more,
+    )
+
+
+def _boxes(words: Sequence[str] | None, option: str) -> list[tuple[Triple, Triple]]:
     """Read ``X,Y,Z,DX,DY,DZ`` words of an option: centres and edges."""
     found = []
     for word in words or ():

@@ -70,6 +70,14 @@ class Limits:
     tool: Tool | None = field(default=None, repr=False)
     clearance: Clearance | None = field(default=None, repr=False)
 
+    def words(self) -> str:
+        """Return what the limits are as text, equal for equal limits."""
+        kept = self.clearance
+        shapes = () if kept is None else (kept.margin, kept.floor, kept.boxes, kept.pairs)
+        arrays = (self.lower, self.upper, self.velocity, self.acceleration, self.jerk, self.torque)
+        tool = (self.tool_acceleration, self.tool_speed, self.floor, self.tool and self.tool.name)
+        return repr(([each.tolist() for each in arrays], tool, shapes))
+
     @property
     def centre(self) -> Array:
         """Middle of each joint's range, shape (n,)."""
