@@ -17,7 +17,7 @@ from pinocchio import coal
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, UsageError
-from scara_ident.excitation.tool import rotation
+from scara_ident.excitation.joint_frames import JointFrames, joint_frames
 from scara_ident.manners import Frozen
 from scara_ident.model.regressor.recursion import joint_geometry
 from scara_ident.robot.collision_shapes import collision_shapes
@@ -103,6 +103,24 @@ class Clearance(Frozen):
                 joint = model.parents[joint]
         return moved
 
+    def _rates(self, q: Array) -> Array:
+        """Return how much the distance of each pair changes at most per rad or m of each joint, shape (P, n)."""
+        joints, robot = joint_geometry(self.robot.model), self.robot
+        centres, radii = self._spheres
+        rates = np.zeros(self._moved_by.shape)
+        for shape, found in enumerate(self.shapes.geometryObjects):
+            joint = found.parentJoint
+            # Obstacles do not move; a floor has no size.
+            extent = float(np.linalg.norm(centres[shape]) + radii[shape]) if joint > 0 else 0.0
+            while joint > 0:
+                own, each = place_of(robot, joint), joints[joint - 1]
+                rates[shape, own] = 1.0 if each.prismatic else extent
+                extent += float(np.linalg.norm(each.offset)) + (np.abs(q[own]).max() if each.prismatic else 0.0)
+                joint = each.parent
+        first, second = (np.array([pair[side] for pair in self.pairs], dtype=int) for side in (0, 1))
+        # What moves both alike changes nothing.
+        return np.asarray(np.where(self._moved_by[first] != self._moved_by[second], rates[first] + rates[second], 0.0))
+
     def nearest(self, q: Array, reach: float = np.inf, *, likely: bool = False) -> Nearest:
         """Measure the smallest distance of each group.
 
@@ -116,28 +134,38 @@ class Clearance(Frozen):
             Whether to look at likely pairs alone.
         """
         groups = self.groups
-        bounds = self._bounds(_joint_frames(self.robot, q))
+        bounds = self._bounds(joint_frames(self.robot, q))
         if likely:
             bounds[~np.array(self.likely, dtype=bool)] = np.inf
         number = np.array([groups.index(group) for *_, group in self.pairs], dtype=int)
         found = Nearest.none(len(groups), q.shape[1], reach)
         model, shapes, (data, measured) = self.robot.model, self.shapes, self._data
         neutral, displaced = pin.neutral(model), np.zeros(model.nv)
+        # What each pair was at the posture where it was last measured, and how fast it may change from there.
+        rate = self._rates(q)
+        last, at = np.full(len(self.pairs), -np.inf), np.zeros((len(self.pairs), len(q)))
         for k in np.flatnonzero(np.any(bounds < reach, axis=0)):
-            displaced[self.robot.order] = q[:, k]
-            pin.updateGeometryPlacements(model, data, shapes, measured, pin.integrate(model, neutral, displaced))
-            for pair in np.argsort(bounds[:, k]):
-                if not bounds[pair, k] < reach:
-                    break
+            least = np.maximum(bounds[:, k], last - np.einsum("pn,pn->p", rate, np.abs(q[:, k] - at)))
+            near = np.flatnonzero(least < reach)
+            placed = False
+            for pair in near[np.argsort(least[near])]:
                 group = number[pair]
-                if bounds[pair, k] < found.distance[group, k]:
-                    pin.computeDistance(shapes, measured, int(pair))
-                    found.take(int(group), int(k), int(pair), measured.distanceResults[int(pair)])
+                if least[pair] >= found.distance[group, k]:
+                    continue
+                if not placed:
+                    displaced[self.robot.order] = q[:, k]
+                    posture = pin.integrate(model, neutral, displaced)
+                    pin.updateGeometryPlacements(model, data, shapes, measured, posture)
+                    placed = True
+                pin.computeDistance(shapes, measured, int(pair))
+                result = measured.distanceResults[int(pair)]
+                last[pair], at[pair] = result.min_distance, q[:, k]
+                found.take(int(group), int(k), int(pair), result)
         return found
 
     def slopes(self, q: Array, found: Nearest) -> Array:
         """Return the derivative of the distances by the joints, shape (G, n, N); 0 where they were not measured."""
-        frames = _joint_frames(self.robot, q)
+        frames = joint_frames(self.robot, q)
         slope = np.zeros((len(found.distance), *q.shape))
         for group, k in np.argwhere(found.pair >= 0):
             first, second, _ = self.pairs[found.pair[group, k]]
@@ -197,7 +225,7 @@ class Clearance(Frozen):
         """Return the smallest distance of a group over postures (n, N), m."""
         kept = tuple(pair for pair in self.pairs if pair[2] == group)
         alone = replace(self, pairs=kept, likely=())
-        bounds = alone._bounds(_joint_frames(self.robot, q))
+        bounds = alone._bounds(joint_frames(self.robot, q))
         least = np.inf
         # Where spheres are nearest first, so that most postures need not be measured.
         for part in np.array_split(np.argsort(bounds.min(axis=0)), max(1, q.shape[1] // 50)):
@@ -240,49 +268,6 @@ class Nearest:
             self.points[0, group, k] = measured.getNearestPoint1()
             self.points[1, group, k] = measured.getNearestPoint2()
             self.normal[group, k] = measured.normal
-
-
-@dataclass(frozen=True, eq=False)
-class JointFrames:
-    """Where the joints are at N postures, in the base frame; axis and origin in the robot's order of joints.
-
-    Attributes
-    ----------
-    turn, place : ndarray, shapes (J, 3, 3, N) and (J, 3, N)
-        Frames of Pinocchio's joints, the base first.
-    axis, origin : ndarray, shape (n, 3, N)
-    prismatic : ndarray of bool, shape (n,)
-    """
-
-    turn: Array
-    place: Array
-    axis: Array
-    origin: Array
-    prismatic: NDArray[np.bool_]
-
-    def centres(self, joints: NDArray[np.intp], points: Array) -> Array:
-        """Return where points (S, 3) fixed to joints are, shape (S, 3, N)."""
-        return np.asarray(np.einsum("sabN,sb->saN", self.turn[joints], points) + self.place[joints])
-
-
-def _joint_frames(robot: Robot, q: Array) -> JointFrames:
-    samples, joints = q.shape[1], joint_geometry(robot.model)
-    turn = np.zeros((len(joints) + 1, 3, 3, samples))
-    place = np.zeros((len(joints) + 1, 3, samples))
-    axis = np.zeros((robot.n, 3, samples))
-    turn[0] = np.eye(3)[:, :, None]
-    for k, joint in enumerate(joints, 1):
-        own = place_of(robot, k)
-        base = turn[joint.parent]
-        place[k] = place[joint.parent] + np.einsum("abN,b->aN", base, joint.offset)
-        turned = np.einsum("abN,bc->acN", base, joint.rotation)
-        axis[own] = np.einsum("abN,b->aN", turned, joint.axis)
-        if joint.prismatic:
-            place[k] += axis[own] * q[own]
-        else:
-            turned = np.einsum("abN,bcN->acN", turned, rotation(joint.axis, q[own]))
-        turn[k] = turned
-    return JointFrames(turn, place, axis, place[1:][robot.order], robot.prismatic)
 
 
 def clearance_of(

@@ -74,6 +74,24 @@ def test_a_box_over_the_floor(tmp_path):
     )
 
 
+def test_what_is_passed_over_along_a_motion_changes_nothing(tmp_path):
+    links = [Link(kind="prismatic", com=(0.0, 0.0, 0.0), shape=BALL)]
+    links += [Link(axis=(0.0, 1.0, 0.2 * k), xyz=(0.3, 0.0, 0.0), com=(0.15, 0.0, 0.0), shape=BALL) for k in range(3)]
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", links))
+    ends = np.full(4, 2.5)
+    boxes = [((0.5, 0.1, 0.4), (0.1, 0.2, 0.1))]
+    clearance = clearance_of(robot, -ends, ends, margin=0.01, floor=-0.3, boxes=boxes)
+    assert clearance.groups == ("self", "floor", "box1")
+    q = 2.4 * np.sin(np.linspace(0.0, 6.0, 400) * np.array([[0.2], [1.1], [0.7], [1.6]]) + 0.3)
+    each = clearance.all_distances(q)
+    groups = [[pair[2] == group for pair in clearance.pairs] for group in clearance.groups]
+    least = np.array([each[own].min(axis=0) for own in groups])
+    for reach in (np.inf, 0.06):
+        found = clearance.nearest(q, reach).distance
+        np.testing.assert_allclose(found[least > 0.0], np.minimum(least, reach)[least > 0.0], atol=1e-9)
+    assert np.mean(least < 0.06) > 0.05
+
+
 def test_a_ball_beside_boxes(tmp_path):
     robot = upright(tmp_path, "", "", BALL)
     boxes = [((0.9, 0.0, 0.6), (0.2, 1.0, 0.4)), ((-5.0, 0.0, 0.0), (0.1, 0.1, 0.1))]
