@@ -324,6 +324,8 @@ def clearance_of(
         if moved[i] != moved[j] and moved[i] != parents[moved[j]] and moved[j] != parents[moved[i]]
     ]
     pairs += [(i, count + k, name) for k, name in enumerate(obstacles) for i in range(count) if moved[i]]
+    if not pairs:
+        return replace(watched, notes=(unwatched.format("all links that have shapes hang on one another"),))
     return _parted(replace(watched, pairs=tuple(pairs)), lower, upper)
 
 

@@ -117,6 +117,8 @@ def test_an_arm_without_shapes_or_with_lost_ones_says_so(tmp_path):
     assert bare.groups == () and "arm.urdf has no collision shapes; rehearse" in bare.notes[0]
     lost = clearance_of(upright(tmp_path, "", "", '<mesh filename="package://gone/l3.stl"/>'), *ENDS, margin=0.02)
     assert lost.groups == () and "link l3: mesh package://gone/l3.stl is not found" in lost.notes[0]
+    near = clearance_of(upright(tmp_path, "", BALL, BALL), *ENDS, margin=0.02)
+    assert near.groups == () and "hang on one another" in near.notes[0]
     robot = upright(tmp_path, "", "", "")
     with pytest.raises(UsageError, match="boxes: Collisions were not looked for"):
         limits_of(robot, boxes=[((1.0, 0.0, 0.0), (0.1, 0.1, 0.1))])
