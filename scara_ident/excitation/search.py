@@ -186,7 +186,7 @@ def _finish(task: Task, x: Array) -> tuple[Array, int]:
         excess = _excess(task, x, times)
         if np.all(excess <= 1.0):
             return x, times
-        bounds = bounds * np.where(excess > 1.0, (1.0 - MARGIN) / excess, 1.0)
+        bounds = bounds * np.where(excess > 1.0, (1.0 - MARGIN) / np.maximum(excess, 1.0), 1.0)
         problem = within_grid(task, FINE, bounds, FINE // COARSE)
         plan = Schedule(first=0.5, last=2e-3, tolerance=1e-2, steps=150, sharpness=1.0)
     return verified_inside(problem, x)
