@@ -34,7 +34,7 @@ from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.questions import Question, Suspect
 from scara_ident.diagnosis.selection_step import fitted_model
 from scara_ident.errors import ScaraIdentError
-from scara_ident.excitation import Design, Effort, design_excitation
+from scara_ident.excitation import Design, Effort, design_excitation, limits_of
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import Effect, ReferenceMotion, VirtualArm, simulate, virtual_arm
@@ -146,12 +146,14 @@ def one_set(robot: str, number: int, seed: int) -> dict[str, Any]:
     asked = inquiry.questions
     result["asked"] = [item.text for item in asked]
     start = time.perf_counter()
-    design = design_excitation(model, duration=ASKED, tell=inquiry, effort=EFFORT)
+    # All of the limits for each, as the random motion has them.
+    limits = limits_of(arm.robot, clearance=None, share=1.0)
+    design = design_excitation(model, duration=ASKED, tell=inquiry, limits=limits, effort=EFFORT)
     result["design_seconds"] = time.perf_counter() - start
     motions = {
         "tell": lambda: as_reference(design),
         "random": lambda: random_motion("more", arm, "fourier", ASKED, rng),
-        "logdet": lambda: as_reference(design_excitation(model, duration=ASKED, effort=PLAIN)),
+        "logdet": lambda: as_reference(design_excitation(model, duration=ASKED, limits=limits, effort=PLAIN)),
     }
     for way in WAYS:
         found = diagnose(arm.robot, [*begun, record(arm, motions[way](), truth, number, 3)])

@@ -63,6 +63,11 @@ def arms() -> dict[str, Robot]:
     }
 
 
+def whole(robot: Robot) -> Limits:
+    """All of the limits, as the paper has them, and no distances."""
+    return limits_of(robot, clearance=None, share=1.0)
+
+
 def told(design: Design) -> dict[str, Any]:
     content = excitation_dict(design)
     wanted = ("log_det", "condition_of_regressor", "condition_of_scaled_regressor", "limits", "active_limits", "search")
@@ -78,7 +83,7 @@ def timed(make: Callable[[], Design]) -> tuple[Design, float, float]:
 
 
 def scara() -> tuple[Design, dict[str, Any]]:
-    design, wall, work = timed(lambda: design_excitation(build_model(load_robot())))
+    design, wall, work = timed(lambda: design_excitation(build_model(load_robot()), limits=whole(load_robot())))
     trajectory = design.trajectories[0]
     log_det, condition = criteria(regressor(*trajectory.at(np.linspace(0.0, 25.0, 2500))))
     ojd, _ = criteria(regressor(*OJD.motion(OJD.times())))
@@ -153,7 +158,9 @@ def virtual_repetitions(design: Design) -> dict[str, float]:
 
 def condition_of(model: TorqueModel, criterion: Criterion) -> dict[str, Any]:
     robot = model.robot
-    design, wall, work = timed(lambda: design_excitation(model, duration=20.0, criterion=criterion))
+    design, wall, work = timed(
+        lambda: design_excitation(model, duration=20.0, limits=whole(model.robot), criterion=criterion)
+    )
     content = {**told(design), "wall": wall, "computing": work}
     print(
         f"  {robot.name:6} {model.name:9} {len(model.names):3} {criterion.name:12} plain "
@@ -181,7 +188,7 @@ def bound_of_states(count: int = 100_000, rounds: int = 200) -> float:
     the equivalence theorem of Kiefer and Wolfowitz, ln det + p ln(max d / p) bounds every weighting of these states.
     """
     random = np.random.default_rng(0)
-    model, limits = build_model(load_robot()), limits_of(load_robot())
+    model, limits = build_model(load_robot()), whole(load_robot())
     nominal = nominal_parameters(model)
     q = random.uniform(limits.lower[:, None], limits.upper[:, None], (2, count))
     # A cubic in speed is told best at these speeds.
@@ -209,7 +216,7 @@ def bound_of_states(count: int = 100_000, rounds: int = 200) -> float:
 
 def wider_limits() -> dict[str, Limits]:
     """Return the SCARA03's limits with one kind of them a tenth wider, by kind."""
-    limits = limits_of(load_robot())
+    limits = whole(load_robot())
     half = 0.5 * (limits.upper - limits.lower)
     return {
         "ranges": replace(limits, lower=limits.centre - 1.1 * half, upper=limits.centre + 1.1 * half),
@@ -220,7 +227,7 @@ def wider_limits() -> dict[str, Limits]:
 
 
 def study(word: str = "") -> list[dict[str, Any]]:
-    model = build_model(load_robot())
+    model, limits = build_model(load_robot()), whole(load_robot())
     print("\nwhat limits J_d of the SCARA03 in 25 s")
     if not word:
         print(
@@ -228,16 +235,23 @@ def study(word: str = "") -> list[dict[str, Any]]:
         )
     found = []
     cases: list[tuple[str, Callable[[], Design]]] = [
-        (f"{k} harmonics", partial(design_excitation, model, harmonics=k)) for k in (5, 10, 20, 40, 60, 80, 120)
+        (f"{k} harmonics", partial(design_excitation, model, harmonics=k, limits=limits))
+        for k in (5, 10, 20, 40, 60, 80, 120)
     ]
     odd = tuple(range(1, 80, 2))
     spread = tuple(sorted({round(1.6 * 1.12**k) for k in range(36)}))
     cases += [
-        (f"{len(odd)} odd harmonics to 79", lambda: design_excitation(model, harmonics=odd)),
-        (f"{len(spread)} spread harmonics to {spread[-1]}", lambda: design_excitation(model, harmonics=spread)),
-        ("splines, 80 intervals", lambda: design_excitation(model, harmonics=40, family="spline")),
-        ("splines, 160 intervals", lambda: design_excitation(model, harmonics=80, family="spline")),
-        ("40, long search", lambda: design_excitation(model, effort=Effort(starts=16, rounds=3, seed=1), progress=dot)),
+        (f"{len(odd)} odd harmonics to 79", lambda: design_excitation(model, harmonics=odd, limits=limits)),
+        (
+            f"{len(spread)} spread harmonics to {spread[-1]}",
+            lambda: design_excitation(model, harmonics=spread, limits=limits),
+        ),
+        ("splines, 80 intervals", lambda: design_excitation(model, harmonics=40, family="spline", limits=limits)),
+        ("splines, 160 intervals", lambda: design_excitation(model, harmonics=80, family="spline", limits=limits)),
+        (
+            "40, long search",
+            lambda: design_excitation(model, limits=limits, effort=Effort(starts=16, rounds=3, seed=1), progress=dot),
+        ),
     ]
     for what, wider in wider_limits().items():
         cases.append((f"{what} by 10 % wider", partial(design_excitation, model, limits=wider)))

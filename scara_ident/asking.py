@@ -20,6 +20,7 @@ from scara_ident.diagnosis.questions import Question
 from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation.design import Design, design_excitation
 from scara_ident.excitation.known import read_diagnosis
+from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.output import excitation_dict, write_joint_trajectory, write_trajectory
 from scara_ident.excitation.search import Effort, Progress
 from scara_ident.excitation.tell import SURE, Told
@@ -79,12 +80,15 @@ class Settings:
     duration : float
         Of an asked motion, s.
     effort : Effort
+    limits : Limits, optional
+        Of the motions; by default those of `limits_of`.
     """
 
     robot: Robot
     model: str = "complete"
     duration: float = 15.0
     effort: Effort = field(default_factory=Effort)
+    limits: Limits | None = None
 
     def hash(self, recordings: Sequence[Path]) -> str:
         """Return a hash of recordings, by name and content, and of what the answer depends on."""
@@ -97,6 +101,7 @@ class Settings:
             self.duration,
             self.effort.starts,
             self.effort.seed,
+            "" if self.limits is None else self.limits.words(),
         ]
         found = hashlib.sha256(repr(words).encode())
         for path in recordings:
@@ -184,7 +189,9 @@ def _note(folder: Path, asked: Asked) -> Asked:
 def _first(folder: Path, settings: Settings, asked: Asked, work: Work) -> Asked:
     """Ask for a motion that tells much of everything, where nothing was recorded."""
     model = build_model(settings.robot, settings.model)
-    design = design_excitation(model, duration=settings.duration, effort=settings.effort, progress=_told(work))
+    design = design_excitation(
+        model, duration=settings.duration, limits=settings.limits, effort=settings.effort, progress=_told(work)
+    )
     words = "Nothing is recorded yet: record next/trajectory.csv, twice, into recordings/."
     _written(folder, design)
     return _note(folder, replace(asked, state="record", words=words))
@@ -211,7 +218,12 @@ def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], aske
         return _note(folder, replace(asked, state="untold" if tired else "settled", words=words))
     inquiry = inquiry_of({**content, "next": [item.entry() for item in left]}, settings.robot, read)
     design = design_excitation(
-        inquiry.scene.model, duration=settings.duration, tell=inquiry, effort=settings.effort, progress=_told(work)
+        inquiry.scene.model,
+        duration=settings.duration,
+        tell=inquiry,
+        limits=settings.limits,
+        effort=settings.effort,
+        progress=_told(work),
     )
     told = worth_recording(design.tells)
     if not told:

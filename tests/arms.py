@@ -31,6 +31,8 @@ class Link:
     inertia: tuple[float, float, float] = (0.03, 0.04, 0.05)
     parent: int = -1
     """Number of the link it hangs on; -1 is the one before it (the base for the first), -2 is the base."""
+    shape: str = ""
+    """Collision geometry about its centre of mass, such as '<sphere radius="0.1"/>'."""
 
 
 def write_urdf(path: Path, links: Sequence[Link], reductions: Sequence[float] = ()) -> Path:
@@ -39,10 +41,11 @@ def write_urdf(path: Path, links: Sequence[Link], reductions: Sequence[float] = 
     for i, link in enumerate(links):
         on = i - 1 if link.parent == -1 else link.parent
         parent = "base" if on < 0 else f"l{on + 1}"
+        shape = f'<collision><origin xyz="{_words(link.com)}"/><geometry>{link.shape}</geometry></collision>'
         ixx, iyy, izz = (repr(float(x)) for x in link.inertia)
         text.append(
             f'<link name="l{i + 1}"><inertial><origin xyz="{_words(link.com)}"/><mass value="{link.mass!r}"/>'
-            f'<inertia ixx="{ixx}" ixy="0" ixz="0" iyy="{iyy}" iyz="0" izz="{izz}"/></inertial></link>'
+            f'<inertia ixx="{ixx}" ixy="0" ixz="0" iyy="{iyy}" iyz="0" izz="{izz}"/></inertial>{shape if link.shape else ""}</link>'
             f'<joint name="j{i + 1}" type="{link.kind}"><parent link="{parent}"/><child link="l{i + 1}"/>'
             f'<origin xyz="{_words(link.xyz)}" rpy="{_words(link.rpy)}"/><axis xyz="{_words(link.axis)}"/>'
             '<limit lower="-3" upper="3" effort="50" velocity="4"/></joint>'

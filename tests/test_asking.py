@@ -13,7 +13,7 @@ from scara_ident.asking import Asked, Settings, ask, key_of, read_asked, still_o
 from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.questions import Question, questions
 from scara_ident.errors import ScaraIdentError
-from scara_ident.excitation import Effort
+from scara_ident.excitation import Effort, limits_of
 from scara_ident.excitation.tell import Told
 from scara_ident.recording.recording import write_recording
 from scara_ident.robot.robot import load_robot
@@ -113,3 +113,11 @@ def test_a_note_that_is_none_is_said(tmp_path: Path):
         read_asked(tmp_path)
     assert read_asked(tmp_path / "nowhere") is None
     assert Asked("x").state is None
+
+
+def test_other_limits_are_another_question():
+    whole = replace(QUICK, limits=limits_of(QUICK.robot, share=1.0))
+    assert (
+        len({each.hash([]) for each in (QUICK, whole, replace(whole, limits=limits_of(QUICK.robot, floor=0.0)))}) == 3
+    )
+    assert whole.hash([]) == replace(whole, limits=limits_of(load_robot(), share=1.0)).hash([])

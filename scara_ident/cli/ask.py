@@ -18,6 +18,15 @@ def ask(
     robot: options.Robot = None,
     model: options.Model = "complete",
     duration: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Of each asked motion, s.")] = 15.0,
+    ranges: options.Ranges = None,
+    velocities: options.Velocities = None,
+    accelerations: options.Accelerations = None,
+    jerks: options.Jerks = None,
+    torques: options.Torques = None,
+    share: options.Share = 0.8,
+    floor: options.Floor = None,
+    box: options.Boxes = None,
+    clearance: options.Clearance = 0.01,
     starts: Annotated[int, typer.Option(min=1, help="Random starts of each design.")] = 8,
     seed: Annotated[int, typer.Option(min=0, help="Of the random starts, and of the virtual arm.")] = 0,
     virtual: Annotated[bool, typer.Option("--virtual", help="Let the virtual arm record what is asked for.")] = False,
@@ -30,6 +39,7 @@ def ask(
     """Say what to record next: diagnose the recordings so far, and design the motion that settles what they leave open."""
     from scara_ident.asking import Settings, recordings_in
     from scara_ident.asking import ask as run
+    from scara_ident.cli.joint_values import motion_limits
     from scara_ident.errors import UsageError
     from scara_ident.excitation import Effort
     from scara_ident.files import check_output, written_together
@@ -39,7 +49,19 @@ def ask(
         raise UsageError("--effect is what the virtual arm has; give --virtual with it")
     check_output(folder)
     arm = load_robot(robot)
-    settings = Settings(arm, model, duration, Effort(starts=starts, seed=seed))
+    limits = motion_limits(
+        arm,
+        ranges=ranges,
+        velocities=velocities,
+        accelerations=accelerations,
+        jerks=jerks,
+        torques=torques,
+        boxes=box,
+        floor=floor,
+        clearance=clearance,
+        share=share,
+    )
+    settings = Settings(arm, model, duration, Effort(starts=starts, seed=seed), limits)
     console = output_console()
     made = 0
     while True:

@@ -19,19 +19,10 @@ def check(
     ],
     result: Result,
     robot: options.Robot = None,
-    ranges: Annotated[
-        list[str] | None, typer.Option("--range", metavar="JOINT=LOWER..UPPER", help="Instead of the URDF's, rad or m.")
-    ] = None,
-    velocities: Annotated[
-        list[str] | None, typer.Option("--velocity", metavar="JOINT=V", help="Instead of the URDF's, rad/s or m/s.")
-    ] = None,
-    accelerations: Annotated[
-        list[str] | None, typer.Option("--acceleration", metavar="JOINT=A", help="Most, rad/s^2 or m/s^2.")
-    ] = None,
-    torques: Annotated[
-        list[str] | None,
-        typer.Option("--torque", metavar="JOINT=T", help="Instead of the URDF's, on the recorded side, N m or N."),
-    ] = None,
+    ranges: options.Ranges = None,
+    velocities: options.Velocities = None,
+    accelerations: options.Accelerations = None,
+    torques: options.Torques = None,
     powers: Annotated[
         list[str] | None, typer.Option("--power", metavar="JOINT=P", help="Most that a drive gives or takes, W.")
     ] = None,

@@ -46,7 +46,7 @@ def demo(
     chapter("The founding paper, printed against computed")
     paper_in_short(output / "paper")
     chapter("A motion that tells more: 12 s within all limits")
-    excite(duration=12.0, harmonics=10, starts=2, seed=seed, output=output / "excite")
+    excite(duration=[12.0], harmonics=10, starts=2, seed=seed, output=output / "excite")
     chapter("Recordings of the virtual arm, with an effect that nobody declares")
     designed = str(output / "excite" / "trajectory.csv")
     simulate([designed, "OJD", "OJK", "CI"], effect=[HIDDEN], seed=seed, repetitions=2, output=train)

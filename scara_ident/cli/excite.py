@@ -16,10 +16,11 @@ SEARCHES_SHARE = 0.97
 
 def excite(
     robot: options.Robot = None,
-    model: options.Model = "complete",
+    model: options.ModelIfGiven = None,
     criterion: Annotated[
-        Literal["logdet", "cond"], typer.Option(help="ln det or the condition of the stacked regressor.")
-    ] = "logdet",
+        Literal["logdet", "cond"] | None,
+        typer.Option(help="ln det (default) or the condition of the stacked regressor."),
+    ] = None,
     wanted: Annotated[
         list[str] | None,
         typer.Option("--for", metavar="NAME", help="Parameter or term to tell from all others; may be repeated."),
@@ -30,13 +31,31 @@ def excite(
             metavar="DIAGNOSIS", help="diagnosis.json: the motion that best answers what it left open, of its model."
         ),
     ] = None,
-    duration: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Of each trajectory, s.")] = 25.0,
-    harmonics: Annotated[int | None, typer.Option(min=3, help="Per joint; default: by the duration.")] = None,
+    duration: Annotated[
+        list[float] | None,
+        typer.Option(
+            min=1.0, max=3600.0, help="Of each trajectory, s; repeated: of one after the other. [default: 25]"
+        ),
+    ] = None,
+    harmonics: Annotated[
+        int | None, typer.Option(min=3, help="Per joint, of the longest trajectory; default: by the duration.")
+    ] = None,
     family: Annotated[Literal["fourier", "spline"], typer.Option(help="Harmonics, or B-splines.")] = "fourier",
     trajectories: Annotated[int, typer.Option(min=1, help="How many are designed together.")] = 1,
     known: Annotated[
         list[str] | None,
         typer.Option("--known", metavar="RECORDING", help="Recordings at hand: the design fills what they lack."),
+    ] = None,
+    asked_std: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PERCENT|NAME=STD",
+            help="Say after which trajectory parameters are as sure as that; may be repeated.",
+        ),
+    ] = None,
+    noise: Annotated[
+        list[str] | None,
+        typer.Option(metavar="JOINT=RMS", help="Of its torque below 50 Hz; default: the residual in --parameters."),
     ] = None,
     parameters: Annotated[
         Path | None,
@@ -45,23 +64,20 @@ def excite(
     start: Annotated[
         str | None, typer.Option(metavar="Q1,Q2,..", help="Positions of all joints to start at, rad or m.")
     ] = None,
-    ranges: Annotated[
-        list[str] | None, typer.Option("--range", metavar="JOINT=LOWER..UPPER", help="Instead of the URDF's, rad or m.")
-    ] = None,
-    velocities: Annotated[
-        list[str] | None, typer.Option("--velocity", metavar="JOINT=V", help="Instead of the URDF's, rad/s or m/s.")
-    ] = None,
-    torques: Annotated[
-        list[str] | None,
-        typer.Option("--torque", metavar="JOINT=T", help="Instead of the URDF's, on the recorded side."),
-    ] = None,
-    share: Annotated[float, typer.Option(help="Share of ranges, velocities and torques to use.")] = 1.0,
+    ranges: options.Ranges = None,
+    velocities: options.Velocities = None,
+    accelerations: options.Accelerations = None,
+    jerks: options.Jerks = None,
+    torques: options.Torques = None,
+    share: options.Share = 0.8,
+    floor: options.Floor = None,
+    box: options.Boxes = None,
+    clearance: options.Clearance = 0.01,
     tool: Annotated[str | None, typer.Option(metavar="LINK", help="Link whose origin is the tool.")] = None,
     tool_acceleration: Annotated[
         float | None, typer.Option(metavar="A", help="Most, m/s^2; default: 9 on the SCARA03, else no limit.")
     ] = None,
     tool_speed: Annotated[float | None, typer.Option(metavar="V", help="Most, m/s.")] = None,
-    floor: Annotated[float | None, typer.Option(metavar="Z", help="Height the tool stays above, m.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the random starts.")] = 0,
     starts: Annotated[int, typer.Option(min=1, help="Random starts; more take longer and may find better.")] = 8,
     rate: Annotated[float, typer.Option(min=1.0, max=1e5, help="Samples per second of trajectory.csv.")] = 1000.0,
@@ -71,24 +87,27 @@ def excite(
     """Design an excitation trajectory within the limits of the joints, the motors and the tool."""
     import numpy as np
 
-    from scara_ident.cli.joint_values import joint_numbers, joint_ranges, numbers
+    from scara_ident.cli.joint_values import joint_numbers, motion_limits, numbers
     from scara_ident.diagnosis.answerability import inquiry_of
     from scara_ident.errors import UsageError
     from scara_ident.estimation.estimate import PAPER_SAMPLES
     from scara_ident.excitation import (
         Effort,
         Progress,
+        block_of,
         default_harmonics,
         design_excitation,
         excitation_dict,
-        limits_of,
+        nominal_parameters,
         write_joint_trajectory,
         write_trajectory,
     )
     from scara_ident.excitation.criteria import criterion_of
-    from scara_ident.excitation.design import SAMPLES, check_size
+    from scara_ident.excitation.design import SAMPLES, check_size, durations_of
     from scara_ident.excitation.known import read_diagnosis, read_parameters
     from scara_ident.excitation.output import check_rate, file_names
+    from scara_ident.excitation.stopping import NOISE_BAND, noise_of, stopping
+    from scara_ident.excitation.stopping import asked_std as read_asked
     from scara_ident.files import write_json
     from scara_ident.identification.identify import known_information
     from scara_ident.model.model import build_model
@@ -102,29 +121,51 @@ def excite(
     arm = load_robot(robot)
     if tell is not None and wanted:
         raise UsageError("--for and --tell: two goals of one motion; give one of them")
+    if tell is not None and (criterion is not None or model is not None):
+        given = "--model" if criterion is None else "--criterion"
+        raise UsageError(f"{given} and --tell: the diagnosis says what is asked, and of which model; leave {given} out")
+    if tell is not None and asked_std:
+        raise UsageError("--asked-std and --tell: two goals of one motion; give one of them")
+    if noise and not asked_std:
+        raise UsageError("--noise is for --asked-std; give both")
     asked = None if tell is None else read_diagnosis(tell)
-    equation = build_model(arm, model if asked is None else str(asked["model"]))
-    goal = None if asked is not None else criterion_of(criterion, equation, wanted or ())
+    equation = build_model(arm, (model or "complete") if asked is None else str(asked["model"]))
+    goal = None if asked is not None else criterion_of(criterion or "logdet", equation, wanted or ())
     place = numbers(start, "--start")
-    limits = limits_of(
+    limits = motion_limits(
         arm,
-        ranges=joint_ranges(ranges, "--range"),
-        velocities=joint_numbers(velocities, "--velocity"),
-        torques=joint_numbers(torques, "--torque"),
+        ranges=ranges,
+        velocities=velocities,
+        accelerations=accelerations,
+        jerks=jerks,
+        torques=torques,
+        boxes=box,
+        floor=floor,
+        clearance=clearance,
+        share=share,
+        tool=tool,
         tool_acceleration=tool_acceleration,
         tool_speed=np.inf if tool_speed is None else tool_speed,
-        floor=-np.inf if floor is None else floor,
-        tool=tool,
-        share=share,
     )
-    count = default_harmonics(duration, arm.n, trajectories) if harmonics is None else harmonics
-    check_size(count, arm.n, trajectories, SAMPLES)
-    check_rate(rate, count / duration)
+    durations = durations_of(duration or 25.0, trajectories)
+    longest = max(durations)
+    count = default_harmonics(longest, arm.n, len(durations)) if harmonics is None else harmonics
+    check_size(count, arm.n, len(durations), SAMPLES)
+    check_rate(rate, count / longest)
     nominal = None if parameters is None else read_parameters(parameters, equation)
+    counted = PAPER_SAMPLES / longest
+    std = None
+    if asked_std:
+        values = dict(zip(equation.names, nominal_parameters(equation, nominal).tolist(), strict=True))
+        judged = [equation.names[k] for k in block_of(equation, wanted).columns] if wanted else equation.names
+        aim, unjudged = read_asked(asked_std, {name: values[name] for name in judged})
+        # As white noise at the samples that the design counts.
+        std = noise_of(arm, joint_numbers(noise, "--noise"), parameters) * np.sqrt(0.5 * counted / NOISE_BAND)
     with progress() as work:
         work("reading what is known")
         recorded, useless = read_usable(known or (), arm)
-        prior = known_information(equation, recorded, PAPER_SAMPLES / duration) if recorded else None
+        weights = None if std is None else 1.0 / std
+        prior = known_information(equation, recorded, counted, weights) if recorded else None
         inquiry = None if asked is None else inquiry_of(asked, arm, recorded)
 
         def told(state: Progress) -> None:
@@ -134,20 +175,21 @@ def excite(
         work("search 1")
         design = design_excitation(
             equation,
-            duration=duration,
+            duration=durations,
             harmonics=count,
             criterion=goal,
             tell=inquiry,
             limits=limits,
             known=nominal,
-            trajectories=trajectories,
+            trajectories=len(durations),
+            torque_std=std,
             prior=prior,
             start=None if place is None else np.array(place),
             family=family,
             effort=Effort(starts=starts, seed=seed),
             progress=told,
         )
-    content = excitation_dict(design)
+    content = excitation_dict(design, stopping(design, aim, unjudged) if asked_std else None)
     console = result_console(content, json)
     console.say(content["summary"])
     console.print(limit_table(design))
@@ -160,7 +202,7 @@ def excite(
             write_joint_trajectory(trajectory, folder / yaml)
         work("drawing excitation.png", 0.1)
         design_picture(folder / "excitation.png", design)
-        motions = [design.motion(k, PAPER_SAMPLES / duration) for k in range(trajectories)]
+        motions = [design.motion(k, counted) for k in range(len(durations))]
         work("drawing report.html", 0.6)
         excitation_report(folder / "report.html", content, arm, motions)
         write_json(folder / "excitation.json", content)

@@ -40,6 +40,22 @@ Model = Annotated[
         help="Terms of the torque equation: {models}.",
     ),
 ]
+
+
+def _known_model(name: str | None) -> str | None:
+    return None if name is None else MODELS.check(name)
+
+
+ModelIfGiven = Annotated[
+    str | None,
+    typer.Option(
+        "--model",
+        metavar="NAME",
+        callback=_known_model,
+        autocompletion=MODELS.names,
+        help="Terms of the torque equation: {models}; default: complete.",
+    ),
+]
 Method = Annotated[
     str,
     typer.Option(
@@ -61,6 +77,39 @@ Validate = Annotated[
 Output = Annotated[Path | None, typer.Option("--output", metavar="DIR", help="Folder for the results; made if needed.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, and nothing else there.")]
 Verbose = Annotated[bool, typer.Option("--verbose", help="Also list what every file holds and what its audit found.")]
+# Limits of motions.
+Ranges = Annotated[
+    list[str] | None, typer.Option("--range", metavar="JOINT=LOWER..UPPER", help="Instead of the URDF's, rad or m.")
+]
+Velocities = Annotated[
+    list[str] | None, typer.Option("--velocity", metavar="JOINT=V", help="Instead of the URDF's, rad/s or m/s.")
+]
+Accelerations = Annotated[
+    list[str] | None,
+    typer.Option("--acceleration", metavar="JOINT=A", help="Instead of robot.yaml's, rad/s^2 or m/s^2."),
+]
+Torques = Annotated[
+    list[str] | None,
+    typer.Option("--torque", metavar="JOINT=T", help="Instead of the URDF's, on the recorded side, N m or N."),
+]
+Jerks = Annotated[
+    list[str] | None, typer.Option("--jerk", metavar="JOINT=J", help="Instead of robot.yaml's, rad/s^3 or m/s^3.")
+]
+Share = Annotated[float, typer.Option("--share", help="Share of every joint's limits to use.")]
+Floor = Annotated[
+    float | None,
+    typer.Option("--floor", metavar="Z", help="Height that the tool, and links with shapes, stay above, m."),
+]
+Boxes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--box", metavar="X,Y,Z,DX,DY,DZ", help="Obstacle: centre and edges in the base frame, m; repeatable."
+    ),
+]
+Clearance = Annotated[
+    float, typer.Option("--clearance", metavar="D", help="Distance from links to one another and to obstacles, m.")
+]
+
 Folder = Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")]
 
 MaxMemory = Annotated[

@@ -33,6 +33,8 @@ HIGHEST_FREQUENCY = 1.6
 MANY_COEFFICIENTS, MOST_COEFFICIENTS = 160, 600
 # Samples per period of the highest harmonic that the criterion needs.
 LEAST_PER_PERIOD = 4
+# A shorter motion has at least so many harmonics.
+FEWEST = 5
 # They are told apart by a letter.
 MOST_TRAJECTORIES = 26
 
@@ -57,7 +59,7 @@ class Design(Saved, told_by="design"):
         Of all trajectories, their samples and weights, with torque zero; without what was known before.
     prior : Information or None
         What was known before.
-    samples : int
+    samples : tuple of int
         Samples of each trajectory in the information.
     weights : ndarray, shape (n,)
         Weight of every joint's rows in it.
@@ -79,7 +81,7 @@ class Design(Saved, told_by="design"):
     verified: int
     information: Information
     prior: Information | None
-    samples: int
+    samples: tuple[int, ...]
     weights: Array
     costs: tuple[float, ...]
     effort: Effort
@@ -88,7 +90,8 @@ class Design(Saved, told_by="design"):
 
     def _in_short(self) -> str:
         names = ", ".join(each.name for each in self.trajectories)
-        return f"{self.model.robot.name}: {names} of {self.trajectories[0].duration:g} s, ln det {self.log_det:.2f}"
+        seconds = ", ".join(dict.fromkeys(f"{each.duration:g}" for each in self.trajectories))
+        return f"{self.model.robot.name}: {names} of {seconds} s, ln det {self.log_det:.2f}"
 
     @property
     def total(self) -> Information:
@@ -124,7 +127,7 @@ class Design(Saved, told_by="design"):
 
 
 def default_harmonics(duration: float, joints: int, trajectories: int = 1) -> int:
-    """Return how many harmonics a design has by default: up to 1.6 Hz, fewer where there are many joints."""
+    """Return how many harmonics a motion has by default: up to 1.6 Hz, fewer where there are many joints or motions."""
     most = MANY_COEFFICIENTS // (2 * joints * trajectories)
     return max(5, min(round(HIGHEST_FREQUENCY * duration), most))
 
@@ -132,7 +135,7 @@ def default_harmonics(duration: float, joints: int, trajectories: int = 1) -> in
 def design_excitation(
     model: TorqueModel,
     *,
-    duration: float = 25.0,
+    duration: float | Sequence[float] = 25.0,
     harmonics: int | Sequence[int] | None = None,
     criterion: Criterion | None = None,
     tell: Inquiry | Diagnosis | None = None,
@@ -154,10 +157,11 @@ def design_excitation(
     ----------
     model : TorqueModel
         Its columns must depend on present position, velocity and acceleration alone.
-    duration : float
-        Of each trajectory, s.
+    duration : float or sequence of float
+        Of each trajectory, s; several give the length of each of several.
     harmonics : int or sequence of int, optional
-        How many, or which: a multisine. See `default_harmonics`.
+        How many, or which: a multisine. See `default_harmonics`. Where lengths differ, how many the longest has; the
+        shorter have as many as reach the same frequency.
     criterion : Criterion, optional
         By default the log determinant.
     tell : Inquiry or Diagnosis, optional
@@ -177,7 +181,7 @@ def design_excitation(
         Posture to start in (and, for harmonics, to end in), rad or m.
     family : {"fourier", "spline"}
     samples : int
-        Samples of each trajectory in the criterion.
+        Samples of each trajectory in the criterion; where lengths differ, of the longest, the others at the same rate.
     name : str
         Of the trajectories; of several ``name-a``, ``name-b``, ... .
     effort : Effort, optional
@@ -216,8 +220,8 @@ def design_excitation(
     """
     begun = time.perf_counter()
     robot, count = model.robot, len(model.names)
-    if not 1 <= trajectories <= MOST_TRAJECTORIES:
-        raise UsageError(f"trajectories {trajectories}: expected at least 1 and at most {MOST_TRAJECTORIES}")
+    durations = durations_of(duration, trajectories)
+    trajectories, longest = len(durations), max(durations)
     if samples < 2:
         raise UsageError(f"samples {samples}: expected at least 2")
     if prior is not None and prior.parameters != count:
@@ -233,17 +237,19 @@ def design_excitation(
     nominal = nominal_parameters(model, known)
     smooth, left = without_coulomb(model, limits, nominal)
     if harmonics is None:
-        harmonics = default_harmonics(duration, robot.n, trajectories)
+        harmonics = default_harmonics(longest, robot.n, trajectories)
     check_size(harmonics, robot.n, trajectories, samples)
     task = Task(
         smooth=SmoothModel(model, NARROWEST * limits.velocity),
         limits=left,
         nominal=smooth,
         criterion=LogDet() if criterion is None else criterion,
-        basis=make_basis(duration, harmonics, family, fixed_start=start is not None),
+        bases=tuple(
+            make_basis(each, _harmonics_of(harmonics, each / longest), family, fixed_start=start is not None)
+            for each in durations
+        ),
         posture=resting_posture(model, left, smooth, start=start, seed=effort.seed),
-        trajectories=trajectories,
-        samples=samples,
+        samples=tuple(max(2, round(samples * each / longest)) for each in durations),
         weights=weights,
         prior=np.zeros((count, count)) if prior is None else prior.regressor_factor.T @ prior.regressor_factor,
     )
@@ -255,8 +261,8 @@ def design_excitation(
         found = search_to_tell(task, inquiry, effort, progress)
     suffixes = [""] if trajectories == 1 else [f"-{chr(ord('a') + k)}" for k in range(trajectories)]
     designed = tuple(
-        ExcitationTrajectory(name + suffix, robot.joints, task.basis, task.posture, x)
-        for suffix, x in zip(suffixes, found.x, strict=True)
+        ExcitationTrajectory(name + suffix, robot.joints, basis, task.posture, x[:, : basis.size])
+        for suffix, basis, x in zip(suffixes, task.bases, found.x, strict=True)
     )
     return Design(
         model=model,
@@ -266,15 +272,48 @@ def design_excitation(
         nominal=nominal,
         reached=reached(task, limits.torque, found.x, found.times),
         verified=found.times,
-        information=merge([information_of(model, each, samples, weights) for each in designed]),
+        information=merge(
+            [information_of(model, each, size, weights) for each, size in zip(designed, task.samples, strict=True)]
+        ),
         prior=prior,
-        samples=samples,
+        samples=task.samples,
         weights=weights,
         costs=found.costs,
         effort=effort,
         seconds=time.perf_counter() - begun,
-        tells=() if tell is None else told(inquiry, [motion_of(task.basis, task.posture, found.x[0], FINE_RATE)]),
+        tells=() if tell is None else told(inquiry, [motion_of(task.bases[0], task.posture, found.x[0], FINE_RATE)]),
     )
+
+
+def durations_of(duration: float | Sequence[float], trajectories: int = 1) -> tuple[float, ...]:
+    """Return the length of every trajectory, s.
+
+    Parameters
+    ----------
+    duration : float or sequence of float
+        One for all, or one for each.
+    trajectories : int
+        How many; several durations say that themselves.
+
+    Raises
+    ------
+    UsageError
+        If they do not agree.
+    """
+    given = (float(duration),) if isinstance(duration, (int, float)) else tuple(map(float, duration))
+    wanted = trajectories if len(given) == 1 else min(trajectories, 1) * len(given)
+    if not 1 <= wanted <= MOST_TRAJECTORIES:
+        raise UsageError(f"trajectories {wanted}: expected at least 1 and at most {MOST_TRAJECTORIES}")
+    if len(given) == 1:
+        return given * trajectories
+    if not given or trajectories not in (1, len(given)):
+        raise UsageError(f"{len(given)} durations for {trajectories} trajectories: give one for all, or one for each")
+    return given
+
+
+def _harmonics_of(harmonics: int | Sequence[int], share: float) -> int | Sequence[int]:
+    """Harmonics of a motion of a share of the longest: those up to the same frequency, and as many as rest needs."""
+    return max(min(harmonics, FEWEST), round(harmonics * share)) if isinstance(harmonics, int) else harmonics
 
 
 def _check_asked(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, ScaraIdentError, UsageError
+from scara_ident.excitation.clearance import Box, Clearance, clearance_of
 from scara_ident.excitation.tool import Tool, tool_motion, tool_of
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
@@ -23,6 +24,8 @@ Value = TypeVar("Value")
 SCARA03_TOOL_ACCELERATION = 9.0
 # Postures that are tried when the middle of the ranges is not within all limits.
 POSTURES = 4000
+# Share of the joints' limits that a motion uses, and distance that shapes keep, m.
+SHARE, CLEARANCE = 0.8, 0.01
 # A posture at rest must leave this share of every limit to move in.
 ROOM = 0.02
 
@@ -41,6 +44,8 @@ class Limits:
         Range of each joint, rad or m.
     velocity : ndarray, shape (n,)
         rad/s or m/s.
+    acceleration, jerk : ndarray, shape (n,)
+        rad/s^2 and rad/s^3, or m/s^2 and m/s^3; infinite where there is none.
     torque : ndarray, shape (n,)
         On the side where effort is recorded, N m or N; infinite where there is none.
     tool_acceleration, tool_speed : float
@@ -49,16 +54,29 @@ class Limits:
         Height in the base frame that the tool stays above, m; -inf where there is none.
     tool : Tool or None
         The point that the last three are about.
+    clearance : Clearance or None
+        Shapes that are kept apart; None: not asked for.
     """
 
     lower: Array
     upper: Array
     velocity: Array
+    acceleration: Array
+    jerk: Array
     torque: Array
     tool_acceleration: float = np.inf
     tool_speed: float = np.inf
     floor: float = -np.inf
     tool: Tool | None = field(default=None, repr=False)
+    clearance: Clearance | None = field(default=None, repr=False)
+
+    def words(self) -> str:
+        """Return what the limits are as text, equal for equal limits."""
+        kept = self.clearance
+        shapes = () if kept is None else (kept.margin, kept.floor, kept.boxes, kept.pairs)
+        arrays = (self.lower, self.upper, self.velocity, self.acceleration, self.jerk, self.torque)
+        tool = (self.tool_acceleration, self.tool_speed, self.floor, self.tool and self.tool.name)
+        return repr(([each.tolist() for each in arrays], tool, shapes))
 
     @property
     def centre(self) -> Array:
@@ -76,34 +94,43 @@ def limits_of(
     *,
     ranges: Mapping[str, tuple[float, float]] | None = None,
     velocities: Mapping[str, float] | None = None,
+    accelerations: Mapping[str, float] | None = None,
+    jerks: Mapping[str, float] | None = None,
     torques: Mapping[str, float] | None = None,
     tool_acceleration: float | None = None,
     tool_speed: float = np.inf,
     floor: float = -np.inf,
+    boxes: Sequence[Box] = (),
+    clearance: float | None = CLEARANCE,
     tool: str | None = None,
-    share: float = 1.0,
+    share: float = SHARE,
 ) -> Limits:
     """Gather the limits of a robot.
 
     Parameters
     ----------
     robot : Robot
-        Its URDF gives ranges, velocities and efforts.
-    ranges, velocities, torques : mapping from joint to limit, optional
-        Instead of the URDF's: (lower, upper) in rad or m, rad/s or m/s, and N m or N on the recorded side.
+        Its URDF gives ranges, velocities, efforts and collision shapes, its ``robot.yaml`` accelerations and jerks.
+    ranges, velocities, accelerations, jerks, torques : mapping from joint to limit, optional
+        Instead of these: (lower, upper) in rad or m, rad/s or m/s, rad/s^2 or m/s^2, rad/s^3 or m/s^3, and N m or N on
+        the recorded side.
     tool_acceleration : float, optional
         m/s^2; without it 9 for the SCARA03 and none for any other robot. Infinity lifts it.
     tool_speed, floor : float, optional
-        m/s, and a height in the base frame in m.
+        m/s, and a height in the base frame in m: of a floor for the tool, and for all links that have shapes.
+    boxes : sequence of Box, optional
+        Obstacles: centre and edges along the axes of the base frame, m.
+    clearance : float, optional
+        Distance that links keep from one another, from the floor and from boxes, m; None: not looked for.
     tool : str, optional
         Link whose origin is the tool; see `tool_of`.
     share : float, optional
-        Share of the ranges (about their middle), velocities and torques to be used, in (0, 1].
+        Share of the limits of every joint to be used, of ranges about their middle; in (0, 1].
 
     Raises
     ------
     UsageError
-        If a limit is given for a joint that the robot lacks, or makes no sense.
+        If a limit is given for a joint that the robot lacks, or makes no sense; if there are boxes without shapes.
     RobotError
         If a joint has no range or no velocity limit.
     """
@@ -111,11 +138,15 @@ def limits_of(
         raise UsageError(f"share of the limits {share:g}: expected more than 0 and at most 1")
     lower, upper = robot.lower.copy(), robot.upper.copy()
     velocity, torque = robot.velocity_limit.copy(), robot.torque_limit.copy()
+    acceleration, jerk = robot.acceleration_limit.copy(), robot.jerk_limit.copy()
     for joint, (low, high) in _of_joints(robot, ranges, "range"):
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise UsageError(f"range of {robot.joints[joint]}: {low:g}..{high:g} is empty; give lower < upper")
         lower[joint], upper[joint] = low, high
-    for given, wanted, kind in ((velocities, velocity, "velocity"), (torques, torque, "torque")):
+    for given, wanted, kind in (
+        (velocities, velocity, "velocity"), (accelerations, acceleration, "acceleration"), (jerks, jerk, "jerk"),
+        (torques, torque, "torque"),
+    ):  # fmt: skip
         for joint, limit in _of_joints(robot, given, kind):
             if not limit > 0.0:
                 raise UsageError(f"{kind} limit of {robot.joints[joint]}: {limit:g} allows no motion; give more than 0")
@@ -145,9 +176,16 @@ def limits_of(
     if not floor < np.inf:
         raise UsageError(f"floor {floor:g}: expected a height in m")
     middle, half = 0.5 * (lower + upper), 0.5 * share * (upper - lower)
+    lower, upper = middle - half, middle + half
     limits = Limits(
-        middle - half, middle + half, share * velocity, share * torque, tool_acceleration, tool_speed, floor
-    )
+        lower, upper, share * velocity, share * acceleration, share * jerk, share * torque,
+        tool_acceleration, tool_speed, floor,
+    )  # fmt: skip
+    if clearance is not None:
+        kept = clearance_of(robot, lower, upper, margin=clearance, floor=floor, boxes=boxes)
+        if boxes and not kept.pairs:
+            raise UsageError(f"boxes: {kept.notes[0]} Give the URDF collision shapes, or no boxes")
+        limits = replace(limits, clearance=kept)
     if limits.watches_tool or tool is not None:
         return replace(limits, tool=tool_of(robot, tool))
     return limits
@@ -282,9 +320,9 @@ def resting_posture(
         random = np.random.default_rng(seed)
         drawn = random.uniform(limits.lower[:, None], limits.upper[:, None], (robot.n, POSTURES))
         tried = np.concatenate([limits.centre[:, None], drawn], axis=1)
-    excess, broken = _at_rest(model, limits, nominal, tried)
-    if excess[0] <= -ROOM:
+    if _at_rest(model, limits, nominal, tried[:, :1])[0][0] <= -ROOM:
         return np.asarray(tried[:, 0])
+    excess, broken = _at_rest(model, limits, nominal, tried)
     best = int(np.argmin(excess))
     if excess[best] > -ROOM:
         where = "at the start" if start is not None else "in every posture tried"
@@ -305,6 +343,9 @@ def _at_rest(model: TorqueModel, limits: Limits, nominal: Array, q: Array) -> tu
     if limits.tool is not None and np.isfinite(limits.floor):
         height = tool_motion(limits.tool, q, still, still).position[2]
         shares.append(limits.floor - height)
+    if limits.clearance is not None and limits.clearance.pairs:
+        near = limits.clearance.rows(q)[0]
+        shares += list(near - 1.0)
     stacked = np.array(shares)
 
     def broken(index: int) -> str:
@@ -318,6 +359,8 @@ def _at_rest(model: TorqueModel, limits: Limits, nominal: Array, q: Array) -> tu
         if row < 2 * robot.n:
             name = robot.joints[row - robot.n]
             return f"{name} stands at the end of its range; start away from it"
+        if row >= 2 * robot.n + bool(np.isfinite(limits.floor)) and limits.clearance is not None:
+            return f"{limits.clearance.nearest_of(q[:, index])}; ask for less clearance, or move what is in the way"
         return (
             f"the tool's height is {height[index]:.4g} m where the floor is at {limits.floor:.4g} m; "
             "lower the floor, or start higher"

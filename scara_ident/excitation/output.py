@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from scara_ident.excitation.criteria import BlockLogDet, Condition
 from scara_ident.excitation.curves import Basis, ExcitationTrajectory
 from scara_ident.excitation.design import Design, information_of
 from scara_ident.excitation.limits import scara03_friction
+from scara_ident.excitation.stopping import Stopping
 from scara_ident.files import write_text
 from scara_ident.recording.files.parquet_csv import write_columns
 
@@ -125,15 +127,22 @@ def write_joint_trajectory(trajectory: ExcitationTrajectory, path: Path | str, r
     write_text(Path(path), joint_trajectory_yaml(trajectory, rate))
 
 
-def excitation_dict(design: Design) -> dict[str, Any]:
+def excitation_dict(design: Design, stopping: Stopping | None = None) -> dict[str, Any]:
     """Return the content of ``excitation.json``.
+
+    Parameters
+    ----------
+    design : Design
+    stopping : Stopping, optional
+        When more recordings no longer pay, where a std is asked.
 
     Returns
     -------
     dict
         Plain values; infinite numbers where something is not known.
     """
-    basis, effort = design.trajectories[0].basis, design.effort
+    longest = max(design.trajectories, key=lambda each: each.duration)
+    basis, effort = longest.basis, design.effort
     scaled = scaled_condition(design.information)
     criterion: dict[str, Any] = {"name": "tell" if design.tells else design.criterion.name}
     columns = design.criterion.columns if isinstance(design.criterion, (BlockLogDet, Condition)) else None
@@ -141,7 +150,7 @@ def excitation_dict(design: Design) -> dict[str, Any]:
         criterion["parameters"] = [design.model.names[k] for k in columns]
     finite = [cost for cost in design.costs if np.isfinite(cost)]
     return {
-        "summary": summary(design),
+        "summary": [*summary(design), *([] if stopping is None else [stopping.words()])],
         "notes": notes(design),
         "robot": design.model.robot.name,
         "model": design.model.name,
@@ -153,7 +162,7 @@ def excitation_dict(design: Design) -> dict[str, Any]:
         "condition_of_scaled_regressor": scaled,
         "log_det_with_prior": None if design.prior is None else design.total.log_det(),
         "duration": basis.duration,
-        "samples": design.samples,
+        "samples": design.samples[0] if len(set(design.samples)) == 1 else list(design.samples),
         "family": basis.family,
         "harmonics": _harmonics(basis),
         "intervals": basis.orders[0] if basis.family == "spline" else None,
@@ -162,6 +171,8 @@ def excitation_dict(design: Design) -> dict[str, Any]:
             each.name: {"bound": each.bound, "reached": each.reached, "unit": each.unit, "share": each.share}
             for each in design.reached
         },
+        **_distances(design),
+        **({} if stopping is None else {"stopping": stopping.entry()}),
         "active_limits": [each.name for each in design.reached if each.active],
         "verified_samples": design.verified,
         "noise_weights": dict(zip(design.model.robot.joints, design.weights.tolist(), strict=True)),
@@ -173,12 +184,13 @@ def excitation_dict(design: Design) -> dict[str, Any]:
             {
                 "name": each.name,
                 "file": file,
+                "duration": each.duration,
                 "log_det": alone.log_det(),
                 "condition": alone.condition(),
                 "joints": dict(zip(each.joints, each.series(), strict=True)),
             }
-            for each, file in zip(design.trajectories, file_names(design, ".csv"), strict=True)
-            for alone in [information_of(design.model, each, design.samples, design.weights)]
+            for each, samples, file in zip(design.trajectories, design.samples, file_names(design, ".csv"), strict=True)
+            for alone in [information_of(design.model, each, samples, design.weights)]
         ],
         "search": {
             "seed": effort.seed,
@@ -192,6 +204,20 @@ def excitation_dict(design: Design) -> dict[str, Any]:
     }
 
 
+def _distances(design: Design) -> dict[str, Any]:
+    """Return the smallest distances with the one asked for, and the obstacles, where there are shapes."""
+    clearance = design.limits.clearance
+    if clearance is None or not clearance.pairs:
+        return {}
+    kept = {each.name.removeprefix("distance."): each.reached for each in design.reached if "distance." in each.name}
+    boxes = [{"centre": list(centre), "edges": list(edges)} for centre, edges in clearance.boxes]
+    return {
+        "distances": kept,
+        "clearance": clearance.margin,
+        "obstacles": {"floor": clearance.floor if np.isfinite(clearance.floor) else None, "boxes": boxes},
+    }
+
+
 def summary(design: Design) -> list[str]:
     """Say in a few sentences what was designed."""
     count = len(design.trajectories)
@@ -199,8 +225,11 @@ def summary(design: Design) -> list[str]:
     held = [each.name for each in design.reached if each.active]
     broken = [each.name for each in design.reached if not each.kept]
     condition = np.sqrt(design.condition)
+    lengths = _listed([each.duration for each in design.trajectories])
+    samples = _listed(list(design.samples))
+    each = "" if count == 1 or len(set(design.samples)) > 1 else " each"
     return [
-        f"{what} of {design.trajectories[0].duration:g} s for {', '.join(design.model.robot.joints)}.",
+        f"{what} of {lengths} s for {', '.join(design.model.robot.joints)}.",
         f"Limits broken: {', '.join(broken)}."
         if broken
         else f"All limits hold, at {design.verified} samples and between them.",
@@ -209,17 +238,23 @@ def summary(design: Design) -> list[str]:
             for item in design.tells
         ),
         f"Held back by {', '.join(held)}." if held else "No limit holds it back: use more harmonics.",
-        f"Information: ln det {design.log_det:.2f} over {design.samples} samples{'' if count == 1 else ' each'}, condition of the "
-        f"regressor {condition:.4g}.",
+        f"Information: ln det {design.log_det:.2f} over {samples} samples{each}, condition of the regressor {condition:.4g}.",
     ]
+
+
+def _listed(numbers: Sequence[float]) -> str:
+    """Return one number where all are the same, else all."""
+    words = [f"{number:g}" for number in (numbers[:1] if len(set(numbers)) == 1 else numbers)]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def notes(design: Design) -> list[str]:
     """Say what the design rests on."""
-    said = ["Collisions of the arm with itself or its surroundings were not looked for: rehearse it slowly."]
+    clearance = design.limits.clearance
+    said = list(clearance.notes) if clearance is not None else ["Collisions were not looked for: rehearse it slowly."]
     if np.any(np.isfinite(design.limits.torque)):
         said.append(_foreseen(design))
-    bandwidth = design.trajectories[0].basis.bandwidth
+    bandwidth = max(each.basis.bandwidth for each in design.trajectories)
     if bandwidth > SWINGING:
         said.append(f"The motion reaches {bandwidth:g} Hz, where many arms swing: use fewer harmonics if yours does.")
     if not design.trajectories[0].basis.periodic:

@@ -32,12 +32,11 @@ class Task:
     nominal : ndarray, shape (p,)
         Parameters of which torques are foreseen, without Coulomb friction.
     criterion : Criterion
-    basis : Basis
+    bases : tuple of Basis
+        Of each of the k trajectories that are designed together.
     posture : ndarray, shape (n,)
         Posture at rest that coefficients of zero give.
-    trajectories : int
-        How many, k, are designed together.
-    samples : int
+    samples : tuple of int
         Samples of each trajectory in the criterion.
     weights : ndarray, shape (n,)
         Weight of every joint's rows: 1 for R_v = identity, else 1 / std of its torque.
@@ -49,17 +48,21 @@ class Task:
     limits: Limits
     nominal: Array
     criterion: Criterion
-    basis: Basis
+    bases: tuple[Basis, ...]
     posture: Array
-    trajectories: int
-    samples: int
+    samples: tuple[int, ...]
     weights: Array
     prior: Array
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Shape of the coefficients (k, n, m)."""
-        return self.trajectories, len(self.posture), self.basis.size
+        """Shape of the coefficients (k, n, m); those beyond the size of a basis move nothing."""
+        return self.trajectories, len(self.posture), max(basis.size for basis in self.bases)
+
+    @property
+    def trajectories(self) -> int:
+        """How many, k, are designed together."""
+        return len(self.bases)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +78,11 @@ class Slopes:
     values : ndarray, shape (R, k M)
         All rows.
     own : tuple of (int, int, float)
-        For the first rows, which depend on one joint: derivative (0 position, 1 velocity), joint, scale.
+        For the first rows, which depend on one joint: derivative (0 position, 1 velocity, ...), joint, scale.
     shared : ndarray, shape (R', k, M, n m)
         Derivative of the rows after them.
-    rows : ndarray, shape (3, M, m)
-        The basis.
+    rows : ndarray, shape (4, k, M, m)
+        The bases.
     """
 
     cost: float
@@ -92,32 +95,34 @@ class Slopes:
     def pull(self, u: Array) -> Array:
         """Return the transposed derivative of all rows times u (R, k M), shape (k, n m)."""
         k, _, width = self.shared.shape[1:]
-        m = self.rows.shape[2]
+        m = self.rows.shape[3]
         u = u.reshape(len(u), k, -1)
         result = (
             np.einsum("rkM,rkMx->kx", u[len(self.own) :], self.shared) if len(self.shared) else np.zeros((k, width))
         )
         for row, (kind, joint, scale) in enumerate(self.own):
-            result[:, joint * m : (joint + 1) * m] += scale * (u[row] @ self.rows[kind])
+            result[:, joint * m : (joint + 1) * m] += scale * np.einsum("kM,kMm->km", u[row], self.rows[kind])
         return np.asarray(result)
 
     def push(self, x: Array) -> Array:
         """Return the derivative of all rows times x (k, n m), shape (R, k M)."""
-        m = self.rows.shape[2]
-        own = [scale * (x[:, j * m : (j + 1) * m] @ self.rows[kind].T) for kind, j, scale in self.own]
+        m = self.rows.shape[3]
+        own = [
+            scale * np.einsum("km,kMm->kM", x[:, j * m : (j + 1) * m], self.rows[kind]) for kind, j, scale in self.own
+        ]
         shared = np.einsum("rkMx,kx->rkM", self.shared, x)
         return np.concatenate([np.array(own), shared]).reshape(len(self.values), -1)
 
     def curvature(self, d: Array) -> Array:
         """Return the squares of all derivatives weighted with d (R, k M), summed over samples, shape (k, n m, n m)."""
         k, _, width = self.shared.shape[1:]
-        m = self.rows.shape[2]
+        m = self.rows.shape[3]
         d = d.reshape(len(d), k, -1)
         result = np.zeros((k, width, width))
         for part in range(k):
             for row, (kind, joint, scale) in enumerate(self.own):
                 place = slice(joint * m, (joint + 1) * m)
-                basis = self.rows[kind]
+                basis = self.rows[kind, part]
                 half = basis * (abs(scale) * np.sqrt(d[row, part]))[:, None]
                 result[part, place, place] += half.T @ half
             for row, slope in enumerate(self.shared[:, part]):
@@ -133,18 +138,21 @@ class Problem:
     Attributes
     ----------
     task : Task
-    rows : ndarray, shape (3, M, m)
-        Basis and its derivatives at the M times of the limits.
+    rows : ndarray, shape (4, k, M, m)
+        Bases and their derivatives at the M times of the limits.
     stride : int
         Every stride-th of them counts in the criterion.
     bounds : ndarray, shape (R,)
         Bound of each row of limits, 1 or a little less to make up for what happens between the times.
+    sparse : int
+        At every sparse-th of them distances are measured; 1 for all pairs of shapes, else for the likely ones.
     """
 
     task: Task
     rows: Array
     stride: int
     bounds: Array
+    sparse: int = 1
 
     def sharpened(self, share: float) -> Problem:
         """Return the problem as it is to be solved first (share 0) or last (share 1)."""
@@ -157,27 +165,49 @@ class Problem:
     def two_sided(self) -> NDArray[np.bool_]:
         """Which rows are bounded from both sides, shape (R,)."""
         names = row_names(self.task.limits, len(self.task.posture))
-        return np.array([not name.startswith("tool") for name, _ in names])
+        return np.array([joint is not None for _, joint in names])
 
     def motion(self, x: Array) -> Motion:
         """Return the motion of coefficients (k, n, m): the samples of all trajectories, one after the other."""
-        q, v, a = (np.einsum("knm,Mm->nkM", x, rows).reshape(x.shape[1], -1) for rows in self.rows)
+        q, v, a = (self._derivative(x, order) for order in range(3))
         q = q + self.task.posture[:, None]
         return Motion("design", "design", np.arange(q.shape[1], dtype=float), q, v, a, None, 1.0)
 
+    def _derivative(self, x: Array, order: int) -> Array:
+        return np.asarray(np.einsum("knm,kMm->nkM", x, self.rows[order]).reshape(x.shape[1], -1))
+
     def values(self, x: Array) -> tuple[float, Array]:
-        """Return cost and rows of limits (R, k M) of coefficients; infinite cost where limits are broken."""
+        """Return cost and rows of limits (R, k M) of coefficients; infinite cost, and some rows, where limits are broken."""
         motion = self.motion(x)
-        cheap = self._own(motion)
-        if np.any(np.abs(cheap) >= self.bounds[: len(cheap), None]):
-            return np.inf, cheap
+        values = self._own(x, motion)
+        if not self._kept(values):
+            return np.inf, values
         regressor = self.task.smooth.regressor(motion)
-        return self._cost(regressor)[0], self._limited(motion, regressor)
+        values = self._limited(values, motion, regressor)
+        if self._kept(values):
+            # Last, as they take longest.
+            values = np.concatenate([values, self._distances(motion)[0]])
+        return self._cost(regressor)[0] if self._kept(values) else np.inf, values
+
+    def inside(self, x: Array) -> bool:
+        """Tell whether all limits are kept, whatever the cost."""
+        motion = self.motion(x)
+        values = self._own(x, motion)
+        if not self._kept(values):
+            return False
+        values = self._limited(values, motion, self.task.smooth.regressor(motion))
+        return self._kept(values) and self._kept(np.concatenate([values, self._distances(motion)[0]]))
+
+    def _kept(self, values: Array) -> bool:
+        """Whether the first rows are within their bounds."""
+        two, bounds = self.two_sided[: len(values), None], self.bounds[: len(values), None]
+        return bool(np.all(np.where(two, np.abs(values), values) < bounds))
 
     def limited(self, x: Array) -> Array:
         """Return all rows of limits (R, k M), broken or not."""
         motion = self.motion(x)
-        return self._limited(motion, self.task.smooth.regressor(motion))
+        values = self._limited(self._own(x, motion), motion, self.task.smooth.regressor(motion))
+        return np.concatenate([values, self._distances(motion)[0]])
 
     def slopes(self, x: Array) -> Slopes:
         """Return cost and limits with their derivatives."""
@@ -188,47 +218,61 @@ class Problem:
         cost, gradient = self._cost(regressor)
         counted = self._counted(regressor)
         weights = np.zeros_like(regressor)
-        scale = 2.0 * self._share * task.weights[:, None, None] ** 2
-        weights.reshape(n, -1, k, motion.samples // k)[..., :: self.stride] = (
-            scale * np.einsum("pr,irN->ipN", gradient, counted)
+        scale = 2.0 * self._share[:, None] * task.weights[:, None, None, None] ** 2
+        weights.reshape(n, -1, k, motion.samples // k)[..., :: self.stride] = scale * np.einsum(
+            "pr,irN->ipN", gradient, counted
         ).reshape(n, -1, k, counted.shape[2] // k)
         by_motion, torque = task.smooth.derivatives(motion, weights, task.nominal)
         limited = np.isfinite(task.limits.torque)
         dense = [torque[limited] / task.limits.torque[limited, None, None, None]]
         tool_rows = self._tool_rows(self._tool(motion), True)
         dense += [slope[None] for _, slope in tool_rows]
+        near, nearing = self._distances(motion, True)
+        dense.append(np.stack([nearing, *2 * [np.zeros_like(nearing)]], axis=1))
         by_kind = by_motion.reshape(3, n, k, -1)
         return Slopes(
             cost=cost,
-            gradient=np.einsum("dnkM,dMm->knm", by_kind, self.rows).reshape(k, -1),
-            values=np.concatenate([self._own(motion), torques, *(row[None] for row, _ in tool_rows)]),
+            gradient=np.einsum("dnkM,dkMm->knm", by_kind, self.rows[:3]).reshape(k, -1),
+            values=np.concatenate([self._own(x, motion), torques, *(row[None] for row, _ in tool_rows), near]),
             own=self._own_rows(),
             shared=self._chained(np.concatenate(dense), k),
             rows=self.rows,
         )
 
     @property
-    def _share(self) -> float:
-        """Samples of the criterion that one sample of the grid stands for."""
-        return self.task.samples * self.stride / int(self.rows.shape[1])
+    def _share(self) -> Array:
+        """Samples of the criterion that one sample of the grid stands for, shape (k,)."""
+        return np.asarray(np.array(self.task.samples) * self.stride / self.rows.shape[2])
 
     def _own_rows(self) -> tuple[tuple[int, int, float], ...]:
         limits = self.task.limits
-        half = 0.5 * (limits.upper - limits.lower)
-        return tuple((0, j, 1.0 / x) for j, x in enumerate(half)) + tuple(
-            (1, j, 1.0 / x) for j, x in enumerate(limits.velocity)
+        bounds = (0.5 * (limits.upper - limits.lower), limits.velocity, limits.acceleration, limits.jerk)
+        return tuple(
+            (kind, j, 1.0 / float(x)) for kind, each in enumerate(bounds) for j, x in enumerate(each) if np.isfinite(x)
         )
 
-    def _own(self, motion: Motion) -> Array:
-        limits = self.task.limits
-        half = 0.5 * (limits.upper - limits.lower)
-        return np.concatenate(
-            [(motion.q - limits.centre[:, None]) / half[:, None], motion.v / limits.velocity[:, None]]
-        )
+    def _own(self, x: Array, motion: Motion) -> Array:
+        centre = self.task.limits.centre[:, None]
+        jerk = self._derivative(x, 3) if np.isfinite(self.task.limits.jerk).any() else motion.a
+        signals = (motion.q - centre, motion.v, motion.a, jerk)
+        return np.array([scale * signals[kind][j] for kind, j, scale in self._own_rows()])
 
-    def _limited(self, motion: Motion, regressor: Array) -> Array:
+    def _limited(self, own: Array, motion: Motion, regressor: Array) -> Array:
         rows = [row[None] for row, _ in self._tool_rows(self._tool(motion), False)]
-        return np.concatenate([self._own(motion), self._torques(regressor), *rows])
+        return np.concatenate([own, self._torques(regressor), *rows])
+
+    def _distances(self, motion: Motion, slopes: bool = False) -> tuple[Array, Array]:
+        """Return rows of distances, shape (G, k M), with their derivatives by positions (G, n, k M) if asked for."""
+        clearance, k = self.task.limits.clearance, self.task.trajectories
+        groups = 0 if clearance is None else len(clearance.groups)
+        rows = np.zeros((groups, motion.samples))
+        slope = np.zeros((groups, *motion.q.shape)) if slopes else np.zeros(0)
+        if clearance is not None and groups:
+            places = np.arange(motion.samples).reshape(k, -1)[:, :: self.sparse].ravel()
+            rows[:, places], nearing = clearance.rows(motion.q[:, places], likely=self.sparse > 1, slopes=slopes)
+            if slopes:
+                slope[..., places] = nearing
+        return rows, slope
 
     def _torques(self, regressor: Array) -> Array:
         limit = self.task.limits.torque
@@ -252,23 +296,26 @@ class Problem:
 
     def _cost(self, regressor: Array) -> tuple[float, Array]:
         rows = self._counted(regressor) * self.task.weights[:, None, None]
-        stacked = rows.transpose(1, 0, 2).reshape(rows.shape[1], -1)
-        return self.task.criterion.cost(self._share * (stacked @ stacked.T) + self.task.prior)
+        rows = rows.reshape(*rows.shape[:2], self.task.trajectories, -1) * np.sqrt(self._share)[:, None]
+        stacked = rows.transpose(1, 0, 2, 3).reshape(rows.shape[1], -1)
+        return self.task.criterion.cost(stacked @ stacked.T + self.task.prior)
 
     def _chained(self, slopes: Array, k: int) -> Array:
         """Chain derivatives of rows by the motion (R', 3, n, k M) with the basis: (R', k, M, n m)."""
         count, _, n, _ = slopes.shape
         parts = slopes.reshape(count, 3, n, k, -1)
-        result = np.einsum("rnkM,Mm->rkMnm", parts[:, 0], self.rows[0])
+        result = np.einsum("rnkM,kMm->rkMnm", parts[:, 0], self.rows[0])
         for kind in (1, 2):
-            result += np.einsum("rnkM,Mm->rkMnm", parts[:, kind], self.rows[kind])
-        return np.asarray(result.reshape(count, k, self.rows.shape[1], -1))
+            result += np.einsum("rnkM,kMm->rkMnm", parts[:, kind], self.rows[kind])
+        return np.asarray(result.reshape(count, k, self.rows.shape[2], -1))
 
 
 def row_names(limits: Limits, joints: int) -> list[tuple[str, int | None]]:
     """List the rows of limits: what they limit and on which joint, in the order of `Slopes`."""
     names: list[tuple[str, int | None]] = [("position", j) for j in range(joints)]
     names += [("velocity", j) for j in range(joints)]
+    names += [("acceleration", j) for j in range(joints) if np.isfinite(limits.acceleration[j])]
+    names += [("jerk", j) for j in range(joints) if np.isfinite(limits.jerk[j])]
     names += [("torque", j) for j in range(joints) if np.isfinite(limits.torque[j])]
     if np.isfinite(limits.tool_acceleration):
         names.append(("tool_acceleration", None))
@@ -276,6 +323,8 @@ def row_names(limits: Limits, joints: int) -> list[tuple[str, int | None]]:
         names.append(("tool_speed", None))
     if np.isfinite(limits.floor):
         names.append(("tool_height", None))
+    if limits.clearance is not None:
+        names += [(f"distance_{group}", None) for group in limits.clearance.groups]
     return names
 
 

@@ -19,6 +19,8 @@ from scara_ident.threads import one_blas_thread
 
 # Times of the limits per period of the highest frequency, in the search and for the winner.
 COARSE, FINE = 12, 48
+# Distances are measured at every so many-th of them.
+SPARSE = {COARSE: 3, FINE: 6}
 LEAST_TIMES = 60
 # Times of the verification per time of the winner's limits, and at least per second.
 FINER, LEAST_RATE = 10, 1000.0
@@ -30,6 +32,8 @@ ELITE = 3
 # Random starts have this share of the highest frequency as their bandwidth, and this share of the velocity limits.
 SLOW, GENTLE = 0.25, 0.5
 CORRECTIONS = 5
+# How much a motion shrinks that is beyond a limit, of the share beyond it; and at least and at most.
+SHRUNK, SHRINKING = 0.5, (0.95, 0.999)
 # Combinations of parameters whose columns, of unit length, sum up to less than this share are not seen.
 UNSEEN = 1e-9
 
@@ -135,9 +139,9 @@ def _rows(task: Task) -> int:
 
 def within_grid(task: Task, density: int, bounds: Array, stride: int = 1) -> Problem:
     """Return a task on so many times per period of its highest frequency; every stride-th counts in the criterion."""
-    periods = task.basis.bandwidth * task.basis.duration
+    periods = max(basis.bandwidth * basis.duration for basis in task.bases)
     counted = max(LEAST_TIMES, int(np.ceil(density / stride * periods)))
-    return Problem(task, grid(task.basis, stride * counted), stride, bounds)
+    return Problem(task, grid(task.bases, stride * counted), stride, bounds, SPARSE[density])
 
 
 def _from(problem: Problem, seed: int, index: int, parent: Array | None) -> Minimum | None:
@@ -153,18 +157,19 @@ def _from(problem: Problem, seed: int, index: int, parent: Array | None) -> Mini
 
 def _random_motion(task: Task, random: np.random.Generator) -> Array:
     """Draw a slow motion of about half the velocity limits."""
-    k, n, _ = task.shape
-    basis = task.basis
-    time = basis.duration * (np.arange(8 * basis.size) + 0.5) / (8 * basis.size)
-    top = max(3.0, SLOW * basis.bandwidth * basis.duration)
-    orders = np.arange(1, int(np.ceil(top)) + 1)
-    phases = 2.0 * np.pi / basis.duration * np.outer(orders, time)
-    sizes = random.normal(size=(2, k, n, len(orders))) / np.sqrt(len(orders))
-    velocity = sizes[0] @ np.cos(phases) + sizes[1] @ np.sin(phases)
-    velocity *= GENTLE * task.limits.velocity[:, None]
-    # The motion of the basis whose velocity is nearest to that.
-    fit, *_ = np.linalg.lstsq(basis.rows(time, 1), velocity.reshape(k * n, -1).T, rcond=1e-9)
-    return np.asarray(fit.T.reshape(task.shape))
+    x = np.zeros(task.shape)
+    for own, basis in zip(x, task.bases, strict=True):
+        time = basis.duration * (np.arange(8 * basis.size) + 0.5) / (8 * basis.size)
+        top = max(3.0, SLOW * basis.bandwidth * basis.duration)
+        orders = np.arange(1, int(np.ceil(top)) + 1)
+        phases = 2.0 * np.pi / basis.duration * np.outer(orders, time)
+        sizes = random.normal(size=(2, len(own), len(orders))) / np.sqrt(len(orders))
+        velocity = sizes[0] @ np.cos(phases) + sizes[1] @ np.sin(phases)
+        velocity *= GENTLE * task.limits.velocity[:, None]
+        # The motion of the basis whose velocity is nearest to that.
+        fit, *_ = np.linalg.lstsq(basis.rows(time, 1), velocity.T, rcond=1e-9)
+        own[:, : basis.size] = fit.T
+    return x
 
 
 def _finish(task: Task, x: Array) -> tuple[Array, int]:
@@ -181,7 +186,7 @@ def _finish(task: Task, x: Array) -> tuple[Array, int]:
         excess = _excess(task, x, times)
         if np.all(excess <= 1.0):
             return x, times
-        bounds = bounds * np.where(excess > 1.0, (1.0 - MARGIN) / excess, 1.0)
+        bounds = bounds * np.where(excess > 1.0, (1.0 - MARGIN) / np.maximum(excess, 1.0), 1.0)
         problem = within_grid(task, FINE, bounds, FINE // COARSE)
         plan = Schedule(first=0.5, last=2e-3, tolerance=1e-2, steps=150, sharpness=1.0)
     return verified_inside(problem, x)
@@ -190,19 +195,20 @@ def _finish(task: Task, x: Array) -> tuple[Array, int]:
 def verified_inside(problem: Problem, x: Array) -> tuple[Array, int]:
     """Shrink a motion until it keeps all limits between samples ten times finer too; return it, and their number."""
     times = _verified_times(problem)
-    while np.any(_excess(problem.task, x, times) > 1.0):
-        x = 0.999 * x
+    while (most := float(np.max(_excess(problem.task, x, times)))) > 1.0:
+        x = float(np.clip(1.0 - SHRUNK * (most - 1.0), *SHRINKING)) * x
     return x, times
 
 
 def _verified_times(problem: Problem) -> int:
-    return max(FINER * int(problem.rows.shape[1]), int(np.ceil(LEAST_RATE * problem.task.basis.duration))) + 1
+    longest = max(basis.duration for basis in problem.task.bases)
+    return max(FINER * int(problem.rows.shape[2]), int(np.ceil(LEAST_RATE * longest))) + 1
 
 
 def _excess(task: Task, x: Array, times: int) -> Array:
     """Largest value of every row, as a share of its bound."""
     largest, smallest = extremes(task, x, times)
-    one_sided = np.array([name.startswith("tool") for name, _ in row_names(task.limits, len(task.posture))])
+    one_sided = np.array([joint is None for _, joint in row_names(task.limits, len(task.posture))])
     return np.where(one_sided, largest, np.maximum(largest, -smallest))
 
 
@@ -215,7 +221,12 @@ def _tightest(problem: Problem, seed: int) -> str:
     # Rows of the tool's acceleration and speed are squares.
     squared = np.array([kind in ("tool_acceleration", "tool_speed") for kind, _ in names])
     kind, joint = names[int(np.argmax(np.where(squared, np.sqrt(values), values)))]
-    if joint is None:
+    if kind.startswith("distance"):
+        clearance = limits.clearance
+        assert clearance is not None
+        other = kind.removeprefix("distance_")
+        where = f"clearance of {clearance.margin:g} m {'of the links' if other == 'self' else f'to {other}'}"
+    elif joint is None:
         bound = {"tool_acceleration": limits.tool_acceleration, "tool_speed": limits.tool_speed}.get(kind, limits.floor)
         unit = {"tool_acceleration": "m/s^2", "tool_speed": "m/s"}.get(kind, "m")
         where = f"{kind.replace('_', ' ')} limit of {bound:.4g} {unit}"
@@ -224,6 +235,8 @@ def _tightest(problem: Problem, seed: int) -> str:
         bound, unit = {
             "position": (limits.upper[joint] - limits.lower[joint], length),
             "velocity": (limits.velocity[joint], f"{length}/s"),
+            "acceleration": (limits.acceleration[joint], f"{length}/s^2"),
+            "jerk": (limits.jerk[joint], f"{length}/s^3"),
             "torque": (limits.torque[joint], robot.torque_unit(joint)),
         }[kind]
         what = "range" if kind == "position" else f"{kind} limit"

@@ -173,7 +173,7 @@ class _Judge:
 
     def cost(self, x: Array) -> float:
         """Return minus the weighted sum of the logarithms of what questions gain."""
-        basis = self.task.basis
+        (basis,) = self.task.bases
         motion = motion_of(basis, self.task.posture, x[0], self.rate)
         sigma = self.inquiry.sigmas(spectral_rows(self.inquiry, motion))
         return -float(self.weights @ np.log1p((sigma / SURE) ** 2))
@@ -191,7 +191,7 @@ def motion_of(basis: Basis, posture: Array, coefficients: Array, rate: float) ->
     """Return samples of a motion at equal steps over its period, the end left out."""
     count = round(basis.duration * rate)
     time = np.arange(count, dtype=np.float64) / rate
-    q, v, a = (coefficients @ rows.T for rows in _rows(basis, count))
+    q, v, a = (coefficients @ rows.T for rows in _rows(basis, count)[:3])
     return Motion("asked", "asked", time, q + posture[:, None], v, a, None, rate)
 
 
@@ -212,7 +212,7 @@ def _best(problem: Problem, judge: _Judge, random: np.random.Generator, rounds: 
 def random_motion(task: Task, random: np.random.Generator) -> Array:
     """Draw a motion, shape (1, n, m): each joint with its own speed and pace, about its own place, or at rest."""
     _, n, m = task.shape
-    basis, limits = task.basis, task.limits
+    (basis,), limits = task.bases, task.limits
     highest = basis.bandwidth * basis.duration
     time = basis.duration * np.arange(8 * m) / (8 * m)
     velocity = np.zeros((n, len(time)))
@@ -242,8 +242,8 @@ def _mean(basis: Basis, x: Array) -> Array:
 
 @lru_cache(maxsize=8)
 def _rows(basis: Basis, count: int) -> Array:
-    """The basis and its derivatives at equal steps over its period, shape (3, count, m)."""
-    return grid(basis, count)
+    """The basis and its derivatives at equal steps over its period, shape (4, count, m)."""
+    return grid((basis,), count)[:, 0]
 
 
 @lru_cache(maxsize=8)
@@ -266,7 +266,7 @@ def _changed(task: Task, x: Array, random: np.random.Generator) -> Array:
     elif kind == 1:
         y[0, chosen] *= np.exp(GROWTH * random.normal(size=(int(np.sum(chosen)), 1)))
     else:
-        basis = task.basis
+        (basis,) = task.bases
         reach = 0.3 * (task.limits.upper - task.limits.lower) * random.normal(size=n)
         y[0] = np.where(chosen[:, None], _placed(basis, x[0], _mean(basis, x[0]) + reach), x[0])
     return y
@@ -274,11 +274,11 @@ def _changed(task: Task, x: Array, random: np.random.Generator) -> Array:
 
 def _inside(problem: Problem, x: Array) -> Array | None:
     """Bring a motion within its limits: first each joint's position and speed, then all of it; None where it never is."""
-    limits, basis, posture = problem.task.limits, problem.task.basis, problem.task.posture
+    limits, (basis,), posture = problem.task.limits, problem.task.bases, problem.task.posture
     bound = float(np.min(problem.bounds))
-    speed = np.max(np.abs(x[0] @ problem.rows[1].T), axis=1)
+    speed = np.max(np.abs(x[0] @ problem.rows[1, 0].T), axis=1)
     x = x * np.minimum(1.0, bound * limits.velocity / np.maximum(speed, 1e-12))[None, :, None]
-    q = x[0] @ problem.rows[0].T + posture[:, None]
+    q = x[0] @ problem.rows[0, 0].T + posture[:, None]
     low, high = q.min(axis=1), q.max(axis=1)
     half = 0.5 * bound * (limits.upper - limits.lower)
     size = np.minimum(1.0, 2.0 * half / np.maximum(high - low, 1e-12))
@@ -288,9 +288,7 @@ def _inside(problem: Problem, x: Array) -> Array | None:
     moved = middle + size * (mean - 0.5 * (low + high)) - posture
     x = _placed(basis, size[:, None] * x[0], moved)[None]
     for _ in range(TRIES):
-        values = problem.limited(x)
-        share = np.where(problem.two_sided, np.max(np.abs(values), axis=1), np.max(values, axis=1))
-        if np.all(share <= problem.bounds):
+        if problem.inside(x):
             return x
         x = SHRINKING * x
     return None

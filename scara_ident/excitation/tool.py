@@ -115,7 +115,7 @@ def tool_motion(tool: Tool, q: Array, v: Array, a: Array) -> ToolMotion:
         else:
             twist = twist + axis * ddx + rate * dx
             spin = spin + axis * dx
-            turn = np.einsum("abN,bcN->acN", turn, _rotation(joint.axis, x))
+            turn = np.einsum("abN,bcN->acN", turn, rotation(joint.axis, x))
         centres.append((origin, speed, push))
     arm = np.einsum("abN,b->aN", turn, tool.point)
     swing = _cross(spin, arm)
@@ -137,8 +137,8 @@ def _cross(x: Array, y: Array) -> Array:
     return np.stack([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]])
 
 
-def _rotation(axis: Array, angle: Array) -> Array:
-    """Rotations about an axis, shape (3, 3, N), by Rodrigues' formula."""
+def rotation(axis: Array, angle: Array) -> Array:
+    """Return rotations about an axis, shape (3, 3, N), by Rodrigues' formula."""
     x, y, z = axis
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     first, second = skew[:, :, None], (skew @ skew)[:, :, None]

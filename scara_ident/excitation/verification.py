@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.excitation.clearance import REACH
 from scara_ident.excitation.curves import CHUNK, Basis
 from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.problem import Problem, Task, row_names
+
+PER_SECOND = {"velocity": "s", "acceleration": "s^2", "jerk": "s^3"}
 
 
 @dataclass(frozen=True)
@@ -19,14 +23,16 @@ class Reached:
     Attributes
     ----------
     name : str
-        ``<joint>.position.lower``, ``<joint>.position.upper``, ``<joint>.velocity``, ``<joint>.torque``,
-        ``tool.acceleration``, ``tool.speed`` or ``tool.height``.
+        ``<joint>.position.lower``, ``<joint>.position.upper``, ``<joint>.velocity``, ``<joint>.acceleration``,
+        ``<joint>.jerk``, ``<joint>.torque``, ``tool.acceleration``, ``tool.speed``, ``tool.height``, or
+        ``distance.self``, ``distance.floor``, ``distance.box1``, ....
     bound : float
     reached : float
-        The largest value, the smallest of lower bounds and of height; between the samples too.
+        The largest value, the smallest of lower bounds, of height and of distances; between the samples too.
     unit : str
     share : float
-        Of the bound that is used, of a range's half from its middle; above 1 the limit is broken.
+        Of the bound that is used, of a range's half from its middle; above 1 the limit is broken. Of height and
+        distances 1 at the bound and less with what room there is beyond it.
     """
 
     name: str
@@ -46,13 +52,20 @@ class Reached:
         return self.share > 0.99
 
 
-def grid(basis: Basis, times: int) -> Array:
-    """Return the basis and its two derivatives at equally spaced times, shape (3, times, m)."""
-    step = basis.duration / times
+def rows_at(bases: Sequence[Basis], shares: Array) -> Array:
+    """Return bases and their three derivatives at shares (M,) of their durations, shape (4, k, M, m), padded by zeros."""
+    rows = np.zeros((4, len(bases), len(shares), max(basis.size for basis in bases)))
+    for k, basis in enumerate(bases):
+        for order in range(4):
+            rows[order, k, :, : basis.size] = basis.rows(basis.duration * shares, order)
+    return rows
+
+
+def grid(bases: Sequence[Basis], times: int) -> Array:
+    """Return bases and their three derivatives at equally spaced times, shape (4, k, times, m)."""
     # A period closes on itself; otherwise the middles of the intervals, where a sum is a good integral.
-    offset = 0.0 if basis.periodic else 0.5 * step
-    time: Array = step * np.arange(times, dtype=np.float64) + offset
-    return np.array([basis.rows(time, order) for order in range(3)])
+    offset = 0.0 if bases[0].periodic else 0.5
+    return rows_at(bases, (np.arange(times, dtype=np.float64) + offset) / times)
 
 
 def extremes(task: Task, x: Array, times: int) -> tuple[Array, Array]:
@@ -72,21 +85,21 @@ def extremes(task: Task, x: Array, times: int) -> tuple[Array, Array]:
     -------
     largest, smallest : ndarray, shape (R,)
     """
-    time: Array = np.asarray(np.linspace(0.0, task.basis.duration, times), dtype=np.float64)
+    shares: Array = np.asarray(np.linspace(0.0, 1.0, times), dtype=np.float64)
     found = []
     for first in range(0, times, CHUNK):
         # With two neighbours on either side, for second differences around every time.
         begin, end = max(0, first - 2), min(times, first + CHUNK + 2)
-        high, low = _envelope(task, x, time[begin:end])
+        high, low = _envelope(task, x, shares[begin:end])
         kept = slice(first - begin, min(first + CHUNK, times) - begin)
         found.append((high[..., kept].max(axis=(1, 2)), low[..., kept].min(axis=(1, 2))))
     return np.max([high for high, _ in found], axis=0), np.min([low for _, low in found], axis=0)
 
 
-def _envelope(task: Task, x: Array, time: Array) -> tuple[Array, Array]:
-    """Return what rows may reach around times, from above and from below, shape (R, k, M)."""
-    rows = np.array([task.basis.rows(time, order) for order in range(3)])
-    values = Problem(task, rows, 1, np.ones(0)).limited(x).reshape(-1, task.trajectories, len(time))
+def _envelope(task: Task, x: Array, shares: Array) -> tuple[Array, Array]:
+    """Return what rows may reach around shares of the durations, from above and from below, shape (R, k, M)."""
+    problem = Problem(task, rows_at(task.bases, shares), 1, np.ones(0))
+    values = problem.limited(x).reshape(-1, task.trajectories, len(shares))
     around = np.zeros_like(values)
     around[..., 1:-1] = np.abs(np.diff(values, n=2, axis=2))
     beyond = np.maximum(around, np.maximum(np.roll(around, 1, axis=2), np.roll(around, -1, axis=2))) / 8.0
@@ -110,7 +123,10 @@ def reached(task: Task, torque: Array, x: Array, times: int) -> tuple[Reached, .
     found = []
     for (kind, joint), high, low in zip(row_names(limits, robot.n), largest, smallest, strict=True):
         if joint is None:
-            found.append(_of_tool(limits, kind, float(high)))
+            if kind.startswith("distance"):
+                found.append(_of_distance(task, x, kind.removeprefix("distance_"), float(high), times))
+            else:
+                found.append(_of_tool(limits, kind, float(high)))
             continue
         name, length = robot.joints[joint], robot.position_unit(joint)
         both = float(max(high, -low))
@@ -119,14 +135,28 @@ def reached(task: Task, torque: Array, x: Array, times: int) -> tuple[Reached, .
             for side, ends, value in (("lower", limits.lower, -low), ("upper", limits.upper, high)):
                 place = centre + (half if side == "upper" else -half) * value
                 found.append(Reached(f"{name}.position.{side}", float(ends[joint]), float(place), length, float(value)))
-        elif kind == "velocity":
-            bound = float(limits.velocity[joint])
-            found.append(Reached(f"{name}.velocity", bound, both * bound, f"{length}/s", both))
+        elif kind != "torque":
+            bound = float(getattr(limits, kind)[joint])
+            found.append(Reached(f"{name}.{kind}", bound, both * bound, f"{length}/{PER_SECOND[kind]}", both))
         else:
             bound, left = float(torque[joint]), float(limits.torque[joint])
             value = bound - left + both * left
             found.append(Reached(f"{name}.torque", bound, value, robot.torque_unit(joint), value / bound))
     return tuple(found)
+
+
+def _of_distance(task: Task, x: Array, group: str, value: float, times: int) -> Reached:
+    clearance = task.limits.clearance
+    assert clearance is not None
+    margin = clearance.margin
+    if value > 0.0:
+        return Reached(f"distance.{group}", margin, margin + REACH * (1.0 - value), "m", value)
+    # Nothing came near: rows do not tell how far away it stayed.
+    least = np.inf
+    for shares in np.array_split(np.linspace(0.0, 1.0, times), -(-times // CHUNK)):
+        motion = Problem(task, rows_at(task.bases, shares), 1, np.ones(0)).motion(x)
+        least = min(least, clearance.smallest(motion.q, group))
+    return Reached(f"distance.{group}", margin, least, "m", max(0.0, 1.0 - (least - margin) / REACH))
 
 
 def _of_tool(limits: Limits, kind: str, value: float) -> Reached:

@@ -219,7 +219,9 @@ def identify(
     )
 
 
-def known_information(model: TorqueModel, recordings: Sequence[Recording], rate: float) -> Information:
+def known_information(
+    model: TorqueModel, recordings: Sequence[Recording], rate: float, weights: Array | None = None
+) -> Information:
     """Return what recordings already say of a model, as if sampled at ``rate`` per second.
 
     Parameters
@@ -228,12 +230,15 @@ def known_information(model: TorqueModel, recordings: Sequence[Recording], rate:
     recordings : sequence of Recording
     rate : float
         Samples per second that the design they are to be joined with counts.
+    weights : ndarray, shape (n,), optional
+        Of every joint's rows in it; 1 by default.
     """
+    each_joint = np.ones(model.robot.n) if weights is None else weights
     data, _, _ = usable_in_bands(model, recordings)
     return merge(
-        information.scaled(float(np.sqrt(rate / item.data.sources[0].rate)))
+        information.scaled(float(weight * np.sqrt(rate / item.data.sources[0].rate)))
         for item in observe(model, data).each
-        for information in item.by_joint
+        for weight, information in zip(each_joint, item.by_joint, strict=True)
     )
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.excitation.curves import ExcitationTrajectory
 from scara_ident.excitation.design import Design
 from scara_ident.excitation.parallel import map_in_order
 from scara_ident.excitation.tool import tool_motion, tool_of
@@ -162,23 +163,27 @@ def design_figures(design: Design) -> tuple[str, list[list[Figure]]]:
     return title, [[_motion(design), _phases(design)], _paths(design), [_parameters(design)]]
 
 
+def _times(trajectory: ExcitationTrajectory) -> Array:
+    return np.linspace(0.0, trajectory.duration, POINTS)
+
+
 def _motion(design: Design) -> Figure:
-    time = np.linspace(0.0, design.trajectories[0].duration, POINTS)
     layers: list[Layer] = [
         Line(time, q, style(j)[0], trajectory.joints[j] if k == 0 else "", 1.5, DASHES[k % len(DASHES)])
         for k, trajectory in enumerate(design.trajectories)
+        for time in [_times(trajectory)]
         for j, q in enumerate(trajectory.at(time)[0])
     ]
     return single("motion", "Motion", "", Plot("time [s]", (Panel("position [rad or m]", layers, 260),)))
 
 
 def _phases(design: Design) -> Figure:
-    limits, time = design.limits, np.linspace(0.0, design.trajectories[0].duration, POINTS)
+    limits = design.limits
     half = 0.5 * (limits.upper - limits.lower)
     box = Line([-1.0, 1.0, 1.0, -1.0, -1.0], [-1.0, -1.0, 1.0, 1.0, -1.0], "grey", "", 1.2, "5 3", path=True)
     layers: list[Layer] = [box]
     for trajectory in design.trajectories:
-        for j, (q, v) in enumerate(zip(*trajectory.at(time)[:2], strict=True)):
+        for j, (q, v) in enumerate(zip(*trajectory.at(_times(trajectory))[:2], strict=True)):
             place = (q - limits.centre[j]) / half[j]
             layers.append(Line(place, v / limits.velocity[j], style(j)[0], "", 1.0, path=True))
     panel = Panel("velocity, share of the limit", layers, 260)
@@ -187,8 +192,7 @@ def _phases(design: Design) -> Figure:
 
 def _paths(design: Design) -> list[Figure]:
     tool = design.limits.tool or tool_of(design.model.robot)
-    time = np.linspace(0.0, design.trajectories[0].duration, POINTS)
-    return path_views([tool_motion(tool, *each.at(time)).position for each in design.trajectories], tool.name)
+    return path_views([tool_motion(tool, *each.at(_times(each))).position for each in design.trajectories], tool.name)
 
 
 def path_views(paths: Sequence[Array], tool: str) -> list[Figure]:

@@ -101,6 +101,8 @@ class JointDescription(BaseModel):
     reduction: NonZero | None = None
     effort_gain: NonZero = 1.0
     rotor_inertia: Annotated[Finite, Field(ge=0.0, le=LARGEST_FACTOR)] | None = None
+    acceleration_limit: Annotated[Finite, Field(gt=0.0)] | None = None
+    jerk_limit: Annotated[Finite, Field(gt=0.0)] | None = None
 
 
 class TimeDescription(BaseModel):

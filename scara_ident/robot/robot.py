@@ -63,6 +63,8 @@ class Robot(Frozen):
         Range of each joint, rad or m; infinite where the URDF gives none.
     velocity_limit, effort_limit : ndarray, shape (n,)
         Limits on the joint side, rad/s or m/s and N m or N; infinite where the URDF gives none.
+    acceleration_limit, jerk_limit : ndarray, shape (n,)
+        rad/s^2 and rad/s^3, or m/s^2 and m/s^3; infinite where the description gives none.
     locked : tuple of (str, float)
         Locked joints and their positions.
     channels : Channels or None
@@ -87,6 +89,8 @@ class Robot(Frozen):
     upper: Array
     velocity_limit: Array
     effort_limit: Array
+    acceleration_limit: Array
+    jerk_limit: Array
     locked: tuple[tuple[str, float], ...]
     channels: Channels | None = None
     notes: tuple[str, ...] = ()
@@ -235,6 +239,8 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
         upper=np.where(unbounded, np.inf, _given(model.upperPositionLimit[position])),
         velocity_limit=_positive_or_inf(_upper(model, "Velocity")[order]),
         effort_limit=effort_limit,
+        acceleration_limit=np.array([joint.acceleration_limit or np.inf for joint in joints]),
+        jerk_limit=np.array([joint.jerk_limit or np.inf for joint in joints]),
         locked=locked,
         channels=None
         if description.recording is None

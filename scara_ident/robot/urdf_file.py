@@ -57,8 +57,8 @@ def read_urdf(urdf: Path, source: Path) -> ElementTree.Element:
 
 
 @contextmanager
-def _quiet_stderr() -> Iterator[None]:
-    # The URDF parser writes its own lines to the C stream; the user gets ours instead.
+def quiet_stderr() -> Iterator[None]:
+    """Keep what the URDF and mesh readers write to the C stream from the user, who gets our line instead."""
     try:
         saved = os.dup(2)
     except OSError:
@@ -84,7 +84,7 @@ def pinocchio_model(urdf: Path, tree: ElementTree.Element) -> pin.Model:
     try:
         # As text: Pinocchio takes the bytes of a file for UTF-8, whatever its first line says.
         text = ElementTree.tostring(tree, encoding="unicode")
-        with _quiet_stderr():
+        with quiet_stderr():
             return pin.buildModelFromXML(text)
     except RecursionError:
         raise RobotError(

@@ -88,7 +88,7 @@ def _mesh_points(shape: ElementTree.Element, urdf: Path, link: str) -> Array:
     import trimesh
 
     name = shape.get("filename", "")
-    path = _find(name, urdf)
+    path = find_mesh(name, urdf)
     if path is None:
         raise RobotError(f"{urdf}: link {link}: mesh {name} is not found; bound its centre of mass by an ellipsoid")
     try:
@@ -101,7 +101,7 @@ def _mesh_points(shape: ElementTree.Element, urdf: Path, link: str) -> Array:
     return np.array([[scaled[i, 0], scaled[j, 1], scaled[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 
 
-def _find(name: str, urdf: Path) -> Path | None:
+def find_mesh(name: str, urdf: Path) -> Path | None:
     """Find a mesh by its name in a URDF: beside it, or in a package above it or on ROS_PACKAGE_PATH."""
     for scheme in ("package://", "model://"):
         if name.startswith(scheme):

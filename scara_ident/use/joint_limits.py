@@ -50,7 +50,7 @@ def joint_limits(
     torques: Mapping[str, float] | None = None,
     powers: Mapping[str, float] | None = None,
 ) -> JointLimits:
-    """Gather limits: positions, velocities and efforts of the URDF, and what is given instead or beside them.
+    """Gather limits: of the URDF and ``robot.yaml``, and what is given instead or beside them.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def joint_limits(
     found = []
     for kind, given, own in (
         ("velocity", velocities, robot.velocity_limit),
-        ("acceleration", accelerations, endless),
+        ("acceleration", accelerations, robot.acceleration_limit),
         ("torque", torques, robot.torque_limit),
         ("power", powers, endless),
     ):

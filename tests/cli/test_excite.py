@@ -51,7 +51,7 @@ def test_start_limits_block_and_known_torques_are_heeded(command, tmp_path: Path
     words = (
         *QUICK, "--for", "rigid_body", "--start", "1,-0.5", "--range", "joint1=0..2", "--velocity", "joint1=1.5",
         "--torque", "joint2=0.8", "--tool-acceleration", "6", "--tool-speed", "0.9", "--parameters", parameters,
-        "--trajectories", "2",
+        "--trajectories", "2", "--share", "1",
     )  # fmt: skip
     result = command("excite", *words, "--output", tmp_path / "a")
     assert result.status == 0
@@ -89,9 +89,15 @@ def test_what_cannot_be_is_said_before_the_search(command, tmp_path: Path):
         (("--duration", "2", "--harmonics", "4000"), 2, "use at most 150"),
         (("--harmonics", "50", "--rate", "5"), 2, "use fewer harmonics, or a higher rate"),
         (("--floor", "2"), 1, "lower the floor"),
-        (("--torque", "joint1=0.1"), 1, "joint1: a torque of 0.1 N m does not overcome its friction"),
+        (("--torque", "joint1=0.1"), 1, "joint1: a torque of 0.08 N m does not overcome its friction"),
         (("--range", "joint9=0..1"), 2, "'joint9': the robot has no such joint"),
         (("--for", "P_d9"), 2, "parameter 'P_d9'"),
+        (("--jerk", "joint1=0"), 2, "jerk limit of joint1"),
+        (("--box", "1,2,3"), 2, "expected X,Y,Z,DX,DY,DZ"),
+        (("--box", "1,0,0,.1,.1,.1"), 2, "has no collision shapes"),
+        (("--asked-std", "5"), 2, "the noise of joint1, joint2 is not known; give --noise joint1=RMS"),
+        (("--asked-std", "five"), 2, "expected a percentage such as 5"),
+        (("--noise", "joint1=1"), 2, "--noise is for --asked-std"),
         (("--parameters", "none.json"), 1, "none.json: cannot be read"),
     ):
         outcome = command("excite", *words, "--output", tmp_path)
@@ -125,4 +131,11 @@ def test_a_file_that_is_no_diagnosis_is_said(command, tmp_path: Path):
     (tmp_path / "other.json").write_text("[]", encoding="utf-8")
     assert "no diagnosis" in command("excite", "--tell", tmp_path / "other.json").err
     assert "cannot be read" in command("excite", "--tell", tmp_path / "none.json").err
-    assert "two goals" in command("excite", "--tell", tmp_path / "other.json", "--for", "friction").err
+    for words, said in (
+        (("--for", "friction"), "two goals"),
+        (("--asked-std", "5"), "two goals"),
+        (("--criterion", "cond"), "leave --criterion out"),
+        (("--model", "complete"), "leave --model out"),
+    ):
+        outcome = command("excite", "--tell", tmp_path / "other.json", *words)
+        assert (outcome.status, said in outcome.err) == (2, True), outcome.err

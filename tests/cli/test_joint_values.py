@@ -1,7 +1,13 @@
+from inspect import signature
+
 import pytest
 
-from scara_ident.cli.joint_values import joint_numbers, joint_ranges, numbers
+from scara_ident.cli.ask import ask
+from scara_ident.cli.excite import excite
+from scara_ident.cli.joint_values import joint_numbers, joint_ranges, motion_limits, numbers
 from scara_ident.errors import UsageError
+from scara_ident.excitation.limits import CLEARANCE, SHARE
+from scara_ident.robot.robot import load_robot
 
 
 def test_values_of_joints_are_read():
@@ -22,3 +28,21 @@ def test_a_word_without_joint_or_value_is_said(word):
 def test_a_range_that_is_none_is_said(word, said):
     with pytest.raises(UsageError, match=said):
         joint_ranges([word], "--range")
+
+
+def test_options_of_limits_have_the_defaults_of_the_package():
+    for command in (ask, excite):
+        given = signature(command).parameters
+        assert (given["share"].default, given["clearance"].default) == (SHARE, CLEARANCE)
+
+
+def test_limits_are_gathered_from_their_options():
+    words = {
+        "ranges": ["joint1=-1..2"],
+        "velocities": None,
+        "accelerations": ["joint2=9"],
+        "jerks": None,
+        "torques": None,
+    }
+    found = motion_limits(load_robot(), **words, boxes=None, floor=0.1, share=1.0)
+    assert (found.lower[0], found.acceleration[1], found.floor) == (-1.0, 9.0, 0.1)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from scara_ident.excitation.criteria import Criterion, LogDet
@@ -45,13 +48,13 @@ def small_problem(
     model: TorqueModel,
     criterion: Criterion | None = None,
     *,
-    trajectories: int = 1,
+    lengths: Sequence[tuple[float, int]] = ((8.0, 6),),
     prior: float = 0.0,
-    **limits: float,
+    **limits: Any,
 ) -> Problem:
-    """Return a problem of six harmonics over 8 s with a grid of 60 times, every second of them in the criterion."""
+    """Return a problem of six harmonics over 8 s, or others, with a grid of 60 times, every second in the criterion."""
     robot = model.robot
-    bounds = limits_of(robot, **limits)
+    bounds = limits_of(robot, **{"share": 1.0, **limits})
     nominal = nominal_parameters(model)
     count = len(model.names)
     task = Task(
@@ -59,12 +62,11 @@ def small_problem(
         limits=bounds,
         nominal=nominal,
         criterion=LogDet() if criterion is None else criterion,
-        basis=make_basis(8.0, 6),
+        bases=tuple(make_basis(duration, harmonics) for duration, harmonics in lengths),
         posture=resting_posture(model, bounds, nominal),
-        trajectories=trajectories,
-        samples=500,
+        samples=tuple(round(62.5 * duration) for duration, _ in lengths),
         weights=np.linspace(1.0, 2.0, robot.n),
         prior=prior * np.eye(count),
     )
     rows = len(row_names(bounds, robot.n))
-    return Problem(task, grid(task.basis, 60), 2, np.full(rows, 0.999))
+    return Problem(task, grid(task.bases, 60), 2, np.full(rows, 0.999))

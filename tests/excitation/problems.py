@@ -20,7 +20,14 @@ def problems():
         "logdet": small_problem(scara, LogDet(), tool_speed=1.5),
         "block": small_problem(scara, BlockLogDet((1, 2, 3))),
         "cond": small_problem(scara, Condition(power=5.0)),
-        "two, with a prior": small_problem(scara, LogDet(), trajectories=2, prior=3.0),
+        "two, with a prior": small_problem(
+            scara,
+            LogDet(),
+            lengths=((8.0, 6), (4.0, 5)),
+            prior=3.0,
+            accelerations={"joint1": 9.0},
+            jerks={"joint2": 60.0},
+        ),
         "prismatic": small_problem(quill, LogDet(), tool_acceleration=5.0, floor=0.0),
         "six joints": small_problem(arm, Condition(scaled=True, power=5.0), floor=-0.5),
     }

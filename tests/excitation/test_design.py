@@ -28,7 +28,7 @@ from tests.excitation.made import rigid_model
 
 @pytest.fixture(scope="module")
 def paper_length():
-    return design_excitation(COMPLETE, effort=QUICK)
+    return design_excitation(COMPLETE, limits=limits_of(SCARA, share=1.0), effort=QUICK)
 
 
 def shares(trajectory: ExcitationTrajectory, limits: Limits, robot: Robot, times: int) -> dict[str, float]:
@@ -74,7 +74,7 @@ def test_what_is_reported_as_reached_is_reached_between_samples_too(short):
     assert told["joint2.velocity"].reached == pytest.approx(np.abs(v[1]).max(), rel=1e-5)
     assert told["tool.acceleration"].reached == pytest.approx(tool_acceleration(q, v, a).max(), rel=1e-5)
     assert told["tool.acceleration"].reached >= tool_acceleration(q, v, a).max() * (1 - 1e-9)
-    assert told["joint1.torque"].bound == limits.torque[0] == 2.0
+    assert told["joint1.torque"].bound == limits.torque[0] == pytest.approx(1.6)
 
 
 @pytest.mark.slow
@@ -143,6 +143,27 @@ def test_a_design_fills_what_existing_recordings_lack():
 
 
 @pytest.mark.slow
+def test_trajectories_of_given_lengths_move_alike_and_count_by_their_time():
+    limits = limits_of(SCARA, accelerations={"joint1": 6.0}, jerks={"joint2": 60.0})
+    made = design_excitation(
+        COMPLETE, duration=(2.0, 4.0), harmonics=8, samples=400, limits=limits, effort=QUICK, name="run"
+    )
+    assert [(each.name, each.duration) for each in made.trajectories] == [("run-a", 2.0), ("run-b", 4.0)]
+    assert made.samples == (200, 400)
+    assert [each.basis.orders[-1] for each in made.trajectories] == [5, 8]
+    told = {each.name: each for each in made.reached}
+    for trajectory in made.trajectories:
+        time = np.linspace(0.0, trajectory.duration, 20_001)
+        assert np.max(np.abs(trajectory.at(time)[2][0])) <= told["joint1.acceleration"].reached <= 4.8
+        jerk = trajectory.coefficients[1] @ trajectory.basis.rows(time, 3).T
+        assert np.max(np.abs(jerk)) <= told["joint2.jerk"].reached <= 48.0
+    parts = [information_of(COMPLETE, each, size) for each, size in zip(made.trajectories, made.samples, strict=True)]
+    assert made.log_det == pytest.approx(
+        np.linalg.slogdet(sum(p.regressor_factor.T @ p.regressor_factor for p in parts))[1], abs=1e-6
+    )
+
+
+@pytest.mark.slow
 def test_trajectories_designed_together_share_the_work(short):
     two = design_excitation(COMPLETE, **SHORT, trajectories=2, effort=short.effort)
     assert [each.name for each in two.trajectories] == ["excitation-a", "excitation-b"]
@@ -168,7 +189,7 @@ def test_noise_of_the_torques_weights_the_rows(short):
 def test_an_arm_of_six_joints_is_excited_within_its_limits():
     robot = load_robot(example_urdf("ur5_joint_limited_robot.urdf"))
     model = rigid_model(robot)
-    limits = limits_of(robot, floor=0.05)
+    limits = limits_of(robot, floor=0.05, clearance=None)
     made = design_excitation(
         model, duration=8.0, harmonics=4, samples=400, criterion=Condition(), limits=limits, effort=QUICK
     )
@@ -196,9 +217,9 @@ def test_the_start_can_be_given():
 
 def test_a_start_outside_the_limits_is_said():
     with pytest.raises(InfeasibleLimits, match=r"start: joint2 = 2\.5 lies outside its range -2\.18166\.\.2\.18166"):
-        design_excitation(COMPLETE, start=np.array([0.0, 2.5]))
+        design_excitation(COMPLETE, limits=limits_of(SCARA, share=1.0), start=np.array([0.0, 2.5]))
     with pytest.raises(InfeasibleLimits, match="joint2 stands at the end of its range"):
-        design_excitation(COMPLETE, start=np.array([0.0, 2.18]))
+        design_excitation(COMPLETE, limits=limits_of(SCARA, share=1.0), start=np.array([0.0, 2.18]))
     with pytest.raises(UsageError, match="expected 2 positions"):
         design_excitation(COMPLETE, start=np.zeros(3))
 
@@ -208,7 +229,7 @@ def test_limits_that_cannot_hold_the_arm_are_said(tmp_path):
     model = build_model(robot, "basic")
     hanging = design_excitation(model, duration=4.0, harmonics=5, limits=limits_of(robot), effort=QUICK)
     assert all(each.kept for each in hanging.reached)
-    low = limits_of(robot, ranges={"j1": (-0.5, 0.5), "j2": (-0.5, 0.5)}, torques={"j1": 3.0})
+    low = limits_of(robot, ranges={"j1": (-0.5, 0.5), "j2": (-0.5, 0.5)}, torques={"j1": 3.0}, share=1.0)
     with pytest.raises(InfeasibleLimits, match=r"j1 needs .* of 3 N m to hold the arm; allow j1 more torque"):
         design_excitation(model, limits=low)
     with pytest.raises(InfeasibleLimits, match=r"height is .* where the floor is at 2 m"):
@@ -217,7 +238,7 @@ def test_limits_that_cannot_hold_the_arm_are_said(tmp_path):
 
 @pytest.mark.slow
 def test_friction_counts_in_the_torque_also_where_a_joint_turns_back():
-    limits = limits_of(SCARA, torques={"joint1": 1.0})
+    limits = limits_of(SCARA, torques={"joint1": 1.0}, share=1.0)
     known = {"a01": 0.3, "a11": 0.05, "a21": -0.01, "a02": 0.1}
     made = design_excitation(COMPLETE, **SHORT, limits=limits, known=known, effort=QUICK)
     torque = np.abs(made.motion(rate=20_000.0).torque[0])
@@ -232,6 +253,7 @@ def test_friction_counts_in_the_torque_also_where_a_joint_turns_back():
     ("given", "said"),
     [
         ({"trajectories": 0}, "trajectories 0"),
+        ({"duration": (5.0, 6.0, 7.0), "trajectories": 2}, "3 durations for 2 trajectories"),
         ({"trajectories": 27}, "trajectories 27: expected at least 1 and at most 26"),
         ({"duration": 2.0, "harmonics": 4000}, "harmonics 4000: more than a search .* use at most 150"),
         ({"harmonics": 151}, "harmonics 151"),

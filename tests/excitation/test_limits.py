@@ -23,7 +23,7 @@ def test_a_joint_without_limits_is_said(tmp_path):
     urdf = write_urdf(tmp_path / "arm.urdf", [Link(kind="continuous"), Link(xyz=(0.3, 0.0, 0.0))])
     with pytest.raises(RobotError, match=r"joint 'j1' has no position limits.*range for j1"):
         design_excitation(build_model(load_robot(urdf)))
-    given = limits_of(load_robot(urdf), ranges={"j1": (-3.0, 3.0)})
+    given = limits_of(load_robot(urdf), ranges={"j1": (-3.0, 3.0)}, share=1.0)
     assert given.upper[0] == 3.0
     urdf.write_text(urdf.read_text().replace(' velocity="4"', ' velocity="0"'))
     with pytest.raises(RobotError, match="joint 'j1' has no velocity limit"):
@@ -41,6 +41,8 @@ def test_a_joint_without_limits_is_said(tmp_path):
         ({"share": np.nan}, "share of the limits nan"),
         ({"floor": np.nan}, "floor nan: expected a height"),
         ({"tool_speed": 0.0}, "tool speed 0"),
+        ({"accelerations": {"joint1": -1.0}}, "acceleration limit of joint1"),
+        ({"jerks": {"joint3": 1.0}}, "jerk for 'joint3'"),
     ],
 )
 def test_limits_that_make_no_sense_are_said(given, said):
@@ -52,6 +54,7 @@ def test_the_scara_has_the_papers_tool_acceleration_and_other_arms_none():
     assert limits_of(SCARA).tool_acceleration == 9.0
     assert limits_of(SCARA, tool_acceleration=np.inf).tool is None
     assert limits_of(panda()).tool_acceleration == np.inf
+    assert limits_of(SCARA).torque[0] == pytest.approx(0.8 * 2.0)
     half = limits_of(SCARA, share=0.5)
     np.testing.assert_allclose(half.velocity, 0.5 * SCARA.velocity_limit)
     np.testing.assert_allclose(half.centre, limits_of(SCARA).centre)

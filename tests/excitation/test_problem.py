@@ -1,8 +1,15 @@
 """Slopes of the design problem against differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from scara_ident.excitation import ExcitationTrajectory, information_of
+from scara_ident.excitation.search import _random_motion
+from scara_ident.excitation.verification import grid
+from scara_ident.robot.robot import load_robot
+from tests.excitation.made import rigid_model, small_problem
 from tests.excitation.problems import PROBLEMS, inside
 
 
@@ -40,3 +47,21 @@ def test_pull_and_curvature_belong_to_push(name):
     assert np.sum(slopes.pull(u) * dx) == pytest.approx(np.sum(u * pushed), rel=1e-10)
     bent = np.einsum("kx,kxy,ky->", dx, slopes.curvature(u**2), dx)
     assert bent == pytest.approx(np.sum(u**2 * pushed**2), rel=1e-10)
+
+
+def test_motions_of_two_lengths_count_by_their_samples():
+    model = rigid_model(load_robot())
+    problem = small_problem(model, lengths=((8.0, 6), (4.0, 5)))
+    task = replace(problem.task, weights=np.ones(2))
+    assert task.samples == (500, 250)
+    x = 0.1 * _random_motion(task, np.random.default_rng(0))
+    # As dense as the samples, so that both sums are integrals; the samples have both ends of a period.
+    cost, _ = replace(problem, task=task, rows=grid(task.bases, 1000)).values(x)
+    parts = [
+        information_of(
+            model, ExcitationTrajectory("m", model.robot.joints, basis, task.posture, own[:, : basis.size]), size
+        )
+        for basis, own, size in zip(task.bases, x, task.samples, strict=True)
+    ]
+    gram = sum(part.regressor_factor.T @ part.regressor_factor for part in parts)
+    assert -cost == pytest.approx(np.linalg.slogdet(gram)[1], abs=0.02)

@@ -13,7 +13,7 @@ from scara_ident.effects.position import Spring
 from scara_ident.effects.tilt import BaseTilt
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.observations import observe
-from scara_ident.excitation import Effort, design_excitation, excitation_dict
+from scara_ident.excitation import Effort, design_excitation, excitation_dict, limits_of
 from scara_ident.excitation.tell import told
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.simulation import ReferenceMotion
@@ -27,7 +27,9 @@ EFFORT = Effort(starts=1, rounds=0, seed=2, processes=1)
 def asked():
     found = open_diagnosis()
     inquiry = inquire(found, questions(found)[:1])
-    return inquiry, design_excitation(found.before.model, duration=6.0, harmonics=6, tell=inquiry, effort=EFFORT)
+    model = found.before.model
+    whole = limits_of(model.robot, share=1.0)
+    return inquiry, design_excitation(model, duration=6.0, harmonics=6, tell=inquiry, limits=whole, effort=EFFORT)
 
 
 def test_the_motion_keeps_its_limits_and_is_said_to_tell(asked):

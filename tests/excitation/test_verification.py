@@ -9,7 +9,7 @@ from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from tests.excitation.made import small_problem
 
-TASK = small_problem(build_model(load_robot()), trajectories=2, tool_speed=1.5).task
+TASK = small_problem(build_model(load_robot()), lengths=((8.0, 6), (5.0, 5)), tool_speed=1.5).task
 MOVED = 0.3 * _random_motion(TASK, np.random.default_rng(0))
 
 
@@ -35,6 +35,6 @@ def test_a_limit_is_active_near_its_bound_and_broken_beyond_it():
 
 
 def test_limits_about_the_tool_are_watched():
-    bare = Limits(-np.ones(1), np.ones(1), np.ones(1), np.ones(1))
+    bare = Limits(-np.ones(1), *np.ones((5, 1)))
     assert not bare.watches_tool
     assert TASK.limits.watches_tool

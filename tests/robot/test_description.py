@@ -66,6 +66,7 @@ def test_everything_but_the_urdf_is_optional(tmp_path: Path):
         ("urdf: a.urdf\njoints: {j1: {reduction: .inf}}\n", "joints.j1.reduction", "finite"),
         ("urdf: a.urdf\njoints: {j1: {effort_gain: .nan}}\n", "joints.j1.effort_gain", "finite"),
         ("urdf: a.urdf\njoints: {j1: {rotor_inertia: -1}}\n", "joints.j1.rotor_inertia", "greater than or equal to 0"),
+        ("urdf: a.urdf\njoints: {j1: {jerk_limit: 0}}\n", "joints.j1.jerk_limit", "greater than 0"),
         ("urdf: a.urdf\njoints: {j1: 100}\n", "joints.j1", "100"),
         ("urdf: a.urdf\njoints: [j1, j2]\n", "joints", "dictionary"),
         ("urdf: a.urdf\nlocked: {j3: .nan}\n", "locked.j3", "finite"),

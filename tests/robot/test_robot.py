@@ -10,7 +10,9 @@ import pinocchio as pin
 import pytest
 
 from scara_ident.errors import RobotError
+from scara_ident.excitation import limits_of
 from scara_ident.robot.robot import Robot, embedded_urdf, load_robot
+from scara_ident.use.joint_limits import joint_limits
 from tests.arms import PLANAR_2R, Link, example_urdf, rnea, write_urdf
 
 TREE = (
@@ -281,3 +283,15 @@ def test_a_reduction_in_the_urdf_of_a_joint_that_is_locked_does_not_matter(tmp_p
 
 def test_the_embedded_urdf_is_there():
     assert embedded_urdf().is_file()
+
+
+def test_acceleration_and_jerk_limits_are_those_of_the_description(tmp_path: Path):
+    write_urdf(tmp_path / "arm.urdf", [Link(), Link()])
+    text = "urdf: arm.urdf\njoints: {j2: {acceleration_limit: 15}, j1: {jerk_limit: 5e3, acceleration_limit: 7.5}}\n"
+    (tmp_path / "robot.yaml").write_text(text, encoding="utf-8")
+    robot = load_robot(tmp_path / "robot.yaml")
+    np.testing.assert_array_equal(robot.acceleration_limit, [15.0, 7.5])
+    np.testing.assert_array_equal(robot.jerk_limit, [np.inf, 5e3])
+    # Both use them where nothing else is said.
+    assert limits_of(robot, share=1.0).jerk[1] == 5e3
+    np.testing.assert_array_equal(joint_limits(robot, accelerations={"j2": 4.0}).acceleration, [4.0, 7.5])

@@ -1,0 +1,376 @@
+"""Distances that a motion keeps: between the links of the arm, to a floor and to boxes.
+
+Shapes are those of the URDF. Bounding spheres tell which pairs may be near at all; of these Coal finds the distance, and
+the nearest points with the direction between them give its derivative by the joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+from pinocchio import coal
+
+from scara_ident.arrays import Array
+from scara_ident.errors import RobotError, UsageError
+from scara_ident.excitation.joint_frames import JointFrames, joint_frames
+from scara_ident.manners import Frozen
+from scara_ident.model.regressor.recursion import joint_geometry
+from scara_ident.robot.collision_shapes import collision_shapes
+from scara_ident.robot.kinematics import place_of
+from scara_ident.robot.robot import Robot
+
+# Centre and edges of a box along the axes of the base, m.
+Box = tuple[tuple[float, float, float], tuple[float, float, float]]
+
+# Distances are told apart up to so much more than the margin, m.
+REACH = 0.05
+# Of Coal's search for nearest points, m.
+TOLERANCE = 1e-8
+# Random postures at which pairs are looked at.
+POSTURES = 100
+# A pair is likely to come near if its least distance there is so much of the range of its distances, or less.
+SPREAD = 0.5
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Clearance(Frozen):
+    """Pairs of shapes that are kept apart.
+
+    Attributes
+    ----------
+    robot : Robot
+    margin : float
+        Least distance asked for, m.
+    floor : float
+        Height of the floor, m; -inf where there is none.
+    boxes : tuple of Box
+    pairs : tuple of (int, int, str)
+        Two shapes and the group they count in: ``self``, ``floor``, ``box1``, ``box2``, ....
+    notes : tuple of str
+        What is not watched, and why.
+    likely : tuple of bool
+        Which pairs may come near the margin at all, as random postures say; a search looks at no others.
+    """
+
+    robot: Robot
+    margin: float
+    floor: float
+    boxes: tuple[Box, ...]
+    pairs: tuple[tuple[int, int, str], ...]
+    notes: tuple[str, ...]
+    likely: tuple[bool, ...] = ()
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Groups with a pair, in order."""
+        return tuple(dict.fromkeys(group for *_, group in self.pairs))
+
+    @cached_property
+    def shapes(self) -> pin.GeometryModel:
+        """Shapes of the robot, then the floor and the boxes, with the pairs."""
+        shapes = pin.GeometryModel(_shapes_about(self.robot, self.floor, self.boxes))
+        for first, second, _ in self.pairs:
+            shapes.addCollisionPair(pin.CollisionPair(first, second))
+        return shapes
+
+    @cached_property
+    def _data(self) -> tuple[pin.Data, pin.GeometryData]:
+        measured = self.shapes.createData()
+        for request in measured.distanceRequests:
+            request.gjk_tolerance = TOLERANCE
+        return self.robot.model.createData(), measured
+
+    @cached_property
+    def _spheres(self) -> tuple[Array, Array]:
+        """Centres in the frames of the joints, (S, 3), and radii of bounding spheres."""
+        shapes = self.shapes.geometryObjects
+        centres = np.array([shape.placement.act(shape.geometry.aabb_center) for shape in shapes])
+        return centres, np.array([shape.geometry.aabb_radius for shape in shapes])
+
+    @cached_property
+    def _moved_by(self) -> NDArray[np.bool_]:
+        """Which joints, in the robot's order, move each shape, shape (S, n)."""
+        model, joints = self.robot.model, [shape.parentJoint for shape in self.shapes.geometryObjects]
+        moved = np.zeros((len(joints), self.robot.n), dtype=bool)
+        for shape, joint in enumerate(joints):
+            while joint > 0:
+                moved[shape, place_of(self.robot, joint)] = True
+                joint = model.parents[joint]
+        return moved
+
+    def _rates(self, q: Array) -> Array:
+        """Return how much the distance of each pair changes at most per rad or m of each joint, shape (P, n)."""
+        joints, robot = joint_geometry(self.robot.model), self.robot
+        centres, radii = self._spheres
+        rates = np.zeros(self._moved_by.shape)
+        for shape, found in enumerate(self.shapes.geometryObjects):
+            joint = found.parentJoint
+            # Obstacles do not move; a floor has no size.
+            extent = float(np.linalg.norm(centres[shape]) + radii[shape]) if joint > 0 else 0.0
+            while joint > 0:
+                own, each = place_of(robot, joint), joints[joint - 1]
+                rates[shape, own] = 1.0 if each.prismatic else extent
+                extent += float(np.linalg.norm(each.offset)) + (np.abs(q[own]).max() if each.prismatic else 0.0)
+                joint = each.parent
+        first, second = (np.array([pair[side] for pair in self.pairs], dtype=int) for side in (0, 1))
+        # What moves both alike changes nothing.
+        return np.asarray(np.where(self._moved_by[first] != self._moved_by[second], rates[first] + rates[second], 0.0))
+
+    def nearest(self, q: Array, reach: float = np.inf, *, likely: bool = False) -> Nearest:
+        """Measure the smallest distance of each group.
+
+        Parameters
+        ----------
+        q : ndarray, shape (n, N)
+            rad or m.
+        reach : float
+            Distances from this on need not be told apart, m.
+        likely : bool
+            Whether to look at likely pairs alone.
+        """
+        groups = self.groups
+        bounds = self._bounds(joint_frames(self.robot, q))
+        if likely:
+            bounds[~np.array(self.likely, dtype=bool)] = np.inf
+        number = np.array([groups.index(group) for *_, group in self.pairs], dtype=int)
+        found = Nearest.none(len(groups), q.shape[1], reach)
+        model, shapes, (data, measured) = self.robot.model, self.shapes, self._data
+        neutral, displaced = pin.neutral(model), np.zeros(model.nv)
+        # What each pair was at the posture where it was last measured, and how fast it may change from there.
+        rate = self._rates(q)
+        last, at = np.full(len(self.pairs), -np.inf), np.zeros((len(self.pairs), len(q)))
+        for k in np.flatnonzero(np.any(bounds < reach, axis=0)):
+            least = np.maximum(bounds[:, k], last - np.einsum("pn,pn->p", rate, np.abs(q[:, k] - at)))
+            near = np.flatnonzero(least < reach)
+            placed = False
+            for pair in near[np.argsort(least[near])]:
+                group = number[pair]
+                if least[pair] >= found.distance[group, k]:
+                    continue
+                if not placed:
+                    displaced[self.robot.order] = q[:, k]
+                    posture = pin.integrate(model, neutral, displaced)
+                    pin.updateGeometryPlacements(model, data, shapes, measured, posture)
+                    placed = True
+                pin.computeDistance(shapes, measured, int(pair))
+                result = measured.distanceResults[int(pair)]
+                last[pair], at[pair] = result.min_distance, q[:, k]
+                found.take(int(group), int(k), int(pair), result)
+        return found
+
+    def slopes(self, q: Array, found: Nearest) -> Array:
+        """Return the derivative of the distances by the joints, shape (G, n, N); 0 where they were not measured."""
+        frames = joint_frames(self.robot, q)
+        slope = np.zeros((len(found.distance), *q.shape))
+        for group, k in np.argwhere(found.pair >= 0):
+            first, second, _ = self.pairs[found.pair[group, k]]
+            normal = found.normal[group, k]
+            for shape, sign, point in ((first, -1.0, found.points[0]), (second, 1.0, found.points[1])):
+                own = self._moved_by[shape]
+                arm = np.cross(frames.axis[own, :, k], point[group, k] - frames.origin[own, :, k])
+                arm[frames.prismatic[own]] = frames.axis[own, :, k][frames.prismatic[own]]
+                slope[group, own, k] += sign * arm @ normal
+        return slope
+
+    def rows(self, q: Array, *, likely: bool = False, slopes: bool = False) -> tuple[Array, Array]:
+        """Return rows of limits, 1 at the margin and 0 where there is room, shape (G, N), with derivatives if asked for."""
+        found = self.nearest(q, self.margin + REACH, likely=likely)
+        rows = 1.0 - (found.distance - self.margin) / REACH
+        return rows, -self.slopes(q, found) / REACH if slopes else np.zeros(0)
+
+    def _bounds(self, frames: JointFrames) -> Array:
+        """Return a lower bound of the distance of every pair, shape (P, N)."""
+        centres, radii = self._spheres
+        joints = np.array([shape.parentJoint for shape in self.shapes.geometryObjects])
+        places = frames.centres(joints, centres)
+        robots = len(joints) - len(self.boxes) - int(np.isfinite(self.floor))
+        found = np.empty((len(self.pairs), places.shape[2]))
+        for row, (first, second, group) in enumerate(self.pairs):
+            if group == "floor":
+                found[row] = places[first, 2] - self.floor
+            elif second >= robots:
+                centre, edges = (np.array(part)[:, None] for part in self.boxes[int(group.removeprefix("box")) - 1])
+                found[row] = np.linalg.norm(np.maximum(np.abs(places[first] - centre) - 0.5 * edges, 0.0), axis=0)
+            else:
+                found[row] = np.linalg.norm(places[first] - places[second], axis=0) - radii[second]
+            found[row] -= radii[first]
+        return found
+
+    def all_distances(self, q: Array) -> Array:
+        """Return the distance of every pair at postures (n, N), shape (P, N), m."""
+        model, shapes, (data, measured) = self.robot.model, self.shapes, self._data
+        found = np.empty((len(self.pairs), q.shape[1]))
+        neutral, displaced = pin.neutral(model), np.zeros(model.nv)
+        for k, posture in enumerate(q.T):
+            displaced[self.robot.order] = posture
+            pin.computeDistances(model, data, shapes, measured, pin.integrate(model, neutral, displaced))
+            found[:, k] = [each.min_distance for each in measured.distanceResults]
+        return found
+
+    def nearest_of(self, posture: Array) -> str:
+        """Say which pair is nearest at a posture (n,)."""
+        distance = self.all_distances(posture[:, None])[:, 0]
+        first, second, _ = self.pairs[int(np.argmin(distance))]
+        return (
+            f"{_link(self, first)} comes within {distance.min():.4g} m of {_link(self, second)}, where {self.margin:g} m "
+            "are to be kept"
+        )
+
+    def smallest(self, q: Array, group: str) -> float:
+        """Return the smallest distance of a group over postures (n, N), m."""
+        kept = tuple(pair for pair in self.pairs if pair[2] == group)
+        alone = replace(self, pairs=kept, likely=())
+        bounds = alone._bounds(joint_frames(self.robot, q))
+        least = np.inf
+        # Where spheres are nearest first, so that most postures need not be measured.
+        for part in np.array_split(np.argsort(bounds.min(axis=0)), max(1, q.shape[1] // 50)):
+            if bounds[:, part].min() < least:
+                least = min(least, float(alone.nearest(q[:, part], least).distance.min()))
+        return least
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """Smallest distances of groups at postures, and where they are.
+
+    Attributes
+    ----------
+    distance : ndarray, shape (G, N)
+        m; negative where shapes overlap, and what was asked as reach where none is nearer.
+    pair : ndarray of int, shape (G, N)
+        -1 where none is nearer than the reach.
+    points : ndarray, shape (2, G, N, 3)
+        On the first and the second shape, in the base frame, m.
+    normal : ndarray, shape (G, N, 3)
+        From the first to the second.
+    """
+
+    distance: Array
+    pair: NDArray[np.intp]
+    points: Array
+    normal: Array
+
+    @staticmethod
+    def none(groups: int, samples: int, reach: float) -> Nearest:
+        """Return what is known before anything is measured."""
+        pair = np.full((groups, samples), -1, dtype=np.intp)
+        return Nearest(np.full(pair.shape, reach), pair, np.zeros((2, *pair.shape, 3)), np.zeros((*pair.shape, 3)))
+
+    def take(self, group: int, k: int, pair: int, measured: coal.DistanceResult) -> None:
+        """Keep a measurement if it is the smallest so far."""
+        if measured.min_distance < self.distance[group, k]:
+            self.distance[group, k], self.pair[group, k] = measured.min_distance, pair
+            self.points[0, group, k] = measured.getNearestPoint1()
+            self.points[1, group, k] = measured.getNearestPoint2()
+            self.normal[group, k] = measured.normal
+
+
+def clearance_of(
+    robot: Robot,
+    lower: Array,
+    upper: Array,
+    *,
+    margin: float,
+    floor: float = -np.inf,
+    boxes: Sequence[Box] = (),
+) -> Clearance:
+    """Choose the pairs of shapes that a motion keeps apart.
+
+    Shapes of one body and of bodies that a joint connects are not watched, nor are two shapes of the arm that overlap both
+    at the neutral posture and in the middle of the ranges, nor any that are nearer than the margin in every posture tried.
+
+    Parameters
+    ----------
+    robot : Robot
+    lower, upper : ndarray, shape (n,)
+        Ranges, rad or m.
+    margin : float
+        m.
+    floor : float
+        Height, m.
+    boxes : sequence of Box
+
+    Raises
+    ------
+    UsageError
+        If the margin is negative, or a box has no size.
+    """
+    if not 0.0 <= margin < np.inf:
+        raise UsageError(f"clearance {margin:g} m: expected 0 or more")
+    for centre, edges in boxes:
+        if not (np.all(np.isfinite(centre)) and np.all(np.isfinite(edges)) and min(edges) > 0.0):
+            raise UsageError(f"box at {centre} with edges {edges}: expected finite places and edges above 0, in m")
+    kept = tuple((_triple(centre), _triple(edges)) for centre, edges in boxes)
+    watched = Clearance(robot, float(margin), float(floor), kept, (), ())
+    unwatched = "Collisions were not looked for: {}; rehearse the motion slowly."
+    try:
+        shapes = _shapes_about(robot, watched.floor, watched.boxes)
+    except RobotError as error:
+        return replace(watched, notes=(unwatched.format(error),))
+    moved = [shape.parentJoint for shape in shapes.geometryObjects]
+    if not any(moved):
+        return replace(watched, notes=(unwatched.format(f"{robot.urdf.name} has no collision shapes"),))
+    obstacles = [*(["floor"] if np.isfinite(floor) else []), *(f"box{k + 1}" for k in range(len(boxes)))]
+    parents, count = robot.model.parents, shapes.ngeoms - len(obstacles)
+    pairs = [
+        (i, j, "self")
+        for i in range(count)
+        for j in range(i + 1, count)
+        if moved[i] != moved[j] and moved[i] != parents[moved[j]] and moved[j] != parents[moved[i]]
+    ]
+    pairs += [(i, count + k, name) for k, name in enumerate(obstacles) for i in range(count) if moved[i]]
+    if not pairs:
+        return replace(watched, notes=(unwatched.format("all links that have shapes hang on one another"),))
+    return _parted(replace(watched, pairs=tuple(pairs)), lower, upper)
+
+
+def _parted(watched: Clearance, lower: Array, upper: Array) -> Clearance:
+    """Leave out the pairs that touch where the designer of the arm let them."""
+    drawn = np.random.default_rng(0).uniform(lower, upper, (POSTURES, len(lower)))
+    postures = np.vstack([np.clip(np.zeros(len(lower)), lower, upper), 0.5 * (lower + upper), drawn]).T
+    distance = watched.all_distances(postures)
+    own = np.array([group == "self" for *_, group in watched.pairs])
+    touching = (own & np.all(distance[:, :2] <= 0.0, axis=1)) | np.all(distance < watched.margin, axis=1)
+    names = [_link(watched, shape) for shape in range(watched.shapes.ngeoms)]
+    left_out = sorted({
+        f"{names[first]} and {names[second]}"
+        for (first, second, _), never in zip(watched.pairs, touching, strict=True) if never
+    })  # fmt: skip
+    kept = tuple(pair for pair, never in zip(watched.pairs, touching, strict=True) if not never)
+    room = distance[~touching].min(axis=1) - watched.margin
+    likely = room < SPREAD * np.ptp(distance[~touching], axis=1)
+    said = "Not kept apart, as they touch in any case: {}."
+    notes = (said.format("; ".join(left_out)),) if left_out else ()
+    return replace(watched, pairs=kept, notes=notes, likely=tuple(likely.tolist()))
+
+
+def _link(watched: Clearance, shape: int) -> str:
+    """Return the link of a shape, or the name of an obstacle."""
+    found = watched.shapes.geometryObjects[shape]
+    frame = found.parentFrame
+    return str(watched.robot.model.frames[frame].name) if 0 < frame < watched.robot.model.nframes else str(found.name)
+
+
+def _triple(numbers: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = map(float, numbers)
+    return x, y, z
+
+
+@lru_cache(maxsize=4)
+def _shapes_about(robot: Robot, floor: float, boxes: tuple[Box, ...]) -> pin.GeometryModel:
+    """Return shapes of the robot, then the floor and the boxes, without pairs."""
+    shapes = collision_shapes(robot)
+    found = []
+    if np.isfinite(floor):
+        found.append(("floor", pin.SE3.Identity(), coal.Halfspace(np.array([0.0, 0.0, 1.0]), floor)))
+    for k, (centre, edges) in enumerate(boxes, 1):
+        found.append((f"box{k}", pin.SE3(np.eye(3), np.array(centre)), coal.Box(*edges)))
+    for name, placement, geometry in found:
+        geometry.computeLocalAABB()
+        shapes.addGeometryObject(pin.GeometryObject(name, 0, placement, geometry))
+    return shapes

@@ -1,0 +1,74 @@
+"""The collision shapes of a URDF, as convex bodies that Coal measures distances between."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+from pinocchio import coal
+from scipy.spatial import ConvexHull, QhullError
+
+from scara_ident.arrays import Array
+from scara_ident.errors import RobotError
+from scara_ident.robot.robot import Robot
+from scara_ident.robot.urdf_file import quiet_stderr, read_urdf
+from scara_ident.robot.visual_boxes import find_mesh
+
+
+def collision_shapes(robot: Robot) -> pin.GeometryModel:
+    """Return the collision shapes of a robot, each on the joint of ``robot.model`` that carries it.
+
+    A mesh is replaced by its convex hull, which holds all of it: distances are rather too small than too large.
+
+    Parameters
+    ----------
+    robot : Robot
+
+    Returns
+    -------
+    pinocchio.GeometryModel
+        Without pairs; empty where the URDF has no collision shape.
+
+    Raises
+    ------
+    RobotError
+        If a mesh is not found or cannot be read.
+    """
+    tree = read_urdf(robot.urdf, robot.urdf)
+    for link in tree.findall("link"):
+        for mesh in link.iterfind("collision/geometry/mesh"):
+            name = mesh.get("filename", "")
+            path = find_mesh(name, robot.urdf)
+            if path is None:
+                raise RobotError(f"{robot.urdf}: link {link.get('name')}: mesh {name} is not found")
+            mesh.set("filename", str(path))
+    text = ElementTree.tostring(tree, encoding="unicode")
+    try:
+        with quiet_stderr():
+            shapes = pin.buildGeomFromUrdfString(robot.model, text, pin.GeometryType.COLLISION)
+    except (ValueError, RuntimeError) as error:
+        raise RobotError(f"{robot.urdf}: collision shapes cannot be read: {' '.join(str(error).split())}") from None
+    for shape in shapes.geometryObjects:
+        if isinstance(shape.geometry, coal.BVHModelBase):
+            shape.geometry = _hull(np.asarray(shape.geometry.vertices()), shape.meshPath)
+        shape.geometry.computeLocalAABB()
+    return shapes
+
+
+def _hull(points: Array, mesh: str) -> coal.Convex:
+    # Coal's own buildConvexRepresentation takes a mesh to be convex as it is, and then measures wrong distances.
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):
+        raise RobotError(f"{mesh}: the mesh has no volume; correct it") from None
+    place = np.full(len(points), -1)
+    place[hull.vertices] = np.arange(len(hull.vertices))
+    vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for point in points[hull.vertices]:
+        vertices.append(point)
+    for corners, outwards in zip(hull.simplices, hull.equations[:, :3], strict=True):
+        a, b, c = points[corners]
+        order = corners if np.cross(b - a, c - a) @ outwards > 0.0 else corners[::-1]
+        triangles.append(coal.Triangle(*(int(place[k]) for k in order)))
+    return coal.Convex(vertices, triangles)
