@@ -41,10 +41,10 @@ class SelectionCriteria:
         "a trajectory that hardly excites an effect says nothing for or against it",
     )
     family_error: float = _criterion(
-        0.01,
+        0.002,
         "probability",
-        "of letting any effect in where nothing is missing, over all candidates tried",
-        "Bonferroni",
+        "of letting any effect in where nothing is missing, over all candidates tried; asked in some five rounds",
+        "Bonferroni: 1 % over a diagnosis",
     )
     least_gain: float = _criterion(
         0.05,
@@ -66,6 +66,12 @@ class SelectionCriteria:
         "standard deviations",
         "by which its size differs from none with its nonlinear parameters free",
         "1 % two-sided",
+    )
+    least_final_size: float = _criterion(
+        3.0,
+        "standard deviations",
+        "by which its coefficients differ from none beside all that was found, what runs differ by counted in",
+        "0.3 % two-sided; docs/diagnosis.md",
     )
     parts: int = _criterion(4, "parts", "of the only trajectory stand in for trajectories where there is but one")
     rotor_inertia_std: float = _criterion(
