@@ -148,7 +148,6 @@ class SelectionCriteria:
     worse_held_out: float = _criterion(
         1.5, "times the training error", "on recordings held out: the model does not hold there", "docs/diagnosis.md"
     )
-    most_tentative: int = _criterion(6, "effects", "worth a look are listed, the most gaining first")
     # Choosing the band again.
     wider: float = _criterion(
         1.3, "of the band", "with an effect found the search is repeated where the band grows by so much"
