@@ -23,13 +23,19 @@ from typing import Any, ClassVar
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from attribution_tables import hits, right, wrong
-from virtual_sets import KINDS, simulate_set, tasks, write_set
+from virtual_sets import simulate_set, tasks, write_set
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.recording.recording import Recording, read_recordings
 from scara_ident.robot.robot import load_robot
 
+# The kinds of sets in rotation: nothing, one effect, something outside the catalogue, two effects.
+KINDS = (
+    *("none", "transmission_loss", "unlisted", "torque_ripple", "pair", "spring", "none", "joint_elasticity"),
+    *("unlisted", "time_delay", "pair", "vibration", "none", "stribeck", "unlisted", "payload_change"),
+    *("pair", "backlash", "none", "torque_sensor_nonlinearity", "unlisted", "friction_coupling", "pair", "base_tilt"),
+)
 NAMES = tuple(name for name, *_ in CRITERIA.documented())
 UNITS = {name: unit for name, _, unit, *_ in CRITERIA.documented()}
 FACTORS = (0.5, 2.0)

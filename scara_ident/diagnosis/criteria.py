@@ -122,7 +122,9 @@ class SelectionCriteria:
     remainder_to_noise: float = _criterion(
         1.0, "of the noise", "a repeatable remainder larger than the noise is one whatever it depends on"
     )
-    significant: float = _criterion(0.01, "probability", "that noise alone repeats so much", "F test")
+    significant: float = _criterion(
+        0.01, "probability", "that noise alone repeats so much, or does as well as what is worth a look", "F test"
+    )
     single_bins: int = _criterion(24, "bins", "of one signal, with equal numbers of samples, follow what it does")
     pair_bins: int = _criterion(10, "bins", "of each signal of a pair, so that their square is filled")
     least_per_bin: int = _criterion(10, "samples", "in each bin of a pair on average, or nothing is said")
