@@ -77,20 +77,21 @@ def folder_of(folder: Path, task: tuple[str, int]) -> Path:
 
 
 @lru_cache(maxsize=1)
-def recordings_of(folder: Path) -> tuple[Recording, ...]:
-    """Return the training recordings of a set."""
-    return read_recordings([folder / "train"], load_robot())
+def recordings_of(folder: Path) -> tuple[tuple[Recording, ...], tuple[Recording, ...]]:
+    """Return the recordings of a set to train on, and those held out."""
+    robot = load_robot()
+    return read_recordings([folder / "train"], robot), read_recordings([folder / "test"], robot)
 
 
 def one_diagnosis(job: tuple[Path, tuple[str, int], str, float]) -> Item:
     """Diagnose a set by criteria of which one is another, and note which were read."""
     folder, task, name, factor = job
     own = folder_of(folder, task)
-    recordings = recordings_of(own)
+    recordings, held_out = recordings_of(own)
     criteria = NotedCriteria() if name == AS_IT_IS else replace(CRITERIA, **{name: scaled(name, factor)})
     NotedCriteria.read.clear()
     began = time.perf_counter()
-    result = diagnose(load_robot(), recordings, criteria=criteria)
+    result = diagnose(load_robot(), recordings, validation=held_out, criteria=criteria)
     seconds = time.perf_counter() - began
     found = [
         {"effect": e.effect, "joint": e.joint, "group": [other.effect for other in e.confounded_with]}

@@ -70,7 +70,7 @@ def decide(
         # The best that a real one can be is absent: nothing is removed, and nothing speaks for it.
         examination, gain = replace(examination, p_value=1.0), min(gain, 0.0)
     words = why or f"removes {gain:.1%} of the squared residual on data that it was not fitted to"
-    tentative = why is not None and small is None and examination.p_value <= criteria.family_error
+    tentative = why is not None and small is None and examination.p_value <= criteria.significant
     return Decision(candidate, candidate.label(scene), examination, why is None, words, gain, tentative)
 
 

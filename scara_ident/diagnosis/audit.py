@@ -6,12 +6,12 @@ from dataclasses import replace
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
-from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.effect_parameters import physical_parameters
+from scara_ident.diagnosis.candidate_tests import Examination
+from scara_ident.diagnosis.cluster_test import significance
+from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.variation_check import variation_objection
-from scara_ident.effects import Parameter
 
 
 def unsettled(found: Search, weights: Array) -> list[Decision]:
@@ -28,34 +28,43 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
     step = replace(found.step, weights=weights)
     if not step.chosen:
         return []
-    # Whether runs that differ make it is asked of it alone, on rows that weigh them as noise.
-    parameters = physical_parameters(step, runs_differ=False).effects
+    coefficients = physical_parameters(found.whole(step)).coefficients
     result = []
-    for place, (candidate, values) in enumerate(zip(step.chosen, parameters, strict=True)):
+    for place, (candidate, own) in enumerate(zip(step.chosen, coefficients, strict=False)):
         beside = step.without(place)
         (decision,) = beside.judge([candidate])
         why = None if decision.accepted else decision.why
-        why = why or uncertain(candidate, values, step.criteria.least_size)
+        least, essential = step.criteria.least_final_size, candidate.effect.essential(step.scene, candidate.member)
+        why = why or uncertain(own, decision.examination, essential, least)
+        small = candidate.effect.negligible(step.scene, candidate.member, own.at_least(least))
+        why = why or (small and f"within its uncertainty {small}")
         why = why or noise_objection(beside, decision) or variation_objection(beside, decision)
         if why is not None:
             result.append(decision.refused(why))
     return result
 
 
-def uncertain(candidate: Candidate, values: dict[str, Parameter], least_size: float) -> str | None:
-    """Say so where no size of an effect is beyond its uncertainty with everything free.
+def uncertain(own: Coefficients, examination: Examination, essential: slice, least: float) -> str | None:
+    """Say so where an effect's coefficients are not beyond their final uncertainty.
+
+    That is the uncertainty beside all that was found, nonlinear parameters free and what runs differ by counted in. The
+    coefficients are asked together, by Wald's statistic with the degrees of freedom of blocks (`significance`); none is
+    all of them zero, whatever the physical parameters are then, and phases, orders and times do not count.
 
     Parameters
     ----------
-    candidate : Candidate
-    values : dict of str to Parameter
-        Its physical parameters.
-    least_size : float
-        Standard deviations that a size must have.
+    own : Coefficients
+    examination : Examination
+        Of the effect beside all others.
+    essential : slice
+        The coefficients that are asked, see `Effect.essential`.
+    least : float
+        Standard deviations that one coefficient would have to lie from zero, beyond which many blocks let so few by.
     """
-    shape = {parameter.name for parameter in candidate.effect.nonlinear} | {"phase"}
-    sizes = {name: item for name, item in values.items() if name not in shape}
-    if any(abs(item.value) > least_size * item.std for item in sizes.values()):
+    from scipy.special import erfc
+
+    value, covariance = own.value[essential], own.covariance[essential, essential]
+    p_value = significance(value, covariance, examination.freedom, examination.products[essential, essential])
+    if p_value <= float(erfc(least / 2.0**0.5)):
         return None
-    name, item = max(sizes.items(), key=lambda pair: abs(pair[1].value) / max(pair[1].std, 1e-300))
-    return f"its {name} of {item.value:.2g} is uncertain by {item.std:.1g} beside all that was found"
+    return f"beside all that was found, with what runs differ by counted, its size is within its uncertainty: p = {p_value:.1e}"

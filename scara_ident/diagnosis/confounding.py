@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,7 +54,9 @@ def confounders(step: SelectionStep, decisions: Sequence[Decision]) -> list[tupl
 
 
 def _confounders_of(step: SelectionStep, found: Candidate, pool: Sequence[Candidate]) -> tuple[Confounder, ...]:
-    scene, criteria = step.scene, step.criteria
+    # A rival is asked for once, not in every round of a search.
+    scene, criteria = step.scene, replace(step.criteria, family_error=step.criteria.significant)
+    step = replace(step, criteria=criteria)
     own = step.judge([found])[0]
     # Of all joints together: candidates of different joints are compared. Those that remove too little, most of them, need
     # no test.

@@ -41,10 +41,10 @@ class SelectionCriteria:
         "a trajectory that hardly excites an effect says nothing for or against it",
     )
     family_error: float = _criterion(
-        0.01,
+        0.002,
         "probability",
-        "of letting any effect in where nothing is missing, over all candidates tried",
-        "Bonferroni",
+        "of letting any effect in where nothing is missing, over all candidates tried; asked in some five rounds",
+        "Bonferroni: 1 % over a diagnosis",
     )
     least_gain: float = _criterion(
         0.05,
@@ -66,6 +66,12 @@ class SelectionCriteria:
         "standard deviations",
         "by which its size differs from none with its nonlinear parameters free",
         "1 % two-sided",
+    )
+    least_final_size: float = _criterion(
+        3.0,
+        "standard deviations",
+        "by which its coefficients differ from none beside all that was found, what runs differ by counted in",
+        "0.3 % two-sided; docs/diagnosis.md",
     )
     parts: int = _criterion(4, "parts", "of the only trajectory stand in for trajectories where there is but one")
     rotor_inertia_std: float = _criterion(
@@ -116,7 +122,9 @@ class SelectionCriteria:
     remainder_to_noise: float = _criterion(
         1.0, "of the noise", "a repeatable remainder larger than the noise is one whatever it depends on"
     )
-    significant: float = _criterion(0.01, "probability", "that noise alone repeats so much", "F test")
+    significant: float = _criterion(
+        0.01, "probability", "that noise alone repeats so much, or does as well as what is worth a look", "F test"
+    )
     single_bins: int = _criterion(24, "bins", "of one signal, with equal numbers of samples, follow what it does")
     pair_bins: int = _criterion(10, "bins", "of each signal of a pair, so that their square is filled")
     least_per_bin: int = _criterion(10, "samples", "in each bin of a pair on average, or nothing is said")
@@ -142,7 +150,6 @@ class SelectionCriteria:
     worse_held_out: float = _criterion(
         1.5, "times the training error", "on recordings held out: the model does not hold there", "docs/diagnosis.md"
     )
-    most_tentative: int = _criterion(6, "effects", "worth a look are listed, the most gaining first")
     # Choosing the band again.
     wider: float = _criterion(
         1.3, "of the band", "with an effect found the search is repeated where the band grows by so much"

@@ -15,7 +15,7 @@ from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
 from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
-from scara_ident.diagnosis.found_effect import FoundEffect, found_effects, negligible_correction
+from scara_ident.diagnosis.found_effect import FoundEffect, found_effects, uncounted_correction
 from scara_ident.diagnosis.held_out_states import HeldOut, held_out_states
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.model_selection import Outcome, Unexplained, rms_of, select_model
@@ -232,16 +232,17 @@ def diagnose(
     held = held_out_states(found, after.value, after.weights, held_out)
     notes += held.notes
     validation_before = observe(base, held.data)
-    parameters = physical_parameters(step) if found.chosen else PhysicalParameters((), ())
+    whole = found.whole(step)
+    parameters = physical_parameters(whole) if whole.chosen else PhysicalParameters((), (), ())
     effects = found_effects(found, step, parameters)
     notes += [f"{item.label} is not counted: {item.why}" for item in outcome.demoted]
     drift = clock_drift(after.value, outcome.training)
     notes += [] if drift is None else [drift]
     if after.variation is not None:
         notes += after.variation.sentences(robot)
-    negligible = negligible_correction(found)
-    if negligible is not None:
-        notes.append(f"{negligible}; corrected in the data, not counted as an effect")
+    uncounted = uncounted_correction(found, parameters)
+    if uncounted is not None:
+        notes.append(f"{uncounted}; corrected in the data, not counted as an effect")
     validation_after = _with_effects(found, held, validation_before)
     # Where something stays unexplained that is why a whole recording is, and no event.
     in_held_out = tuple(

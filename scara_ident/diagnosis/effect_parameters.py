@@ -50,35 +50,48 @@ class RotorInertia:
     told: bool
 
 
+@dataclass(frozen=True, eq=False)
+class Coefficients:
+    """Coefficients of an effect (k,) and their covariance (k, k)."""
+
+    value: Array
+    covariance: Array
+
+    def at_least(self, stds: float) -> Array:
+        """Return the coefficients so many standard deviations nearer to zero, and no further than that."""
+        reach = stds * np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return np.asarray(np.sign(self.value) * np.maximum(np.abs(self.value) - reach, 0.0))
+
+
 @dataclass(frozen=True)
 class PhysicalParameters:
-    """Of each chosen effect its parameters, and the rotors that these depend on."""
+    """Of each chosen effect its parameters and its coefficients, and the rotors that these depend on."""
 
     effects: tuple[dict[str, Parameter], ...]
+    coefficients: tuple[Coefficients, ...]
     rotors: tuple[RotorInertia, ...]
 
 
-def physical_parameters(step: SelectionStep, *, runs_differ: bool = True) -> PhysicalParameters:
+def physical_parameters(step: SelectionStep) -> PhysicalParameters:
     """Return the physical parameters of each chosen effect, and the rotor inertias that they depend on.
 
     Parameters
     ----------
     step : SelectionStep
-    runs_differ : bool, optional
-        Whether what runs differ by stands in the standard deviations.
 
     Notes
     -----
-    Nonlinear parameters, armatures included, join the fit by the derivative of the effects' columns, so that the
+    What runs differ by stands in the standard deviations. Nonlinear parameters, armatures included, join the fit by the derivative of the effects' columns, so that the
     covariance is that of all parameters together.
     """
     state = linearise(step.scene, step.columns, step.weights, step.chosen, step.criteria.rotor_inertia_std)
-    covariance = _covariance(step, state, runs_differ=runs_differ)
+    covariance = _covariance(step, state)
     found: list[dict[str, Parameter]] = []
+    coefficients = []
     for owner, (candidate, own) in enumerate(zip(step.chosen, state.places, strict=True)):
-        parameters = dict(
-            candidate.effect.parameters(step.scene, candidate.member, state.value[own], covariance[own, own])
-        )
+        linear = Coefficients(state.value[own], covariance[own, own])
+        coefficients.append(linear)
+        parameters = dict(candidate.effect.parameters(step.scene, candidate.member, linear.value, linear.covariance))
         for position, unknown in enumerate(state.unknowns):
             if unknown.owner != owner:
                 continue
@@ -89,7 +102,7 @@ def physical_parameters(step: SelectionStep, *, runs_differ: bool = True) -> Phy
                 unit = parameter.unit.format(**candidate.effect.words(step.scene, candidate.member))
                 parameters[parameter.name] = Parameter(unknown.value, float(np.sqrt(max(variance, 0.0))), unit)
         found.append(parameters)
-    return PhysicalParameters(tuple(found), _rotors(step, state, covariance))
+    return PhysicalParameters(tuple(found), tuple(coefficients), _rotors(step, state, covariance))
 
 
 def _rotors(step: SelectionStep, state: Linearised, covariance: Array) -> tuple[RotorInertia, ...]:
@@ -139,13 +152,12 @@ def parameters_beside(step: SelectionStep, candidate: Candidate) -> dict[str, Pa
     return dict(candidate.effect.parameters(step.scene, candidate.member, alone.value, covariance))
 
 
-def _covariance(step: SelectionStep, state: Linearised, *, runs_differ: bool) -> Array:
+def _covariance(step: SelectionStep, state: Linearised) -> Array:
     """Block covariance of all parameters, with what the priors leave open, which no residual shows."""
     inverse = merge([state.information, state.prior]).inverse()
     value = np.concatenate([state.value, np.zeros(len(state.unknowns))])
     spread = block_covariance(inverse, value, state.joints, step.observations.owner, step.weights).matrix
-    if runs_differ:
-        variation = run_variation(step.observations, state.joints, value)
-        spread = spread + variation.covariance(inverse, state.joints, step.weights)
+    variation = run_variation(step.observations, state.joints, value)
+    spread = spread + variation.covariance(inverse, state.joints, step.weights)
     known = state.prior.factor[:, :-1]
     return np.asarray(spread + state.variance * inverse @ (known.T @ known) @ inverse)

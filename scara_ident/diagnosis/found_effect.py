@@ -9,7 +9,7 @@ import numpy as np
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.confounding import Confounder, confounders
-from scara_ident.diagnosis.effect_parameters import PhysicalParameters
+from scara_ident.diagnosis.effect_parameters import Coefficients, PhysicalParameters
 from scara_ident.diagnosis.model_selection import rms_of
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep
@@ -70,12 +70,11 @@ def found_effects(found: Search, step: SelectionStep, parameters: PhysicalParame
         candidate = decision.candidate
         now = item.rms
         if candidate.corrects_data and found.correction is not None:
-            if negligible_correction(found) is not None:
+            if uncounted_correction(found, parameters) is not None:
                 before = now
                 continue
-            covariance = np.diag(found.correction.std**2)
             values: Mapping[str, Parameter] = candidate.effect.parameters(
-                scene, candidate.member, found.correction.value, covariance
+                scene, candidate.member, found.correction.value, parameters.coefficients[-1].covariance
             )
             confounded: tuple[Confounder, ...] = ()
         else:
@@ -101,9 +100,25 @@ def found_effects(found: Search, step: SelectionStep, parameters: PhysicalParame
     return results
 
 
-def negligible_correction(found: Search) -> str | None:
-    """Say why what was corrected in the data is no effect to speak of."""
+def uncounted_correction(found: Search, parameters: PhysicalParameters) -> str | None:
+    """Say why what was corrected in the data is no effect to speak of.
+
+    Parameters
+    ----------
+    found : Search
+    parameters : PhysicalParameters
+        Of `Search.whole`, the correction last.
+    """
     if found.correction is None:
         return None
-    candidate = found.correction.candidate
-    return candidate.effect.negligible(found.scene, candidate.member, found.correction.value)
+    candidate, value = found.correction.candidate, found.correction.value
+    small = candidate.effect.negligible(found.scene, candidate.member, value)
+    if small is not None:
+        return small
+    own = Coefficients(value, parameters.coefficients[-1].covariance)
+    least = own.at_least(found.step.criteria.least_final_size)
+    if np.any(least) and candidate.effect.negligible(found.scene, candidate.member, least) is None:
+        return None
+    told = candidate.effect.parameters(found.scene, candidate.member, value, own.covariance)
+    sizes = ", ".join(f"{name} {item.value:.2g} +- {item.std:.1g} {item.unit}" for name, item in told.items())
+    return f"{sizes}: within its uncertainty, with what runs differ by counted"

@@ -115,6 +115,11 @@ def _searched(
     now, tests = search_and_rest(task.progress)
     found = search(replace(task, progress=now), columns, without=without, known=known)
     tests("testing what is left")
+    return _outcome(task, found)
+
+
+def _outcome(task: SearchTask, found: Search) -> Outcome:
+    """Say what a search leaves."""
     training = observed_at_every_sample(found.step)
     after = wls(training)
     before, left = found.uncorrected.residuals(found.start.value), training.residuals(after.value)
@@ -186,6 +191,11 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
         demoted |= {item.label: item for item in reversed(proxies)}
         now, left = next_of(left)
         found = _searched(replace(task, progress=now), columns, tuple(demoted), found.search)
+    else:
+        # No further search, but nothing is believed that does not stand.
+        while unstable := unsettled(found.search, found.after.weights):
+            demoted |= {item.label: item for item in unstable}
+            found = _outcome(task, found.search.without([item.label for item in unstable]))
     return replace(found, demoted=tuple(demoted.values()))
 
 

@@ -38,13 +38,12 @@ class Correction:
     Attributes
     ----------
     candidate : Candidate
-    value, std : ndarray, shape (k,)
-        In all, and the standard deviation of the last step.
+    value : ndarray, shape (k,)
+        In all.
     """
 
     candidate: Candidate
     value: Array
-    std: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +134,23 @@ class Search:
         """The base model with the effects that stayed."""
         return model_with(self.scene, self.chosen)
 
+    def without(self, labels: Collection[str]) -> Search:
+        """Return it without some of the effects that stayed, the others fitted again."""
+        kept = tuple(item for item in self.chosen if item.label(self.scene) not in labels)
+        step = self.step
+        scene, kept = tune(self.scene, step.columns, step.weights, kept, step.criteria.rotor_inertia_std)
+        steps = tuple(item for item in self.steps if item.decision.label not in labels)
+        return replace(self, step=replace(step, scene=scene, chosen=kept), steps=steps)
+
+    def whole(self, step: SelectionStep) -> SelectionStep:
+        """Return a step of the effects that stayed, with what was taken out of the data as the last of them.
+
+        Of that nothing is left to find, but how sure it is follows.
+        """
+        if self.correction is None:
+            return step
+        return replace(step, chosen=(*step.chosen, self.correction.candidate))
+
 
 @dataclass(frozen=True, eq=False)
 class SearchTask:
@@ -207,8 +223,7 @@ def search(
         if candidate.corrects_data:
             observations = observations.with_torque(corrected(observations.data, candidate, found.value))
             columns = columns.beside(observations)
-            std = np.sqrt(np.diag(found.covariance))
-            correction = Correction(candidate, found.value + (correction.value if correction else 0.0), std)
+            correction = Correction(candidate, found.value + (correction.value if correction else 0.0))
         else:
             chosen = (*chosen, candidate)
         if not candidate.corrects_data or candidate.effect.settled(found.value):

@@ -9,6 +9,9 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import best_of_each
 
+# Of more than this many, the most gaining first, nobody reads the rest; nothing is decided by it.
+MOST = 6
+
 
 @dataclass(frozen=True)
 class TentativeEffect:
@@ -67,4 +70,4 @@ def tentative_effects(
             p_value = min(1.0, decision.examination.p_value * found.tried)
             words, settled = candidate.effect.description(scene, candidate.member), candidate.effect.experiment
             result.append(TentativeEffect(name, joint, words, decision.why, settled, decision.gain, p_value, decision))
-    return tuple(result[: found.step.criteria.most_tentative])
+    return tuple(result[:MOST])

@@ -261,6 +261,10 @@ class Effect(ABC):
         """
         raise NotImplementedError(f"{self.name} is tied and has no slopes")
 
+    def essential(self, scene: Scene, member: Member) -> slice:
+        """Return the coefficients of which one at least is not zero where the effect is there: all, unless one says it."""
+        return slice(None)
+
     def corrects_data(self, member: Member) -> bool:
         """Whether it is taken out of the recordings instead of becoming a term of the model."""
         return False

@@ -189,6 +189,10 @@ class PayloadOfRecordings(Effect):
             return "its mass would be negative: these recordings carry less than the others"
         return _too_heavy(scene, float(value[0]), float(std[0]))
 
+    def essential(self, scene: Scene, member: Member) -> slice:
+        """Return the mass where the torque tells it: a body has one, and runs that differ seem to turn without any."""
+        return slice(0, 1) if self._told(scene.robot)[0] == 0 else slice(None)
+
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return mass and centre of mass where they can be told, and the body's standard parameters."""
         shown = self._told(scene.robot)

@@ -75,7 +75,7 @@ def test_a_coefficient_within_two_deviations_of_what_is_possible_is_possible():
 
 
 def test_the_p_value_is_corrected_for_what_was_tried():
-    item = replace(GOOD, p_value=1e-4)
+    item = replace(GOOD, p_value=0.01 * CRITERIA.family_error)
     assert decided(SPRING, item, 50).accepted
     assert not decided(SPRING, item, 200).accepted
 

@@ -6,26 +6,49 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.audit import uncertain, unsettled
-from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.diagnose import diagnose
-from scara_ident.effects import Member, Parameter
-from scara_ident.effects.elasticity import JointElasticity
+from scara_ident.diagnosis.effect_parameters import Coefficients
 from scara_ident.effects.position import Spring
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, searched, with_torque
 from tests.estimation.test_run_variation import runs
 
 
-def test_a_size_within_its_uncertainty_is_none():
-    elastic = Candidate(JointElasticity(), Member(0, (10.0, 0.1)))
-    surely = {"stiffness": Parameter(3e4, 1e3, "N m/rad"), "frequency": Parameter(10.0, 9.0, "Hz")}
-    hardly = {"stiffness": Parameter(3e4, 1.4e4, "N m/rad"), "frequency": Parameter(10.0, 0.1, "Hz")}
-    assert uncertain(elastic, surely, 2.5) is None
-    # That its frequency is sure does not make it large.
-    why = uncertain(elastic, hardly, 2.5)
-    assert why is not None
-    assert "stiffness" in why
-    assert uncertain(elastic, {"stiffness": Parameter(3e4, np.inf, "N m/rad")}, 2.5) is not None
+def examined(freedom: float, size: int) -> Examination:
+    """An examination of which only these are asked."""
+    nothing = np.zeros(size)
+    return Examination(
+        nothing, np.eye(size), 0.0, 1.0, 0.5, 0.5, (), 1.0, nothing, nothing, np.eye(size), freedom
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("value", "covariance", "freedom", "stands"),
+    [
+        ([3.2], [[1.0]], 200.0, True),
+        ([-2.8], [[1.0]], 200.0, False),
+        # Few blocks know a standard deviation badly.
+        ([3.2], [[1.0]], 5.0, False),
+        ([3.2], [[np.inf]], 200.0, False),
+        # Together beyond doubt, though neither alone; and no more sure for a second that says nothing.
+        ([2.6, 2.6], np.eye(2), 500.0, True),
+        ([3.0, 3.0], [[1.0, 0.95], [0.95, 1.0]], 500.0, False),
+        ([0.5, -0.5], [[1.0, 0.99], [0.99, 1.0]], 500.0, True),
+    ],
+)
+def test_coefficients_are_asked_together(value: list, covariance: list, freedom: float, stands: bool):
+    own = Coefficients(np.array(value), np.array(covariance))
+    why = uncertain(own, examined(freedom, len(value)), slice(None), 3.0)
+    assert (why is None) is stands
+    assert stands or "within its uncertainty" in why
+
+
+def test_only_what_is_essential_is_asked():
+    # First moments that differ beyond doubt from run to run make no body without a mass.
+    own = Coefficients(np.array([2.0, 9.0]), np.eye(2))
+    for essential, stands in ((slice(None), True), (slice(0, 1), False), (slice(1, 2), True)):
+        assert (uncertain(own, examined(100.0, 2), essential, 3.0) is None) is stands
 
 
 def test_a_spring_of_the_arm_stands():

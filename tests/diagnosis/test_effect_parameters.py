@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.effect_parameters import parameters_beside, physical_parameters
+from scara_ident.diagnosis.effect_parameters import Coefficients, parameters_beside, physical_parameters
 from scara_ident.effects import Member
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
@@ -105,3 +105,8 @@ def test_beside_a_model_the_parameters_are_those_of_the_model_that_has_the_effec
     assert beside["amplitude"].std == pytest.approx(whole["amplitude"].std, rel=0.15)
     spring = parameters_beside(step_beside(runs, (), WEIGHTS), Candidate(Spring(), Member(1)))
     assert abs(spring["stiffness"].value) < 4.0 * spring["stiffness"].std
+
+
+def test_coefficients_are_at_least_what_their_uncertainty_leaves():
+    own = Coefficients(np.array([5.0, -5.0, 1.0]), np.diag([1.0, 4.0, 1.0]))
+    np.testing.assert_allclose(own.at_least(2.0), [3.0, -1.0, 0.0])

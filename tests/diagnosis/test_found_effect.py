@@ -2,10 +2,26 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
+
 from scara_ident.diagnosis import diagnose
 from scara_ident.effects import effects_named
+from scara_ident.effects.measurement import shifted
 from scara_ident.robot.robot import load_robot
-from tests.diagnosis.made import BANDS, virtual_runs
+from tests.diagnosis.made import BANDS, exact_runs, virtual_runs
+
+
+@pytest.mark.parametrize(
+    ("late", "named"), [((0.008, 0.008, 0.008, 0.008), True), ((0.003, 0.013, 0.006, 0.011), False)]
+)
+def test_a_delay_by_which_runs_differ_is_corrected_but_not_named(late: tuple[float, ...], named: bool) -> None:
+    runs = [shifted(run, -delay) for run, delay in zip(exact_runs(), late, strict=True)]
+    found = diagnose(load_robot(), runs, bands=BANDS, catalogue=effects_named("time_delay"))
+    assert found.search.correction is not None
+    assert found.search.correction.value[0] == pytest.approx(np.mean(late), abs=1.5e-3)
+    assert [item.effect for item in found.effects] == (["time_delay"] if named else [])
+    assert any("not counted as an effect" in note for note in found.notes) is not named
 
 
 def test_errors_go_from_effect_to_effect() -> None:

@@ -233,6 +233,7 @@ def test_the_diagnosis_page_lists_every_alias_and_the_limits_of_the_program() ->
         f"| gain on data not fitted to | at least {100 * CRITERIA.least_gain:g} % ",
         f"| helps in | at least {100 * CRITERIA.least_votes:g} % ",
         f"| larger than its uncertainty | by {CRITERIA.least_size:g} standard deviations",
+        f"| larger than its final uncertainty | by {CRITERIA.least_final_size:g} standard deviations",
         f"at most {100 * CRITERIA.least_colour:g} % of its power within the band",
         f"significant if they removed {100 * CRITERIA.least_power:g} % of",
         f"at most {CRITERIA.worse_held_out:g} times that of the training",

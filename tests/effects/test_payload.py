@@ -121,6 +121,8 @@ def test_the_payload_of_some_recordings_is_recovered():
     scene, value, covariance = fit(build_model(robot), data, effect, member, rounds=1)
     found = effect.parameters(scene, member, value, covariance)
     assert found["mass"].value == pytest.approx(0.8, abs=4.0 * found["mass"].std)
+    # Without mass there is no body, whatever else of it seems to differ.
+    assert [column.name for column in effect.columns(scene, member)[effect.essential(scene, member)]] == ["payload_m"]
     # A mass mounted anyhow is less sure than one at the tool.
     assert found["mass"].std < 0.05
     point = tool_of(robot).point
