@@ -39,7 +39,7 @@ def mujoco_arm(model: IdentifiedModel) -> Iterator[Free]:
     try:
         import mujoco
     except ImportError:
-        raise ScaraIdentError("MuJoCo is not installed: pip install mujoco") from None
+        raise ScaraIdentError('MuJoCo is not installed; install it with: pip install "scara-ident[mujoco]"') from None
     robot = model.robot
     text, code = export_model(model, "mjcf").files.values()
     beside = ModuleType(f"{robot.name}_mujoco")
