@@ -18,7 +18,13 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 VERSIONS = ("3.11", "3.12", "3.13", "3.14")
 # What each extra brings, by the name it is imported by.
-EXTRAS = {"ros": "rosbags", "hdf5": "h5py", "casadi": "casadi", "mujoco": "mujoco", "fleet": "dask, distributed, fsspec, s3fs"}
+EXTRAS = {
+    "ros": "rosbags",
+    "hdf5": "h5py",
+    "casadi": "casadi",
+    "mujoco": "mujoco",
+    "fleet": "dask, distributed, fsspec, s3fs",
+}
 USED = """
 import pickle
 from scara_ident import identify, load_robot, named_motion, simulate, virtual_arm

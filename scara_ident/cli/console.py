@@ -69,12 +69,15 @@ def errors_console() -> PlainConsole:
 def plugin_notices() -> Iterator[None]:
     """Say in one line on stderr what of an installed package is left out."""
     with catch_warnings():
-        simplefilter("once", PluginWarning)
-        others = warnings.showwarning
+        # The filter "once" forgets when a library that is loaded later sets filters of its own.
+        simplefilter("always", PluginWarning)
+        others, said = warnings.showwarning, set()
 
         def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
             if issubclass(category, PluginWarning):
-                errors_console().print(f"scara-ident: note: {message}", soft_wrap=True)
+                if str(message) not in said:
+                    said.add(str(message))
+                    errors_console().print(f"scara-ident: note: {message}", soft_wrap=True)
             else:
                 others(message, category, *where, **more)
 

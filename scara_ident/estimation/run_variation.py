@@ -194,8 +194,8 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
         Parameters of all these columns.
     """
     runs = len(observations.data.recordings)
-    # Of long files the rows are not beside the samples that the directions are made of.
-    if runs < LEAST_RUNS or observations.kept is not None:
+    # Where blocks are triangular factors the rows are not beside the samples that the directions are made of.
+    if runs < LEAST_RUNS or any(rows.sizes is not None for rows in joints):
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
 
