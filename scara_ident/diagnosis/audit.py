@@ -28,9 +28,10 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
     step = replace(found.step, weights=weights)
     if not step.chosen:
         return []
-    coefficients = physical_parameters(found.whole(step)).coefficients
+    # Whether runs that differ make it is asked of it alone, on rows that weigh them as noise.
+    coefficients = physical_parameters(step, runs_differ=False).coefficients
     result = []
-    for place, (candidate, own) in enumerate(zip(step.chosen, coefficients, strict=False)):
+    for place, (candidate, own) in enumerate(zip(step.chosen, coefficients, strict=True)):
         beside = step.without(place)
         (decision,) = beside.judge([candidate])
         why = None if decision.accepted else decision.why
@@ -47,7 +48,7 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
 def uncertain(own: Coefficients, examination: Examination, essential: slice, least: float) -> str | None:
     """Say so where an effect's coefficients are not beyond their final uncertainty.
 
-    That is the uncertainty beside all that was found, nonlinear parameters free and what runs differ by counted in. The
+    That is the uncertainty beside all that was found, nonlinear parameters free. The
     coefficients are asked together, by Wald's statistic with the degrees of freedom of blocks (`significance`); none is
     all of them zero, whatever the physical parameters are then, and phases, orders and times do not count.
 
@@ -67,4 +68,4 @@ def uncertain(own: Coefficients, examination: Examination, essential: slice, lea
     p_value = significance(value, covariance, examination.freedom, examination.products[essential, essential])
     if p_value <= float(erfc(least / 2.0**0.5)):
         return None
-    return f"beside all that was found, with what runs differ by counted, its size is within its uncertainty: p = {p_value:.1e}"
+    return f"beside all that was found its size is within its uncertainty: p = {p_value:.1e}"

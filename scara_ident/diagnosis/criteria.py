@@ -70,7 +70,7 @@ class SelectionCriteria:
     least_final_size: float = _criterion(
         3.0,
         "standard deviations",
-        "by which its coefficients differ from none beside all that was found, what runs differ by counted in",
+        "by which its coefficients differ from none beside all that was found",
         "0.3 % two-sided; docs/diagnosis.md",
     )
     parts: int = _criterion(4, "parts", "of the only trajectory stand in for trajectories where there is but one")

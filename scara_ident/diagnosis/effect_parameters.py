@@ -72,20 +72,22 @@ class PhysicalParameters:
     rotors: tuple[RotorInertia, ...]
 
 
-def physical_parameters(step: SelectionStep) -> PhysicalParameters:
+def physical_parameters(step: SelectionStep, *, runs_differ: bool = True) -> PhysicalParameters:
     """Return the physical parameters of each chosen effect, and the rotor inertias that they depend on.
 
     Parameters
     ----------
     step : SelectionStep
+    runs_differ : bool, optional
+        Whether what runs differ by stands in the standard deviations.
 
     Notes
     -----
-    What runs differ by stands in the standard deviations. Nonlinear parameters, armatures included, join the fit by the derivative of the effects' columns, so that the
+    Nonlinear parameters, armatures included, join the fit by the derivative of the effects' columns, so that the
     covariance is that of all parameters together.
     """
     state = linearise(step.scene, step.columns, step.weights, step.chosen, step.criteria.rotor_inertia_std)
-    covariance = _covariance(step, state)
+    covariance = _covariance(step, state, runs_differ=runs_differ)
     found: list[dict[str, Parameter]] = []
     coefficients = []
     for owner, (candidate, own) in enumerate(zip(step.chosen, state.places, strict=True)):
@@ -152,12 +154,13 @@ def parameters_beside(step: SelectionStep, candidate: Candidate) -> dict[str, Pa
     return dict(candidate.effect.parameters(step.scene, candidate.member, alone.value, covariance))
 
 
-def _covariance(step: SelectionStep, state: Linearised) -> Array:
+def _covariance(step: SelectionStep, state: Linearised, *, runs_differ: bool) -> Array:
     """Block covariance of all parameters, with what the priors leave open, which no residual shows."""
     inverse = merge([state.information, state.prior]).inverse()
     value = np.concatenate([state.value, np.zeros(len(state.unknowns))])
     spread = block_covariance(inverse, value, state.joints, step.observations.owner, step.weights).matrix
-    variation = run_variation(step.observations, state.joints, value)
-    spread = spread + variation.covariance(inverse, state.joints, step.weights)
+    if runs_differ:
+        variation = run_variation(step.observations, state.joints, value)
+        spread = spread + variation.covariance(inverse, state.joints, step.weights)
     known = state.prior.factor[:, :-1]
     return np.asarray(spread + state.variance * inverse @ (known.T @ known) @ inverse)
