@@ -283,7 +283,7 @@ def clearance_of(
 ) -> Clearance:
     """Choose the pairs of shapes that a motion keeps apart.
 
-    Shapes of one body and of bodies that a joint connects are not watched, nor are two shapes of the arm that overlap both
+    Shapes of one body and of links that a joint connects are not watched, nor are two shapes of the arm that overlap both
     at the neutral posture and in the middle of the ranges, or are never 1 cm (or the margin) apart; nor any pair that, in
     every posture tried, touches, or is nearer than the margin without touching.
 
@@ -319,17 +319,25 @@ def clearance_of(
     if not any(moved):
         return replace(watched, notes=(unwatched.format(f"{robot.urdf.name} has no collision shapes"),))
     obstacles = [*(["floor"] if np.isfinite(floor) else []), *(f"box{k + 1}" for k in range(len(boxes)))]
-    parents, count = robot.model.parents, shapes.ngeoms - len(obstacles)
+    count, found = shapes.ngeoms - len(obstacles), shapes.geometryObjects
     pairs = [
         (i, j, "self")
         for i in range(count)
         for j in range(i + 1, count)
-        if moved[i] != moved[j] and moved[i] != parents[moved[j]] and moved[j] != parents[moved[i]]
+        if moved[i] != moved[j]
+        and not _hangs(robot.model, found[i], found[j])
+        and not _hangs(robot.model, found[j], found[i])
     ]
     pairs += [(i, count + k, name) for k, name in enumerate(obstacles) for i in range(count) if moved[i]]
     if not pairs:
         return replace(watched, notes=(unwatched.format("all links that have shapes hang on one another"),))
     return _parted(replace(watched, pairs=tuple(pairs)), lower, upper)
+
+
+def _hangs(model: pin.Model, shape: pin.GeometryObject, on: pin.GeometryObject) -> bool:
+    """Whether a joint that moves connects a shape's link to that of another; what is fixed to either is a link of its own."""
+    joint = model.frames[model.frames[shape.parentFrame].parentFrame]
+    return bool(joint.type == pin.FrameType.JOINT and joint.parentFrame == on.parentFrame)
 
 
 def _parted(watched: Clearance, lower: Array, upper: Array) -> Clearance:

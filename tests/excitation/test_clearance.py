@@ -120,6 +120,20 @@ def test_a_margin_that_nothing_can_keep_leaves_out_only_what_cannot_collide(tmp_
     assert clearance.notes[0].endswith(": l1 and floor.")
 
 
+def test_links_beyond_a_locked_joint_are_kept_apart(tmp_path):
+    upright(tmp_path, BALL, BALL, BALL)
+    (tmp_path / "robot.yaml").write_text(
+        "urdf: arm.urdf\neffort_side: joint\njoints: {j1: {}, j3: {}}\nlocked: {j2: 0.5}\n"
+    )
+    clearance = clearance_of(load_robot(tmp_path / "robot.yaml"), *(each[:2] for each in ENDS), margin=0.02)
+    # The third link folds back onto the first, which is one body with the second.
+    assert clearance.pairs == ((0, 2, "self"),)
+    q = drawn()[:2]
+    full = np.array([q[0], np.full(q.shape[1], 0.5), q[1]])
+    expected = np.linalg.norm(middle(full, 2) - middle(full, 0), axis=0) - 0.1
+    np.testing.assert_allclose(clearance.nearest(q).distance[0], expected, atol=1e-9)
+
+
 def test_an_arm_without_shapes_or_with_lost_ones_says_so(tmp_path):
     bare = clearance_of(upright(tmp_path, "", "", ""), *ENDS, margin=0.02, floor=0.0)
     assert bare.groups == () and "arm.urdf has no collision shapes; rehearse" in bare.notes[0]
