@@ -298,9 +298,12 @@ def durations_of(duration: float | Sequence[float], trajectories: int = 1) -> tu
     Raises
     ------
     UsageError
-        If they do not agree.
+        If they do not agree, or are no positive numbers.
     """
-    given = (float(duration),) if isinstance(duration, (int, float)) else tuple(map(float, duration))
+    given = tuple(np.atleast_1d(np.asarray(duration, dtype=float)).tolist())
+    for each in given:
+        if not 0.0 < each < np.inf:
+            raise UsageError(f"duration {each:g} s: expected a positive number of seconds")
     wanted = trajectories if len(given) == 1 else min(trajectories, 1) * len(given)
     if not 1 <= wanted <= MOST_TRAJECTORIES:
         raise UsageError(f"trajectories {wanted}: expected at least 1 and at most {MOST_TRAJECTORIES}")
