@@ -87,7 +87,11 @@ class Stopping:
         }
 
     def words(self) -> str:
-        """Say it in a sentence."""
+        """Say it in a sentence, and what is not judged in another."""
+        unjudged = f" Not judged, as no value is known to take a percentage of: {', '.join(self.not_judged)}."
+        return f"{self._verdict()}{unjudged if self.not_judged else ''}"
+
+    def _verdict(self) -> str:
         last, first = self.after[-1], self.suffices
         worst = f"{last.parameter}, {last.std:.3g} where {last.asked:.3g} is asked"
         if first == 0:
