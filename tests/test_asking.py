@@ -107,6 +107,19 @@ def test_where_nothing_is_open_it_says_so_and_no_motion_is_left(folder: Path, mo
     assert not (folder / "next" / "trajectory.csv").exists()
 
 
+def test_what_was_asked_counts_when_something_was_recorded_not_when_limits_are_others(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def designed(folder: Path, settings: Settings, recordings: object, asked: Asked, work: object) -> Asked:
+        return asking._note(folder, replace(asked, state="settled", asked=(PAIR,)))
+
+    monkeypatch.setattr(asking, "_designed", designed)
+    assert ask(folder, QUICK).times == {}
+    assert ask(folder, replace(QUICK, duration=5.0)).times == {}
+    write_recording(replace(small_runs()[0], name="more_1"), folder / "recordings" / "more_1.parquet")
+    assert ask(folder, replace(QUICK, duration=5.0)).times == {PAIR: 1}
+
+
 def test_a_note_that_is_none_is_said(tmp_path: Path):
     (tmp_path / "ask.json").write_text("[]", encoding="utf-8")
     with pytest.raises(ScaraIdentError, match="remove it to begin again"):
