@@ -36,7 +36,7 @@ POSTURES = 100
 # A pair is likely to come near if its least distance there is so much of the range of its distances, or less.
 SPREAD = 0.5
 # Links of the arm that are never further apart than this touch by design, m.
-TOUCHING = 0.01
+TOUCHING = 0.02
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -284,7 +284,7 @@ def clearance_of(
     """Choose the pairs of shapes that a motion keeps apart.
 
     Shapes of one body and of links that a joint connects are not watched, nor are two shapes of the arm that overlap both
-    at the neutral posture and in the middle of the ranges, or are never 1 cm (or the margin) apart; nor any pair that, in
+    at the neutral posture and in the middle of the ranges, or are never 2 cm (or the margin) apart; nor any pair that, in
     every posture tried, touches, or is nearer than the margin without touching.
 
     Parameters
@@ -358,7 +358,7 @@ def _parted(watched: Clearance, lower: Array, upper: Array) -> Clearance:
     kept = tuple(pair for pair, never in zip(watched.pairs, touching, strict=True) if not never)
     room = distance[~touching].min(axis=1) - watched.margin
     likely = room < SPREAD * np.ptp(distance[~touching], axis=1)
-    said = f"Not kept {watched.margin:g} m apart, as they touch, or are nearer without touching, in any case: {{}}."
+    said = f"Not kept {watched.margin:g} m apart, as they touch by design, or never: {{}}."
     notes = (said.format("; ".join(left_out)),) if left_out else ()
     return replace(watched, pairs=kept, notes=notes, likely=tuple(likely.tolist()))
 
