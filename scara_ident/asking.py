@@ -59,6 +59,8 @@ class Asked:
         Questions that the motion is to answer.
     times : mapping of str to int
         How often each question was asked before.
+    recorded : str
+        Hash of the recordings alone: what was asked counts once something new is there, not where limits are others.
     """
 
     inputs: str
@@ -66,6 +68,7 @@ class Asked:
     words: str = ""
     asked: tuple[str, ...] = ()
     times: Mapping[str, int] = field(default_factory=dict)
+    recorded: str = ""
 
 
 @dataclass(frozen=True)
@@ -103,10 +106,15 @@ class Settings:
             self.effort.seed,
             "" if self.limits is None else self.limits.words(),
         ]
-        found = hashlib.sha256(repr(words).encode())
-        for path in recordings:
-            found.update(path.name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
-        return found.hexdigest()
+        return hashlib.sha256(f"{words!r} {hash_of(recordings)}".encode()).hexdigest()
+
+
+def hash_of(recordings: Sequence[Path]) -> str:
+    """Return a hash of recordings, by name and content."""
+    found = hashlib.sha256()
+    for path in recordings:
+        found.update(path.name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+    return found.hexdigest()
 
 
 def ask(folder: Path, settings: Settings, work: Work | None = None) -> Asked:
@@ -140,12 +148,14 @@ def ask(folder: Path, settings: Settings, work: Work | None = None) -> Asked:
         return before
     if before is None or before.inputs != inputs or not recordings:
         times = dict(before.times) if before is not None else {}
-        for question in before.asked if before is not None and before.inputs != inputs else ():
+        recorded = hash_of(recordings)
+        for question in before.asked if before is not None and before.recorded != recorded else ():
             times[question] = times.get(question, 0) + 1
+        fresh = Asked(inputs, times=times, recorded=recorded)
         if not recordings:
-            return _first(folder, settings, Asked(inputs, times=times), work)
+            return _first(folder, settings, fresh, work)
         _diagnosed(folder, settings, recordings, work.part(0.0, 0.6))
-        before = Asked(inputs, times=times)
+        before = fresh
         _note(folder, before)
     work("designing the next motion", 0.6)
     return _designed(folder, settings, recordings, before, work.part(0.6, 1.0))

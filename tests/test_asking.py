@@ -19,6 +19,7 @@ from scara_ident.recording.recording import write_recording
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.asked import PAIR, open_diagnosis, small_runs
 
+# All of the limits: so short a motion of so short a search tells too little within less.
 QUICK = Settings(
     load_robot(),
     duration=4.0,
@@ -112,6 +113,19 @@ def test_where_nothing_is_open_it_says_so_and_no_motion_is_left(folder: Path, mo
     assert not (folder / "next" / "trajectory.csv").exists()
 
 
+def test_what_was_asked_counts_when_something_was_recorded_not_when_limits_are_others(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def designed(folder: Path, settings: Settings, recordings: object, asked: Asked, work: object) -> Asked:
+        return asking._note(folder, replace(asked, state="settled", asked=(PAIR,)))
+
+    monkeypatch.setattr(asking, "_designed", designed)
+    assert ask(folder, QUICK).times == {}
+    assert ask(folder, replace(QUICK, duration=5.0)).times == {}
+    write_recording(replace(small_runs()[0], name="more_1"), folder / "recordings" / "more_1.parquet")
+    assert ask(folder, replace(QUICK, duration=5.0)).times == {PAIR: 1}
+
+
 def test_a_note_that_is_none_is_said(tmp_path: Path):
     (tmp_path / "ask.json").write_text("[]", encoding="utf-8")
     with pytest.raises(ScaraIdentError, match="remove it to begin again"):
@@ -121,6 +135,6 @@ def test_a_note_that_is_none_is_said(tmp_path: Path):
 
 
 def test_other_limits_are_another_question():
-    bare, whole = replace(QUICK, limits=None), QUICK
-    assert len({each.hash([]) for each in (bare, whole, replace(whole, limits=limits_of(QUICK.robot, floor=0.0)))}) == 3
-    assert whole.hash([]) == replace(whole, limits=limits_of(load_robot(), share=1.0)).hash([])
+    part = replace(QUICK, limits=limits_of(QUICK.robot, share=0.9))
+    assert len({each.hash([]) for each in (QUICK, part, replace(part, limits=limits_of(QUICK.robot, floor=0.0)))}) == 3
+    assert part.hash([]) == replace(part, limits=limits_of(load_robot(), share=0.9)).hash([])

@@ -68,6 +68,8 @@ def ask(
         with progress() as work:
             found = run(folder, settings, work)
         console.print(found.words)
+        if found.state == "record" and limits.clearance is not None:
+            console.note(limits.clearance.notes)
         if not virtual or found.state != "record" or made >= steps:
             return
         from scara_ident.simulation import parse_effect, read_trajectory, simulate, virtual_arm, write_simulation

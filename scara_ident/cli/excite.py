@@ -103,7 +103,7 @@ def excite(
         write_trajectory,
     )
     from scara_ident.excitation.criteria import criterion_of
-    from scara_ident.excitation.design import SAMPLES, check_size, durations_of
+    from scara_ident.excitation.design import SAMPLES, check_size, durations_of, harmonics_of
     from scara_ident.excitation.known import read_diagnosis, read_parameters
     from scara_ident.excitation.output import check_rate, file_names
     from scara_ident.excitation.stopping import NOISE_BAND, noise_of, stopping
@@ -150,8 +150,10 @@ def excite(
     durations = durations_of(duration or 25.0, trajectories)
     longest = max(durations)
     count = default_harmonics(longest, arm.n, len(durations)) if harmonics is None else harmonics
-    check_size(count, arm.n, len(durations), SAMPLES)
-    check_rate(rate, count / longest)
+    for each in durations:
+        own = harmonics_of(count, each / longest)
+        check_size(own, arm.n, len(durations), round(SAMPLES * each / longest))
+        check_rate(rate, own / each)
     nominal = None if parameters is None else read_parameters(parameters, equation)
     counted = PAPER_SAMPLES / longest
     std = None

@@ -35,6 +35,8 @@ TOLERANCE = 1e-8
 POSTURES = 100
 # A pair is likely to come near if its least distance there is so much of the range of its distances, or less.
 SPREAD = 0.5
+# Links of the arm that are never further apart than this touch by design, m.
+TOUCHING = 0.02
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -281,8 +283,9 @@ def clearance_of(
 ) -> Clearance:
     """Choose the pairs of shapes that a motion keeps apart.
 
-    Shapes of one body and of bodies that a joint connects are not watched, nor are two shapes of the arm that overlap both
-    at the neutral posture and in the middle of the ranges, nor any that are nearer than the margin in every posture tried.
+    Shapes of one body and of links that a joint connects are not watched, nor are two shapes of the arm that overlap both
+    at the neutral posture and in the middle of the ranges, or are never 2 cm (or the margin) apart; nor any pair that, in
+    every posture tried, touches, or is nearer than the margin without touching.
 
     Parameters
     ----------
@@ -316,12 +319,14 @@ def clearance_of(
     if not any(moved):
         return replace(watched, notes=(unwatched.format(f"{robot.urdf.name} has no collision shapes"),))
     obstacles = [*(["floor"] if np.isfinite(floor) else []), *(f"box{k + 1}" for k in range(len(boxes)))]
-    parents, count = robot.model.parents, shapes.ngeoms - len(obstacles)
+    count, found = shapes.ngeoms - len(obstacles), shapes.geometryObjects
     pairs = [
         (i, j, "self")
         for i in range(count)
         for j in range(i + 1, count)
-        if moved[i] != moved[j] and moved[i] != parents[moved[j]] and moved[j] != parents[moved[i]]
+        if moved[i] != moved[j]
+        and not _hangs(robot.model, found[i], found[j])
+        and not _hangs(robot.model, found[j], found[i])
     ]
     pairs += [(i, count + k, name) for k, name in enumerate(obstacles) for i in range(count) if moved[i]]
     if not pairs:
@@ -329,13 +334,22 @@ def clearance_of(
     return _parted(replace(watched, pairs=tuple(pairs)), lower, upper)
 
 
+def _hangs(model: pin.Model, shape: pin.GeometryObject, on: pin.GeometryObject) -> bool:
+    """Whether a joint that moves connects a shape's link to that of another; what is fixed to either is a link of its own."""
+    joint = model.frames[model.frames[shape.parentFrame].parentFrame]
+    return bool(joint.type == pin.FrameType.JOINT and joint.parentFrame == on.parentFrame)
+
+
 def _parted(watched: Clearance, lower: Array, upper: Array) -> Clearance:
-    """Leave out the pairs that touch where the designer of the arm let them."""
+    """Leave out the pairs that touch where the designer of the arm let them, and those that no motion parts."""
     drawn = np.random.default_rng(0).uniform(lower, upper, (POSTURES, len(lower)))
     postures = np.vstack([np.clip(np.zeros(len(lower)), lower, upper), 0.5 * (lower + upper), drawn]).T
     distance = watched.all_distances(postures)
     own = np.array([group == "self" for *_, group in watched.pairs])
-    touching = (own & np.all(distance[:, :2] <= 0.0, axis=1)) | np.all(distance < watched.margin, axis=1)
+    near = np.all(distance < min(watched.margin, TOUCHING), axis=1)
+    touching = own & (near | np.all(distance[:, :2] <= 0.0, axis=1)) | np.all(distance <= 0.0, axis=1)
+    # What comes apart and collides is watched, though the margin be more than it can have: the design then says so.
+    touching |= np.all((distance > 0.0) & (distance < watched.margin), axis=1)
     names = [_link(watched, shape) for shape in range(watched.shapes.ngeoms)]
     left_out = sorted({
         f"{names[first]} and {names[second]}"
@@ -344,7 +358,7 @@ def _parted(watched: Clearance, lower: Array, upper: Array) -> Clearance:
     kept = tuple(pair for pair, never in zip(watched.pairs, touching, strict=True) if not never)
     room = distance[~touching].min(axis=1) - watched.margin
     likely = room < SPREAD * np.ptp(distance[~touching], axis=1)
-    said = "Not kept apart, as they touch in any case: {}."
+    said = f"Not kept {watched.margin:g} m apart, as they touch by design, or never: {{}}."
     notes = (said.format("; ".join(left_out)),) if left_out else ()
     return replace(watched, pairs=kept, notes=notes, likely=tuple(likely.tolist()))
 

@@ -238,18 +238,23 @@ def design_excitation(
     smooth, left = without_coulomb(model, limits, nominal)
     if harmonics is None:
         harmonics = default_harmonics(longest, robot.n, trajectories)
-    check_size(harmonics, robot.n, trajectories, samples)
+    chosen = [
+        harmonics_of(harmonics, each / longest) if isinstance(harmonics, int) else harmonics for each in durations
+    ]
+    counted = tuple(max(2, round(samples * each / longest)) for each in durations)
+    for orders, size in zip(chosen, counted, strict=True):
+        check_size(orders, robot.n, trajectories, size)
     task = Task(
         smooth=SmoothModel(model, NARROWEST * limits.velocity),
         limits=left,
         nominal=smooth,
         criterion=LogDet() if criterion is None else criterion,
         bases=tuple(
-            make_basis(each, _harmonics_of(harmonics, each / longest), family, fixed_start=start is not None)
-            for each in durations
+            make_basis(each, orders, family, fixed_start=start is not None)
+            for each, orders in zip(durations, chosen, strict=True)
         ),
         posture=resting_posture(model, left, smooth, start=start, seed=effort.seed),
-        samples=tuple(max(2, round(samples * each / longest)) for each in durations),
+        samples=counted,
         weights=weights,
         prior=np.zeros((count, count)) if prior is None else prior.regressor_factor.T @ prior.regressor_factor,
     )
@@ -298,9 +303,12 @@ def durations_of(duration: float | Sequence[float], trajectories: int = 1) -> tu
     Raises
     ------
     UsageError
-        If they do not agree.
+        If they do not agree, or are no positive numbers.
     """
-    given = (float(duration),) if isinstance(duration, (int, float)) else tuple(map(float, duration))
+    given = tuple(np.atleast_1d(np.asarray(duration, dtype=float)).tolist())
+    for each in given:
+        if not 0.0 < each < np.inf:
+            raise UsageError(f"duration {each:g} s: expected a positive number of seconds")
     wanted = trajectories if len(given) == 1 else min(trajectories, 1) * len(given)
     if not 1 <= wanted <= MOST_TRAJECTORIES:
         raise UsageError(f"trajectories {wanted}: expected at least 1 and at most {MOST_TRAJECTORIES}")
@@ -311,9 +319,9 @@ def durations_of(duration: float | Sequence[float], trajectories: int = 1) -> tu
     return given
 
 
-def _harmonics_of(harmonics: int | Sequence[int], share: float) -> int | Sequence[int]:
-    """Harmonics of a motion of a share of the longest: those up to the same frequency, and as many as rest needs."""
-    return max(min(harmonics, FEWEST), round(harmonics * share)) if isinstance(harmonics, int) else harmonics
+def harmonics_of(harmonics: int, share: float) -> int:
+    """Return how many a motion of a share of the longest has: those up to the same frequency, and as many as rest needs."""
+    return max(min(harmonics, FEWEST), round(harmonics * share))
 
 
 def _check_asked(

@@ -130,7 +130,8 @@ def limits_of(
     Raises
     ------
     UsageError
-        If a limit is given for a joint that the robot lacks, or makes no sense; if there are boxes without shapes.
+        If a limit is given for a joint that the robot lacks, or makes no sense; if there are boxes without shapes, or
+        without a clearance.
     RobotError
         If a joint has no range or no velocity limit.
     """
@@ -181,6 +182,8 @@ def limits_of(
         lower, upper, share * velocity, share * acceleration, share * jerk, share * torque,
         tool_acceleration, tool_speed, floor,
     )  # fmt: skip
+    if boxes and clearance is None:
+        raise UsageError("boxes without a clearance: nothing would be kept from them; give a clearance of 0 m or more")
     if clearance is not None:
         kept = clearance_of(robot, lower, upper, margin=clearance, floor=floor, boxes=boxes)
         if boxes and not kept.pairs:

@@ -63,7 +63,8 @@ class Stopping:
     after : tuple of After
         With the recordings at hand, if there are any, then after each motion.
     repetitions : int or None
-        How often each motion is to be recorded so that all suffice; None where no number does.
+        How often each motion is to be recorded so that all suffice; 0 where the recordings at hand do, None where no
+        number does.
     not_judged : tuple of str
         Parameters of which no std is asked, as no value is known.
     """
@@ -87,7 +88,11 @@ class Stopping:
         }
 
     def words(self) -> str:
-        """Say it in a sentence."""
+        """Say it in a sentence, and what is not judged in another."""
+        unjudged = f" Not judged, as no value is known to take a percentage of: {', '.join(self.not_judged)}."
+        return f"{self._verdict()}{unjudged if self.not_judged else ''}"
+
+    def _verdict(self) -> str:
         last, first = self.after[-1], self.suffices
         worst = f"{last.parameter}, {last.std:.3g} where {last.asked:.3g} is asked"
         if first == 0:
@@ -138,9 +143,9 @@ def stopping(design: Design, asked: Mapping[str, float], not_judged: Sequence[st
         total = more if design.prior is None else merge([design.prior, more])
         return farthest(total, 0, 0.0).share <= 1.0
 
-    low, high = 0, 1
+    low, high = (0, 1) if design.prior is None else (-1, 0)
     while high <= MOST_REPETITIONS and not enough(high):
-        low, high = high, 2 * high
+        low, high = high, max(1, 2 * high)
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if enough(middle) else (middle, high)

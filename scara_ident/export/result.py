@@ -67,6 +67,15 @@ def read_identified(path: Path | str, robot: Path | str | None = None, *, determ
     """
     path = Path(path)
     content = read_content(path)
+    try:
+        return _model_of(content, path, robot, determined)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        raise ScaraIdentError(
+            f"{path}: damaged, or of another version ({type(error).__name__}: {error}); make it again"
+        ) from error
+
+
+def _model_of(content: Mapping[str, Any], path: Path, robot: Path | str | None, determined: bool) -> IdentifiedModel:
     known = content[KEY]
     arm = _robot(known["robot"], path) if robot is None else load_robot(robot)
     if content["model"] not in MODELS.names():
@@ -106,9 +115,11 @@ def read_identified(path: Path | str, robot: Path | str | None = None, *, determ
 
 def _rms(content: Mapping[str, Any], joints: Sequence[str]) -> Array:
     """Return the rms error over the recordings held out, else over those fitted, all counted alike; NaN where none is told."""
-    whole = content.get("validation") or content.get("training")
-    if whole:
-        return np.array([whole["after_unfiltered"][joint] for joint in joints], dtype=float)
+    for kind in ("validation", "training"):
+        # Of a diagnosis, where what was not held out has no errors.
+        whole = (content.get(kind) or {}).get("after_unfiltered")
+        if whole:
+            return np.array([whole[joint] for joint in joints], dtype=float)
     errors = content.get("errors") or {}
     runs = [run for run in (errors.get("validation") or errors.get("training") or {}).values() if run]
     found = np.full(len(joints), np.nan)
@@ -143,9 +154,11 @@ def read_content(path: Path) -> dict[str, Any]:
 
 
 def _robot_entry(robot: Robot) -> dict[str, Any]:
+    limits = {"acceleration_limit": robot.acceleration_limit, "jerk_limit": robot.jerk_limit}
     joints = {
         name: {"reduction": float(robot.reduction[j]), "effort_gain": float(robot.effort_gain[j])}
         | ({"rotor_inertia": float(robot.rotor_inertia[j])} if robot.rotor_stated[j] else {})
+        | {key: float(limit[j]) for key, limit in limits.items() if np.isfinite(limit[j])}
         for j, name in enumerate(robot.joints)
     }
     return {

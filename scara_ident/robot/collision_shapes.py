@@ -33,7 +33,7 @@ def collision_shapes(robot: Robot) -> pin.GeometryModel:
     Raises
     ------
     RobotError
-        If a mesh is not found or cannot be read.
+        If a mesh is not found or cannot be read, or a shape has a negative size.
     """
     tree = read_urdf(robot.urdf, robot.urdf)
     for link in tree.findall("link"):
@@ -48,11 +48,15 @@ def collision_shapes(robot: Robot) -> pin.GeometryModel:
         with quiet_stderr():
             shapes = pin.buildGeomFromUrdfString(robot.model, text, pin.GeometryType.COLLISION)
     except (ValueError, RuntimeError) as error:
-        raise RobotError(f"{robot.urdf}: collision shapes cannot be read: {' '.join(str(error).split())}") from None
+        # Coal says first where in its own source.
+        said = " ".join(str(error).rpartition("message:")[2].split()).rstrip(".")
+        raise RobotError(f"{robot.urdf}: collision shapes cannot be read: {said}") from None
     for shape in shapes.geometryObjects:
         if isinstance(shape.geometry, coal.BVHModelBase):
             shape.geometry = _hull(np.asarray(shape.geometry.vertices()), shape.meshPath)
         shape.geometry.computeLocalAABB()
+        if not shape.geometry.aabb_radius >= 0.0:
+            raise RobotError(f"{robot.urdf}: collision shape {shape.name} has a negative size; correct it")
     return shapes
 
 

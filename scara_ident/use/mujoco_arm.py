@@ -34,7 +34,7 @@ def mujoco_arm(model: IdentifiedModel) -> Iterator[Free]:
     Raises
     ------
     ScaraIdentError
-        If MuJoCo is not installed, or the model cannot be exported to it.
+        If MuJoCo is not installed, or the model cannot be exported to it, or it does not take what was.
     """
     try:
         import mujoco
@@ -44,7 +44,10 @@ def mujoco_arm(model: IdentifiedModel) -> Iterator[Free]:
     text, code = export_model(model, "mjcf").files.values()
     beside = ModuleType(f"{robot.name}_mujoco")
     exec(code, vars(beside))
-    plant = mujoco.MjModel.from_xml_string(text)
+    try:
+        plant = mujoco.MjModel.from_xml_string(text)
+    except ValueError as error:
+        raise ScaraIdentError(f"MuJoCo does not take the model: {' '.join(str(error).split())}") from None
     plant.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
     places = np.array([plant.joint(name).qposadr[0] for name in robot.joints])
     speeds = np.array([plant.joint(name).dofadr[0] for name in robot.joints])

@@ -12,6 +12,7 @@ def test_an_empty_folder_asks_for_a_first_motion(command, steps, tmp_path: Path)
     result = command("ask", tmp_path / "arm", *QUICK)
     assert steps[0] == "designing: search 1" and steps[-1].endswith(" done")
     assert result.status == 0 and "Nothing is recorded yet" in result.out
+    assert "Collisions were not looked for" in result.out + result.err
     assert (tmp_path / "arm" / "next" / "trajectory.csv").is_file()
     assert json.loads((tmp_path / "arm" / "ask.json").read_text())["state"] == "record"
 

@@ -88,6 +88,7 @@ def test_what_cannot_be_is_said_before_the_search(command, tmp_path: Path):
         (("--start", "0"), 2, "expected 2 positions"),
         (("--duration", "2", "--harmonics", "4000"), 2, "use at most 150"),
         (("--harmonics", "50", "--rate", "5"), 2, "use fewer harmonics, or a higher rate"),
+        (("--duration", "1", "--rate", "12"), 2, "reaches 5 Hz and needs at least 20 Hz"),
         (("--floor", "2"), 1, "lower the floor"),
         (("--torque", "joint1=0.1"), 1, "joint1: a torque of 0.08 N m does not overcome its friction"),
         (("--range", "joint9=0..1"), 2, "'joint9': the robot has no such joint"),

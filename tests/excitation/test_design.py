@@ -254,6 +254,9 @@ def test_friction_counts_in_the_torque_also_where_a_joint_turns_back():
     [
         ({"trajectories": 0}, "trajectories 0"),
         ({"duration": (5.0, 6.0, 7.0), "trajectories": 2}, "3 durations for 2 trajectories"),
+        ({"duration": (300.0, 1.0)}, "harmonic 5: 8 samples cannot tell"),
+        ({"duration": 0.0}, "duration 0 s"),
+        ({"duration": (5.0, np.nan)}, "duration nan s"),
         ({"trajectories": 27}, "trajectories 27: expected at least 1 and at most 26"),
         ({"duration": 2.0, "harmonics": 4000}, "harmonics 4000: more than a search .* use at most 150"),
         ({"harmonics": 151}, "harmonics 151"),

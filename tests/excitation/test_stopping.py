@@ -46,9 +46,11 @@ def test_recordings_at_hand_count_and_the_worst_parameter_is_told(pair):
     design, each = pair
     known = replace(design, prior=each.scaled(3.0))
     std = std_of(each) / 3.0
-    found = stopping(known, {"P_d1": 1.1 * std[0], "P_d2": 1.2 * std[1]})
-    assert (found.suffices, found.after[0].motions, found.after[0].parameter) == (0, 0, "P_d1")
-    assert "no more of them pay" in found.words()
+    found = stopping(known, {"P_d1": 1.1 * std[0], "P_d2": 1.2 * std[1]}, ("a01",))
+    assert (found.suffices, found.repetitions) == (0, 0)
+    assert (found.after[0].motions, found.after[0].parameter) == (0, "P_d1")
+    assert stopping(known, {"P_d1": 0.95 * std[0]}).repetitions == 1
+    assert "no more of them pay. Not judged, as no value is known to take a percentage of: a01." in found.words()
 
 
 def test_what_is_asked_is_read():

@@ -13,7 +13,7 @@ from scara_ident.effects import available_effects
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation import Estimate
 from scara_ident.export.identified_model import IdentifiedModel, identified_model
-from scara_ident.export.result import KEY, read_identified, rebuild_entry
+from scara_ident.export.result import KEY, _robot_entry, read_identified, rebuild_entry
 from scara_ident.files import json_text, write_json
 from scara_ident.identification.identify import Identification
 from scara_ident.report.identification import identification_dict
@@ -99,6 +99,33 @@ def test_every_effect_reads_back_as_it_was(found, content, read):
         value[model.place(term)] = 0.0
     expected = np.einsum("jpn,p->jn", model.regressor(motion), value)
     np.testing.assert_array_equal(model_torque(back, value, motion), expected)
+
+
+def test_a_diagnosis_without_recordings_held_out_has_the_errors_of_the_training(content, read):
+    told = {"after_unfiltered": {"joint1": 0.5, "joint2": 0.25}}
+    diagnosis = {**content, "errors": None, "training": told, "validation": {"before": {}, "after": {}}}
+    assert read(diagnosis).rms.tolist() == [0.5, 0.25]
+    assert read(diagnosis | {"validation": {"after_unfiltered": {"joint1": 1.0, "joint2": 2.0}}}).rms.tolist() == [
+        1.0,
+        2.0,
+    ]
+    with pytest.raises(
+        ScaraIdentError, match=r"r\.json: damaged, or of another version \(KeyError: 'std'\); make it again"
+    ):
+        read(
+            {
+                **content,
+                "parameters": [{key: x for key, x in item.items() if key != "std"} for item in content["parameters"]],
+            }
+        )
+
+
+def test_limits_of_the_description_come_with_the_robot(found, content, read, tmp_path: Path):
+    robot = replace(
+        found.model.robot, acceleration_limit=np.array([15.0, np.inf]), jerk_limit=np.array([np.inf, 500.0])
+    )
+    back = read(content | {KEY: content[KEY] | {"robot": _robot_entry(robot)}}).robot
+    assert (back.acceleration_limit.tolist(), back.jerk_limit.tolist()) == ([15.0, np.inf], [np.inf, 500.0])
 
 
 def test_a_robot_that_has_moved_can_be_given(content, read, tmp_path: Path):

@@ -39,6 +39,8 @@ def test_meshes_that_cannot_be_used_are_one_line(tmp_path):
     with pytest.raises(RobotError, match=r"flat\.stl: the mesh has no volume"):
         collision_shapes(arm(tmp_path, '<mesh filename="flat.stl"/>'))
     (tmp_path / "bad.stl").write_bytes(b"solid nothing")
-    with pytest.raises(RobotError, match="collision shapes cannot be read"):
+    with pytest.raises(RobotError, match="collision shapes cannot be read: Could not load"):
         collision_shapes(arm(tmp_path, '<mesh filename="bad.stl"/>'))
+    with pytest.raises(RobotError, match="shape l1_0 has a negative size"):
+        collision_shapes(arm(tmp_path, '<sphere radius="-1"/>'))
     assert collision_shapes(load_robot()).ngeoms == 0

@@ -43,8 +43,8 @@ def _tracking(context: UseContext) -> list[Block]:
         rows.append([name(WORDS[key]), *cells])
     head = ["rms tracking error", *(f"{joint} [{superscripts(units[joint])}]" for joint in context.joints)]
     words = (
-        f"{count(len(result.runs), 'virtual arm')} drawn about the model by its standard deviations: how well a motion is followed of "
-        f"{result.motion.duration:.3g} s that played no part in the identification. Bars: share of the PID's own error."
+        f"{count(len(result.runs), 'virtual arm')} drawn about the model by its standard deviations: how well a motion of "
+        f"{result.motion.duration:.3g} s, which played no part in the identification, is followed. Bars: share of the PID's own error."
     )
     figures = []
     for j, joint in enumerate(context.joints):
