@@ -57,7 +57,7 @@ def arrays(rows: list[dict[str, Any]]) -> list[str]:
     found = table([*head, "MB", "loop, MB", "figaroh, MB"], lines)
     found += [
         "",
-        "\\* scaled from the largest number of samples at which all its rows fit the memory that was free.",
+        "\\* scaled from the largest number of samples that was measured: more takes too much memory or time.",
         "",
         *table(
             ["arm, a million samples", "faster than the loop", "asked", "extra MB", "at most"],
@@ -238,7 +238,7 @@ def page(held: dict[str, Any]) -> str:
     lines = [
         "# Speed",
         "",
-        "How fast this is, beside what else there is. `make bench` measures all of it anew in some minutes, with figaroh in an "
+        "How fast this is, beside what else there is. `make bench` measures all of it anew in half an hour or more, with figaroh in an "
         "environment of its own, and writes this page from `benchmarks/results/bench.json`; `python benchmarks/bench.py --full` "
         "repeats more often. Figures are medians; what is compared ran in turn on one machine. Where the load before "
         "was above its number of cores, other programs ran too: times are then too long, and ratios of CPU time tell more.",

@@ -42,7 +42,7 @@ def information_of(model: TorqueModel, motion: Motion) -> tuple[Information, ...
     Raises
     ------
     RecordingError
-        If there is no torque.
+        If there is no torque, or a number of the motion is none.
 
     Examples
     --------
@@ -78,7 +78,10 @@ def information_of(model: TorqueModel, motion: Motion) -> tuple[Information, ...
 
     starts = range(0, motion.samples, chunk)
     each = side_by_side(of_some, [starts[k::THREADS] for k in range(THREADS)])
-    return tuple(
-        merge(parts).embed(own, len(model.columns))
-        for own, parts in zip(model.active, zip(*each, strict=True), strict=True)
-    )
+    whole = [merge(parts) for parts in zip(*each, strict=True)]
+    for joint, found in zip(model.robot.joints, whole, strict=True):
+        if not np.isfinite(found.factor).all():
+            raise RecordingError(
+                f"{motion.name}: NaN or infinite numbers in the equation of {joint}; leave those samples out"
+            )
+    return tuple(found.embed(own, len(model.columns)) for own, found in zip(model.active, whole, strict=True))

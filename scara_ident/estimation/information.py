@@ -310,7 +310,9 @@ def _updated(factor: Array, columns: Array, gram: Array) -> Array | None:
         part = columns[:, start : start + GRAM_ROWS].copy()
         solved = dtrsm(1.0, upper, part.T, side=1, overwrite_b=1)
         gram = dsyrk(1.0, solved, 1.0, gram, trans=1, overwrite_c=1)
-    size = float(np.max(np.sum(np.abs(gram), axis=0)))
+    # Only the upper half is filled.
+    half = np.abs(gram)
+    size = float(np.max(half.sum(axis=0) + np.triu(half, 1).sum(axis=1)))
     root, failed = dpotrf(gram)
     if failed or not np.isfinite(size) or dpocon(root, size)[0] < NEAR_SINGULAR:
         return None

@@ -45,6 +45,8 @@ class Observations(Frozen):
         For every recording, stretch and joint the columns at every sample, not filtered.
     kept : Observations or None
         Those whose rows are of the samples in `data` alone, where the rows hold all of longer files; None where they hold no more.
+    counts : tuple of int, or None
+        Of each recording the samples that the rows are of; None where those are the ones in `data`.
     """
 
     model: TorqueModel
@@ -53,6 +55,7 @@ class Observations(Frozen):
     owner: NDArray[np.intp]
     raw: tuple[tuple[Raw, ...], ...]
     kept: Observations | None = None
+    counts: tuple[int, ...] | None = None
 
     @property
     def in_memory(self) -> Observations:
@@ -100,6 +103,7 @@ class Observations(Frozen):
             owner=owner.astype(np.intp),
             raw=tuple(self.raw[k] for k in places),
             kept=None if self.kept is None else self.kept.of(places),
+            counts=None if self.counts is None else tuple(self.counts[k] for k in places),
         )
 
     @cached_property
@@ -147,10 +151,8 @@ class Observations(Frozen):
 
     @property
     def samples(self) -> int:
-        """Samples on the uniform time grids, and in long files."""
-        whole = [None if self.kept is None else item.recording.long for item in self.data.recordings]
-        own = (sum(part.samples for part in item.stretches) for item in self.data.recordings)
-        return sum(count if long is None else long.samples for count, long in zip(own, whole, strict=True))
+        """Samples on the uniform time grids, those of long files counted in."""
+        return sum(part.samples for part in self.data.stretches) if self.counts is None else sum(self.counts)
 
     @property
     def row_step(self) -> tuple[int, ...]:

@@ -190,7 +190,8 @@ def _equation(robot: bytes, model: str) -> TorqueModel:
 
 def _visit(model: TorqueModel, recordings: Sequence[Recording], reference: Reference | None) -> Visit:
     result = identify(model.robot, recordings, model=model, bands=None if reference is None else reference.bands)
-    observations, estimate = result.training, result.estimate
+    # What is added stands beside the samples that are held.
+    observations, estimate = result.training.in_memory, result.estimate
     if reference is None:
         scene = scene_of(model, estimate.value, observations)
         reach = (scene.duration, scene.rate, scene.band)
@@ -201,7 +202,7 @@ def _visit(model: TorqueModel, recordings: Sequence[Recording], reference: Refer
     rows = with_columns(observations, [*added, *_delays(observations, reference.value)])
     known = [Information.empty(len(item.columns)).absorb_columns(item.table).factor for item in rows]
     errors = [
-        np.nan if item is None or item.relative is None else item.relative for item in estimate.errors(observations)
+        np.nan if item is None or item.relative is None else item.relative for item in estimate.errors(result.training)
     ]
     return Visit(
         estimate.value,

@@ -20,7 +20,7 @@ from scara_ident.identification.events import Event, find_events, without_events
 from scara_ident.motion.prepared import prepare
 from scara_ident.progress import Tell, silent
 from scara_ident.recording.long_file import LongFile
-from scara_ident.recording.recording import Recording, read_parts
+from scara_ident.recording.recording import Recording, read_parts, refuse_backwards
 from scara_ident.threads import one_blas_thread
 
 
@@ -29,6 +29,7 @@ class _Absorbed:
     """What is held of a long file while it is read."""
 
     joints: tuple[JointRows, ...] = ()
+    samples: int = 0
     group: int = 1
     events: list[Event] = field(default_factory=list)
     refused: list[RecordingError] = field(default_factory=list)
@@ -67,20 +68,21 @@ def with_all_samples(
     """
     found = list(events)
     notes: list[str] = []
-    rows: dict[int, tuple[JointRows, ...]] = {}
+    files: dict[int, _Absorbed] = {}
     for place, recording in enumerate(observations.data.sources):
         if recording.long is not None:
             held = _absorbed(observations, recording, recording.long, value, progress)
-            rows[place] = held.joints
+            files[place] = held
             found = [*(event for event in found if event.recording != recording.name), *held.events]
             notes += _notes(recording, recording.long, held)
-    if not rows:
+    if not files:
         return without_events(observations, events), tuple(events), []
     ordered = tuple(event for item in observations.data.recordings for event in found if event.recording == item.name)
     kept = without_events(observations, ordered)
-    parts = [rows.get(k, each.joints) for k, each in enumerate(kept.each)]
+    parts = [files[k].joints if k in files else each.joints for k, each in enumerate(kept.each)]
     joints, owner = joined(parts, observations.model.active)
-    return replace(kept, joints=joints, owner=owner, kept=kept), ordered, notes
+    counts = tuple(files[k].samples if k in files else each.samples for k, each in enumerate(kept.each))
+    return replace(kept, joints=joints, owner=owner, kept=kept, counts=counts), ordered, notes
 
 
 def _absorbed(
@@ -103,12 +105,12 @@ def _absorbed(
 @one_blas_thread()
 def _absorb(held: _Absorbed, observations: Observations, part: Recording, value: Array | None, origin: float) -> None:
     """Take in a part of a long file, and nothing of one that cannot be used."""
-    if part.time[0] <= held.stop:
-        raise RecordingError(f"{part.path}: time runs backwards at {part.time[0]:.6g} s; sort the rows by time")
+    refuse_backwards(part, held.stop)
     rows = observe(observations.model, prepare([part], observations.data.bands))
     events = () if value is None else find_events(rows, value)
     joints = without_events(rows, events).joints
     held.stop = float(part.time[-1])
+    held.samples += rows.samples
     later = float(part.time[0]) - origin
     held.events += [replace(event, start=event.start + later, stop=event.stop + later) for event in events]
     for finding in part.findings:
@@ -118,9 +120,11 @@ def _absorb(held: _Absorbed, observations: Observations, part: Recording, value:
 
 def _notes(recording: Recording, long: LongFile, held: _Absorbed) -> list[str]:
     count, known = len(long.parts), {finding.kind for finding in recording.findings}
+    whole = "all" if held.samples == long.samples else "the"
     notes = [
-        f"{recording.name}: parameters, their standard deviations, events and errors within the band are of all {long.samples} "
-        f"samples, read in {count} parts; bands, checks, unfiltered errors and pictures are of the {len(recording.time)} kept"
+        f"{recording.name}: parameters, their standard deviations, events and errors within the band are of {whole} "
+        f"{held.samples} samples, read in {count} parts; "
+        f"bands, checks, unfiltered errors and pictures are of the {len(recording.time)} kept"
     ]
     if held.refused:
         notes.append(f"{held.refused[0]}; left out, {len(held.refused)} of {count} parts in all")

@@ -54,22 +54,23 @@ class LongFile:
     @property
     def parts(self) -> tuple[tuple[int, ...], ...]:
         """Bounds of pieces that are read together, part by part: all of the file."""
-        found = [[self.bounds[0]]]
-        for stop in self.bounds[1:]:
-            if stop - found[-1][0] > PART and len(found[-1]) > 1:
-                found.append([found[-1][-1]])
-            found[-1].append(stop)
-        return tuple(tuple(part) for part in found)
+        return _together(self.bounds, PART)
 
     @property
     def windows(self) -> tuple[tuple[int, ...], ...]:
-        """Bounds of pieces that are kept, window by window: spread evenly over the file, and all of one that is not longer."""
+        """Bounds of pieces that are kept, window by window: spread evenly over the file, and all of one that is not longer.
+
+        Short pieces are kept together with their neighbours: alone they say little, or nothing.
+        """
         if self.samples <= KEPT:
             return (self.bounds,)
-        pieces = list(pairwise(self.bounds))
-        count = min(len(pieces), max(WINDOWS, KEPT * len(pieces) // self.samples))
-        places = np.unique(np.rint(np.linspace(0, len(pieces) - 1, count)).astype(int))
-        return tuple((pieces[k][0], min(pieces[k][1], pieces[k][0] + KEPT // count)) for k in places)
+        most = KEPT // WINDOWS
+        groups = _together(self.bounds, most)
+        size = sum(min(group[-1] - group[0], most) for group in groups)
+        count = min(len(groups), max(WINDOWS, KEPT * len(groups) // size))
+        starts = [group[0] for group in groups]
+        places = np.unique(np.searchsorted(starts, np.linspace(0, starts[-1], count).astype(int), side="right") - 1)
+        return tuple(_first_of(groups[k], KEPT // count) for k in places)
 
 
 def long_file(path: Path, time: str, names: Sequence[str]) -> LongFile | None:
@@ -100,6 +101,22 @@ def long_file(path: Path, time: str, names: Sequence[str]) -> LongFile | None:
     return LongFile(path, tuple(cut_long([0, *_gaps(path, time, samples), samples])))
 
 
+def _together(bounds: Sequence[int], most: int) -> tuple[tuple[int, ...], ...]:
+    """Return bounds of neighbouring pieces that have together no more than ``most`` rows, or of one that alone has more."""
+    found = [[bounds[0]]]
+    for stop in bounds[1:]:
+        if stop - found[-1][0] > most and len(found[-1]) > 1:
+            found.append([found[-1][-1]])
+        found[-1].append(stop)
+    return tuple(tuple(part) for part in found)
+
+
+def _first_of(bounds: Sequence[int], most: int) -> tuple[int, ...]:
+    """Return the bounds of the first ``most`` rows of pieces."""
+    stop = min(bounds[-1], bounds[0] + most)
+    return (*(bound for bound in bounds if bound < stop), stop)
+
+
 def _gaps(path: Path, time: str, samples: int) -> list[int]:
     """Return the rows before which time leaps."""
     found: list[NDArray[np.intp]] = []
@@ -107,7 +124,9 @@ def _gaps(path: Path, time: str, samples: int) -> list[int]:
     for start in range(0, samples, CLOCK_ROWS):
         first = max(0, start - 1)
         step = np.diff(read_rows(path, [time], first, min(start + CLOCK_ROWS, samples))[time])
-        usual = float(np.nanmedian(step)) if usual is None and np.isfinite(step).any() else usual
+        # Rows that repeat a time are left out later, and are no steps.
+        onward = step[np.isfinite(step) & (step > 0.0)] if usual is None else step
+        usual = float(np.median(onward)) if usual is None and len(onward) else usual
         if usual is not None:
             found.append(np.flatnonzero(step > GAP_STEPS * usual) + first + 1)
     return [int(row) for row in np.concatenate(found)] if found else []

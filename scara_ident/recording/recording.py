@@ -168,6 +168,12 @@ def read_parts(long: LongFile, robot: Robot) -> Iterator[Recording | RecordingEr
             yield error
 
 
+def refuse_backwards(part: Recording, before: float) -> None:
+    """Refuse a part of a long file whose time is not after that of the one before, s."""
+    if part.time[0] <= before:
+        raise RecordingError(f"{part.path}: time runs backwards at {part.time[0]:.6g} s; sort the rows by time")
+
+
 def _rows_of(long: LongFile, bounds: Sequence[int], robot: Robot, *, need_effort: bool) -> Recording:
     channels = robot.channels or contract_channels(robot.joints)
 
@@ -185,7 +191,9 @@ def _kept(long: LongFile, robot: Robot, *, need_effort: bool) -> Recording:
     errors = []
     for bounds in long.windows:
         try:
-            parts.append(_rows_of(long, bounds, robot, need_effort=need_effort))
+            part = _rows_of(long, bounds, robot, need_effort=need_effort)
+            refuse_backwards(part, parts[-1].time[-1] if parts else -np.inf)
+            parts.append(part)
         except RecordingError as error:
             errors.append(error)
     if not parts:
@@ -200,7 +208,7 @@ def _kept(long: LongFile, robot: Robot, *, need_effort: bool) -> Recording:
     findings = dict.fromkeys(finding.kind for part in parts for finding in part.findings)
     said = [next(own for part in parts for own in part.findings if own.kind == kind) for kind in findings]
     kept = int(starts[-1])
-    if kept < long.samples:
+    if long.windows != (long.bounds,):
         where = f"of its {long.samples} samples {kept} are looked at, in {len(parts)} windows spread over it"
         said.append(Finding("long", f"too long to hold: {where}; identify estimates from all", long.samples - kept))
     said += [Finding("refused", f"{error}; that window is left out") for error in errors[:1]]

@@ -36,3 +36,12 @@ def test_without_torque_it_is_one_line():
     motion = Motion("still", "still", np.arange(4.0), *np.zeros((3, 2, 4)), None, 1.0)
     with pytest.raises(RecordingError, match="still: no effort was recorded"):
         information_of(model, motion)
+
+
+def test_numbers_that_are_none_are_one_line():
+    model = build_model(load_robot(), "basic")
+    torque = np.ones((2, 100))
+    torque[1, 50] = np.nan
+    motion = Motion("torn", "torn", np.arange(100.0), *np.ones((3, 2, 100)), torque, 1.0)
+    with pytest.raises(RecordingError, match="torn: NaN or infinite numbers in the equation of joint2"):
+        information_of(model, motion)

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from scara_ident.estimation import information
 from scara_ident.estimation.information import GRAM_ROWS, Information, merge
 
 
@@ -310,3 +311,39 @@ def test_many_rows_unlike_the_first_are_absorbed_as_exactly(monkeypatch):
     for one in (quick, nothing):
         assert_allclose(gram(one), gram(exact), atol=1e-13 * gram(exact).max())
         assert_allclose(one.solve().value, exact.solve().value, rtol=1e-12)
+
+
+def test_columns_of_any_size_and_dependent_ones_take_the_quick_way_and_keep_their_digits():
+    table = weak_rows(2, 3 * GRAM_ROWS, 1e4)
+    table[:, 3] = table[:, 1]
+    table *= 10.0 ** np.array([8.0, -8.0, 0.0, 5.0, -3.0, 2.0])
+    found = Information.empty(5)
+    for part in np.split(table, 3):
+        updated = information._updated(found.factor, part.T, np.eye(6))
+        found = found.absorb_columns(part.T)
+        assert updated is None or np.array_equal(updated, found.factor)
+    assert updated is not None
+    size = np.linalg.norm(table, axis=0)
+    whole = (table / size).T @ (table / size)
+    assert_allclose(gram(found) / np.outer(size, size), whole, atol=1e-13)
+    assert found.solve().undetermined.tolist() == [False, True, False, True, False]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("value", [1e200, np.nan, np.inf])
+def test_what_the_quick_way_cannot_take_is_left_to_the_other(value: float):
+    table = weak_rows(3, 2 * GRAM_ROWS, 10.0)
+    known = Information.empty(5).absorb_columns(table[:GRAM_ROWS].T)
+    table[-1, 2] = value
+    assert information._updated(known.factor, table[GRAM_ROWS:].T, np.eye(6)) is None
+    found = known.absorb_columns(table[GRAM_ROWS:].T).factor
+    assert np.isfinite(found).all() == np.isfinite(value)
+
+
+def test_how_near_to_singular_is_measured_by_the_whole_matrix():
+    # One column goes with each of the others: the upper half alone looks a third as large.
+    near = np.eye(12)
+    near[0, 1:] = near[1:, 0] = 0.995 / np.sqrt(11.0)
+    assert 0.4e-3 < 1.0 / np.linalg.cond(near, 1) < 0.6e-3
+    table = np.vstack([np.linalg.cholesky(near).T, np.zeros((GRAM_ROWS, 12))])
+    assert information._updated(np.eye(12), table.T, np.zeros((12, 12))) is None

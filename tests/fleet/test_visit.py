@@ -11,6 +11,7 @@ import pytest
 from scara_ident.fleet.folder import RecordingFile
 from scara_ident.fleet.visit import look, watched
 from scara_ident.identification.identify import identify
+from scara_ident.recording import long_file
 from scara_ident.recording.recording import read_recording
 from scara_ident.robot.robot import load_robot
 from tests.fleet.made import DATES
@@ -78,3 +79,10 @@ def test_an_arm_that_does_not_move_is_a_fault(folder, tmp_path):
     recording.write_text("\n".join([*lines, *(f"{0.005 * k},0.1,0.2,0.0,0.0" for k in range(400))]))
     visit, (fault,) = look(ROBOT, "complete", [RecordingFile("a", "2026-01-01", "still.csv", str(recording))])
     assert visit is None and fault.file is None and "a, 2026-01-01" in fault.why
+
+
+def test_a_long_file_is_a_visit_too(folder, histories, monkeypatch):
+    for name, size in {"MOST_SAMPLES": 500, "PART": 1_000, "KEPT": 1_000, "WINDOWS": 2, "LONGEST_WHOLE": 1_000}.items():
+        monkeypatch.setattr(long_file, name, size)
+    visit, faults = look(ROBOT, "complete", [file_of(folder)], histories[0].visits[0].reference)
+    assert (faults, visit is not None) == ((), True)

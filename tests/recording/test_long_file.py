@@ -102,3 +102,28 @@ def test_windows_are_spread_over_the_file_and_all_of_a_shorter_one(robot, gappy)
     (finding,) = (finding for finding in kept.findings if finding.kind == "long")
     assert "of its 10000 samples" in finding.message
     assert "gap" not in {finding.kind for finding in kept.findings}
+
+
+def test_short_pieces_are_kept_together_so_that_windows_are_no_slivers():
+    for bounds in ([*range(0, 2_000, 10), 60_000], [*range(0, 30_000, 10), 60_000], [*range(0, 60_001, 100)]):
+        windows = LongFile(Path("a.parquet"), tuple(cut_long(bounds))).windows
+        sizes = [window[-1] - window[0] for window in windows]
+        assert 1_600 <= sum(sizes) <= 2_000
+        assert min(sizes) >= 200
+        assert all(one[-1] <= other[0] for one, other in pairwise(windows))
+        assert all(set(window[:-1]) <= set(cut_long(bounds)) for window in windows)
+
+
+def test_rows_that_repeat_a_time_are_no_gaps(tmp_path):
+    made = {name: np.repeat(values, 3) for name, values in columns(2_000).items()}
+    found = find(save(tmp_path / "held.parquet", made), "time", WANTED)
+    assert found is not None
+    assert len(found.bounds) == 11
+
+
+def test_windows_of_a_clock_that_starts_again_are_left_out(robot, tmp_path):
+    made = columns(10_000)
+    made["time"][5_100:] -= made["time"][5_100]
+    kept = read_recording(save(tmp_path / "twice_1.parquet", made), robot)
+    assert np.all(np.diff(kept.time) > 0.0)
+    assert any("time runs backwards" in finding.message for finding in kept.findings)

@@ -125,7 +125,6 @@ def consistent(observations: Observations, *, options: ConsistentOptions | None 
     return _estimate(problem, observations, information, weights, "consistent", found, x, shapes)
 
 
-@one_blas_thread()
 def _estimate(
     problem: Problem,
     observations: Observations,

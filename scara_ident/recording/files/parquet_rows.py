@@ -44,7 +44,13 @@ def row_groups(path: Path) -> tuple[int, ...]:
 
 
 def seekable(path: Path, time: str, names: Sequence[str]) -> bool:
-    """Tell whether rows of these columns read alone are what they are in the whole: numbers, and a clock that starts nowhere."""
+    """Tell whether rows of these columns read alone are what they are in the whole: numbers, and a clock that starts nowhere.
+
+    Raises
+    ------
+    RecordingError
+        A damaged file.
+    """
     import polars as pl
 
     with path.open("rb") as file:
@@ -76,11 +82,7 @@ def read_rows(path: Path, names: Sequence[str], start: int, stop: int) -> dict[s
     """
     import polars as pl
 
-    try:
-        rows = pl.scan_parquet(path, glob=False, hive_partitioning=False).select(names).slice(start, stop - start)
-        frame = rows.collect()
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
-        raise damaged_table(path, error) from error
+    frame = _frame(path, names, start, stop)
     found = {}
     for name in names:
         if frame[name].dtype.is_numeric():
@@ -92,9 +94,17 @@ def read_rows(path: Path, names: Sequence[str], start: int, stop: int) -> dict[s
 
 def _first(path: Path, name: str) -> Any:
     """Return the first row of a column."""
+    return _frame(path, [name], 0, 1)[name]
+
+
+def _frame(path: Path, names: Sequence[str], start: int, stop: int) -> Any:
     import polars as pl
 
-    return pl.scan_parquet(path, glob=False, hive_partitioning=False).select(name).head(1).collect()[name]
+    try:
+        rows = pl.scan_parquet(path, glob=False, hive_partitioning=False).select(names).slice(start, stop - start)
+        return rows.collect()
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
+        raise damaged_table(path, error) from error
 
 
 def _struct(data: bytes, place: int) -> tuple[dict[int, Any], int]:

@@ -53,3 +53,13 @@ def test_a_file_that_is_not_whole_is_refused_in_one_line(tmp_path):
         path.write_bytes(cut)
         with pytest.raises(RecordingError, match=r"a\.parquet: not a whole parquet file \("):
             row_groups(path)
+
+
+def test_damage_at_the_first_row_of_a_clock_of_dates_is_one_line(tmp_path):
+    path = tmp_path / "a.parquet"
+    first = datetime(2024, 5, 1)  # as a logger writes it
+    pl.DataFrame({"time": [first + timedelta(milliseconds=k) for k in range(1_000)]}).write_parquet(path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:4] + b"\xff" * 40 + whole[44:])
+    with pytest.raises(RecordingError, match=r"a\.parquet: not a whole parquet file \("):
+        seekable(path, "time", ["time"])
