@@ -107,7 +107,7 @@ def test_a_joint_at_rest_is_drawn_too(tmp_path: Path):
 def test_a_design_is_a_picture(tmp_path: Path):
     effort = Effort(starts=1, rounds=0, processes=1)
     design = design_excitation(
-        build_model(load_robot()), duration=4.0, harmonics=6, samples=400, trajectories=2, effort=effort
+        build_model(load_robot()), duration=4.0, harmonics=5, samples=120, trajectories=2, effort=effort
     )
     design_picture(tmp_path / "new" / "preview.png", design)
     for color in ("blue", "vermillion", "sky"):
