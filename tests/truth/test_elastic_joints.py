@@ -39,7 +39,7 @@ def alone(found: Diagnosis, effect: str, joint: str, name: str) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stiffness", [1500.0, 2400.0, 4000.0])
+@pytest.mark.parametrize("stiffness", [1500.0, 2400.0])
 def test_a_soft_first_joint_is_found_alone_with_its_stiffness(stiffness: float):
     """Commit a6cf3ca: `unexplained` below 5000 N m/rad."""
     found = diagnosed(virtual(f"joint_elasticity:joint1:stiffness={stiffness}", 1))
