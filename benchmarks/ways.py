@@ -168,8 +168,6 @@ def robot_of(urdf: str, joints: Sequence[str]) -> Any:
 
 def prepared_package(urdf: str, joints: Sequence[str], consistent: bool) -> Callable[..., Any]:
     """Return this package's way: columns made, absorbed and forgotten; or the consistent programme on their factor."""
-    import scipy.linalg.lapack  # noqa: F401
-
     from scara_ident import Motion, build_model
     from scara_ident.estimation.consistent.problem import Problem
     from scara_ident.estimation.consistent.solution import solve_consistent

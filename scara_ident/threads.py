@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
+from importlib import import_module
 from typing import Any, Generic, TypeVar, overload
 
 from threadpoolctl import ThreadpoolController
@@ -42,8 +43,7 @@ class made_once(Generic[T]):
 @cache
 def _controller() -> ThreadpoolController:
     # NumPy and SciPy have a BLAS each; one that is loaded later would not be held.
-    import scipy.linalg  # noqa: F401
-
+    import_module("scipy.linalg")
     return ThreadpoolController()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -43,13 +44,19 @@ from tests.use.quiet import known_ur5, pushed, quiet, ur5
 
 
 @pytest.fixture(scope="session")
+def place(tmp_path_factory) -> Callable[[str], Path]:
+    """Where a page goes that all tests look at."""
+    return lambda name: tmp_path_factory.mktemp(name) / "report.html"
+
+
+@pytest.fixture(scope="session")
 def result():
     return made([run("OJD_1", 1), run("OJD_2", 2)], [run("CI_1", 3, start=4.0)], bands=[15.0, 15.0])
 
 
 @pytest.fixture(scope="session")
-def identified(result, tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("identified") / "report.html"
+def identified(result, place) -> Path:
+    path = place("identified")
     identification_report(path, IdentificationContext(result))
     return path
 
@@ -74,15 +81,15 @@ def diagnosis() -> Diagnosis:
 
 
 @pytest.fixture(scope="session")
-def diagnosed(diagnosis, tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("diagnosed") / "report.html"
+def diagnosed(diagnosis, place) -> Path:
+    path = place("diagnosed")
     diagnosis_report(path, DiagnosisContext(diagnosis))
     return path
 
 
 @pytest.fixture(scope="session")
-def compared(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("compared") / "report.html"
+def compared(place) -> Path:
+    path = place("compared")
     content = comparison_dict(compare(load_robot(), [run("A_1", 1), run("A_2", 2), run("B_1", 3, start=5.0)]))
     comparison_report(path, json.loads(json.dumps(plain(content))))
     return path
@@ -95,8 +102,8 @@ def _designed() -> Motion:
 
 
 @pytest.fixture(scope="session")
-def excited(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("excited") / "report.html"
+def excited(place) -> Path:
+    path = place("excited")
     limits = {"joint1.velocity": {"bound": 1.0, "reached": 1.2566, "unit": "rad/s", "share": 1.2566}}
     content = {"log_det": 70.0, "condition": 2e5, "duration": 10.0, "limits": limits}
     excitation_report(path, content, load_robot(), [_designed()])
@@ -111,9 +118,9 @@ def _in_space() -> Motion:
 
 
 @pytest.fixture(scope="session")
-def turning(tmp_path_factory) -> Path:
+def turning(place) -> Path:
     """The page of a motion of an arm that leaves every plane."""
-    path = tmp_path_factory.mktemp("turning") / "report.html"
+    path = place("turning")
     excitation_report(path, {"log_det": 70.0, "condition": 2e5, "duration": 10.0}, ur5(), [_in_space()])
     return path
 
@@ -126,8 +133,8 @@ def checked(result) -> Check:
 
 
 @pytest.fixture(scope="session")
-def checked_page(checked, tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("checked") / "report.html"
+def checked_page(checked, place) -> Path:
+    path = place("checked")
     check_report(path, checked)
     return path
 
@@ -141,29 +148,29 @@ def touched() -> ContactFindings:
 
 
 @pytest.fixture(scope="session")
-def touched_page(touched, tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("touched") / "report.html"
+def touched_page(touched, place) -> Path:
+    path = place("touched")
     contact_report(path, touched)
     return path
 
 
 @pytest.fixture(scope="session")
-def fleet_page(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("fleet") / "report.html"
+def fleet_page(place) -> Path:
+    path = place("fleet")
     fleet_report(path, made_fleet())
     return path
 
 
 @pytest.fixture(scope="session")
-def used_page(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("used") / "report.html"
+def used_page(place) -> Path:
+    path = place("used")
     use_report(path, used())
     return path
 
 
 @pytest.fixture(scope="session")
-def printed(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("printed") / "report.html"
+def printed(place) -> Path:
+    path = place("printed")
     paper_report(path, check_paper())
     return path
 
@@ -187,9 +194,9 @@ def pages(
 
 
 @pytest.fixture(scope="session")
-def big(tmp_path_factory) -> Path:
+def big(place) -> Path:
     """Ten recordings of 25 s at 1 kHz, with one sample of the first far off."""
-    path = tmp_path_factory.mktemp("big") / "report.html"
+    path = place("big")
     slow = run("OJD_1", 1, seconds=25.0)
     time = np.arange(25000) / 1000.0
     robot = load_robot()
