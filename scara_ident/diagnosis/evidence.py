@@ -35,7 +35,7 @@ class Evidence:
     shown : bool
         Whether it was shown to be noise, by recordings that would have shown otherwise.
     by : {"repetition", "whiteness", ""}
-        What showed it.
+        What showed that it is noise, or that not all of it is.
     why : str
         In words.
     limit : float
@@ -87,8 +87,9 @@ def _of_joint(
         why = f"an effect that removes {share} of the squared residual would not have been significant: record more"
         return Evidence(joint, False, "", why, limit)
     if fit is not None and fit.p_value < criteria.significant and fit.missing > small:
-        why = f"{fit.missing:.3g} of it repeats (p = {fit.p_value:.1e}), beside {fit.noise:.3g} that does not, and nothing found is it"
-        return Evidence(joint, False, "", why, limit)
+        why = f"{fit.missing:.3g} repeats (p = {fit.p_value:.1e}) beside {fit.noise:.3g} that does not: "
+        why += "too much for filters and encoders alone, too little to tell what it is"
+        return Evidence(joint, False, "repetition", why, limit)
     if fit is not None and fit.most_missing <= criteria.remainder_to_noise * fit.noise:
         why = f"repetitions leave at most {fit.most_missing:.3g} that repeats, and {fit.noise:.3g} that does not"
         return Evidence(joint, True, "repetition", why, limit)
