@@ -254,7 +254,7 @@ def diagnose(
     notes += [event.sentence(robot) for event in events]
     log_notes(_LOG, notes)
     shown = held_out_evidence(
-        evidence(found, outcome.residuals, outcome.fit_after, criteria),
+        evidence(found, outcome.residuals, outcome.fit_after, outcome.small, criteria),
         rms_of(after.value, outcome.training),
         rms_of(after.value, without_stretches(validation_after, in_held_out)),
         criteria,

@@ -35,7 +35,7 @@ class Evidence:
     shown : bool
         Whether it was shown to be noise, by recordings that would have shown otherwise.
     by : {"repetition", "whiteness", ""}
-        What showed it.
+        What showed that it is noise, or that not all of it is.
     why : str
         In words.
     limit : float
@@ -51,7 +51,11 @@ class Evidence:
 
 
 def evidence(
-    found: Search, residuals: Residuals, fit: Sequence[LackOfFit], criteria: SelectionCriteria = CRITERIA
+    found: Search,
+    residuals: Residuals,
+    fit: Sequence[LackOfFit],
+    small: Sequence[float],
+    criteria: SelectionCriteria = CRITERIA,
 ) -> tuple[Evidence, ...]:
     """Return for each joint whether what is left was shown to be noise.
 
@@ -62,24 +66,30 @@ def evidence(
         What is left of the training recordings.
     fit : sequence of LackOfFit
         From repetitions; empty without.
+    small : sequence of float
+        What may repeat on each joint all the same, as filters and encoders leave as much, N m or N.
     criteria : SelectionCriteria, optional
     """
     limits = detection_limits(found, criteria)
     coloured = coloured_shares(residuals)
     repeated = {item.joint: item for item in fit}
     return tuple(
-        _of_joint(joint, repeated.get(joint), float(coloured[j]), float(limits[j]), criteria)
+        _of_joint(joint, repeated.get(joint), float(coloured[j]), float(limits[j]), small[j], criteria)
         for j, joint in enumerate(found.scene.robot.joints)
     )
 
 
 def _of_joint(
-    joint: str, fit: LackOfFit | None, coloured: float, limit: float, criteria: SelectionCriteria
+    joint: str, fit: LackOfFit | None, coloured: float, limit: float, small: float, criteria: SelectionCriteria
 ) -> Evidence:
     if limit > criteria.least_power:
         share = "no share" if limit >= 1.0 else f"less than {limit:.0%}"
         why = f"an effect that removes {share} of the squared residual would not have been significant: record more"
         return Evidence(joint, False, "", why, limit)
+    if fit is not None and fit.p_value < criteria.significant and fit.missing > small:
+        why = f"{fit.missing:.3g} repeats (p = {fit.p_value:.1e}) beside {fit.noise:.3g} that does not: "
+        why += "too much for filters and encoders alone, too little to tell what it is"
+        return Evidence(joint, False, "repetition", why, limit)
     if fit is not None and fit.most_missing <= criteria.remainder_to_noise * fit.noise:
         why = f"repetitions leave at most {fit.most_missing:.3g} that repeats, and {fit.noise:.3g} that does not"
         return Evidence(joint, True, "repetition", why, limit)

@@ -64,6 +64,8 @@ class Outcome:
     dependences : tuple of Dependence
         What the remainder depends on, ranked.
     unexplained : Unexplained or None
+    small : tuple of float
+        What is too small on each joint to be called a remainder, where one is significant; 0 elsewhere. N m or N.
     demoted : tuple of Decision
         On effects that were found and are not believed, with why.
     """
@@ -76,6 +78,7 @@ class Outcome:
     fit_after: tuple[LackOfFit, ...]
     dependences: tuple[Dependence, ...]
     unexplained: Unexplained | None
+    small: tuple[float, ...]
     demoted: tuple[Decision, ...] = ()
 
 
@@ -140,15 +143,18 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     depending = [
         item for item in dependences if item.p_value < criteria.significant and item.explained > least[item.joint]
     ]
-    if repeating or depending:
+    small = np.zeros(len(joints))
+    if depending or any(fit.p_value < criteria.significant for fit in fit_after):
         # What the positions' noise does to the columns may repeat too; and what is small beside the torque is not called one.
         torque = [item.torque_rms if item.rows else 0.0 for item in training.by_joint]
-        least_rms = np.maximum(noise_torque(training, after.value), criteria.least_remainder * np.array(torque))
-        large = dict(zip(joints, least_rms.tolist(), strict=True))
-        repeating = [fit for fit in repeating if fit.missing > large[fit.joint]]
-        depending = [item for item in depending if item.rms > large[item.joint]]
+        small = np.maximum(noise_torque(training, after.value), criteria.least_remainder * np.array(torque))
+    least_rms = dict(zip(joints, small.tolist(), strict=True))
+    repeating = [fit for fit in repeating if fit.missing > least_rms[fit.joint]]
+    depending = [item for item in depending if item.rms > least_rms[item.joint]]
     unexplained = _unexplained(repeating, depending, criteria)
-    return Outcome(found, after, training, residuals, lack_of_fit(before), fit_after, dependences, unexplained)
+    return Outcome(
+        found, after, training, residuals, lack_of_fit(before), fit_after, dependences, unexplained, tuple(small)
+    )
 
 
 def _unexplained(

@@ -93,9 +93,14 @@ def _motions(diagnosis: Diagnosis, asked: Sequence[Question]) -> Iterator[NextSt
 
 def _remainder(diagnosis: Diagnosis, asked: Sequence[Question]) -> Iterator[NextStep]:
     """Say what tells a remainder over which no motion can be spread."""
-    left = diagnosis.unexplained
-    if left is not None and not any(item.kind == "unexplained" for item in asked):
-        yield NextStep(f"what is left on {left.joint}", HALF_THE_SPEED, 2.0 * diagnosis.search.scene.duration)
+    if any(item.kind == "unexplained" for item in asked):
+        return
+    if diagnosis.unexplained is not None:
+        joints = [diagnosis.unexplained.joint]
+    else:
+        joints = [item.joint for item in diagnosis.evidence if not item.shown and item.by == "repetition"]
+    if joints:
+        yield NextStep(f"what is left on {' and '.join(joints)}", HALF_THE_SPEED, 2.0 * diagnosis.search.scene.duration)
 
 
 def _recordings(diagnosis: Diagnosis) -> Iterator[NextStep]:

@@ -10,7 +10,8 @@ from scipy.signal import lfilter
 
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import diagnose
-from scara_ident.diagnosis.evidence import Evidence, coloured_shares, held_out_evidence
+from scara_ident.diagnosis.evidence import Evidence, coloured_shares, evidence, held_out_evidence
+from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.motion.prepared import prepare
 from scara_ident.robot.robot import load_robot
@@ -67,3 +68,13 @@ def test_what_does_not_hold_on_other_recordings_is_not_shown():
     assert [item.shown for item in found] == [True, False]
     assert "1.6 times" in found[1].why
     assert held_out_evidence(shown, (1.0, 1.0), (None, None)) == shown
+
+
+@pytest.mark.parametrize(("missing", "shown"), [(0.009, False), (0.005, True)])
+def test_what_surely_repeats_is_no_noise_however_small_beside_it(nothing_missing, missing, shown):
+    # A delay of 12 ms that no candidate could take up left as much, beside noise that is larger.
+    fit = [LackOfFit(joint, 0.0103, missing, missing * 1.1, 1.3e-14, ()) for joint in ("joint1", "joint2")]
+    residuals = nothing_missing.training_after.residuals(nothing_missing.after.value)
+    found = evidence(nothing_missing.search, residuals, fit, (0.0057, 0.0057))
+    assert [item.shown for item in found] == [shown, shown]
+    assert ("repeats (p = 1.3e-14)" in found[0].why) != shown

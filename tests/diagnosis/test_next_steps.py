@@ -46,6 +46,9 @@ def test_a_remainder_that_depends_on_a_signal_asks_for_a_motion_and_another_for_
     assert REPEAT not in [item.motion for item in others]
     bare = replace(found, unexplained=replace(found.unexplained, signals=()))
     assert "at half the speed" in next_steps(bare)[0].motion
+    shown = tuple(replace(item, shown=False, by="repetition") for item in found.evidence)
+    small = next_steps(replace(found, unexplained=None, evidence=shown))[0]
+    assert small.question == "what is left on joint1 and joint2" and "at half the speed" in small.motion
 
 
 def test_rivals_ask_for_a_motion_and_an_effect_for_the_experiment_that_shows_it():
