@@ -4,7 +4,7 @@ Of the residual of a robust fit in bins what the motion makes is taken off (see 
 to 2 s are compared with their own scale (the median absolute value over all recordings, and over this one), in
 which colour of the noise and what the model lacks everywhere are included. A stretch stands out where such a mean is beyond
 what the largest of each second lets expect once in ten hours (Gumbel's law; Coles, *An Introduction to Statistical Modeling of
-Extreme Values*, 2001). Its ends are where the likelihood that the variance is larger between them is largest.
+Extreme Values*, 2001). Where it begins and ends is looked for last (see `event_ends`).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.identification.binned_residual import FILLED, NORMAL, Binned
 from scara_ident.identification.event_background import without_states, without_trends
+from scara_ident.identification.event_ends import event_ends, spread_of_rests
 
 # Lengths of the windows, s.
 WINDOWS = (0.16, 0.32, 0.6, 1.2, 2.0)
@@ -27,7 +28,7 @@ LEAST_WINDOWS, LEAST_SECONDS = 20, 5
 FALSE_EVERY = 36_000.0
 LEAST_SCORE = 6.5
 # What a model lacks makes the largest larger than that law; found by benchmarks/events.py.
-HEAVIER = 1.4
+HEAVIER = 1.5
 # One event and the windows beside it are in at most so many seconds.
 EVENT_SECONDS = 5.0
 # Least rms of an event in standard deviations of a bin, and the share of it that least squares leave too.
@@ -37,16 +38,13 @@ LEAST_SIZE, LEAST_BEFORE = 2.0, 0.5
 LONGEST, LONGEST_SHARE = 3.0, 0.15
 SEEN, BESIDE = 0.3, 1.0
 # Where speed, acceleration or torque are above this share of all, only what stands out by so much is an event.
-USUAL, SURE = 0.97, 2.2
+USUAL, SURE = 0.97, 2.6
 # Events are rare: a residual that stands out in more of the time than this is the model's doing.
 RARE = 0.2
 # A joint helps to find the ends of an event if it stands out by this share of what would make it one.
 AT_ENDS = 0.45
-# Events looked for in a stretch, and how far one may reach to either side of what stands out most, s.
+# Events looked for in a stretch.
 MOST_IN_STRETCH = 12
-REACH = 5.0
-# Its ends are looked for again between so long within and so long beyond them, s.
-EDGE = (0.3, 0.6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +86,13 @@ def standing_out(stretches: Sequence[Binned], fitted: Callable[[], Sequence[Binn
     if not shown_by:
         return []
     original, everywhere = fitted(), _bin_noise(stretches)
+    rests = spread_of_rests([item.still for item in stretches])
     found = []
     for k in shown_by:
         item = stretches[k]
         own = _bin_noise([other for other in stretches if other.recording == item.recording])
         sigma = np.maximum(everywhere, own)
-        for segment in _segments(item, scores[k], sigma):
+        for segment in _segments(item, scores[k], sigma, rests):
             size, before = _sizes(item, original[places[k]], segment)
             large = (size > LEAST_SIZE * sigma) & (before > LEAST_BEFORE * size)
             shown = large & (segment.score >= 1.0)
@@ -199,12 +198,14 @@ def _bin_noise(stretches: Sequence[Binned]) -> Array:
     return _median([np.where(item.known > FILLED, np.abs(item.left), np.nan) for item in stretches])
 
 
-def _segments(item: Binned, scores: Sequence[tuple[int, Array]], noise: Array) -> Iterator[Segment]:
+def _segments(item: Binned, scores: Sequence[tuple[int, Array]], noise: Array, rests: Array) -> Iterator[Segment]:
     """Give what stands out most, then what does beside it, and so on."""
     n, count = item.left.shape
     free = np.ones(count, dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.where((item.known > FILLED) & (noise[:, None] > 0.0), item.left / noise[:, None], 0.0)
+        relative = np.where((item.known > FILLED) & (noise[:, None] > 0.0), item.left / noise[:, None], np.nan)
+        still = np.where(noise[:, None] > 0.0, item.still / noise[:, None], np.nan)
+        alike = np.where(noise > 0.0, rests / noise, np.inf)
     for _ in range(MOST_IN_STRETCH):
         best, place, long = 1.0, -1, 0
         for length, score in scores:
@@ -224,32 +225,7 @@ def _segments(item: Binned, scores: Sequence[tuple[int, Array]], noise: Array) -
             near = score[:, max(0, place - length // 2) : place + max(1, long - length // 2)]
             if near.shape[1]:
                 share = np.fmax(share, np.nanmax(np.nan_to_num(near, nan=0.0), axis=1))
-        own = share >= min(AT_ENDS, best)
-        power = np.maximum(np.mean(relative[own][:, window] ** 2, axis=1), 2.0)
-        # Of log variance: what is between the ends has the power of the window, what is outside has 1.
-        value = np.minimum(relative[own] ** 2, 4.0 * power[:, None])
-        likelihood = np.sum(0.5 * (value * (1.0 - 1.0 / power[:, None]) - np.log(power[:, None])), axis=0)
-        likelihood[~free] = -np.inf
-        middle, reach = place + long // 2, int(REACH / item.width)
-        before = np.cumsum(likelihood[max(0, middle - reach) : middle + 1][::-1])
-        after = np.cumsum(likelihood[middle : middle + reach])
-        start = middle - int(np.argmax(before))
-        stop = middle + int(np.argmax(after)) + 1
-        within, beyond = (round(seconds / item.width) for seconds in EDGE)
-        open_bins = np.where(free, relative, 0.0)
-        start = stop - _reach(open_bins[:, :stop][:, ::-1], stop - start, within, beyond)
-        stop = start + _reach(open_bins[:, start:], stop - start, within, beyond)
+        start, stop = event_ends(relative, still, alike, free, window, share >= min(AT_ENDS, best), item.width)
         pad = max(1, round(0.1 / item.width))
         free[max(0, min(start, place) - pad) : max(stop, place + long) + pad] = False
         yield Segment(item, start, stop, share)
-
-
-def _reach(relative: Array, length: int, near: int, far: int) -> int:
-    """Return how many bins from the first on a shift of the mean lasts, which is known to last about so many.
-
-    By likelihood, with the mean of each joint as it is shortly before the end; a joint that shows nothing counts for nothing.
-    """
-    mean = np.mean(relative[:, max(0, length - near) : length], axis=1, keepdims=True)
-    first = max(0, length - near)
-    likelihood = np.cumsum(np.sum(2.0 * relative * mean - mean**2, axis=0)[first : length + far])
-    return first + int(np.argmax(likelihood)) + 1 if len(likelihood) else length
