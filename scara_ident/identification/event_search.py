@@ -34,11 +34,12 @@ EVENT_SECONDS = 5.0
 # Least rms of an event in standard deviations of a bin, and the share of it that least squares leave too.
 LEAST_SIZE, LEAST_BEFORE = 2.0, 0.5
 # What lasts longer than this, s, and than this share of its recording is a change of the arm. What does not stand out surely is
-# seen for so long, s, before and after it within the other: how an arm starts and stops is no event.
+# seen for so long, s, before and after it within the other, and so is what is nearer to the ends of a recording than that: how
+# an arm starts and stops is no event.
 LONGEST, LONGEST_SHARE = 3.0, 0.15
 SEEN, BESIDE = 0.3, 1.0
 # Where speed, acceleration or torque are above this share of all, only what stands out by so much is an event.
-USUAL, SURE = 0.97, 2.6
+USUAL, SURE = 0.97, 3.3
 # Events are rare: a residual that stands out in more of the time than this is the model's doing.
 RARE = 0.2
 # A joint helps to find the ends of an event if it stands out by this share of what would make it one.
@@ -121,7 +122,9 @@ def _local(segment: Segment) -> bool:
     before = np.sum(shown[:, max(0, segment.start - beside) : segment.start], axis=1)
     after = np.sum(shown[:, segment.stop : segment.stop + beside], axis=1)
     whole = item.left.shape[1] * item.width
-    seen_beside = bool(np.any((before >= seen) & (after >= seen))) or float(np.max(segment.score)) >= SURE
+    inside = beside <= segment.start and segment.stop + beside <= item.left.shape[1]
+    sure = inside and float(np.max(segment.score)) >= SURE
+    seen_beside = sure or bool(np.any((before >= seen) & (after >= seen)))
     return length <= max(LONGEST, LONGEST_SHARE * whole) and seen_beside
 
 
