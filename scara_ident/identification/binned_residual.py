@@ -69,6 +69,11 @@ class Binned:
         """Mean residual over what is used of each bin, bounded sample by sample, shape (n, M)."""
         return self.bounded(BOUND)
 
+    @cached_property
+    def anyhow(self) -> Array:
+        """The same over all of each bin, whether it is used or not, shape (n, M)."""
+        return replace(self, used=np.ones_like(self.used)).bounded(BOUND)
+
     def bounded(self, bound: float) -> Array:
         """Return the mean residual of bins with samples bounded at so many standard deviations, shape (n, M)."""
         shape = (*self.taken.shape, self.size)

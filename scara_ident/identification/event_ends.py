@@ -1,13 +1,13 @@
 """Where in time what stands out begins and ends, by likelihood.
 
 First where the variance is larger between them than outside; then each end again, by where the mean stops being what it is
-within; there a bin that says nothing, as of a joint that turns slowly, counts neither for nor against. While the whole arm stands
-still the torque steps where a push begins or ends, beside a friction that is constant and known only as far as rests are alike.
+within, or what a constant force at the tool makes of it along the motion. There a joint that turns slowly counts as far as its
+residual is usually small then. While the whole arm stands still the torque steps where a push begins or ends, beside a friction that is constant and known only as far as rests are alike.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,19 +29,23 @@ LEAST_RESTS = 4
 
 def event_ends(
     relative: Array,
+    trust: Array,
     still: Array,
     alike: Array,
     free: NDArray[np.bool_],
     window: slice,
     shows: NDArray[np.bool_],
     width: float,
+    shape: Callable[[int, int], Array | None] = lambda start, stop: None,
 ) -> tuple[int, int]:
     """Return the first bin of an event, and the first one after it.
 
     Parameters
     ----------
     relative : ndarray, shape (n, M)
-        Residual over the noise of its bins; NaN where it says nothing.
+        Residual over the noise of its bins.
+    trust : ndarray, shape (n, M)
+        Weight of bins: 1 where a joint moves, less where it turns slowly, 0 where a bin says nothing.
     still : ndarray, shape (n, M)
         The same while the whole arm stands still; NaN where it moves.
     alike : ndarray, shape (n,)
@@ -54,8 +58,10 @@ def event_ends(
         Joints that help to find the ends.
     width : float
         Length of a bin, s.
+    shape : callable, optional
+        What it would be in every bin, shape (n, M), of an event from a bin to before another; None where nobody can say.
     """
-    own = np.nan_to_num(relative[shows])
+    own = np.where(trust[shows] >= 1.0, relative[shows], 0.0)
     power = np.maximum(np.mean(own[:, window] ** 2, axis=1), 2.0)
     # Of log variance: what is between the ends has the power of the window, what is outside has 1.
     value = np.minimum(own**2, 4.0 * power[:, None])
@@ -69,22 +75,34 @@ def event_ends(
     # Nothing of it is in another event.
     open_ = np.where(free, relative, 0.0)
     near, far = (round(seconds / width) for seconds in EDGE)
-    start = stop - _lasting(open_[:, :stop][:, ::-1], still[:, :stop][:, ::-1], alike, stop - start, near, far)
-    return start, start + _lasting(open_[:, start:], still[:, start:], alike, stop - start, near, far)
+    trust = np.where(free, trust, 1.0)
+
+    def again(start: int, stop: int, shape: Array | None) -> tuple[int, int]:
+        parts = (open_, trust, still, *(() if shape is None else (shape,)))
+        start = stop - _lasting([part[:, :stop][:, ::-1] for part in parts], alike, stop - start, near, far)
+        return start, start + _lasting([part[:, start:] for part in parts], alike, stop - start, near, far)
+
+    start, stop = again(start, stop, None)
+    expected = shape(start, stop)
+    return (start, stop) if expected is None else again(start, stop, expected)
 
 
-def _lasting(relative: Array, still: Array, alike: Array, length: int, near: int, far: int) -> int:
-    """Return how many bins from the first on a shift of the mean lasts, which is known to last about so many.
+def _lasting(parts: Sequence[Array], alike: Array, length: int, near: int, far: int) -> int:
+    """Return how many bins from the first on a shift lasts, which is known to last about so many.
 
-    With the mean of each joint as it is shortly before the end; a joint that shows nothing counts for nothing.
+    ``parts`` are residual, trust, what is left at rest, and the shift, by default the mean of each joint shortly before the end;
+    a joint that shows nothing counts for nothing.
     """
+    relative, trust, still = parts[:3]
     first = max(0, length - near)
     # So many bins further that say something.
-    seen = np.cumsum(np.any(np.isfinite(relative[:, length:]), axis=0))
+    seen = np.cumsum(np.max(trust[:, length:], axis=0, initial=0.0))
     last = length + int(np.searchsorted(seen, far, side="right"))
-    mean = _mean(relative[:, first:length])[:, None]
-    gain = np.cumsum(np.nansum(2.0 * relative[:, first:last] * mean - mean**2, axis=0))
-    gain += _at_rest(still[:, first:last], alike, mean)
+    inside, weight = slice(first, last), trust[:, first:length]
+    mean = np.sum(weight * relative[:, first:length], axis=1) / np.maximum(np.sum(weight, axis=1), 1e-300)
+    shift = parts[3][:, inside] if len(parts) > 3 else np.repeat(mean[:, None], last - first, axis=1)
+    gain = np.cumsum(np.sum(trust[:, inside] * (2.0 * relative[:, inside] * shift - shift**2), axis=0))
+    gain += _at_rest(still[:, inside], alike, shift)
     best = int(np.argmax(gain))
     # Between bins that say something the middle is as good as any.
     as_good = int(np.argmin(np.append(gain[best:] == gain[best], False)))
@@ -109,15 +127,17 @@ def spread_of_rests(still: Sequence[Array]) -> Array:
     return np.asarray(NORMAL * np.median(np.abs(levels), axis=0))
 
 
-def _at_rest(still: Array, alike: Array, mean: Array) -> Array:
-    """Return the likelihood that the mean lasts up to each bin, of the rests up to there, against none in them, (M,).
+def _at_rest(still: Array, alike: Array, shift: Array) -> Array:
+    """Return the likelihood that the shift lasts up to each bin, of the rests up to there, against none in them, (M,).
 
     What is left in a rest is noise about a level, of which is known that it is normal about zero.
     """
     found = np.zeros(still.shape[1])
-    most = LARGEST_STEP * np.abs(mean) + LOOSE
     for begin, end in runs_of(np.any(np.isfinite(still), axis=0)):
         count = end - begin
+        # Nothing moves: it is the same all along.
+        mean = shift[:, begin : begin + 1]
+        most = LARGEST_STEP * np.abs(mean) + LOOSE
         level = np.median(still[:, begin:end], axis=1, keepdims=True)
         left = level + np.clip(still[:, begin:end] - level, -most, most)
         # Of the inverse of the covariance, 1 less this share of the mean of all.
@@ -128,8 +148,3 @@ def _at_rest(still: Array, alike: Array, mean: Array) -> Array:
         found[begin:end] += gain - DOUBT
         found[end:] += gain[-1] - DOUBT
     return found
-
-
-def _mean(signal: Array) -> Array:
-    """Return the mean of each row over what is known, 0 where nothing is."""
-    return np.asarray(np.nansum(signal, axis=1) / np.maximum(np.sum(np.isfinite(signal), axis=1), 1))

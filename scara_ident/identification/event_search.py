@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.identification.binned_residual import FILLED, NORMAL, Binned
+from scara_ident.identification.binned_residual import BOUND, FILLED, NORMAL, Binned
 from scara_ident.identification.event_background import without_states, without_trends
 from scara_ident.identification.event_ends import event_ends, spread_of_rests
 
@@ -48,6 +48,9 @@ AT_ENDS = 0.45
 MOST_IN_STRETCH = 12
 
 
+Shape = Callable[[Binned, int, int], Array | None]
+
+
 @dataclass(frozen=True, eq=False)
 class Segment:
     """A stretch of time that stands out.
@@ -67,7 +70,9 @@ class Segment:
     score: Array
 
 
-def standing_out(stretches: Sequence[Binned], fitted: Callable[[], Sequence[Binned]]) -> list[Segment]:
+def standing_out(
+    stretches: Sequence[Binned], fitted: Callable[[], Sequence[Binned]], shape: Shape = lambda item, start, stop: None
+) -> list[Segment]:
     """Return the stretches of time that stand out, in the order in which they come.
 
     Parameters
@@ -77,6 +82,9 @@ def standing_out(stretches: Sequence[Binned], fitted: Callable[[], Sequence[Binn
     fitted : callable
         Returns the same of least squares: what that explains is a state of motion that the robust fit took for an outlier.
         Asked only where something stands out.
+    shape : callable, optional
+        Returns what an event from a bin to before another would leave in every bin, N m or N, shape (n, M); None where nobody
+        can say. It helps to find the ends.
     """
     places = [k for k, item in enumerate(stretches) if item.taken.shape[1] > 1]
     if not places:
@@ -88,12 +96,13 @@ def standing_out(stretches: Sequence[Binned], fitted: Callable[[], Sequence[Binn
         return []
     original, everywhere = fitted(), _bin_noise(stretches)
     rests = spread_of_rests([item.still for item in stretches])
+    slow = _median([np.where(_slow(item), np.abs(item.anyhow), np.nan) for item in stretches])
     found = []
     for k in shown_by:
         item = stretches[k]
         own = _bin_noise([other for other in stretches if other.recording == item.recording])
         sigma = np.maximum(everywhere, own)
-        for segment in _segments(item, scores[k], sigma, rests):
+        for segment in _segments(item, scores[k], sigma, slow, rests, shape):
             size, before = _sizes(item, original[places[k]], segment)
             large = (size > LEAST_SIZE * sigma) & (before > LEAST_BEFORE * size)
             shown = large & (segment.score >= 1.0)
@@ -118,9 +127,11 @@ def _local(segment: Segment) -> bool:
     item = segment.binned
     length = (segment.stop - segment.start) * item.width
     beside, seen = round(BESIDE / item.width), SEEN / item.width
+    # Rests do not count.
+    moves = np.logical_not(np.isfinite(item.still[0]))
     shown = item.known[segment.score >= 1.0]
-    before = np.sum(shown[:, max(0, segment.start - beside) : segment.start], axis=1)
-    after = np.sum(shown[:, segment.stop : segment.stop + beside], axis=1)
+    before = np.sum(shown[:, : segment.start][:, moves[: segment.start]][:, -beside:], axis=1)
+    after = np.sum(shown[:, segment.stop :][:, moves[segment.stop :]][:, :beside], axis=1)
     whole = item.left.shape[1] * item.width
     inside = beside <= segment.start and segment.stop + beside <= item.left.shape[1]
     sure = inside and float(np.max(segment.score)) >= SURE
@@ -201,14 +212,35 @@ def _bin_noise(stretches: Sequence[Binned]) -> Array:
     return _median([np.where(item.known > FILLED, np.abs(item.left), np.nan) for item in stretches])
 
 
-def _segments(item: Binned, scores: Sequence[tuple[int, Array]], noise: Array, rests: Array) -> Iterator[Segment]:
+def _slow(item: Binned) -> NDArray[np.bool_]:
+    """Return where a joint turns slowly, and the arm does not stand still, shape (n, M)."""
+    return np.logical_not((item.known > FILLED) | np.isfinite(item.still))
+
+
+def _segments(
+    item: Binned, scores: Sequence[tuple[int, Array]], noise: Array, slow: Array, rests: Array, shape: Shape
+) -> Iterator[Segment]:
     """Give what stands out most, then what does beside it, and so on."""
     n, count = item.left.shape
     free = np.ones(count, dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.where((item.known > FILLED) & (noise[:, None] > 0.0), item.left / noise[:, None], np.nan)
+        relative = np.where(
+            noise[:, None] > 0.0, np.where(item.known > FILLED, item.left, item.anyhow) / noise[:, None], 0.0
+        )
+        anyhow = np.where(slow > 0.0, np.minimum(1.0, noise / slow) ** 2, 0.0)
+        trust = np.where(item.known > FILLED, 1.0, np.where(_slow(item), anyhow[:, None], 0.0))
         still = np.where(noise[:, None] > 0.0, item.still / noise[:, None], np.nan)
         alike = np.where(noise > 0.0, rests / noise, np.inf)
+
+    def expected(start: int, stop: int) -> Array | None:
+        found = shape(item, start, stop)
+        if found is None:
+            return None
+        # As the residual is bounded.
+        most = BOUND * item.noise[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(noise[:, None] > 0.0, np.clip(found, -most, most) / noise[:, None], 0.0)
+
     for _ in range(MOST_IN_STRETCH):
         best, place, long = 1.0, -1, 0
         for length, score in scores:
@@ -228,7 +260,9 @@ def _segments(item: Binned, scores: Sequence[tuple[int, Array]], noise: Array, r
             near = score[:, max(0, place - length // 2) : place + max(1, long - length // 2)]
             if near.shape[1]:
                 share = np.fmax(share, np.nanmax(np.nan_to_num(near, nan=0.0), axis=1))
-        start, stop = event_ends(relative, still, alike, free, window, share >= min(AT_ENDS, best), item.width)
+        start, stop = event_ends(
+            relative, trust, still, alike, free, window, share >= min(AT_ENDS, best), item.width, expected
+        )
         pad = max(1, round(0.1 / item.width))
         free[max(0, min(start, place) - pad) : max(stop, place + long) + pad] = False
         yield Segment(item, start, stop, share)

@@ -17,12 +17,12 @@ def found(push: slice, alike: float, friction: float = 0.0, window: slice | None
     rng = np.random.default_rng(3)
     left = rng.standard_normal((2, 300))
     left[0, push] += 5.0
-    relative, still = left.copy(), np.full_like(left, np.nan)
-    relative[:, 100:150] = np.nan
+    trust, still = np.ones_like(left), np.full_like(left, np.nan)
+    trust[:, 100:150] = 0.0
     still[:, REST] = left[:, REST] + friction
     window = slice(push.start, min(push.stop, 100)) if window is None else window
     free, shows = np.ones(300, dtype=bool), np.array([True, False])
-    return event_ends(relative, still, np.full(2, alike), free, window, shows, WIDTH)
+    return event_ends(left, trust, still, np.full(2, alike), free, window, shows, WIDTH)
 
 
 @pytest.mark.parametrize("stop", [90, 115, 130])
