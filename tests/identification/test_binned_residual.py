@@ -68,3 +68,4 @@ def test_at_rest_the_torque_less_the_predicted_is_known_up_to_a_constant():
     assert not np.any(rest[:140]) and not np.any(rest[205:360])
     assert still[0, 180] - still[0, 165] == pytest.approx(0.5)
     assert still[1, 180] == pytest.approx(still[1, 165])
+    assert binned(0, part, part.torque.copy(), np.full(2, 0.05)).anyhow[0, 180] == pytest.approx(0.25)

@@ -50,3 +50,37 @@ def test_how_far_rests_are_apart_takes_several():
         still[:, 50 * k : 50 * k + 20] = np.array([[2.0], [0.1]]) * (-1.0) ** k
     assert spread_of_rests([still]) == pytest.approx(1.4826 * np.array([2.0, 0.1]))
     assert np.all(np.isinf(spread_of_rests([still[:, :100]])))
+
+
+@pytest.mark.parametrize(("trust", "end"), [(0.0, 115), (0.2, 128)])
+def test_bins_of_less_trust_say_where_it_ends_and_between_those_of_none_the_middle_is_as_good_as_any(
+    trust: float, end: int
+):
+    rng = np.random.default_rng(4)
+    left = rng.standard_normal((1, 300))
+    left[0, 60:128] += 6.0
+    weight = np.ones_like(left)
+    weight[:, 100:130] = trust
+    nothing, every = np.full_like(left, np.nan), np.ones(300, dtype=bool)
+    found = event_ends(left, weight, nothing, np.ones(1), every, slice(60, 100), np.array([True]), WIDTH)
+    assert found == (pytest.approx(60, abs=1), pytest.approx(end, abs=1))
+
+
+def test_a_force_whose_torque_changes_its_sign_along_the_motion_begins_before_it_does():
+    rng = np.random.default_rng(5)
+    shape = np.clip(0.25 * (np.arange(300.0)[None] - 100.0), -6.0, 6.0)
+    left = rng.standard_normal((1, 300))
+    left[:, 91:160] += shape[:, 91:160]
+    weight, nothing, every = np.ones_like(left), np.full_like(left, np.nan), np.ones(300, dtype=bool)
+    asked: list[tuple[int, int]] = []
+
+    def expected(start: int, stop: int) -> np.ndarray:
+        asked.append((start, stop))
+        return shape
+
+    place = slice(120, 155), np.array([True]), WIDTH
+    start, stop = event_ends(left, weight, nothing, np.ones(1), every, *place, expected)
+    assert (start, stop) == (pytest.approx(91, abs=2), pytest.approx(160, abs=1))
+    # By the mean alone it is late.
+    assert asked == [event_ends(left, weight, nothing, np.ones(1), every, *place)]
+    assert asked[0][0] > 98
