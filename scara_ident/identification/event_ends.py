@@ -2,7 +2,7 @@
 
 First where the variance is larger between them than outside; then each end again, by where the mean stops being what it is
 within, or what a constant force at the tool makes of it along the motion. There a joint that turns slowly counts as far as its
-residual is usually small then. While the whole arm stands still the torque steps where a push begins or ends, beside a friction that is constant and known only as far as rests are alike.
+residual is usually small then. While the whole arm stands still the torque steps where a push begins or ends, beside a friction that is constant and not known.
 """
 
 from __future__ import annotations
@@ -13,25 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.identification.binned_residual import NORMAL, runs_of
+from scara_ident.identification.binned_residual import runs_of
 
 # How far an event may reach to either side of what stands out most, s.
 REACH = 5.0
+# What comes so much later, s, is something else.
+GAP = 0.6
 # Its ends are looked for again between so long within and so long beyond them, s, in which something is seen.
 EDGE = (0.3, 0.6)
 # A step of the torque at rest is bounded at that of the event by this factor, and so many standard deviations of bins.
 LARGEST_STEP, LOOSE = 2.0, 4.0
-# Twice the logarithm of how much less likely it is to last into a rest: levels there are normal only nearly.
-DOUBT = 5.0
-# Rests from which it is known how far apart they are.
-LEAST_RESTS = 4
 
 
 def event_ends(
     relative: Array,
     trust: Array,
     still: Array,
-    alike: Array,
     free: NDArray[np.bool_],
     window: slice,
     shows: NDArray[np.bool_],
@@ -48,8 +45,6 @@ def event_ends(
         Weight of bins: 1 where a joint moves, less where it turns slowly, 0 where a bin says nothing.
     still : ndarray, shape (n, M)
         The same while the whole arm stands still; NaN where it moves.
-    alike : ndarray, shape (n,)
-        How far apart rests are in that (see `spread_of_rests`).
     free : ndarray of bool, shape (M,)
         Bins of no other event.
     window : slice
@@ -70,8 +65,9 @@ def event_ends(
     middle, reach = (window.start + window.stop) // 2, int(REACH / width)
     before = np.cumsum(likelihood[max(0, middle - reach) : middle + 1][::-1])
     after = np.cumsum(likelihood[middle : middle + reach])
-    start = middle - int(np.argmax(before))
-    stop = middle + int(np.argmax(after)) + 1
+    gap = round(GAP / width)
+    start = middle - _first_peak(before, gap)
+    stop = middle + _first_peak(after, gap) + 1
     # Nothing of it is in another event.
     open_ = np.where(free, relative, 0.0)
     near, far = (round(seconds / width) for seconds in EDGE)
@@ -79,15 +75,25 @@ def event_ends(
 
     def again(start: int, stop: int, shape: Array | None) -> tuple[int, int]:
         parts = (open_, trust, still, *(() if shape is None else (shape,)))
-        start = stop - _lasting([part[:, :stop][:, ::-1] for part in parts], alike, stop - start, near, far)
-        return start, start + _lasting([part[:, start:] for part in parts], alike, stop - start, near, far)
+        start = stop - _lasting([part[:, :stop][:, ::-1] for part in parts], stop - start, near, far)
+        return start, start + _lasting([part[:, start:] for part in parts], stop - start, near, far)
 
     start, stop = again(start, stop, None)
     expected = shape(start, stop)
     return (start, stop) if expected is None else again(start, stop, expected)
 
 
-def _lasting(parts: Sequence[Array], alike: Array, length: int, near: int, far: int) -> int:
+def _first_peak(likelihood: Array, gap: int) -> int:
+    """Return the place of the first value that no value exceeds within so many places after it."""
+    best = 0
+    for place, value in enumerate(likelihood.tolist()):
+        if place - best > gap:
+            break
+        best = place if value > likelihood[best] else best
+    return best
+
+
+def _lasting(parts: Sequence[Array], length: int, near: int, far: int) -> int:
     """Return how many bins from the first on a shift lasts, which is known to last about so many.
 
     ``parts`` are residual, trust, what is left at rest, and the shift, by default the mean of each joint shortly before the end;
@@ -102,49 +108,25 @@ def _lasting(parts: Sequence[Array], alike: Array, length: int, near: int, far: 
     mean = np.sum(weight * relative[:, first:length], axis=1) / np.maximum(np.sum(weight, axis=1), 1e-300)
     shift = parts[3][:, inside] if len(parts) > 3 else np.repeat(mean[:, None], last - first, axis=1)
     gain = np.cumsum(np.sum(trust[:, inside] * (2.0 * relative[:, inside] * shift - shift**2), axis=0))
-    gain += _at_rest(still[:, inside], alike, shift)
+    gain += _at_rest(still[:, inside], shift)
     best = int(np.argmax(gain))
     # Between bins that say something the middle is as good as any.
     as_good = int(np.argmin(np.append(gain[best:] == gain[best], False)))
     return first + best + 1 + as_good // 2
 
 
-def spread_of_rests(still: Sequence[Array]) -> Array:
-    """Return how far apart rests are in what is left of the torque there, shape (n,); infinite where they are too few.
-
-    Parameters
-    ----------
-    still : sequence of ndarray, each of shape (n, M)
-        Of every stretch, NaN where the arm moves.
-    """
-    levels = [
-        np.median(item[:, begin:end], axis=1)
-        for item in still
-        for begin, end in runs_of(np.all(np.isfinite(item), axis=0))
-    ]
-    if len(levels) < LEAST_RESTS:
-        return np.full(len(still[0]), np.inf)
-    return np.asarray(NORMAL * np.median(np.abs(levels), axis=0))
-
-
-def _at_rest(still: Array, alike: Array, shift: Array) -> Array:
-    """Return the likelihood that the shift lasts up to each bin, of the rests up to there, against none in them, (M,).
-
-    What is left in a rest is noise about a level, of which is known that it is normal about zero.
-    """
+def _at_rest(still: Array, shift: Array) -> Array:
+    """Return the likelihood that the shift ends after each bin of a rest, against none in that rest, (M,)."""
     found = np.zeros(still.shape[1])
     for begin, end in runs_of(np.any(np.isfinite(still), axis=0)):
         count = end - begin
         # Nothing moves: it is the same all along.
         mean = shift[:, begin : begin + 1]
         most = LARGEST_STEP * np.abs(mean) + LOOSE
-        level = np.median(still[:, begin:end], axis=1, keepdims=True)
-        left = level + np.clip(still[:, begin:end] - level, -most, most)
-        # Of the inverse of the covariance, 1 less this share of the mean of all.
-        share = (1.0 - 1.0 / (1.0 + count * alike**2))[:, None] / count
+        left = still[:, begin:end] - np.median(still[:, begin:end], axis=1, keepdims=True)
+        left = np.clip(left, -most, most)
+        left -= np.mean(left, axis=1, keepdims=True)
         before = np.arange(1, count + 1)
-        first = np.cumsum(left, axis=1) - share * np.sum(left, axis=1, keepdims=True) * before
-        gain = np.nansum(2.0 * mean * first - mean**2 * (before - share * before**2), axis=0)
-        found[begin:end] += gain - DOUBT
-        found[end:] += gain[-1] - DOUBT
+        gain = 2.0 * mean * np.cumsum(left, axis=1) - mean**2 * before * (count - before) / count
+        found[begin:end] = np.nansum(gain, axis=0)
     return found

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.identification.binned_residual import BOUND, FILLED, NORMAL, Binned
 from scara_ident.identification.event_background import without_states, without_trends
-from scara_ident.identification.event_ends import event_ends, spread_of_rests
+from scara_ident.identification.event_ends import event_ends
 
 # Lengths of the windows, s.
 WINDOWS = (0.16, 0.32, 0.6, 1.2, 2.0)
@@ -95,14 +95,13 @@ def standing_out(
     if not shown_by:
         return []
     original, everywhere = fitted(), _bin_noise(stretches)
-    rests = spread_of_rests([item.still for item in stretches])
     slow = _median([np.where(_slow(item), np.abs(item.anyhow), np.nan) for item in stretches])
     found = []
     for k in shown_by:
         item = stretches[k]
         own = _bin_noise([other for other in stretches if other.recording == item.recording])
         sigma = np.maximum(everywhere, own)
-        for segment in _segments(item, scores[k], sigma, slow, rests, shape):
+        for segment in _segments(item, scores[k], sigma, slow, shape):
             size, before = _sizes(item, original[places[k]], segment)
             large = (size > LEAST_SIZE * sigma) & (before > LEAST_BEFORE * size)
             shown = large & (segment.score >= 1.0)
@@ -218,7 +217,7 @@ def _slow(item: Binned) -> NDArray[np.bool_]:
 
 
 def _segments(
-    item: Binned, scores: Sequence[tuple[int, Array]], noise: Array, slow: Array, rests: Array, shape: Shape
+    item: Binned, scores: Sequence[tuple[int, Array]], noise: Array, slow: Array, shape: Shape
 ) -> Iterator[Segment]:
     """Give what stands out most, then what does beside it, and so on."""
     n, count = item.left.shape
@@ -230,7 +229,6 @@ def _segments(
         anyhow = np.where(slow > 0.0, np.minimum(1.0, noise / slow) ** 2, 0.0)
         trust = np.where(item.known > FILLED, 1.0, np.where(_slow(item), anyhow[:, None], 0.0))
         still = np.where(noise[:, None] > 0.0, item.still / noise[:, None], np.nan)
-        alike = np.where(noise > 0.0, rests / noise, np.inf)
 
     def expected(start: int, stop: int) -> Array | None:
         found = shape(item, start, stop)
@@ -261,7 +259,7 @@ def _segments(
             if near.shape[1]:
                 share = np.fmax(share, np.nanmax(np.nan_to_num(near, nan=0.0), axis=1))
         start, stop = event_ends(
-            relative, trust, still, alike, free, window, share >= min(AT_ENDS, best), item.width, expected
+            relative, trust, still, free, window, share >= min(AT_ENDS, best), item.width, expected
         )
         pad = max(1, round(0.1 / item.width))
         free[max(0, min(start, place) - pad) : max(stop, place + long) + pad] = False

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.identification.event_ends import event_ends, spread_of_rests
+from scara_ident.identification.event_ends import event_ends
 
 WIDTH = 0.04
 # It moves up to bin 100 and from bin 150 on; in between it stands still, and nothing is said of four bins on either side.
 REST = slice(104, 146)
 
 
-def found(push: slice, alike: float, friction: float = 0.0, window: slice | None = None) -> tuple[int, int]:
+def found(push: slice, friction: float = 0.0, window: slice | None = None) -> tuple[int, int]:
     """The ends found of a push of five times the noise on the first of two joints."""
     rng = np.random.default_rng(3)
     left = rng.standard_normal((2, 300))
@@ -22,34 +22,24 @@ def found(push: slice, alike: float, friction: float = 0.0, window: slice | None
     still[:, REST] = left[:, REST] + friction
     window = slice(push.start, min(push.stop, 100)) if window is None else window
     free, shows = np.ones(300, dtype=bool), np.array([True, False])
-    return event_ends(left, trust, still, np.full(2, alike), free, window, shows, WIDTH)
+    return event_ends(left, trust, still, free, window, shows, WIDTH)
 
 
 @pytest.mark.parametrize("stop", [90, 115, 130])
 def test_a_push_ends_where_the_torque_steps_at_rest_whatever_friction_is_there(stop: int):
-    start, end = found(slice(70, stop), np.inf, friction=-9.0)
+    start, end = found(slice(70, stop), friction=-9.0)
     assert start == pytest.approx(70, abs=1)
     assert end == pytest.approx(stop, abs=1)
 
 
 def test_it_begins_so_too():
-    start, end = found(slice(120, 190), np.inf, friction=7.0, window=slice(150, 190))
+    start, end = found(slice(120, 190), friction=7.0, window=slice(150, 190))
     assert start == pytest.approx(120, abs=1)
     assert end == pytest.approx(190, abs=1)
 
 
-def test_a_rest_without_a_step_counts_as_pushed_only_where_rests_are_alike():
-    assert found(slice(70, 148), alike=0.5)[1] == pytest.approx(148, abs=2)
-    # Friction that is nowhere the same may be as large.
-    assert found(slice(70, 148), alike=20.0)[1] == pytest.approx(102, abs=2)
-
-
-def test_how_far_rests_are_apart_takes_several():
-    still = np.full((2, 300), np.nan)
-    for k in range(5):
-        still[:, 50 * k : 50 * k + 20] = np.array([[2.0], [0.1]]) * (-1.0) ** k
-    assert spread_of_rests([still]) == pytest.approx(1.4826 * np.array([2.0, 0.1]))
-    assert np.all(np.isinf(spread_of_rests([still[:, :100]])))
+def test_a_rest_without_a_step_says_nothing_of_it():
+    assert found(slice(70, 148))[1] == pytest.approx(102, abs=2)
 
 
 @pytest.mark.parametrize(("trust", "end"), [(0.0, 115), (0.2, 128)])
@@ -62,7 +52,7 @@ def test_bins_of_less_trust_say_where_it_ends_and_between_those_of_none_the_midd
     weight = np.ones_like(left)
     weight[:, 100:130] = trust
     nothing, every = np.full_like(left, np.nan), np.ones(300, dtype=bool)
-    found = event_ends(left, weight, nothing, np.ones(1), every, slice(60, 100), np.array([True]), WIDTH)
+    found = event_ends(left, weight, nothing, every, slice(60, 100), np.array([True]), WIDTH)
     assert found == (pytest.approx(60, abs=1), pytest.approx(end, abs=1))
 
 
@@ -79,8 +69,8 @@ def test_a_force_whose_torque_changes_its_sign_along_the_motion_begins_before_it
         return shape
 
     place = slice(120, 155), np.array([True]), WIDTH
-    start, stop = event_ends(left, weight, nothing, np.ones(1), every, *place, expected)
+    start, stop = event_ends(left, weight, nothing, every, *place, expected)
     assert (start, stop) == (pytest.approx(91, abs=2), pytest.approx(160, abs=1))
     # By the mean alone it is late.
-    assert asked == [event_ends(left, weight, nothing, np.ones(1), every, *place)]
+    assert asked == [event_ends(left, weight, nothing, every, *place)]
     assert asked[0][0] > 98
