@@ -74,3 +74,12 @@ def test_a_force_whose_torque_changes_its_sign_along_the_motion_begins_before_it
     # By the mean alone it is late.
     assert asked == [event_ends(left, weight, nothing, every, *place)]
     assert asked[0][0] > 98
+
+
+def test_what_comes_three_seconds_later_is_something_else():
+    left = np.random.default_rng(6).standard_normal((1, 300))
+    left[0, 60:128] += 6.0
+    left[0, 200:215] += 40.0
+    trust, nothing, every = np.ones_like(left), np.full_like(left, np.nan), np.ones(300, dtype=bool)
+    start, stop = event_ends(left, trust, nothing, every, slice(70, 120), np.array([True]), WIDTH)
+    assert (start, stop) == (pytest.approx(60, abs=1), pytest.approx(128, abs=1))
