@@ -164,7 +164,7 @@ def size_of(robot: Robot, made: Set) -> float:
         for item in made.recordings
     ]
     observations = observed(robot, plain)
-    left = observations.unfiltered_rms(weighted_value(observations))
+    left = observations.unfiltered_rms(weighted_value(observations.by_joint))
     (run,) = (item for item in made.recordings if item.name == made.push.recording)
     inside = (run.time >= made.push.start) & (run.time <= made.push.stop)
     return float(np.max(np.sqrt(np.mean(made.added[:, inside] ** 2, axis=1)) / left))

@@ -15,7 +15,13 @@ from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
 from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
-from scara_ident.diagnosis.found_effect import FoundEffect, found_effects, uncounted_correction
+from scara_ident.diagnosis.found_effect import (
+    FoundEffect,
+    direct_readings,
+    found_effects,
+    not_found,
+    uncounted_correction,
+)
 from scara_ident.diagnosis.held_out_states import HeldOut, held_out_states
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.model_selection import Outcome, Unexplained, rms_of, select_model
@@ -234,7 +240,9 @@ def diagnose(
     validation_before = observe(base, held.data)
     whole = found.whole(step)
     parameters = physical_parameters(whole) if whole.chosen else PhysicalParameters((), (), ())
-    effects = found_effects(found, step, parameters)
+    readings = direct_readings(found, families, criteria.rotor_inertia_std)
+    effects = found_effects(found, step, parameters, readings)
+    notes += not_found(readings, effects)
     notes += [f"{item.label} is not counted: {item.why}" for item in outcome.demoted]
     drift = clock_drift(after.value, outcome.training)
     notes += [] if drift is None else [drift]

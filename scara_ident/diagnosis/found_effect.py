@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from scara_ident.diagnosis.effect_parameters import Coefficients, PhysicalParame
 from scara_ident.diagnosis.model_selection import rms_of
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.effects import Parameter
+from scara_ident.effects import Effect, Parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +38,8 @@ class FoundEffect:
         Rms of each joint over the training recordings when it came in.
     candidate : Candidate or None
         As a term of the model; None where it was taken out of the recordings.
+    direct : mapping of str to Parameter
+        Those of its parameters that a channel of its own, as of a second encoder, tells without this fit.
     """
 
     effect: str
@@ -51,6 +53,7 @@ class FoundEffect:
     before: Mapping[str, float | None]
     after: Mapping[str, float | None]
     candidate: Candidate | None = None
+    direct: Mapping[str, Parameter] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -58,7 +61,37 @@ class FoundEffect:
         return self.effect if self.joint is None else f"{self.effect} of {self.joint}"
 
 
-def found_effects(found: Search, step: SelectionStep, parameters: PhysicalParameters) -> list[FoundEffect]:
+Readings = Mapping[tuple[str, str | None], Mapping[str, Parameter]]
+
+
+def direct_readings(found: Search, families: Sequence[Effect], rotor_std: float) -> Readings:
+    """Return what channels tell of effects without a fit, by effect and joint, where they tell something."""
+    told = {
+        (family.name, joint): family.read_directly(found.scene, j, found.data.recordings, rotor_std)
+        for family in families
+        for j, joint in enumerate(found.scene.robot.joints)
+    }
+    return {key: values for key, values in told.items() if values}
+
+
+def not_found(readings: Readings, effects: Sequence[FoundEffect]) -> list[str]:
+    """Return in words what channels tell of effects that the fit did not find."""
+    added = {(item.effect, item.joint) for item in effects}
+    return [
+        f"{effect} of {joint} was not added, but a channel of its own tells {said(values)}"
+        for (effect, joint), values in readings.items()
+        if (effect, joint) not in added
+    ]
+
+
+def said(values: Mapping[str, Parameter]) -> str:
+    """Return parameters in words."""
+    return ", ".join(f"{name} {item.value:.4g} +- {item.std:.1g} {item.unit}" for name, item in values.items())
+
+
+def found_effects(
+    found: Search, step: SelectionStep, parameters: PhysicalParameters, readings: Readings
+) -> list[FoundEffect]:
     """Return the effects that came in, in that order, with their parameters and what cannot be told from them."""
     scene = found.scene
     groups = confounders(step, found.decisions) if found.chosen else []
@@ -94,6 +127,7 @@ def found_effects(found: Search, step: SelectionStep, parameters: PhysicalParame
                 dict(zip(scene.robot.joints, before, strict=True)),
                 dict(zip(scene.robot.joints, now, strict=True)),
                 None if candidate.corrects_data else candidate,
+                readings.get((candidate.effect.name, candidate.joint(scene)), {}),
             )
         )
         before = now
@@ -120,5 +154,4 @@ def uncounted_correction(found: Search, parameters: PhysicalParameters) -> str |
     if np.any(least) and candidate.effect.negligible(found.scene, candidate.member, least) is None:
         return None
     told = candidate.effect.parameters(found.scene, candidate.member, value, own.covariance)
-    sizes = ", ".join(f"{name} {item.value:.2g} +- {item.std:.1g} {item.unit}" for name, item in told.items())
-    return f"{sizes}: within its uncertainty, with what runs differ by counted"
+    return f"{said(told)}: within its uncertainty, with what runs differ by counted"

@@ -24,6 +24,7 @@ from scara_ident.model.prediction import states
 from scara_ident.model.terms import Column
 from scara_ident.model.terms.term import StateTorque
 from scara_ident.motion.motion import Motion
+from scara_ident.motion.prepared import PreparedRecording
 from scara_ident.recording.recording import Recording
 
 # Standard deviations by which a coefficient may lie beyond what a real arm can have.
@@ -264,6 +265,15 @@ class Effect(ABC):
     def essential(self, scene: Scene, member: Member) -> slice:
         """Return the coefficients of which one at least is not zero where the effect is there: all, unless one says it."""
         return slice(None)
+
+    def read_directly(
+        self, scene: Scene, joint: int, recordings: Sequence[PreparedRecording], rotor_std: float
+    ) -> Mapping[str, Parameter]:
+        """Return those of a joint's parameters that a channel of its own tells without the fit; none where none does.
+
+        ``rotor_std`` is of the rotor's inertia where the description states it, as a share.
+        """
+        return {}
 
     def corrects_data(self, member: Member) -> bool:
         """Whether it is taken out of the recordings instead of becoming a term of the model."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,11 @@ from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.links import lagging, link_inertia, usual_link_inertia, usual_link_inertia_slopes
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, deviation
+from scara_ident.effects.second_encoder import gear_stiffness
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.two_mass import TwoMasses
 from scara_ident.motion.low_pass import HIGHEST_CUT, differentiate
+from scara_ident.motion.prepared import PreparedRecording
 
 # The torque that winds up a gear keeps this many times the band, so that the band itself is left alone.
 LOAD_BAND = 3.0
@@ -128,6 +130,13 @@ class JointElasticity(BehindGear):
         if compliance == 0.0:
             return {"stiffness": Parameter(np.inf, np.inf, unit)}
         return {"stiffness": Parameter(1.0 / compliance, deviation(covariance) / compliance**2, unit)}
+
+    def read_directly(
+        self, scene: Scene, joint: int, recordings: Sequence[PreparedRecording], rotor_std: float
+    ) -> Mapping[str, Parameter]:
+        """Return the stiffness that a second encoder behind the gear tells."""
+        stiffness = gear_stiffness(scene, recordings, joint, rotor_std)
+        return {} if stiffness is None else {"stiffness": stiffness}
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say what else it may be on the first joint."""

@@ -19,6 +19,8 @@ BOUND = 5.0
 NORMAL = 1.4826
 # Nothing is said of a joint slower than this share of its peak speed, where friction is known least.
 SLOW = 0.05
+# The arm stands still where all joints are slower than this share, and for so long, s, before and after; longer than this, s.
+STILL, SETTLED, SHORTEST = 0.01, 0.06, 0.12
 # Share of a window that has to be used, or nothing is said of it.
 FILLED = 0.6
 # Samples of a stretch that its standard deviation is taken from.
@@ -67,6 +69,11 @@ class Binned:
         """Mean residual over what is used of each bin, bounded sample by sample, shape (n, M)."""
         return self.bounded(BOUND)
 
+    @cached_property
+    def anyhow(self) -> Array:
+        """The same over all of each bin, whether it is used or not, shape (n, M)."""
+        return replace(self, used=np.ones_like(self.used)).bounded(BOUND)
+
     def bounded(self, bound: float) -> Array:
         """Return the mean residual of bins with samples bounded at so many standard deviations, shape (n, M)."""
         shape = (*self.taken.shape, self.size)
@@ -75,6 +82,27 @@ class Binned:
         np.clip(inside, -most, most, out=inside)
         inside *= self.used.reshape(shape)
         return np.asarray(inside.mean(axis=2) / np.maximum(self.known, 1.0 / self.size))
+
+    @cached_property
+    def still(self) -> Array:
+        """Mean recorded torque less the predicted over each bin in which the whole arm stands still, else NaN, shape (n, M).
+
+        The predicted is the median over each rest: of friction only that is known at rest that it is constant.
+        """
+        shape = (*self.taken.shape, self.size)
+        speed = np.abs(self.part.motion.v[:, : self.raw.shape[1]])
+        moving = np.any(speed > STILL * np.max(speed, axis=1, keepdims=True), axis=0)
+        wide = round(SETTLED * self.part.rate)
+        near = np.convolve(moving, np.ones(2 * wide + 1), mode="same") > 0.5
+        rest = np.logical_not(np.any(near.reshape(shape[1:]), axis=1))
+        torque = self.part.torque[:, : self.raw.shape[1]]
+        predicted = (torque - self.raw).reshape(shape).mean(axis=2)
+        recorded, found = torque.reshape(shape).mean(axis=2), np.full(shape[:2], np.nan)
+        for begin, end in runs_of(rest):
+            if (end - begin) * self.width > SHORTEST:
+                inside = slice(begin, end)
+                found[:, inside] = recorded[:, inside] - np.median(predicted[:, inside], axis=1, keepdims=True)
+        return found
 
     def without(self, more: Array) -> Binned:
         """Return it with more taken off the residual, shape (n, M)."""
@@ -94,6 +122,12 @@ class Binned:
         """Return the mean over windows of so many bins, shape (n, M - length + 1); NaN where too little is used."""
         total, used = (item[:, length:] - item[:, :-length] for item in self.sums)
         return np.where(used >= FILLED * length, total / np.maximum(used, FILLED), np.nan)
+
+
+def runs_of(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return where flags, (M,), are set one after the other: the first place, and the one after the last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return [(int(begin), int(end)) for begin, end in edges.reshape(-1, 2)]
 
 
 def bounded_noise(parts: Sequence[PreparedStretch], left: Sequence[Array], owner: Sequence[int]) -> dict[int, Array]:

@@ -4,7 +4,7 @@ Of the residual of a robust fit in bins what the motion makes is taken off (see 
 to 2 s are compared with their own scale (the median absolute value over all recordings, and over this one), in
 which colour of the noise and what the model lacks everywhere are included. A stretch stands out where such a mean is beyond
 what the largest of each second lets expect once in ten hours (Gumbel's law; Coles, *An Introduction to Statistical Modeling of
-Extreme Values*, 2001). Its ends are where the likelihood that the variance is larger between them is largest.
+Extreme Values*, 2001). Where it begins and ends is looked for last (see `event_ends`).
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.identification.binned_residual import FILLED, NORMAL, Binned
+from scara_ident.identification.binned_residual import BOUND, FILLED, NORMAL, Binned
 from scara_ident.identification.event_background import without_states, without_trends
+from scara_ident.identification.event_ends import event_ends
 
 # Lengths of the windows, s.
 WINDOWS = (0.16, 0.32, 0.6, 1.2, 2.0)
@@ -27,26 +28,27 @@ LEAST_WINDOWS, LEAST_SECONDS = 20, 5
 FALSE_EVERY = 36_000.0
 LEAST_SCORE = 6.5
 # What a model lacks makes the largest larger than that law; found by benchmarks/events.py.
-HEAVIER = 1.4
+HEAVIER = 1.5
 # One event and the windows beside it are in at most so many seconds.
 EVENT_SECONDS = 5.0
 # Least rms of an event in standard deviations of a bin, and the share of it that least squares leave too.
 LEAST_SIZE, LEAST_BEFORE = 2.0, 0.5
 # What lasts longer than this, s, and than this share of its recording is a change of the arm. What does not stand out surely is
-# seen for so long, s, before and after it within the other: how an arm starts and stops is no event.
+# seen for so long, s, before and after it within the other, and so is what is nearer to the ends of a recording than that: how
+# an arm starts and stops is no event.
 LONGEST, LONGEST_SHARE = 3.0, 0.15
 SEEN, BESIDE = 0.3, 1.0
 # Where speed, acceleration or torque are above this share of all, only what stands out by so much is an event.
-USUAL, SURE = 0.97, 2.2
+USUAL, SURE = 0.97, 3.3
 # Events are rare: a residual that stands out in more of the time than this is the model's doing.
 RARE = 0.2
 # A joint helps to find the ends of an event if it stands out by this share of what would make it one.
 AT_ENDS = 0.45
-# Events looked for in a stretch, and how far one may reach to either side of what stands out most, s.
+# Events looked for in a stretch.
 MOST_IN_STRETCH = 12
-REACH = 5.0
-# Its ends are looked for again between so long within and so long beyond them, s.
-EDGE = (0.3, 0.6)
+
+
+Shape = Callable[[Binned, int, int], Array | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +70,9 @@ class Segment:
     score: Array
 
 
-def standing_out(stretches: Sequence[Binned], fitted: Callable[[], Sequence[Binned]]) -> list[Segment]:
+def standing_out(
+    stretches: Sequence[Binned], fitted: Callable[[], Sequence[Binned]], shape: Shape = lambda item, start, stop: None
+) -> list[Segment]:
     """Return the stretches of time that stand out, in the order in which they come.
 
     Parameters
@@ -78,6 +82,9 @@ def standing_out(stretches: Sequence[Binned], fitted: Callable[[], Sequence[Binn
     fitted : callable
         Returns the same of least squares: what that explains is a state of motion that the robust fit took for an outlier.
         Asked only where something stands out.
+    shape : callable, optional
+        Returns what an event from a bin to before another would leave in every bin, N m or N, shape (n, M); None where nobody
+        can say. It helps to find the ends.
     """
     places = [k for k, item in enumerate(stretches) if item.taken.shape[1] > 1]
     if not places:
@@ -88,12 +95,13 @@ def standing_out(stretches: Sequence[Binned], fitted: Callable[[], Sequence[Binn
     if not shown_by:
         return []
     original, everywhere = fitted(), _bin_noise(stretches)
+    slow = _median([np.where(_slow(item), np.abs(item.anyhow), np.nan) for item in stretches])
     found = []
     for k in shown_by:
         item = stretches[k]
         own = _bin_noise([other for other in stretches if other.recording == item.recording])
         sigma = np.maximum(everywhere, own)
-        for segment in _segments(item, scores[k], sigma):
+        for segment in _segments(item, scores[k], sigma, slow, shape):
             size, before = _sizes(item, original[places[k]], segment)
             large = (size > LEAST_SIZE * sigma) & (before > LEAST_BEFORE * size)
             shown = large & (segment.score >= 1.0)
@@ -118,11 +126,15 @@ def _local(segment: Segment) -> bool:
     item = segment.binned
     length = (segment.stop - segment.start) * item.width
     beside, seen = round(BESIDE / item.width), SEEN / item.width
+    # Rests do not count.
+    moves = np.logical_not(np.isfinite(item.still[0]))
     shown = item.known[segment.score >= 1.0]
-    before = np.sum(shown[:, max(0, segment.start - beside) : segment.start], axis=1)
-    after = np.sum(shown[:, segment.stop : segment.stop + beside], axis=1)
+    before = np.sum(shown[:, : segment.start][:, moves[: segment.start]][:, -beside:], axis=1)
+    after = np.sum(shown[:, segment.stop :][:, moves[segment.stop :]][:, :beside], axis=1)
     whole = item.left.shape[1] * item.width
-    seen_beside = bool(np.any((before >= seen) & (after >= seen))) or float(np.max(segment.score)) >= SURE
+    inside = beside <= segment.start and segment.stop + beside <= item.left.shape[1]
+    sure = inside and float(np.max(segment.score)) >= SURE
+    seen_beside = sure or bool(np.any((before >= seen) & (after >= seen)))
     return length <= max(LONGEST, LONGEST_SHARE * whole) and seen_beside
 
 
@@ -199,12 +211,34 @@ def _bin_noise(stretches: Sequence[Binned]) -> Array:
     return _median([np.where(item.known > FILLED, np.abs(item.left), np.nan) for item in stretches])
 
 
-def _segments(item: Binned, scores: Sequence[tuple[int, Array]], noise: Array) -> Iterator[Segment]:
+def _slow(item: Binned) -> NDArray[np.bool_]:
+    """Return where a joint turns slowly, and the arm does not stand still, shape (n, M)."""
+    return np.logical_not((item.known > FILLED) | np.isfinite(item.still))
+
+
+def _segments(
+    item: Binned, scores: Sequence[tuple[int, Array]], noise: Array, slow: Array, shape: Shape
+) -> Iterator[Segment]:
     """Give what stands out most, then what does beside it, and so on."""
     n, count = item.left.shape
     free = np.ones(count, dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.where((item.known > FILLED) & (noise[:, None] > 0.0), item.left / noise[:, None], 0.0)
+        relative = np.where(
+            noise[:, None] > 0.0, np.where(item.known > FILLED, item.left, item.anyhow) / noise[:, None], 0.0
+        )
+        anyhow = np.where(slow > 0.0, np.minimum(1.0, noise / slow) ** 2, 0.0)
+        trust = np.where(item.known > FILLED, 1.0, np.where(_slow(item), anyhow[:, None], 0.0))
+        still = np.where(noise[:, None] > 0.0, item.still / noise[:, None], np.nan)
+
+    def expected(start: int, stop: int) -> Array | None:
+        found = shape(item, start, stop)
+        if found is None:
+            return None
+        # As the residual is bounded.
+        most = BOUND * item.noise[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(noise[:, None] > 0.0, np.clip(found, -most, most) / noise[:, None], 0.0)
+
     for _ in range(MOST_IN_STRETCH):
         best, place, long = 1.0, -1, 0
         for length, score in scores:
@@ -224,32 +258,9 @@ def _segments(item: Binned, scores: Sequence[tuple[int, Array]], noise: Array) -
             near = score[:, max(0, place - length // 2) : place + max(1, long - length // 2)]
             if near.shape[1]:
                 share = np.fmax(share, np.nanmax(np.nan_to_num(near, nan=0.0), axis=1))
-        own = share >= min(AT_ENDS, best)
-        power = np.maximum(np.mean(relative[own][:, window] ** 2, axis=1), 2.0)
-        # Of log variance: what is between the ends has the power of the window, what is outside has 1.
-        value = np.minimum(relative[own] ** 2, 4.0 * power[:, None])
-        likelihood = np.sum(0.5 * (value * (1.0 - 1.0 / power[:, None]) - np.log(power[:, None])), axis=0)
-        likelihood[~free] = -np.inf
-        middle, reach = place + long // 2, int(REACH / item.width)
-        before = np.cumsum(likelihood[max(0, middle - reach) : middle + 1][::-1])
-        after = np.cumsum(likelihood[middle : middle + reach])
-        start = middle - int(np.argmax(before))
-        stop = middle + int(np.argmax(after)) + 1
-        within, beyond = (round(seconds / item.width) for seconds in EDGE)
-        open_bins = np.where(free, relative, 0.0)
-        start = stop - _reach(open_bins[:, :stop][:, ::-1], stop - start, within, beyond)
-        stop = start + _reach(open_bins[:, start:], stop - start, within, beyond)
+        start, stop = event_ends(
+            relative, trust, still, free, window, share >= min(AT_ENDS, best), item.width, expected
+        )
         pad = max(1, round(0.1 / item.width))
         free[max(0, min(start, place) - pad) : max(stop, place + long) + pad] = False
         yield Segment(item, start, stop, share)
-
-
-def _reach(relative: Array, length: int, near: int, far: int) -> int:
-    """Return how many bins from the first on a shift of the mean lasts, which is known to last about so many.
-
-    By likelihood, with the mean of each joint as it is shortly before the end; a joint that shows nothing counts for nothing.
-    """
-    mean = np.mean(relative[:, max(0, length - near) : length], axis=1, keepdims=True)
-    first = max(0, length - near)
-    likelihood = np.cumsum(np.sum(2.0 * relative * mean - mean**2, axis=0)[first : length + far])
-    return first + int(np.argmax(likelihood)) + 1 if len(likelihood) else length

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,6 +27,8 @@ MARGIN = 0.1
 ROUNDING = 1e-6
 # A constant force at the tool explains at least this share of the squared residual of a contact there.
 FITS = 0.75
+# How far beyond an event it is asked what its force would do, s.
+NEAR_ENDS = 2.0
 # States at which the tool's Jacobian is taken.
 STATES = 40
 # Two lists hold the same event where their times overlap by this share.
@@ -137,7 +139,7 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
     whole = {id(part): row for part, row in zip(parts, left, strict=True)}
     found = [
         _event(robot, data, item, whole[id(item.binned.part)], held_out=fitted is not None)
-        for item in standing_out(stretches, plain)
+        for item in standing_out(stretches, plain, lambda *event: _of_tool_force(robot, *event))
         if item.binned.recording < len(data.recordings) and not _repeated(item, stretches, data)
     ]
     return tuple(sorted(found, key=lambda event: (data_place(data, event.recording), event.start)))
@@ -228,7 +230,7 @@ def _event(robot: Robot, data: PreparedData, segment: Segment, left: Array, *, h
     record = data.recordings[item.recording]
     times = item.part.stretch.time[inside] - record.recording.time[0]
     shown = tuple(robot.joints[j] for j in ranked)
-    force, fit = tool_force(robot, item, segment)
+    force, fit = tool_force(robot, item, segment.start, segment.stop)
     inner = max(ranked) < robot.n - 1
     kind = "contact" if fit >= FITS and len(ranked) > 1 else "push" if inner else "unknown"
     return Event(
@@ -244,29 +246,45 @@ def _event(robot: Robot, data: PreparedData, segment: Segment, left: Array, *, h
     )
 
 
-def tool_force(robot: Robot, item: Binned, segment: Segment) -> tuple[Array, float]:
-    """Return the constant force on the tool, base frame, N, shape (3,), that fits an event best, and the share it explains.
+def _of_tool_force(robot: Robot, item: Binned, start: int, stop: int) -> Array | None:
+    """Return what the constant force on the tool that fits an event makes of every bin near it, if it is one, shape (n, M)."""
+    force, fit = tool_force(robot, item, start, stop)
+    if fit < FITS:
+        return None
+    reach = round(NEAR_ENDS / item.width)
+    found = np.zeros_like(item.left)
+    bins = range(max(0, start - reach), min(found.shape[1], stop + reach))
+    found[:, bins.start : bins.stop] = np.stack([turned @ force for turned in _per_force(robot, item, bins)], axis=1)
+    return found
 
-    A force f on the tool at the end of the Jacobian J takes ``J.T @ f`` from the torque that the drives have to give.
-    """
-    bins = np.arange(segment.start, segment.stop)
-    bins = bins[:: max(1, len(bins) // STATES)]
-    frame = tool_frame(robot)
-    place = robot.model.getFrameId(frame.name, pin.FrameType.BODY)
-    model_data = robot.model.createData()
-    rows, rights = [], []
-    spread = np.sqrt(np.mean(item.left**2, axis=1)) + 1e-12
-    left = item.bounded(np.inf)
-    back = np.argsort(robot.order)
+
+def _per_force(robot: Robot, item: Binned, bins: Sequence[int]) -> Iterator[Array]:
+    """Give what a unit of each force on the tool takes from the torque of the drives, recorded side, shape (n, 3)."""
+    place = robot.model.getFrameId(tool_frame(robot).name, pin.FrameType.BODY)
+    model_data, back = robot.model.createData(), np.argsort(robot.order)
     for k in bins:
         q = _configuration(robot, item.state[0][back, k])
         jacobian = pin.computeFrameJacobian(robot.model, model_data, q, place, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        turned = -(jacobian[:3][:, robot.order] * robot.row_scale).T
+        yield -(jacobian[:3][:, robot.order] * robot.row_scale).T
+
+
+def tool_force(robot: Robot, item: Binned, start: int, stop: int) -> tuple[Array, float]:
+    """Return the constant force on the tool, base frame, N, shape (3,), that fits an event best, and the share it explains.
+
+    The event is from a bin to before another.
+
+    A force f on the tool at the end of the Jacobian J takes ``J.T @ f`` from the torque that the drives have to give.
+    """
+    bins = range(start, stop, max(1, (stop - start) // STATES))
+    rows, rights = [], []
+    spread = np.sqrt(np.mean(item.left**2, axis=1)) + 1e-12
+    left = item.bounded(np.inf)
+    for k, turned in zip(bins, _per_force(robot, item, bins), strict=True):
         weight = np.where(item.known[:, k] > 0.5, 1.0 / spread, 0.0)
         rows.append(weight[:, None] * turned)
         rights.append(weight * left[:, k])
     matrix, right = np.concatenate(rows), np.concatenate(rights)
-    force = np.linalg.lstsq(matrix, right, rcond=1e-3)[0]
+    force = np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-3)[0])
     total = float(right @ right)
     return force, 1.0 - float(np.sum((right - matrix @ force) ** 2)) / total if total > 0.0 else 0.0
 

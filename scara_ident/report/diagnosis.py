@@ -26,6 +26,8 @@ from scara_ident.robot.rotors import GUESS_FACTOR
 
 # An uncertainty below this factor is told as a standard deviation.
 NEAR = 1.3
+# Two values differ from so many of their common standard deviations: 0.3 %.
+DIFFERENT_STDS = 3.0
 
 
 def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -58,6 +60,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
                 "joint": effect.joint,
                 "description": effect.description,
                 "parameters": {name: dict(vars(parameter)) for name, parameter in effect.parameters.items()},
+                "direct": {name: dict(vars(parameter)) for name, parameter in effect.direct.items()},
                 "confounded_with": list(dict.fromkeys(confounder.effect for confounder in effect.confounded_with)),
                 "confounders": [
                     {"effect": confounder.effect, "joint": confounder.joint, "gain": confounder.gain}
@@ -173,6 +176,13 @@ def _armature_unit(rotor: RotorInertia, diagnosis: Diagnosis) -> str:
     return "kg" if robot.prismatic[robot.joints.index(rotor.joint)] else "kg m^2"
 
 
+def _directly(name: str, told: Parameter, fitted: Parameter) -> str:
+    """Say what a channel tells of a parameter by itself, and whether the fit agrees."""
+    same = abs(told.value - fitted.value) <= DIFFERENT_STDS * np.hypot(told.std, fitted.std)
+    agree = "which agrees" if same else "which differs by more than their uncertainty"
+    return f"A channel of its own, without this fit, tells {quantity(name, told)}, {agree}."
+
+
 def _of_rotor(rotor: RotorInertia, diagnosis: Diagnosis) -> str:
     """Say which inertia of a rotor that nobody stated the result rests on."""
     unit = _armature_unit(rotor, diagnosis)
@@ -272,6 +282,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         where = f" on {effect.joint}" if effect.joint else ""
         values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())
         found.append(f"Found {effect.effect}{where}: {effect.description}; {values}.")
+        found += [_directly(name, parameter, effect.parameters[name]) for name, parameter in effect.direct.items()]
         if effect.confounded_with:
             others = ", ".join(confounder.label for confounder in effect.confounded_with)
             found.append(f"These recordings cannot tell it from: {others}.")

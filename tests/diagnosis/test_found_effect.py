@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.effects import effects_named
+from scara_ident.diagnosis.found_effect import not_found
+from scara_ident.effects import Parameter, effects_named
 from scara_ident.effects.measurement import shifted
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, virtual_runs
@@ -32,3 +33,10 @@ def test_errors_go_from_effect_to_effect() -> None:
     assert first.after == second.before
     assert all(item.after[item.joint] < item.before[item.joint] for item in found if item.joint)
     assert all(0.0 < item.gain <= 1.0 and item.p_value < 1e-2 for item in found)
+
+
+def test_what_a_second_encoder_tells_of_an_effect_that_was_not_added_is_said() -> None:
+    readings = {("joint_elasticity", "joint1"): {"stiffness": Parameter(20012.0, 211.0, "N m/rad")}}
+    assert not_found(readings, []) == [
+        "joint_elasticity of joint1 was not added, but a channel of its own tells stiffness 2.001e+04 +- 2e+02 N m/rad"
+    ]

@@ -53,3 +53,19 @@ def test_noise_is_the_larger_of_a_recordings_own_and_of_all():
     assert noise[2] == pytest.approx([4.0, 4.0], rel=0.1)
     assert np.all((noise[0] > 1.0) & (noise[0] < 2.0))
     assert noise[0] == pytest.approx(noise[1], rel=0.1)
+
+
+def test_at_rest_the_torque_less_the_predicted_is_known_up_to_a_constant():
+    run = swing(ROBOT, "r", seed=0, seconds=20.0, rate=250.0)
+    hold = slice(1500, 2000)
+    position, effort = run.position.copy(), run.effort.copy()
+    position[:, hold], effort[:, hold] = position[:, 1500:1501], 0.3
+    effort[0, 1750:2000] += 0.5
+    (part,) = prepare([replace(run, position=position, effort=effort)], (8.0, 8.0)).stretches
+    still = binned(0, part, part.torque.copy(), np.ones(2)).still
+    rest = np.isfinite(still[0])
+    assert np.all(rest[160:190])
+    assert not np.any(rest[:140]) and not np.any(rest[205:360])
+    assert still[0, 180] - still[0, 165] == pytest.approx(0.5)
+    assert still[1, 180] == pytest.approx(still[1, 165])
+    assert binned(0, part, part.torque.copy(), np.full(2, 0.05)).anyhow[0, 180] == pytest.approx(0.25)

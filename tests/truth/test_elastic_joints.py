@@ -9,6 +9,7 @@ import pytest
 
 from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
 from scara_ident.recording.recording import Recording
+from scara_ident.report.diagnosis import diagnosis_dict, sentences
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
 from tests.effects.scenes import wandering
@@ -21,7 +22,8 @@ SECONDS, RATE = 14.0, 500.0
 def virtual(effect: str, seed: int) -> list[Recording]:
     arm = virtual_arm()
     return [
-        simulate(arm, wandering(arm, f"t{k}", 10 * seed + k, SECONDS), effects=[parse_effect(effect)], seed=k, rate=RATE).recording
+        simulate(arm, wandering(arm, f"t{k}", 10 * seed + k, SECONDS), effects=[parse_effect(effect)], seed=k, rate=RATE,
+                 link_encoders=["joint1"]).recording
         for k in range(5)
     ]  # fmt: skip
 
@@ -44,6 +46,12 @@ def test_a_soft_first_joint_is_found_alone_with_its_stiffness(stiffness: float):
     """Commit a6cf3ca: `unexplained` below 5000 N m/rad."""
     found = diagnosed(virtual(f"joint_elasticity:joint1:stiffness={stiffness}", 1))
     assert alone(found, "joint_elasticity", "joint1", "stiffness") == pytest.approx(stiffness, rel=0.05)
+    told = found.effects[0].direct["stiffness"]
+    assert told.value == pytest.approx(stiffness, abs=3.0 * told.std)
+    assert told.std < 0.03 * stiffness
+    (entry,) = diagnosis_dict(found)["effects"]
+    assert entry["direct"]["stiffness"]["value"] == told.value
+    assert any("tells stiffness" in sentence and "agrees" in sentence for sentence in sentences(found))
 
 
 @pytest.mark.slow

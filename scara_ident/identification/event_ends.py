@@ -1,0 +1,132 @@
+"""Where in time what stands out begins and ends, by likelihood.
+
+First where the variance is larger between them than outside; then each end again, by where the mean stops being what it is
+within, or what a constant force at the tool makes of it along the motion. There a joint that turns slowly counts as far as its
+residual is usually small then. While the whole arm stands still the torque steps where a push begins or ends, beside a friction that is constant and not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.identification.binned_residual import runs_of
+
+# How far an event may reach to either side of what stands out most, s.
+REACH = 5.0
+# What comes so much later, s, is something else.
+GAP = 0.6
+# Its ends are looked for again between so long within and so long beyond them, s, in which something is seen.
+EDGE = (0.3, 0.6)
+# A step of the torque at rest is bounded at that of the event by this factor, and so many standard deviations of bins.
+LARGEST_STEP, LOOSE = 2.0, 4.0
+
+
+def event_ends(
+    relative: Array,
+    trust: Array,
+    still: Array,
+    free: NDArray[np.bool_],
+    window: slice,
+    shows: NDArray[np.bool_],
+    width: float,
+    shape: Callable[[int, int], Array | None] = lambda start, stop: None,
+) -> tuple[int, int]:
+    """Return the first bin of an event, and the first one after it.
+
+    Parameters
+    ----------
+    relative : ndarray, shape (n, M)
+        Residual over the noise of its bins.
+    trust : ndarray, shape (n, M)
+        Weight of bins: 1 where a joint moves, less where it turns slowly, 0 where a bin says nothing.
+    still : ndarray, shape (n, M)
+        The same while the whole arm stands still; NaN where it moves.
+    free : ndarray of bool, shape (M,)
+        Bins of no other event.
+    window : slice
+        Bins that stand out most.
+    shows : ndarray of bool, shape (n,)
+        Joints that help to find the ends.
+    width : float
+        Length of a bin, s.
+    shape : callable, optional
+        What it would be in every bin, shape (n, M), of an event from a bin to before another; None where nobody can say.
+    """
+    own = np.where(trust[shows] >= 1.0, relative[shows], 0.0)
+    power = np.maximum(np.mean(own[:, window] ** 2, axis=1), 2.0)
+    # Of log variance: what is between the ends has the power of the window, what is outside has 1.
+    value = np.minimum(own**2, 4.0 * power[:, None])
+    likelihood = np.sum(0.5 * (value * (1.0 - 1.0 / power[:, None]) - np.log(power[:, None])), axis=0)
+    likelihood[~free] = -np.inf
+    middle, reach = (window.start + window.stop) // 2, int(REACH / width)
+    before = np.cumsum(likelihood[max(0, middle - reach) : middle + 1][::-1])
+    after = np.cumsum(likelihood[middle : middle + reach])
+    gap = round(GAP / width)
+    start = middle - _first_peak(before, gap)
+    stop = middle + _first_peak(after, gap) + 1
+    # Nothing of it is in another event.
+    open_ = np.where(free, relative, 0.0)
+    near, far = (round(seconds / width) for seconds in EDGE)
+    trust = np.where(free, trust, 1.0)
+
+    def again(start: int, stop: int, shape: Array | None) -> tuple[int, int]:
+        parts = (open_, trust, still, *(() if shape is None else (shape,)))
+        start = stop - _lasting([part[:, :stop][:, ::-1] for part in parts], stop - start, near, far)
+        return start, start + _lasting([part[:, start:] for part in parts], stop - start, near, far)
+
+    start, stop = again(start, stop, None)
+    expected = shape(start, stop)
+    return (start, stop) if expected is None else again(start, stop, expected)
+
+
+def _first_peak(likelihood: Array, gap: int) -> int:
+    """Return the place of the first value that no value exceeds within so many places after it."""
+    best = 0
+    for place, value in enumerate(likelihood.tolist()):
+        if place - best > gap:
+            break
+        best = place if value > likelihood[best] else best
+    return best
+
+
+def _lasting(parts: Sequence[Array], length: int, near: int, far: int) -> int:
+    """Return how many bins from the first on a shift lasts, which is known to last about so many.
+
+    ``parts`` are residual, trust, what is left at rest, and the shift, by default the mean of each joint shortly before the end;
+    a joint that shows nothing counts for nothing.
+    """
+    relative, trust, still = parts[:3]
+    first = max(0, length - near)
+    # So many bins further that say something.
+    seen = np.cumsum(np.max(trust[:, length:], axis=0, initial=0.0))
+    last = length + int(np.searchsorted(seen, far, side="right"))
+    inside, weight = slice(first, last), trust[:, first:length]
+    mean = np.sum(weight * relative[:, first:length], axis=1) / np.maximum(np.sum(weight, axis=1), 1e-300)
+    shift = parts[3][:, inside] if len(parts) > 3 else np.repeat(mean[:, None], last - first, axis=1)
+    gain = np.cumsum(np.sum(trust[:, inside] * (2.0 * relative[:, inside] * shift - shift**2), axis=0))
+    gain += _at_rest(still[:, inside], shift)
+    best = int(np.argmax(gain))
+    # Between bins that say something the middle is as good as any.
+    as_good = int(np.argmin(np.append(gain[best:] == gain[best], False)))
+    return first + best + 1 + as_good // 2
+
+
+def _at_rest(still: Array, shift: Array) -> Array:
+    """Return the likelihood that the shift ends after each bin of a rest, against none in that rest, (M,)."""
+    found = np.zeros(still.shape[1])
+    for begin, end in runs_of(np.any(np.isfinite(still), axis=0)):
+        count = end - begin
+        # Nothing moves: it is the same all along.
+        mean = shift[:, begin : begin + 1]
+        most = LARGEST_STEP * np.abs(mean) + LOOSE
+        left = still[:, begin:end] - np.median(still[:, begin:end], axis=1, keepdims=True)
+        left = np.clip(left, -most, most)
+        left -= np.mean(left, axis=1, keepdims=True)
+        before = np.arange(1, count + 1)
+        gain = 2.0 * mean * np.cumsum(left, axis=1) - mean**2 * before * (count - before) / count
+        found[begin:end] = np.nansum(gain, axis=0)
+    return found
