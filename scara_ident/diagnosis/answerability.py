@@ -130,15 +130,36 @@ class Inquiry:
         parts = [part for part in (self.known, rows) if part is not None]
         if not parts:
             return np.zeros(len(self.questions))
+        view = self._view(parts[0] if len(parts) == 1 else merge(parts))
+        return np.array([view.sigma(item) for item in self.questions])
+
+    def just_seen(self, suspect: Suspect) -> Array:
+        """Return the metric of coefficients that the recordings at hand show as well as a suspect's, shape (k, k).
+
+        All ``a`` with ``a^T S a = 1`` are told from none by as many standard errors as the suspect's own; where nothing
+        is known, or nothing shows, only its own are.
+        """
+        value = np.asarray(suspect.value)
+        own = np.zeros((0, len(value))) if self.known is None else self._own_view.left(suspect, {suspect.label})
+        shown = float(np.linalg.norm(own @ value))
+        if not shown > 0.0:
+            return np.asarray(np.outer(value, value) / max(float(value @ value) ** 2, 1e-300))
+        return np.asarray(own.T @ own / shown**2)
+
+    @cached_property
+    def _own_view(self) -> _View:
+        assert self.known is not None
+        return self._view(self.known)
+
+    def _view(self, rows: Information) -> _View:
         p = len(self.scene.model.columns)
-        factor = (parts[0] if len(parts) == 1 else merge(parts)).factor[:, :-1]
+        factor = rows.factor[:, :-1]
         beside, places, start = factor[p:, p:], [], 0
         for item in self.suspects:
             columns = _widths(item, self.scene)
             places.append((slice(start, start + columns[0]), slice(start, start + sum(columns))))
             start += sum(columns)
-        view = _View(self, factor, beside, places)
-        return np.array([view.sigma(item) for item in self.questions])
+        return _View(self, factor, beside, places)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +180,7 @@ class _View:
             pairs = permutations(question.suspects, 2)
             names = {item.label for item in question.suspects}
             return min((self._apart(one, names, other) for one, other in pairs), default=0.0)
-        sizes = np.array([self._apart(item, {item.label}, None) for item in question.suspects])
+        sizes = np.array([self._from_none(item) for item in question.suspects])
         # The mean variance counts, so that no suspect is forgotten for the others.
         return float(1.0 / np.sqrt(np.mean(1.0 / sizes**2))) if np.all(sizes > 0.0) else 0.0
 
@@ -179,6 +200,19 @@ class _View:
         if instead is not None:
             spanning.append(self.beside[:, self.places[self._place(instead)][1]])
         return float(np.linalg.norm(_outside(spanning, own)))
+
+    def left(self, item: Suspect, questioned: set[str]) -> Array:
+        """Return what the model without some effects leaves of a suspect's columns."""
+        own = self.beside[:, self.places[self._place(item)][0]]
+        spanning = self._model(questioned)
+        return np.column_stack([_outside(spanning, column) for column in own.T])
+
+    def _from_none(self, item: Suspect) -> float:
+        """Return how far a suspect is from none, whichever coefficients it has of those that would just have been seen.
+
+        What is below the detection limit is found in a direction that is noise: its mean variance over all counts.
+        """
+        return apart(self.inquiry.just_seen(item), self.left(item, {item.label}))
 
     def _parameter(self, question: Question) -> float:
         model = self.inquiry.scene.model
@@ -200,6 +234,27 @@ class _View:
         before = np.eye(left.shape[1]) / (LARGEST_SHAPE * question.size) ** 2
         variance = np.diag(np.linalg.inv(left.T @ left + before))
         return float(question.size / np.sqrt(np.mean(variance)))
+
+
+def apart(metric: Array, left: Array) -> float:
+    """Return the standard errors between coefficients and none, by their mean variance over a metric.
+
+    Parameters
+    ----------
+    metric : ndarray, shape (k, k)
+        S of the coefficients ``a`` in question, those with ``a^T S a = 1``.
+    left : ndarray, shape (N, k)
+        Columns of unit noise, what others span taken off: the covariance is ``(left^T left)^-1``.
+    """
+    singular = np.linalg.svd(left @ axes_of(metric), compute_uv=False)
+    return float(1.0 / np.sqrt(np.mean(1.0 / singular**2))) if np.all(singular > 0.0) else 0.0
+
+
+def axes_of(metric: Array) -> Array:
+    """Return the half axes of the coefficients ``a^T S a = 1``, shape (k, r): those of the directions that S weighs."""
+    strength, directions = np.linalg.eigh(metric)
+    kept = strength > _RANK * strength[-1]
+    return np.asarray(directions[:, kept] / np.sqrt(strength[kept]))
 
 
 def _outside(spanning: Sequence[Array], own: Array) -> Array:
