@@ -29,7 +29,7 @@ from virtual_motions import RATE, random_motion, ranges
 from virtual_sets import _random_effect
 
 from scara_ident.diagnosis import Diagnosis, diagnose
-from scara_ident.diagnosis.answerability import Inquiry, axes_of, inquire, known_rows
+from scara_ident.diagnosis.answerability import Inquiry, inquire, known_rows
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.fitted_model import FittedModel
@@ -114,7 +114,7 @@ def seen(found: Diagnosis, first: Diagnosis, question: Question) -> float:
         gone = {one.label} if other is None else {item.label for item in question.suspects}
         model = beside(tuple(label for label in now if label not in gone), None if other is None else other.label)
         value = np.array(one.value)
-        axes = axes_of(inquiry.just_seen(one)) if other is None else value[:, None]
+        axes = inquiry.just_seen[one.label] if other is None else value[:, None]
         torque = {joint: axes.T @ rows[: len(value)] for joint, rows in wide[one.label].items()}
         spread = np.diag(examine(model, [torque])[0].covariance)
         return float(1.0 / np.sqrt(np.mean(spread))) if np.all(np.isfinite(spread) & (spread > 0.0)) else 1e-12

@@ -133,18 +133,20 @@ class Inquiry:
         view = self._view(parts[0] if len(parts) == 1 else merge(parts))
         return np.array([view.sigma(item) for item in self.questions])
 
-    def just_seen(self, suspect: Suspect) -> Array:
-        """Return the metric of coefficients that the recordings at hand show as well as a suspect's, shape (k, k).
+    @cached_property
+    def just_seen(self) -> dict[str, Array]:
+        """Half axes of the coefficients that the recordings at hand show as well as a suspect's, (k, r) by label.
 
-        All ``a`` with ``a^T S a = 1`` are told from none by as many standard errors as the suspect's own; where nothing
-        is known, or nothing shows, only its own are.
+        All on the ellipsoid are told from none by as many standard errors as the suspect's own; where nothing is known, or
+        nothing of these shows, they are alone on it.
         """
-        value = np.asarray(suspect.value)
-        own = np.zeros((0, len(value))) if self.known is None else self._own_view.left(suspect, {suspect.label})
-        shown = float(np.linalg.norm(own @ value))
-        if not shown > 0.0:
-            return np.asarray(np.outer(value, value) / max(float(value @ value) ** 2, 1e-300))
-        return np.asarray(own.T @ own / shown**2)
+        found = {}
+        for item in self.suspects:
+            value = np.asarray(item.value)
+            own = np.zeros((0, len(value))) if self.known is None else self._own_view.left(item, {item.label})
+            shown = float(np.linalg.norm(own @ value)) if len(value) else 0.0
+            found[item.label] = _axes(own / shown) if shown > 0.0 else value[:, None]
+        return found
 
     @cached_property
     def _own_view(self) -> _View:
@@ -212,7 +214,9 @@ class _View:
 
         What is below the detection limit is found in a direction that is noise: its mean variance over all counts.
         """
-        return apart(self.inquiry.just_seen(item), self.left(item, {item.label}))
+        left = self.left(item, {item.label})
+        singular = np.linalg.svd(left @ self.inquiry.just_seen[item.label], compute_uv=False)
+        return float(1.0 / np.sqrt(np.mean(1.0 / singular**2))) if np.all(singular > 0.0) else 0.0
 
     def _parameter(self, question: Question) -> float:
         model = self.inquiry.scene.model
@@ -236,25 +240,11 @@ class _View:
         return float(question.size / np.sqrt(np.mean(variance)))
 
 
-def apart(metric: Array, left: Array) -> float:
-    """Return the standard errors between coefficients and none, by their mean variance over a metric.
-
-    Parameters
-    ----------
-    metric : ndarray, shape (k, k)
-        S of the coefficients ``a`` in question, those with ``a^T S a = 1``.
-    left : ndarray, shape (N, k)
-        Columns of unit noise, what others span taken off: the covariance is ``(left^T left)^-1``.
-    """
-    singular = np.linalg.svd(left @ axes_of(metric), compute_uv=False)
-    return float(1.0 / np.sqrt(np.mean(1.0 / singular**2))) if np.all(singular > 0.0) else 0.0
-
-
-def axes_of(metric: Array) -> Array:
-    """Return the half axes of the coefficients ``a^T S a = 1``, shape (k, r): those of the directions that S weighs."""
-    strength, directions = np.linalg.eigh(metric)
-    kept = strength > _RANK * strength[-1]
-    return np.asarray(directions[:, kept] / np.sqrt(strength[kept]))
+def _axes(rows: Array) -> Array:
+    """Return the half axes of the coefficients ``a`` with ``|rows a| = 1``, those of the directions that rows see."""
+    _, singular, right = np.linalg.svd(rows, full_matrices=False)
+    seen = singular > np.sqrt(_RANK) * singular[0]
+    return np.asarray(right[seen].T / singular[seen])
 
 
 def _outside(spanning: Sequence[Array], own: Array) -> Array:
