@@ -147,7 +147,7 @@ class RigidBody(Filled):
         if self.kernel is not None:
             back = np.argsort(robot.order)
             states = np.concatenate([motion.q[back], motion.v[back], motion.a[back]])
-            seeds = scaled[np.ix_(back, links)].reshape(-1, motion.samples)
+            seeds = scaled[back][:, links].reshape(-1, motion.samples)
             program = self._adjoint
             found = np.zeros((3 * robot.n, motion.samples))
             program.evaluate([*states, *seeds], found, np.empty((program.buffers, motion.samples)))
