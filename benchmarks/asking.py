@@ -9,6 +9,7 @@ which the recordings show, by the scatter of blocks of time.
 
     python benchmarks/asking.py OUTPUT.jsonl --robot scara03 --sets 24 --seed 1
     python benchmarks/asking.py OUTPUT.jsonl --show
+    python benchmarks/asking.py OUTPUT.jsonl --bump --sets 12
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import argparse
 import json
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from itertools import permutations
 from pathlib import Path
@@ -27,16 +29,20 @@ from virtual_motions import RATE, random_motion, ranges
 from virtual_sets import _random_effect
 
 from scara_ident.diagnosis import Diagnosis, diagnose
-from scara_ident.diagnosis.answerability import inquire
+from scara_ident.diagnosis.answerability import Inquiry, inquire, known_rows
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.fitted_model import FittedModel
-from scara_ident.diagnosis.questions import Question, Suspect
+from scara_ident.diagnosis.questions import Question, Suspect, noise_density
 from scara_ident.diagnosis.selection_step import fitted_model
+from scara_ident.diagnosis.shape import KNOTS
 from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation import Design, Effort, design_excitation, limits_of
+from scara_ident.excitation.tell import told as tells
+from scara_ident.model.model import build_model
+from scara_ident.motion.motion import Motion
 from scara_ident.recording.recording import Recording
-from scara_ident.robot.robot import load_robot
+from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation import Effect, ReferenceMotion, VirtualArm, simulate, virtual_arm
 
 PAIRS = (
@@ -52,15 +58,18 @@ FACTORS, REACHES, SPEEDS = (0.15, 1.5), (0.1, 0.3), (0.4, 1.0)
 FIRST, ASKED, SAMPLED = 8.0, 15.0, 500.0
 EFFORT, PLAIN = Effort(starts=2, rounds=2, processes=1), Effort(starts=2, rounds=0, processes=1)
 WAYS = ("tell", "random", "logdet")
+# Of a bump: standard deviation over the joint's range, and height over the standard deviation of the effort.
+# The first motion passes all of a bump, or it could be anything: reach, rad.
+WIDTHS, SIZES, PASSING = (0.09, 0.14), (0.2, 0.6), (0.8, 1.2)
 KINDS = ("rivals", "below_limit")
 
 
-def poor_motion(arm: VirtualArm, rng: np.random.Generator) -> ReferenceMotion:
+def poor_motion(arm: VirtualArm, rng: np.random.Generator, reaches: tuple[float, float] = REACHES) -> ReferenceMotion:
     """Return two slow sines of each joint about a random place, faded in and out."""
     robot = arm.robot
     low, high = ranges(robot)
     place = (low + rng.uniform(0.3, 0.7, robot.n) * (high - low))[:, None]
-    reach, speed = np.exp(rng.uniform(*np.log(REACHES))), rng.uniform(*SPEEDS)
+    reach, speed = np.exp(rng.uniform(*np.log(reaches))), rng.uniform(*SPEEDS)
     fast = speed / reach * rng.uniform(0.7, 1.3, (robot.n, 1))
     phase = rng.uniform(0.0, 2.0 * np.pi, (2, robot.n, 1))
     t = np.arange(round(FIRST * RATE) + 1) / RATE
@@ -106,9 +115,10 @@ def seen(found: Diagnosis, first: Diagnosis, question: Question) -> float:
         gone = {one.label} if other is None else {item.label for item in question.suspects}
         model = beside(tuple(label for label in now if label not in gone), None if other is None else other.label)
         value = np.array(one.value)
-        torque = {joint: (value @ rows[: len(value)])[None] for joint, rows in wide[one.label].items()}
-        spread = float(examine(model, [torque])[0].covariance[0, 0])
-        return float(1.0 / np.sqrt(spread)) if np.isfinite(spread) and spread > 0.0 else 1e-12
+        axes = inquiry.just_seen[one.label] if other is None else value[:, None]
+        torque = {joint: axes.T @ rows[: len(value)] for joint, rows in wide[one.label].items()}
+        spread = np.diag(examine(model, [torque])[0].covariance)
+        return float(1.0 / np.sqrt(np.mean(spread))) if np.all(np.isfinite(spread) & (spread > 0.0)) else 1e-12
 
     if question.kind == "rivals":
         return min(apart(one, other) for one, other in permutations(question.suspects, 2))
@@ -127,10 +137,22 @@ def as_reference(design: Design) -> ReferenceMotion:
     return ReferenceMotion("more", designed.joints, t, *designed.at(t))
 
 
+@cache
+def _robot(name: str) -> Robot:
+    return load_robot(None if name == "scara03" else name)
+
+
+@cache
+def _plain(robot: Robot) -> ReferenceMotion:
+    """Return the motion of the largest log determinant, the same for every set of a robot."""
+    limits = limits_of(robot, clearance=None, share=1.0)
+    return as_reference(design_excitation(build_model(robot), duration=ASKED, limits=limits, effort=PLAIN))
+
+
 def one_set(robot: str, number: int, seed: int) -> dict[str, Any]:
     """Return what one set tells."""
     rng = np.random.default_rng([seed, number])
-    arm = virtual_arm(load_robot(None if robot == "scara03" else robot))
+    arm = virtual_arm(_robot(robot))
     pair = PAIRS[number % len(PAIRS)]
     name = pair[(number // len(PAIRS)) % 2]
     truth = _random_effect(name, float(np.exp(rng.uniform(*np.log(FACTORS)))), arm, rng)
@@ -153,18 +175,112 @@ def one_set(robot: str, number: int, seed: int) -> dict[str, Any]:
     motions = {
         "tell": lambda: as_reference(design),
         "random": lambda: random_motion("more", arm, "fourier", ASKED, rng),
-        "logdet": lambda: as_reference(design_excitation(model, duration=ASKED, limits=limits, effort=PLAIN)),
+        "logdet": lambda: _plain(arm.robot),
     }
     for way in WAYS:
         found = diagnose(arm.robot, [*begun, record(arm, motions[way](), truth, number, 3)])
         result[way] = right(found, truth)
-        result[f"found_{way}"] = _found(found)
+        result[f"found_{way}"], result[f"why_{way}"] = _found(found), _why(found, truth)
         if way == "tell":
+            later = replace(inquiry, noise=noise_density(found), bands=found.search.bands)
+            later = replace(later, known=known_rows(later, first.search.step.columns))
+            moved = [design.motion()]
+            result["own"] = own(first, inquiry, moved, truth)
+            result["noise"] = [each.noise.tolist() for each in (inquiry, later)]
+            result["bands"] = [list(each.bands) for each in (inquiry, later)]
+            result["seen_noise"] = [
+                [each.before, each.after] for each in tells(later, moved) if each.question.suspects
+            ][:1]
             told = next((item for item in design.tells if item.question.suspects), None)
             if told is not None:
                 result["kind"], result["promised"] = told.question.kind, [told.before, told.after]
                 result["seen"] = seen(found, first, told.question)
     return result
+
+
+def own(first: Diagnosis, inquiry: Inquiry, motions: Sequence[Motion], truth: Effect) -> list[float] | None:
+    """Return how far the effect that is there is from none, before and after; None where it is in no question."""
+    for item in inquiry.suspects:
+        place = truth.joint is None or item.candidate.joint(inquiry.scene) in (None, truth.joint)
+        if item.value and item.candidate.effect.name == truth.name and place:
+            (found,) = tells(inquire(first, [Question("below_limit", item.label, (item,))]), motions)
+            return [found.before, found.after]
+    return None
+
+
+def one_bump(robot: str, number: int, seed: int) -> dict[str, Any]:
+    """Return how well the shape of a torque that no catalogue lists is recovered by the motion asked for it.
+
+    A bump over the position of a joint is added to its recorded effort, where the first motion comes by. The curve is
+    that of the question, hats over the range, fitted together with the base model; what an offset takes of it is left out
+    of both.
+    """
+    rng = np.random.default_rng([seed, number, 1])
+    arm = virtual_arm(_robot(robot))
+    motion, j = poor_motion(arm, rng, PASSING), int(rng.integers(arm.robot.n))
+    low, high = float(arm.robot.lower[j]), float(arm.robot.upper[j])
+    centre = float(rng.uniform(motion.position[j].min(), motion.position[j].max()))
+    effort = simulate(arm, motion, seed=number, rate=SAMPLED).recording.effort
+    assert effort is not None
+    width, size = float(rng.uniform(*WIDTHS) * (high - low)), float(rng.uniform(*SIZES) * np.std(effort[j]))
+
+    def bump(q: np.ndarray) -> np.ndarray:
+        return np.asarray(size * np.exp(-0.5 * ((q - centre) / width) ** 2))
+
+    def bumped(followed: ReferenceMotion, run: int) -> Recording:
+        plain = simulate(arm, followed, seed=number, repetition=run, rate=SAMPLED).recording
+        assert plain.effort is not None
+        more = plain.effort.copy()
+        more[j] += bump(plain.position[j])
+        return replace(plain, effort=more)
+
+    begun = [bumped(motion, run) for run in (1, 2)]
+    first = diagnose(arm.robot, begun)
+    joint = arm.robot.joints[j]
+    result: dict[str, Any] = {
+        "robot": robot,
+        "seed": seed,
+        "bump": number,
+        "joint": joint,
+        "size": size,
+        "width": width,
+    }
+    result |= {"verdict": first.verdict, "found": _found(first)}
+    inquiry = inquire(first)
+    wanted = [item for item in inquiry.questions if item.kind == "unexplained" and item.joint == joint]
+    result["asked"] = [item.text for item in inquiry.questions]
+    if not wanted:
+        return result
+    limits = limits_of(arm.robot, clearance=None, share=1.0)
+    design = design_excitation(first.before.model, duration=ASKED, tell=inquiry, limits=limits, effort=EFFORT)
+    more = as_reference(design)
+    found = diagnose(arm.robot, [*begun, bumped(more, 3)])
+    result |= {"verdict_after": found.verdict, "found_after": _found(found)}
+    left = found.unexplained
+    result["signals"] = None if left is None or left.joint != joint else list(left.signals)
+    over = f"position of {joint}"
+    # An effect in the model that took a part of it is left out: the curve stands for all of it.
+    bare = replace(inquire(found, [replace(wanted[0], signals=(over,))]), in_model=(), known=None)
+    hats = known_rows(bare, found.search.step.columns).solve().value[-KNOTS:]
+    q = np.linspace(more.position[j].min(), more.position[j].max(), 400)
+    curve = np.interp(q, np.linspace(low, high, KNOTS), hats)
+    wrong, true = curve - bump(q), bump(q)
+    result["error"] = float(np.std(wrong) / np.std(true))
+    result["over"] = float((q[-1] - q[0]) / (high - low))
+    return result
+
+
+def _why(diagnosis: Diagnosis, truth: Effect) -> str:
+    """Say what became of the effect that is there where it was seen best: standard errors, and why in words."""
+    scene, said = diagnosis.search.scene, [(0.0, "")]
+    for item in diagnosis.search.decisions:
+        if item.candidate.effect.name == truth.name and truth.joint in (None, item.candidate.joint(scene)):
+            found = item.examination
+            if np.all(np.isfinite(found.covariance)):
+                wald = float(found.value @ np.linalg.pinv(found.covariance, rcond=1e-9, hermitian=True) @ found.value)
+                errors = float(np.sqrt(max(wald, 0.0)))
+                said.append((errors, f"{item.label}: {errors:.1f} standard errors; {item.why}"))
+    return max(said)[1]
 
 
 def _found(diagnosis: Diagnosis) -> list[str]:
@@ -192,6 +308,16 @@ def show(rows: Sequence[dict[str, Any]]) -> None:
             print(f"seen over promised: median {np.median(ratio):.2f}, {near:.0%} within 30 % of {len(ratio)}")
 
 
+def show_bumps(rows: Sequence[dict[str, Any]]) -> None:
+    """Print how well bumps are recovered."""
+    for robot in dict.fromkeys(row["robot"] for row in rows):
+        own = [row for row in rows if row["robot"] == robot]
+        error = np.array([row["error"] for row in own if "error" in row])
+        print(f"{robot}: {len(own)} bumps, {len(error)} left unexplained at first and asked for")
+        if len(error):
+            print(f"shape: rms error {np.median(error):.1%} in the median, {np.mean(error <= 0.15):.0%} within 15 %")
+
+
 def main() -> None:
     """Run the sets that are not there yet, or show what there is."""
     words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -199,22 +325,24 @@ def main() -> None:
     words.add_argument("--robot", default="scara03")
     words.add_argument("--sets", type=int, default=24)
     words.add_argument("--seed", type=int, default=1)
+    words.add_argument("--bump", action="store_true", help="torques that no catalogue lists, instead of pairs")
     words.add_argument("--show", action="store_true")
     given = words.parse_args()
     lines = given.output.read_text(encoding="utf-8").splitlines() if given.output.is_file() else []
-    rows = [json.loads(line) for line in lines]
-    done = {(row["robot"], row["seed"], row["set"]) for row in rows}
+    what, run, tell = ("bump", one_bump, show_bumps) if given.bump else ("set", one_set, show)
+    rows = [row for row in map(json.loads, lines) if what in row]
+    done = {(row["robot"], row["seed"], row[what]) for row in rows}
     for number in range(0 if given.show else given.sets):
         if (given.robot, given.seed, number) in done:
             continue
         try:
-            rows.append(one_set(given.robot, number, given.seed))
+            rows.append(run(given.robot, number, given.seed))
         except ScaraIdentError as error:
-            print(f"set {number}: {error}", flush=True)
+            print(f"{what} {number}: {error}", flush=True)
             continue
         with given.output.open("a", encoding="utf-8") as file:
             file.write(json.dumps(rows[-1]) + "\n")
-    show(rows)
+    tell(rows)
 
 
 if __name__ == "__main__":

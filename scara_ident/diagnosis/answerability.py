@@ -130,15 +130,38 @@ class Inquiry:
         parts = [part for part in (self.known, rows) if part is not None]
         if not parts:
             return np.zeros(len(self.questions))
+        view = self._view(parts[0] if len(parts) == 1 else merge(parts))
+        return np.array([view.sigma(item) for item in self.questions])
+
+    @cached_property
+    def just_seen(self) -> dict[str, Array]:
+        """Half axes of the coefficients that the recordings at hand show as well as a suspect's, (k, r) by label.
+
+        All on the ellipsoid are told from none by as many standard errors as the suspect's own; where nothing is known, or
+        nothing of these shows, they are alone on it.
+        """
+        found = {}
+        for item in self.suspects:
+            value = np.asarray(item.value)
+            own = np.zeros((0, len(value))) if self.known is None else self._own_view.left(item, {item.label})
+            shown = float(np.linalg.norm(own @ value)) if len(value) else 0.0
+            found[item.label] = _axes(own / shown) if shown > 0.0 else value[:, None]
+        return found
+
+    @cached_property
+    def _own_view(self) -> _View:
+        assert self.known is not None
+        return self._view(self.known)
+
+    def _view(self, rows: Information) -> _View:
         p = len(self.scene.model.columns)
-        factor = (parts[0] if len(parts) == 1 else merge(parts)).factor[:, :-1]
+        factor = rows.factor[:, :-1]
         beside, places, start = factor[p:, p:], [], 0
         for item in self.suspects:
             columns = _widths(item, self.scene)
             places.append((slice(start, start + columns[0]), slice(start, start + sum(columns))))
             start += sum(columns)
-        view = _View(self, factor, beside, places)
-        return np.array([view.sigma(item) for item in self.questions])
+        return _View(self, factor, beside, places)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +182,7 @@ class _View:
             pairs = permutations(question.suspects, 2)
             names = {item.label for item in question.suspects}
             return min((self._apart(one, names, other) for one, other in pairs), default=0.0)
-        sizes = np.array([self._apart(item, {item.label}, None) for item in question.suspects])
+        sizes = np.array([self._from_none(item) for item in question.suspects])
         # The mean variance counts, so that no suspect is forgotten for the others.
         return float(1.0 / np.sqrt(np.mean(1.0 / sizes**2))) if np.all(sizes > 0.0) else 0.0
 
@@ -179,6 +202,21 @@ class _View:
         if instead is not None:
             spanning.append(self.beside[:, self.places[self._place(instead)][1]])
         return float(np.linalg.norm(_outside(spanning, own)))
+
+    def left(self, item: Suspect, questioned: set[str]) -> Array:
+        """Return what the model without some effects leaves of a suspect's columns."""
+        own = self.beside[:, self.places[self._place(item)][0]]
+        spanning = self._model(questioned)
+        return np.column_stack([_outside(spanning, column) for column in own.T])
+
+    def _from_none(self, item: Suspect) -> float:
+        """Return how far a suspect is from none, whichever coefficients it has of those that would just have been seen.
+
+        What is below the detection limit is found in a direction that is noise: its mean variance over all counts.
+        """
+        left = self.left(item, {item.label})
+        singular = np.linalg.svd(left @ self.inquiry.just_seen[item.label], compute_uv=False)
+        return float(1.0 / np.sqrt(np.mean(1.0 / singular**2))) if np.all(singular > 0.0) else 0.0
 
     def _parameter(self, question: Question) -> float:
         model = self.inquiry.scene.model
@@ -200,6 +238,13 @@ class _View:
         before = np.eye(left.shape[1]) / (LARGEST_SHAPE * question.size) ** 2
         variance = np.diag(np.linalg.inv(left.T @ left + before))
         return float(question.size / np.sqrt(np.mean(variance)))
+
+
+def _axes(rows: Array) -> Array:
+    """Return the half axes of the coefficients ``a`` with ``|rows a| = 1``, those of the directions that rows see."""
+    _, singular, right = np.linalg.svd(rows, full_matrices=False)
+    seen = singular > np.sqrt(_RANK) * singular[0]
+    return np.asarray(right[seen].T / singular[seen])
 
 
 def _outside(spanning: Sequence[Array], own: Array) -> Array:

@@ -198,12 +198,15 @@ def _rivals(diagnosis: Diagnosis) -> Iterator[Question]:
 
 def _remainder(diagnosis: Diagnosis) -> Iterator[Question]:
     left = diagnosis.unexplained
-    if left is None or shape_over(diagnosis.robot, left.signals, diagnosis.robot.joints.index(left.joint)) is None:
+    if left is None:
         return
-    text = f"what is left on {left.joint}, over {' and '.join(left.signals)}"
-    yield Question(
-        "unexplained", text, joint=left.joint, signals=left.signals, size=left.rms, experiment=HALF_THE_SPEED
-    )
+    signals = left.signals
+    if not diagnosis.dependences:
+        # One trajectory cannot say what it depends on: another spreads over the state of its joint.
+        signals = signals or (f"position of {left.joint}", f"velocity of {left.joint}")
+    if shape_over(diagnosis.robot, signals, diagnosis.robot.joints.index(left.joint)) is not None:
+        text = f"what is left on {left.joint}, over {' and '.join(signals)}"
+        yield Question("unexplained", text, joint=left.joint, signals=signals, size=left.rms, experiment=HALF_THE_SPEED)
 
 
 def _worth_a_look(diagnosis: Diagnosis) -> Iterator[Question]:

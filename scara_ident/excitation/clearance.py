@@ -17,10 +17,9 @@ from pinocchio import coal
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, UsageError
-from scara_ident.excitation.joint_frames import JointFrames, joint_frames
+from scara_ident.excitation.joint_frames import JointFrames, joint_frames, joints_of
 from scara_ident.manners import Frozen
-from scara_ident.model.regressor.recursion import joint_geometry
-from scara_ident.robot.collision_shapes import collision_shapes
+from scara_ident.robot.collision_shapes import bare_links, collision_shapes
 from scara_ident.robot.kinematics import place_of
 from scara_ident.robot.robot import Robot
 
@@ -107,7 +106,7 @@ class Clearance(Frozen):
 
     def _rates(self, q: Array) -> Array:
         """Return how much the distance of each pair changes at most per rad or m of each joint, shape (P, n)."""
-        joints, robot = joint_geometry(self.robot.model), self.robot
+        joints, robot = joints_of(self.robot), self.robot
         centres, radii = self._spheres
         rates = np.zeros(self._moved_by.shape)
         for shape, found in enumerate(self.shapes.geometryObjects):
@@ -139,44 +138,53 @@ class Clearance(Frozen):
         bounds = self._bounds(joint_frames(self.robot, q))
         if likely:
             bounds[~np.array(self.likely, dtype=bool)] = np.inf
-        number = np.array([groups.index(group) for *_, group in self.pairs], dtype=int)
+        number = [groups.index(group) for *_, group in self.pairs]
         found = Nearest.none(len(groups), q.shape[1], reach)
         model, shapes, (data, measured) = self.robot.model, self.shapes, self._data
-        neutral, displaced = pin.neutral(model), np.zeros(model.nv)
-        # What each pair was at the posture where it was last measured, and how fast it may change from there.
-        rate = self._rates(q)
-        last, at = np.full(len(self.pairs), -np.inf), np.zeros((len(self.pairs), len(q)))
-        for k in np.flatnonzero(np.any(bounds < reach, axis=0)):
-            least = np.maximum(bounds[:, k], last - np.einsum("pn,pn->p", rate, np.abs(q[:, k] - at)))
+        results, postures = list(measured.distanceResults), self._configurations(q)
+        # How much each pair may have changed on the way to every posture, and what it was where it was last measured.
+        way = np.cumsum(self._rates(q) @ np.abs(np.diff(q, axis=1, prepend=q[:, :1])), axis=1).T.copy()
+        last, bounds = np.full(len(self.pairs), -np.inf), bounds.T.copy()
+        for k in np.flatnonzero(np.any(bounds < reach, axis=1)).tolist():
+            least = np.maximum(bounds[k], last - way[k])
             near = np.flatnonzero(least < reach)
-            placed = False
-            for pair in near[np.argsort(least[near])]:
+            if not len(near):
+                continue
+            pin.updateGeometryPlacements(model, data, shapes, measured, postures[k])
+            best, nearest = [reach] * len(groups), [-1] * len(groups)
+            for pair in near[np.argsort(least[near])].tolist():
                 group = number[pair]
-                if least[pair] >= found.distance[group, k]:
+                if least[pair] >= best[group]:
                     continue
-                if not placed:
-                    displaced[self.robot.order] = q[:, k]
-                    posture = pin.integrate(model, neutral, displaced)
-                    pin.updateGeometryPlacements(model, data, shapes, measured, posture)
-                    placed = True
-                pin.computeDistance(shapes, measured, int(pair))
-                result = measured.distanceResults[int(pair)]
-                last[pair], at[pair] = result.min_distance, q[:, k]
-                found.take(int(group), int(k), int(pair), result)
+                pin.computeDistance(shapes, measured, pair)
+                distance = results[pair].min_distance
+                last[pair] = distance + way[k, pair]
+                if distance < best[group]:
+                    best[group], nearest[group] = distance, pair
+            for group, pair in enumerate(nearest):
+                if pair >= 0:
+                    found.take(group, k, pair, results[pair])
         return found
+
+    def _configurations(self, q: Array) -> list[Array]:
+        """Return Pinocchio's configuration of every posture (n, N)."""
+        model, back = self.robot.model, np.argsort(self.robot.order)
+        plain = model.nq == model.nv
+        neutral = pin.neutral(model)
+        return [each if plain else pin.integrate(model, neutral, each) for each in np.ascontiguousarray(q[back].T)]
 
     def slopes(self, q: Array, found: Nearest) -> Array:
         """Return the derivative of the distances by the joints, shape (G, n, N); 0 where they were not measured."""
         frames = joint_frames(self.robot, q)
         slope = np.zeros((len(found.distance), *q.shape))
-        for group, k in np.argwhere(found.pair >= 0):
-            first, second, _ = self.pairs[found.pair[group, k]]
-            normal = found.normal[group, k]
-            for shape, sign, point in ((first, -1.0, found.points[0]), (second, 1.0, found.points[1])):
-                own = self._moved_by[shape]
-                arm = np.cross(frames.axis[own, :, k], point[group, k] - frames.origin[own, :, k])
-                arm[frames.prismatic[own]] = frames.axis[own, :, k][frames.prismatic[own]]
-                slope[group, own, k] += sign * arm @ normal
+        group, place = np.nonzero(found.pair >= 0)
+        pairs = np.array([pair[:2] for pair in self.pairs], dtype=int)[found.pair[group, place]]
+        axes, origins = frames.axis[:, :, place], frames.origin[:, :, place]
+        normal, slides = found.normal[group, place].T, frames.prismatic[:, None, None]
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            arm = np.cross(axes, found.points[side, group, place].T - origins, axis=1)
+            moved = self._moved_by[pairs[:, side]].T
+            slope[group, :, place] += sign * (moved * np.einsum("jcN,cN->jN", np.where(slides, axes, arm), normal)).T
         return slope
 
     def rows(self, q: Array, *, likely: bool = False, slopes: bool = False) -> tuple[Array, Array]:
@@ -207,10 +215,8 @@ class Clearance(Frozen):
         """Return the distance of every pair at postures (n, N), shape (P, N), m."""
         model, shapes, (data, measured) = self.robot.model, self.shapes, self._data
         found = np.empty((len(self.pairs), q.shape[1]))
-        neutral, displaced = pin.neutral(model), np.zeros(model.nv)
-        for k, posture in enumerate(q.T):
-            displaced[self.robot.order] = posture
-            pin.computeDistances(model, data, shapes, measured, pin.integrate(model, neutral, displaced))
+        for k, posture in enumerate(self._configurations(q)):
+            pin.computeDistances(model, data, shapes, measured, posture)
             found[:, k] = [each.min_distance for each in measured.distanceResults]
         return found
 
@@ -264,12 +270,11 @@ class Nearest:
         return Nearest(np.full(pair.shape, reach), pair, np.zeros((2, *pair.shape, 3)), np.zeros((*pair.shape, 3)))
 
     def take(self, group: int, k: int, pair: int, measured: coal.DistanceResult) -> None:
-        """Keep a measurement if it is the smallest so far."""
-        if measured.min_distance < self.distance[group, k]:
-            self.distance[group, k], self.pair[group, k] = measured.min_distance, pair
-            self.points[0, group, k] = measured.getNearestPoint1()
-            self.points[1, group, k] = measured.getNearestPoint2()
-            self.normal[group, k] = measured.normal
+        """Keep a measurement."""
+        self.distance[group, k], self.pair[group, k] = measured.min_distance, pair
+        self.points[0, group, k] = measured.getNearestPoint1()
+        self.points[1, group, k] = measured.getNearestPoint2()
+        self.normal[group, k] = measured.normal
 
 
 def clearance_of(
@@ -318,6 +323,8 @@ def clearance_of(
     moved = [shape.parentJoint for shape in shapes.geometryObjects]
     if not any(moved):
         return replace(watched, notes=(unwatched.format(f"{robot.urdf.name} has no collision shapes"),))
+    bare = bare_links(robot)
+    notes = (f"Links without a collision shape are not watched: {', '.join(bare)}.",) if bare else ()
     obstacles = [*(["floor"] if np.isfinite(floor) else []), *(f"box{k + 1}" for k in range(len(boxes)))]
     count, found = shapes.ngeoms - len(obstacles), shapes.geometryObjects
     pairs = [
@@ -331,7 +338,7 @@ def clearance_of(
     pairs += [(i, count + k, name) for k, name in enumerate(obstacles) for i in range(count) if moved[i]]
     if not pairs:
         return replace(watched, notes=(unwatched.format("all links that have shapes hang on one another"),))
-    return _parted(replace(watched, pairs=tuple(pairs)), lower, upper)
+    return _parted(replace(watched, pairs=tuple(pairs), notes=notes), lower, upper)
 
 
 def _hangs(model: pin.Model, shape: pin.GeometryObject, on: pin.GeometryObject) -> bool:
@@ -359,7 +366,7 @@ def _parted(watched: Clearance, lower: Array, upper: Array) -> Clearance:
     room = distance[~touching].min(axis=1) - watched.margin
     likely = room < SPREAD * np.ptp(distance[~touching], axis=1)
     said = f"Not kept {watched.margin:g} m apart, as they touch by design, or never: {{}}."
-    notes = (said.format("; ".join(left_out)),) if left_out else ()
+    notes = (*watched.notes, said.format("; ".join(left_out))) if left_out else watched.notes
     return replace(watched, pairs=kept, notes=notes, likely=tuple(likely.tolist()))
 
 

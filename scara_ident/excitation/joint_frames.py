@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.excitation.tool import rotation
-from scara_ident.model.regressor.recursion import joint_geometry
+from scara_ident.model.regressor.recursion import JointGeometry, joint_geometry
 from scara_ident.robot.kinematics import place_of
 from scara_ident.robot.robot import Robot
 
@@ -37,9 +38,15 @@ class JointFrames:
         return np.asarray(np.einsum("sabN,sb->saN", self.turn[joints], points) + self.place[joints])
 
 
+@lru_cache(maxsize=8)
+def joints_of(robot: Robot) -> tuple[JointGeometry, ...]:
+    """Return the geometry of a robot's joints, in Pinocchio's order."""
+    return tuple(joint_geometry(robot.model))
+
+
 def joint_frames(robot: Robot, q: Array) -> JointFrames:
     """Return where the joints are at postures (n, N), rad or m in the robot's order."""
-    samples, joints = q.shape[1], joint_geometry(robot.model)
+    samples, joints = q.shape[1], joints_of(robot)
     turn = np.zeros((len(joints) + 1, 3, 3, samples))
     place = np.zeros((len(joints) + 1, 3, samples))
     axis = np.zeros((robot.n, 3, samples))

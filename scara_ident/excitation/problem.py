@@ -219,9 +219,9 @@ class Problem:
         counted = self._counted(regressor)
         weights = np.zeros_like(regressor)
         scale = 2.0 * self._share[:, None] * task.weights[:, None, None, None] ** 2
-        weights.reshape(n, -1, k, motion.samples // k)[..., :: self.stride] = scale * np.einsum(
-            "pr,irN->ipN", gradient, counted
-        ).reshape(n, -1, k, counted.shape[2] // k)
+        weights.reshape(n, -1, k, motion.samples // k)[..., :: self.stride] = scale * (gradient @ counted).reshape(
+            n, -1, k, counted.shape[2] // k
+        )
         by_motion, torque = task.smooth.derivatives(motion, weights, task.nominal)
         limited = np.isfinite(task.limits.torque)
         dense = [torque[limited] / task.limits.torque[limited, None, None, None]]

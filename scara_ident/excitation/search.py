@@ -20,7 +20,7 @@ from scara_ident.threads import one_blas_thread
 # Times of the limits per period of the highest frequency, in the search and for the winner.
 COARSE, FINE = 12, 48
 # Distances are measured at every so many-th of them.
-SPARSE = {COARSE: 3, FINE: 6}
+SPARSE = {COARSE: 2, FINE: 1}
 LEAST_TIMES = 60
 # Times of the verification per time of the winner's limits, and at least per second.
 FINER, LEAST_RATE = 10, 1000.0

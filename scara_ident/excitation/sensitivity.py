@@ -1,8 +1,8 @@
 """How the regressor of a motion changes with the motion.
 
 What an optimiser needs is linear in the regressor: the derivative of ``sum_ij G_ij W_ij`` by positions, velocities
-and accelerations, for weights G of every sample, and that of the torques of given parameters. Every term is
-evaluated beside the motion and the differences are taken of these sums.
+and accelerations, for weights G of every sample, and that of the torques of given parameters. The first goes backwards
+through the arithmetic of rigid bodies; other terms and torques are evaluated beside the motion and differences taken.
 
 For rigid bodies the differences are exact. Kinetic energy is a trigonometric polynomial of degree 2 in the angle of
 a revolute joint, and a polynomial of degree 2 in the position of a prismatic one, and so is the regressor; it is
@@ -94,6 +94,11 @@ class SmoothModel:
                 if value is not None:
                     torque[np.arange(n), 1, np.arange(n)] += np.einsum("ipN,p->iN", slope, value)
                 continue
+            if isinstance(term, RigidBody):
+                gradient += term.pulled_back(motion, part)
+                if value is not None:
+                    torque += _of_torque(term, motion, value)
+                continue
             for kind, joint, weight, columns in _beside(term, motion):
                 gradient[kind, joint] += weight * np.einsum("ipN,ipN->N", part, columns)
                 if value is not None:
@@ -128,14 +133,32 @@ def _friction(term: Friction, motion: Motion, width: Array) -> tuple[Array, Arra
     return columns, slopes
 
 
+def _of_torque(term: RigidBody, motion: Motion, value: Array) -> Array:
+    """Differentiate the torque of bodies by the motion, all differences at once, shape (n, 3, n, N)."""
+    n = len(motion.q)
+    beside = [
+        (kind, joint, shift, weight)
+        for kind in range(3)
+        for joint in range(n)
+        for shift, weight in (CENTRAL if kind or term.robot.prismatic[joint] else RIESZ)
+    ]
+    states = np.repeat(np.array([motion.q, motion.v, motion.a])[:, :, None], len(beside), axis=2)
+    for place, (kind, joint, shift, _) in enumerate(beside):
+        states[kind, joint, place] += shift
+    q, v, a = states.reshape(3, n, -1)
+    moved = replace(motion, time=np.arange(q.shape[1], dtype=np.float64), q=q, v=v, a=a)
+    torque = term.torque(moved, value).reshape(n, len(beside), -1)
+    result = np.zeros((n, 3, n, motion.samples))
+    for place, (kind, joint, _, weight) in enumerate(beside):
+        result[:, kind, joint] += weight * torque[:, place]
+    return result
+
+
 def _beside(term: Term, motion: Motion) -> Iterator[tuple[int, int, float, Array]]:
     """Give (kind, joint, weight, columns) whose weighted sums are derivatives; kind is 0, 1, 2 for q, v, a."""
-    exact = isinstance(term, RigidBody)
-    prismatic = term.robot.prismatic if isinstance(term, RigidBody) else np.zeros(len(motion.q), dtype=bool)
     for joint in range(len(motion.q)):
         for kind, signal in enumerate("qva"):
-            stencil = (SMOOTH if not exact else CENTRAL) if kind or prismatic[joint] or not exact else RIESZ
-            for shift, weight in stencil:
+            for shift, weight in SMOOTH:
                 moved = getattr(motion, signal).copy()
                 moved[joint] += shift
                 yield kind, joint, weight, term.regressor(replace(motion, **{signal: moved}))

@@ -9,7 +9,7 @@ spectra, over the noise, merged with what is known.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -175,16 +175,34 @@ class _Judge:
         """Return minus the weighted sum of the logarithms of what questions gain."""
         (basis,) = self.task.bases
         motion = motion_of(basis, self.task.posture, x[0], self.rate)
-        sigma = self.inquiry.sigmas(spectral_rows(self.inquiry, motion))
+        sigma = self.each.sigmas(spectral_rows(self.each, motion))
         return -float(self.weights @ np.log1p((sigma / SURE) ** 2))
+
+    @cached_property
+    def each(self) -> Inquiry:
+        """The same with a question for each of several that may be below the limit.
+
+        How large the one that is there may be is not known: each counts by the logarithm of what it gains, and one that no
+        motion shows keeps none from showing the others.
+        """
+        return replace(
+            self.inquiry, questions=tuple(alone for item in self.inquiry.questions for alone in _alone(item))
+        )
 
     @cached_property
     def weights(self) -> Array:
         """Questions of one kind share its weight, so that many effects worth a look do not outweigh all others."""
         kinds = [(item.kind, len(item.suspects) > 1) for item in self.inquiry.questions]
-        return np.array(
-            [(PARAMETERS if kind == "parameter" else 1.0) / kinds.count((kind, more)) for kind, more in kinds]
-        )
+        shares = [(PARAMETERS if kind == "parameter" else 1.0) / kinds.count((kind, more)) for kind, more in kinds]
+        counts = [len(_alone(item)) for item in self.inquiry.questions]
+        return np.repeat(np.array(shares) / counts, counts)
+
+
+def _alone(question: Question) -> list[Question]:
+    """Return a question for each suspect that may be below the limit; any other as it is."""
+    if question.kind != "below_limit":
+        return [question]
+    return [replace(question, text=item.label, suspects=(item,)) for item in question.suspects]
 
 
 def motion_of(basis: Basis, posture: Array, coefficients: Array, rate: float) -> Motion:

@@ -60,6 +60,19 @@ def collision_shapes(robot: Robot) -> pin.GeometryModel:
     return shapes
 
 
+def bare_links(robot: Robot) -> tuple[str, ...]:
+    """Return the links that move and have a mass or a picture, but no collision shape, in the URDF's order."""
+    model, found = robot.model, []
+    for link in read_urdf(robot.urdf, robot.urdf).findall("link"):
+        mass, name = link.find("inertial/mass"), str(link.get("name"))
+        heavy = mass is not None and float(mass.get("value", "0")) > 0.0
+        if link.find("collision") is None and (heavy or link.find("visual") is not None):
+            frame = model.getFrameId(name, pin.FrameType.BODY)
+            if frame < model.nframes and model.frames[frame].parentJoint > 0:
+                found.append(name)
+    return tuple(found)
+
+
 def _hull(points: Array, mesh: str) -> coal.Convex:
     # Coal's own buildConvexRepresentation takes a mesh to be convex as it is, and then measures wrong distances.
     try:

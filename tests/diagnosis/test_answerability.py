@@ -42,6 +42,11 @@ def test_rivals_are_apart_by_what_neither_does_for_the_other():
     assert sigma[0] == pytest.approx(np.sqrt(min(of_a, of_b)), rel=1e-9)
 
 
+def left_matrix(spanning, columns):
+    left = columns - spanning @ np.linalg.lstsq(spanning, columns)[0]
+    return left.T @ left
+
+
 def test_an_effect_is_apart_from_none_by_what_the_model_leaves_of_it_and_a_parameter_by_its_std():
     found = open_diagnosis()
     tilt = questions(found)[0].suspects[1]
@@ -55,6 +60,15 @@ def test_an_effect_is_apart_from_none_by_what_the_model_leaves_of_it_and_a_param
     model, b = rows[:, : p + own], rows[:, p + own : p + own + len(tilt.value)]
     assert sigma[0] == pytest.approx(np.sqrt(left_of(model, b @ tilt.value)), rel=1e-9)
     assert sigma[1] == pytest.approx(2.0 / np.sqrt(np.linalg.inv(model.T @ model)[0, 0]), rel=1e-9)
+    # What is known says which coefficients would just have been seen; the mean variance over all of them counts.
+    known = np.random.default_rng(5).normal(size=(40, width))
+    inquiry = replace(inquiry, known=Information.empty(width).absorb(known, np.zeros(40)))
+    before, after = inquiry.sigmas()[0], inquiry.sigmas(Information.empty(width).absorb(rows, np.zeros(90)))[0]
+    place = slice(p + own, p + own + len(tilt.value))
+    first, both = (left_matrix(each[:, : p + own], each[:, place]) for each in (known, np.vstack([known, rows])))
+    assert before**2 == pytest.approx(tilt.value @ first @ tilt.value, rel=1e-9)
+    worse = np.trace(np.linalg.solve(both, first)) / len(first)
+    assert after**2 == pytest.approx(before**2 / worse, rel=1e-9)
 
 
 def test_a_remainder_is_as_sure_as_the_knots_of_a_free_curve():

@@ -49,6 +49,10 @@ def test_a_remainder_that_depends_on_a_signal_asks_for_a_motion_and_another_for_
     shown = tuple(replace(item, shown=False, by="repetition") for item in found.evidence)
     small = next_steps(replace(found, unexplained=None, evidence=shown))[0]
     assert small.question == "what is left on joint1 and joint2" and "at half the speed" in small.motion
+    # Of one trajectory nobody can say what it depends on.
+    (alone, *_) = next_steps(replace(bare, dependences=()))
+    assert alone.question == "what is left on joint2, over position of joint2 and velocity of joint2"
+    assert alone.motion == ASKED_MOTION
 
 
 def test_rivals_ask_for_a_motion_and_an_effect_for_the_experiment_that_shows_it():

@@ -15,10 +15,65 @@ from scara_ident.model.regressor.tracing import (
     SIGN,
     SIN,
     SUB,
+    VAR,
     Expr,
     Scalar,
     needed,
 )
+
+
+def gradient(values: Sequence[Scalar], seeds: Sequence[Scalar], variables: Sequence[Expr]) -> list[Scalar]:
+    """Differentiate ``sum_k seed_k value_k`` by inputs, backwards through the graph (Griewank, Walther 2008, chapter 3).
+
+    All inputs cost together a few times what the values do.
+
+    Parameters
+    ----------
+    values : sequence of Expr or float
+    seeds : sequence of Expr or float
+        One per value, not differentiated.
+    variables : sequence of Expr
+        Inputs of the same trace.
+
+    Returns
+    -------
+    list of Expr or float
+        One per input.
+    """
+    slopes: dict[int, Scalar] = {}
+
+    def add(node: int, slope: Scalar) -> None:
+        slopes[node] = slopes.get(node, 0.0) + slope
+
+    for value, seed in zip(values, seeds, strict=True):
+        if isinstance(value, Expr):
+            add(value.node, seed * value.sign)
+    trace = variables[0].trace
+    for node in reversed(needed(trace, values)):
+        operation, first, second = trace.nodes[node]
+        slope = slopes.get(node, 0.0)
+        if operation in (VAR, SIGN) or (isinstance(slope, float) and slope == 0.0):
+            continue
+        x = Expr(trace, first, 1)
+        if operation in (ADD, SUB):
+            add(first, slope)
+            add(second, slope if operation == ADD else -slope)
+        elif operation == MUL:
+            add(first, slope * Expr(trace, second, 1))
+            add(second, slope * x)
+        elif operation == ADD_CONST:
+            add(first, slope)
+        elif operation == MUL_CONST:
+            add(first, slope * second)
+        elif operation == SIN:
+            add(first, slope * x.cos())
+        elif operation == COS:
+            add(first, -slope * x.sin())
+        elif operation == ABS:
+            add(first, slope * x.direction())
+        elif operation == EXP:
+            add(first, slope * Expr(trace, node, second))
+    return [slopes.get(variable.node, 0.0) * variable.sign for variable in variables]
 
 
 def derivative(values: Sequence[Scalar], variable: Expr) -> list[Scalar]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.model.base_parameters import BaseParameters, find_base_parameters
+from scara_ident.model.regressor.derivative import gradient
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
 from scara_ident.model.regressor.program import Program
 from scara_ident.model.regressor.recursion import joint_geometry
@@ -123,6 +124,49 @@ class RigidBody(Filled):
         rows = [bodies[k : k + 10] for k in range(0, len(bodies), 10)]
         torque = trace_torque(joint_geometry(robot.model), robot.model.gravity, rows, q, v, a)
         return compile_program(trace, [(joint, torque[int(j)]) for joint, j in enumerate(robot.order)])
+
+    def pulled_back(self, motion: Motion, weights: Array) -> Array:
+        """Differentiate ``sum_ij G_ij W_ij`` of the columns W by the motion, backwards through their arithmetic.
+
+        Parameters
+        ----------
+        motion : Motion
+            N samples.
+        weights : ndarray, shape (n, p, N)
+            G.
+
+        Returns
+        -------
+        ndarray, shape (3, n, N)
+            By position, velocity and acceleration of each joint.
+        """
+        robot = self.robot
+        scaled = weights * robot.row_scale[:, None, None]
+        result = np.zeros((3, robot.n, motion.samples))
+        links, rotors = _split(self.base.kept[self.kept], robot.n)
+        if self.kernel is not None:
+            back = np.argsort(robot.order)
+            states = np.concatenate([motion.q[back], motion.v[back], motion.a[back]])
+            seeds = scaled[back][:, links].reshape(-1, motion.samples)
+            program = self._adjoint
+            found = np.zeros((3 * robot.n, motion.samples))
+            program.evaluate([*states, *seeds], found, np.empty((program.buffers, motion.samples)))
+            result += found.reshape(3, robot.n, -1)[:, robot.order]
+        for column in rotors:
+            joint = int(self.base.kept[self.kept][column]) - 10 * robot.n
+            result[2, joint] += scaled[joint, column]
+        return result
+
+    @cached_property
+    def _adjoint(self) -> Program:
+        """The gradient of the kernel's weighted sum by its states; weights follow these, row by row."""
+        assert self.kernel is not None
+        trace, inputs = Trace(), 3 * self.robot.n
+        states = [trace.variable(k) for k in range(inputs)]
+        q, v, a = np.array(states, dtype=object).reshape(3, -1, 1)
+        entries = self.kernel(q, v, a).ravel().tolist()
+        seeds = [trace.variable(inputs + k) for k in range(len(entries))]
+        return compile_program(trace, list(enumerate(gradient(entries, seeds, states))))
 
     def _standard(self, value: Array) -> tuple[Array, Array]:
         """Return the bodies' parameters, in Pinocchio's order, and the armatures, at the joints; what does not lead is zero."""

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scara_ident.model.regressor.derivative import derivative
+from scara_ident.model.regressor.derivative import derivative, gradient
 from scara_ident.model.regressor.tracing import Scalar, Trace, compile_program, cos, sin
 
 
@@ -25,6 +25,10 @@ def test_every_operation_has_the_slope_of_a_complex_step() -> None:
     found = evaluate(trace, derivative([value], x)[0], inputs)
     step = function(inputs[0] + 1e-30j, inputs[1] + 0j, np.sin, np.cos, np.exp).imag / 1e-30
     np.testing.assert_allclose(found, step, rtol=1e-13, atol=1e-13)
+    backwards = gradient([x * y, value], [0.0, 2.0], [x, y])
+    np.testing.assert_allclose(evaluate(trace, backwards[0], inputs), 2.0 * step, rtol=1e-13, atol=1e-13)
+    forwards = evaluate(trace, derivative([value], y)[0], inputs)
+    np.testing.assert_allclose(evaluate(trace, backwards[1], inputs), 2.0 * forwards, rtol=1e-13, atol=1e-13)
 
 
 def test_sizes_have_the_slope_of_their_sign_and_signs_none() -> None:
@@ -32,5 +36,7 @@ def test_sizes_have_the_slope_of_their_sign_and_signs_none() -> None:
     x, y = trace.variable(0), trace.variable(1)
     inputs = np.array([[-2.0, 0.0, 3.0], [1.0, 1.0, 1.0]])
     np.testing.assert_array_equal(evaluate(trace, derivative([abs(2.0 * x)], x)[0], inputs), [-2.0, 0.0, 2.0])
+    (back,) = gradient([abs(2.0 * x), x.direction(), 4.0], [y, 1.0, 1.0], [x])
+    np.testing.assert_array_equal(evaluate(trace, back, inputs), [-2.0, 0.0, 2.0])
     assert derivative([x.direction(), y * y, 4.0], x) == [0.0, 0.0, 0.0]
     assert derivative([-x, x - x], x) == [-1.0, 0.0]
