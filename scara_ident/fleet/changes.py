@@ -17,7 +17,15 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.fleet.causes import Cause
-from scara_ident.fleet.history import DateRows, History, common_removed, freedom_of, run_scatter, scatter
+from scara_ident.fleet.history import (
+    DateRows,
+    History,
+    common_removed,
+    freedom_of,
+    pseudo_inverses,
+    run_scatter,
+    scatter,
+)
 
 # Chance that a report names any arm of a fleet in which nothing changed, and share of the arms named that are wrong on average.
 LEVEL = 0.02
@@ -190,25 +198,34 @@ def least_probability(history: History, scatter: Scatter, tried: float) -> float
     return min(1.0, tried * min((trial.p_value for trial in each if trial is not None), default=1.0))
 
 
-def grown_residuals(history: History, histories: Sequence[History], tried: float) -> tuple[Change, ...]:
+def residual_scatter(histories: Sequence[History]) -> tuple[Array, float]:
+    """Return by what share the residual of each joint differs from date to date, shape (n,), and its degrees of freedom.
+
+    Parameters
+    ----------
+    histories : sequence of History
+        The whole fleet; at least one has two dates.
+    """
+    steps = np.concatenate([np.diff(np.log([visit.error for visit in item.visits]), axis=0) for item in histories])
+    return np.sqrt(scatter(steps, np.zeros_like(steps))), freedom_of(len(steps))
+
+
+def grown_residuals(history: History, std: Array, freedom: float, tried: float) -> tuple[Change, ...]:
     """Return the joints whose residual grew by more than it differs from date to date.
 
     Parameters
     ----------
     history : History
-    histories : sequence of History
-        The whole fleet.
+    std : ndarray, shape (n,)
+    freedom : float
+        See `residual_scatter`.
     tried : float
         See `find_changes`.
     """
     from scipy.special import stdtr
 
-    several = [np.log([visit.error for visit in item.visits]) for item in histories if len(item.dates) > 1]
-    if not several or len(history.dates) < 2:
+    if len(history.dates) < 2:
         return ()
-    steps = np.concatenate([np.diff(item, axis=0) for item in several])
-    freedom = freedom_of(len(steps))
-    std = np.sqrt(scatter(steps, np.zeros_like(steps)))
     own = np.log([visit.error for visit in history.visits])
     count, found = len(own), []
     for j, joint in enumerate(history.model.robot.joints):
@@ -340,4 +357,4 @@ def _inverses(matrices: Array) -> Array:
     scale = size[:, :, None] * size[:, None, :]
     if matrices.shape[1] == 1:
         return np.where(matrices > np.finfo(float).tiny, 1.0 / scale, 0.0)
-    return np.asarray(np.linalg.pinv(matrices / scale, rcond=LEFT_SHARE, hermitian=True) / scale)
+    return pseudo_inverses(matrices / scale, LEFT_SHARE) / scale

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.fleet.changes import LEVEL, find_changes, fleet_scatter, grown_residuals, trials_of
+from scara_ident.fleet.changes import LEVEL, find_changes, fleet_scatter, grown_residuals, residual_scatter, trials_of
 from scara_ident.fleet.history import with_dates
 from tests.fleet.made import DATES, WEAR, WORN
 
@@ -52,10 +52,10 @@ def test_a_residual_that_grew_is_named_where_no_cause_is(histories):
     )
     grown = replace(arm, visits=worse)
     tried = 400.0
-    (found,) = grown_residuals(grown, [grown, *histories[1:]], tried)
+    (found,) = grown_residuals(grown, *residual_scatter([grown, *histories[1:]]), tried)
     assert found.cause is None and found.joint == "joint2" and found.since == DATES[3]
     np.testing.assert_allclose(found.size[0], 3.0, rtol=0.3)
-    assert grown_residuals(histories[3], histories, tried) == ()
+    assert grown_residuals(histories[3], *residual_scatter(histories), tried) == ()
 
 
 def test_the_tests_of_an_arm_are_worth_fewer_than_they_are_many_and_more_dates_ask_for_more(histories, noise):
