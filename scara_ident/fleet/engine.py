@@ -131,6 +131,9 @@ def started(scheduler: str | None = None, workers: int | None = None) -> Iterato
         "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": KEPT_ARRAY,
         "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": KEPT_MEMORY,
         "distributed.worker.profile.enabled": False,
+        # What a dashboard would show costs more than handing out the work.
+        "distributed.admin.system-monitor.interval": "10s",
+        "distributed.admin.tick.interval": "1s",
     }
     log = logging.getLogger("distributed")
     level = log.level
