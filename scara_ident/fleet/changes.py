@@ -364,4 +364,4 @@ def _inverses(matrices: Array) -> Array:
     scale = size[:, :, None] * size[:, None, :]
     if matrices.shape[1] == 1:
         return np.where(matrices > np.finfo(float).tiny, 1.0 / scale, 0.0)
-    return pseudo_inverses(matrices / scale, LEFT_SHARE) / scale
+    return np.asarray(pseudo_inverses(matrices / scale, LEFT_SHARE) / scale)
