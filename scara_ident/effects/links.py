@@ -86,9 +86,14 @@ def gravity_columns(robot: Robot, axis: int, q: Array) -> Array:
     ndarray, shape (n, 4 n, N)
         Recorded side; parameters as `first_moments`.
     """
+    return gravity_torque(robot, axis, q, np.eye(4 * robot.n))
+
+
+def gravity_torque(robot: Robot, axis: int, q: Array, moments: Array) -> Array:
+    """Return the torque, shape (n, k, N), of each of k sets of masses and first moments (k, 4 n), as `gravity_columns`."""
     rest = np.zeros_like(q)
-    columns = gravity_kernels(robot)[axis](q[np.argsort(robot.order)], rest, rest)[robot.order]
-    return np.asarray(columns * robot.row_scale[:, None, None])
+    columns = gravity_kernels(robot)[axis](q[np.argsort(robot.order)], rest, rest)
+    return np.asarray((moments @ columns)[robot.order] * robot.row_scale[:, None, None])
 
 
 @dataclass(frozen=True, eq=False)

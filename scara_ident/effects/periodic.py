@@ -15,7 +15,7 @@ from scara_ident.effects.friction import friction_slope
 from scara_ident.effects.links import rigid_slopes
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine
+from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine, sines
 from scara_ident.effects.spectra import HIGHEST_FREQUENCY_SHARE
 from scara_ident.model.terms import Column
 
@@ -67,9 +67,8 @@ class TorqueRipple(PerMotorTurn):
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return sine and cosine of the order times the motor's angle."""
         j, order = member.place, member.nonlinear[0]
-        angle = order * signals.motor_turns[j]
         seen = _seen(signals, j, order)
-        return [seen * np.sin(angle), seen * np.cos(angle)]
+        return [seen * part for part in sines(signals, j, order)]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where it leaves the torque limit behind."""

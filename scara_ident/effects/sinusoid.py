@@ -6,11 +6,16 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
+from scara_ident.effects.links import shared
 from scara_ident.effects.parameters import Coefficient, Member, Parameter
-from scara_ident.effects.signals import Scene
+from scara_ident.effects.signals import Scene, Signals
+
+# Samples whose powers are taken together, so that they stay in the cache.
+AT_ONCE = 2048
 
 
 def amplitude_and_phase(value: Array, covariance: Array) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -58,3 +63,28 @@ class Sinusoid(Effect):
 def least_amplitude(value: Array, std: Array) -> float:
     """Return the amplitude of a sine and a cosine less what it may be too large by."""
     return float(np.hypot(*value)) - DOUBT_STDS * float(np.max(std))
+
+
+def sines(signals: Signals, joint: int, order: float) -> tuple[Array, Array]:
+    """Return sine and cosine of ``order`` times the motor's angle of a joint, shape (N,) each.
+
+    Those of whole orders are powers of ``exp(i angle)``: sine and cosine of many turns take ten times as long.
+    """
+    turns = signals.motor_turns[joint]
+    if turns.dtype == object or order != round(order) or order < 1.0:
+        return np.sin(order * turns), np.cos(order * turns)
+    once = shared(signals, ("once a turn", joint), lambda: np.array([np.sin(turns), np.cos(turns)]))
+    found = np.empty_like(once)
+    for start in range(0, len(turns), AT_ONCE):
+        some = slice(start, start + AT_ONCE)
+        power = _power(once[1, some] + 1j * once[0, some], int(order))
+        found[0, some], found[1, some] = power.imag, power.real
+    return found[0], found[1]
+
+
+def _power(base: NDArray[np.complex128], order: int) -> NDArray[np.complex128]:
+    """Return a power by squaring, order at least 1."""
+    if order == 1:
+        return base
+    half = _power(base, order // 2)
+    return half * half * base if order % 2 else half * half

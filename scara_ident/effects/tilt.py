@@ -10,7 +10,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
-from scara_ident.effects.links import first_moments, gravity_columns, shared
+from scara_ident.effects.links import first_moments, gravity_columns, gravity_torque, shared
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.spanned import rows_by_sample
@@ -118,7 +118,7 @@ def _parts(signals: Signals) -> Array:
             # In parts: the columns of all first moments at once would be the largest array of a diagnosis.
             for start in range(0, motion.samples, AT_ONCE):
                 part = slice(start, start + AT_ONCE)
-                result[:, places, part] = moments @ gravity_columns(scene.robot, axis, motion.q[:, part])
+                result[:, places, part] = gravity_torque(scene.robot, axis, motion.q[:, part], moments)
         return result
 
     return shared(signals, "tilt", make)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -283,7 +284,15 @@ def triangular(rows: Array) -> Array:
     """Triangular factor of rows; rows that are fewer than the columns are kept as they are."""
     if rows.shape[0] <= 1:
         return rows
-    return np.asarray(np.linalg.qr(rows, mode="r"))
+    # As mode "r" does, but for the mask of what is above the diagonal, which takes as long as a small factor.
+    raw = np.linalg.qr(rows, mode="raw")[0].T
+    least = min(rows.shape)
+    return np.where(_above(least, rows.shape[1]), raw[:least], 0.0)
+
+
+@lru_cache(maxsize=256)
+def _above(rows: int, columns: int) -> NDArray[np.bool_]:
+    return np.asarray(np.tri(rows, columns, -1) == 0.0)
 
 
 def _updated(factor: Array, columns: Array, gram: Array) -> Array | None:

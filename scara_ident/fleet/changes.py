@@ -17,7 +17,18 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.fleet.causes import Cause
-from scara_ident.fleet.history import DateRows, History, common_removed, freedom_of, run_scatter, scatter
+from scara_ident.fleet.history import (
+    CUT,
+    LEFT,
+    NORMAL_MEDIAN,
+    DateRows,
+    History,
+    common_removed,
+    freedom_of,
+    pseudo_inverses,
+    run_scatter,
+    scatter,
+)
 
 # Chance that a report names any arm of a fleet in which nothing changed, and share of the arms named that are wrong on average.
 LEVEL = 0.02
@@ -76,14 +87,15 @@ class Scatter:
     ----------
     runs : ndarray, shape (4 n,)
         Standard deviations, see `run_scatter`.
-    causes : mapping of str to float
-        By a cause's label how much larger than their noise differences along it are, as a ratio of squares, at least 1.
+    causes : mapping of str to ndarray, shape (s,)
+        By a cause's label how much larger than their noise differences of each of its sizes are, as a ratio of squares, at
+        least 1: a tilt about one axis may differ from date to date and that about the other not.
     freedom : float
         Degrees of freedom of both.
     """
 
     runs: Array
-    causes: Mapping[str, float]
+    causes: Mapping[str, Array]
     freedom: float
 
 
@@ -95,10 +107,8 @@ def fleet_scatter(histories: Sequence[History]) -> Scatter:
     histories : sequence of History
         Of one robot and model.
     """
-    from scipy.special import chdtri
-
     runs, freedom = run_scatter(histories)
-    found: dict[str, list[float]] = {}
+    found: dict[str, list[Array]] = {}
     for history in histories:
         count = len(history.dates)
         if count < 2:
@@ -110,11 +120,17 @@ def fleet_scatter(histories: Sequence[History]) -> Scatter:
             aims = np.array([row.directions[k].T @ rest for row, rest in zip(rows, left, strict=True)])
             spread = _inverses(own)
             sizes = np.einsum("dij,dj->di", spread, aims)
-            step, both = np.diff(sizes, axis=0), spread[1:] + spread[:-1]
+            step, noise = np.diff(sizes, axis=0), np.einsum("dii->di", spread[1:] + spread[:-1])
             # What all dates share took its part of the differences too.
-            squares = np.einsum("di,dij,dj->d", step, _inverses(both), step) * count / (count - 1.0)
-            found.setdefault(cause.label, []).extend(squares / float(chdtri(cause.sizes, 0.5)))
-    ratios = {label: max(1.0, float(np.median(squares))) for label, squares in found.items()}
+            squares = np.where(noise > 0.0, step**2 / np.where(noise > 0.0, noise, 1.0), 0.0) * count / (count - 1.0)
+            found.setdefault(cause.label, []).append(squares)
+    ratios = {}
+    for label, parts in found.items():
+        squares = np.concatenate(parts)
+        # As `scatter` does: in noise the median alone is worth a third as many differences.
+        usual = np.median(squares, axis=0) / NORMAL_MEDIAN**2
+        kept = np.where(squares <= CUT**2 * usual, squares, np.nan)
+        ratios[label] = np.maximum(1.0, np.nanmean(kept, axis=0) / LEFT)
     return Scatter(runs, ratios, freedom)
 
 
@@ -190,25 +206,34 @@ def least_probability(history: History, scatter: Scatter, tried: float) -> float
     return min(1.0, tried * min((trial.p_value for trial in each if trial is not None), default=1.0))
 
 
-def grown_residuals(history: History, histories: Sequence[History], tried: float) -> tuple[Change, ...]:
+def residual_scatter(histories: Sequence[History]) -> tuple[Array, float]:
+    """Return by what share the residual of each joint differs from date to date, shape (n,), and its degrees of freedom.
+
+    Parameters
+    ----------
+    histories : sequence of History
+        The whole fleet; at least one has two dates.
+    """
+    steps = np.concatenate([np.diff(np.log([visit.error for visit in item.visits]), axis=0) for item in histories])
+    return np.sqrt(scatter(steps, np.zeros_like(steps))), freedom_of(len(steps))
+
+
+def grown_residuals(history: History, std: Array, freedom: float, tried: float) -> tuple[Change, ...]:
     """Return the joints whose residual grew by more than it differs from date to date.
 
     Parameters
     ----------
     history : History
-    histories : sequence of History
-        The whole fleet.
+    std : ndarray, shape (n,)
+    freedom : float
+        See `residual_scatter`.
     tried : float
         See `find_changes`.
     """
     from scipy.special import stdtr
 
-    several = [np.log([visit.error for visit in item.visits]) for item in histories if len(item.dates) > 1]
-    if not several or len(history.dates) < 2:
+    if len(history.dates) < 2:
         return ()
-    steps = np.concatenate([np.diff(item, axis=0) for item in several])
-    freedom = freedom_of(len(steps))
-    std = np.sqrt(scatter(steps, np.zeros_like(steps)))
     own = np.log([visit.error for visit in history.visits])
     count, found = len(own), []
     for j, joint in enumerate(history.model.robot.joints):
@@ -249,7 +274,7 @@ def trials_of(history: History, scatter: Scatter) -> float:
     least = np.ones(SIMULATED)
     for k, cause in enumerate(history.causes):
         own = [row.directions[k] for row in rows]
-        inverse, kept = _left_of(own, basis, share)
+        inverse, _, kept = _left_of(own, basis, share)
         aims = np.array([each.T @ part for each, part in zip(own, left, strict=True)])
         along = np.einsum("sd,din->sin", share, aims)
         explained = np.einsum("sin,sij,sjn->sn", along, inverse, along)[kept]
@@ -294,16 +319,15 @@ def _best(
     own = [row.directions[k] for row in rows]
     aims = np.array([each.T @ rest for each, rest in zip(own, left, strict=True)])
     share = np.array([share for _, _, share in shapes])
-    inverse, kept = _left_of(own, basis, share)
+    inverse, told, kept = _left_of(own, basis, share)
     if not np.any(kept):
         return None
-    ratio = scatter.causes.get(cause.label, 1.0)
-    aim = share @ aims
-    value = np.einsum("sij,sj->si", inverse, aim)
-    explained = np.where(kept, np.maximum(0.0, np.sum(aim * value, axis=1)) / ratio, -1.0)
+    wider = np.sqrt(scatter.causes.get(cause.label, np.ones(cause.sizes)))
+    value = np.einsum("sij,sj->si", inverse, share @ aims)
+    explained = np.where(kept, np.einsum("si,sij,sj->s", value / wider, told, value / wider), -1.0)
     best = int(np.argmax(explained))
     p_value = float(fdtrc(cause.sizes, max(1.0, scatter.freedom), explained[best] / cause.sizes))
-    return _Trial(k, best, float(explained[best]), p_value, value[best], ratio * inverse[best])
+    return _Trial(k, best, float(explained[best]), p_value, value[best], np.outer(wider, wider) * inverse[best])
 
 
 def _without(
@@ -323,15 +347,15 @@ def _without(
     return np.split(rest - turned @ (turned.T @ rest), ends), np.split(np.hstack([known, turned]), ends)
 
 
-def _left_of(own: Sequence[Array], basis: Sequence[Array], share: Array) -> tuple[Array, Array]:
-    """Return for each shape the covariance of a cause's sizes, (S, s, s), and whether common parameters leave any of it."""
+def _left_of(own: Sequence[Array], basis: Sequence[Array], share: Array) -> tuple[Array, Array, Array]:
+    """Return for each shape the covariance of a cause's sizes, its inverse, (S, s, s), and whether anything of it is left."""
     squares = np.array([part.T @ part for part in own])
     shared = np.array([part.T @ each for part, each in zip(basis, own, strict=True)])
     taken = np.einsum("sd,drj->srj", share, shared)
     whole = np.einsum("sd,dij->sij", share**2, squares)
     matrix = whole - np.einsum("sri,srj->sij", taken, taken)
     kept = np.all(np.einsum("sii->si", matrix) > LEFT_SHARE * np.einsum("sii->si", whole), axis=1)
-    return _inverses(matrix), kept
+    return _inverses(matrix), matrix, kept
 
 
 def _inverses(matrices: Array) -> Array:
@@ -340,4 +364,4 @@ def _inverses(matrices: Array) -> Array:
     scale = size[:, :, None] * size[:, None, :]
     if matrices.shape[1] == 1:
         return np.where(matrices > np.finfo(float).tiny, 1.0 / scale, 0.0)
-    return np.asarray(np.linalg.pinv(matrices / scale, rcond=LEFT_SHARE, hermitian=True) / scale)
+    return np.asarray(pseudo_inverses(matrices / scale, LEFT_SHARE) / scale)

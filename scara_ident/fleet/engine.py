@@ -24,6 +24,8 @@ LOOK_SECONDS = 2.0
 # A piece of work that so many workers died on is given up.
 MOST_DEATHS = 3
 CONNECT_SECONDS = "10s"
+# Bytes up to which a worker of this machine holds the memory of an array for the next one, and of all of them together.
+KEPT_ARRAY, KEPT_MEMORY = 32 << 20, 128 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +128,12 @@ def started(scheduler: str | None = None, workers: int | None = None) -> Iterato
         "distributed.worker.daemon": False,
         # Else every array is asked of the system anew and given back, and every 10 ms is looked what a worker does: together
         # as much as the work.
-        "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
+        "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": KEPT_ARRAY,
+        "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": KEPT_MEMORY,
         "distributed.worker.profile.enabled": False,
+        # What a dashboard would show costs more than handing out the work.
+        "distributed.admin.system-monitor.interval": "10s",
+        "distributed.admin.tick.interval": "1s",
     }
     log = logging.getLogger("distributed")
     level = log.level

@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from scara_ident.fleet.changes import (
+    LEVEL,
     Change,
     arms_counted,
     find_changes,
     fleet_scatter,
     grown_residuals,
     least_probability,
+    residual_scatter,
     trials_of,
 )
 from scara_ident.fleet.folder import Fault, list_fleet
@@ -185,13 +187,14 @@ def changes_of(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:
         # Arms with as many dates are tried as often.
         trials = {len(item.dates): item for item in several}
         tried = {count: trials_of(item, scatter) for count, item in trials.items()}
-        arms = arms_counted([least_probability(item, scatter, tried[len(item.dates)]) for item in several])
+        least = [least_probability(item, scatter, tried[len(item.dates)]) for item in several]
+        arms, residuals = arms_counted(least), residual_scatter(several)
         found = {}
-        for item in several:
+        for item, probability in zip(several, least, strict=True):
             own = tried[len(item.dates)]
-            found[item.arm] = find_changes(item, scatter, own * arms) or grown_residuals(
-                item, several, own * len(several)
-            )
+            # Of most arms the surest change is none, and no more is asked.
+            named = find_changes(item, scatter, own * arms) if probability * arms < LEVEL else ()
+            found[item.arm] = named or grown_residuals(item, *residuals, own * len(several))
         return found
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from hashlib import blake2b
 from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from scara_ident.errors import RecordingError, UsageError
@@ -174,8 +175,8 @@ def content_key(url: str) -> str:
     return f"{fs.checksum(path)}-{fs.size(path)}"
 
 
-def fetched(url: str, folder: Path) -> Path:
-    """Return a file as one on this machine's disk, copied into a folder if it is elsewhere.
+def fetched(url: str, copies: ExitStack) -> Path:
+    """Return a file as one on this machine's disk; what is elsewhere is copied, and the copy goes with the stack.
 
     Raises
     ------
@@ -185,7 +186,8 @@ def fetched(url: str, folder: Path) -> Path:
     fs, path = file_system(url)
     if _is_local(fs):
         return Path(path)
-    copy = folder / PurePosixPath(path).name
+    # A folder of its own: files of several places may have one name.
+    copy = Path(copies.enter_context(TemporaryDirectory())) / PurePosixPath(path).name
     fs.get_file(path, str(copy))
     return copy
 

@@ -95,6 +95,11 @@ class History:
         return causes_of(self.model, self.scene, watched(self.scene), first.columns, first.std)
 
     @cached_property
+    def _effect_columns(self) -> int:
+        """Columns of the watched effects, between the model's and those of the delays."""
+        return sum(cause.sizes for cause in self.causes if cause.candidate is not None)
+
+    @cached_property
     def rows(self) -> tuple[DateRows, ...]:
         """What each date says, in units of the noise."""
         return tuple(self._rows(visit) for visit in self.visits)
@@ -121,8 +126,7 @@ class History:
         return tuple(row.whitened(std) for row in self.rows)
 
     def _rows(self, visit: Visit) -> DateRows:
-        effects = watched(self.scene)
-        count = sum(len(item.effect.columns(self.scene, item.member)) for item in effects)
+        count = self._effect_columns
         total = len(self.model.columns) + count + self.model.robot.n
         runs = run_directions(self.model, self.scene.value, visit.columns, count)
         columns, torque, along = [], [], []
@@ -226,13 +230,24 @@ def noise_of(factor: Array, rows: float) -> float:
     return float(abs(factor[known, known]) / np.sqrt(rows - known))
 
 
+def pseudo_inverses(matrices: Array, share: float) -> Array:
+    """Return the pseudo-inverses of symmetric matrices, shape (N, k, k), without eigenvalues below a share of the largest.
+
+    As NumPy's of Hermitian matrices, without its sorting, which takes as long as small ones do.
+    """
+    values, vectors = np.linalg.eigh(matrices)
+    told = np.abs(values) > share * np.max(np.abs(values), axis=1, keepdims=True)
+    inverse = np.where(told, 1.0 / np.where(told, values, 1.0), 0.0)
+    return np.asarray((vectors * inverse[:, None, :]) @ np.swapaxes(vectors, 1, 2))
+
+
 def _inverse(matrix: Array) -> Array:
     size = np.sqrt(np.diag(matrix))
     entering = size > 0.0
     result = np.zeros_like(matrix)
     if np.any(entering):
-        scaled = matrix[np.ix_(entering, entering)] / np.outer(size[entering], size[entering])
-        result[np.ix_(entering, entering)] = np.linalg.pinv(scaled, rcond=1e-10, hermitian=True) / np.outer(
-            size[entering], size[entering]
+        units = np.outer(size[entering], size[entering])
+        result[np.ix_(entering, entering)] = (
+            pseudo_inverses((matrix[np.ix_(entering, entering)] / units)[None], UNDETERMINED)[0] / units
         )
     return result

@@ -6,6 +6,7 @@ import json
 import zipfile
 from dataclasses import asdict, dataclass
 from hashlib import blake2b
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -40,10 +41,12 @@ class Store:
 
     def put_visit(self, key: str, visit: Visit) -> None:
         """Hold what an arm showed on a date, whole or not at all."""
+        # In memory first: the archive is put together in many small steps, which on disk take long.
+        archive = BytesIO()
+        np.savez(archive, **_arrays(visit))
 
         def write(place: Path) -> None:
-            with place.open("wb") as file:
-                np.savez(file, **_arrays(visit))
+            place.write_bytes(archive.getvalue())
 
         write_whole(self.folder / f"{key}.npz", write)
 

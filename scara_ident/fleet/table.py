@@ -12,7 +12,7 @@ from scara_ident.estimation.information import triangular
 from scara_ident.fleet.causes import sizes_in_words
 from scara_ident.fleet.changes import Change
 from scara_ident.fleet.folder import Fault
-from scara_ident.fleet.history import History, noise_of, scatter
+from scara_ident.fleet.history import History, noise_of, pseudo_inverses, scatter
 from scara_ident.fleet.visit import Visit
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ def _watched(history: History, visit: Visit) -> Iterator[Quantity]:
             for name, item in nothing.items():
                 yield Quantity(f"{name}: {cause.label}", cause.joint, item.unit, np.nan, np.inf, cause.label)
             continue
-        covariance = np.asarray(np.linalg.pinv(columns.T @ columns, hermitian=True), dtype=float)
+        covariance = pseudo_inverses((columns.T @ columns)[None], np.finfo(float).eps)[0]
         value = covariance @ (columns.T @ left[:, -1])
         for name, item in sizes_in_words(cause, history.scene, value, covariance).items():
             yield Quantity(f"{name}: {cause.label}", cause.joint, item.unit, item.value, item.std, cause.label)

@@ -6,12 +6,11 @@ This is what a process of the fleet does. A recording goes in; what comes out is
 from __future__ import annotations
 
 import pickle
-import tempfile
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import groupby
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,12 +159,10 @@ def read_files(robot: Robot, files: Sequence[RecordingFile]) -> tuple[list[Recor
     """Read recordings; those that cannot be used are faults."""
     found: dict[str, Recording] = {}
     faults = []
-    with tempfile.TemporaryDirectory() as folder:
-        for k, file in enumerate(files):
+    with ExitStack() as copies:
+        for file in files:
             try:
-                place = Path(folder) / str(k)
-                place.mkdir()
-                recording = read_recording(fetched(file.url, place), robot)
+                recording = read_recording(fetched(file.url, copies), robot)
             except (ScaraIdentError, OSError) as error:
                 passing = isinstance(error, OSError)
                 faults.append(Fault(file.arm, file.date, file.place, _why(error), passing))

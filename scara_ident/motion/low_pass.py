@@ -76,7 +76,8 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int, wei
     reach, lead = folding.reach, folding.lead
     kept, low = folding.of_chord.shape[1], folding.closed // step
     result = np.empty((len(signal), kept))
-    buffer = np.zeros((min(ROWS_AT_ONCE, len(signal)), folding.closed))
+    buffer = np.empty((min(ROWS_AT_ONCE, len(signal)), folding.closed))
+    buffer[:, : lead - reach] = buffer[:, lead + count + reach :] = 0.0
     whole = np.empty((len(buffer), folding.closed // 2 + 1), dtype=complex)
     for begin in range(0, len(signal), ROWS_AT_ONCE):
         rows = signal[begin : begin + ROWS_AT_ONCE]

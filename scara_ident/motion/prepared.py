@@ -169,7 +169,8 @@ class PreparedStretch:
         def passed(places: list[int]) -> list[Array]:
             joints = [signals[place][0] for place in places]
             step, band = keys[places[0]]
-            low = low_pass_every(np.array([signals[place][1] for place in places]), self.rate, band, step, fade[joints])
+            weight = fade[joints] if len(set(joints)) > 1 else fade[joints[0]]
+            low = low_pass_every(np.array([signals[place][1] for place in places]), self.rate, band, step, weight)
             return [np.sqrt(step) * row[kept[joint] // step] for joint, row in zip(joints, low, strict=True)]
 
         made = side_by_side(passed, parts) if len(parts) > 1 else [passed(places) for places in parts]

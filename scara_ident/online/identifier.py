@@ -201,19 +201,19 @@ class OnlineIdentifier:
     @property
     def determined(self) -> bool:
         """Whether every parameter is known."""
-        return self._now().determined()
+        return self._now().determined
 
     @property
     def value(self) -> Array:
         """The parameters with all samples so far, shape (p,); NaN as long as one of them is undetermined."""
         now = self._now()
-        return now.value() if now.determined() else np.full(now.parameters, np.nan)
+        return now.value() if now.determined else np.full(now.parameters, np.nan)
 
     @property
     def covariance(self) -> Array:
         """Their covariance, shape (p, p); infinite as long as one of them is undetermined."""
         now = self._now()
-        if not now.determined():
+        if not now.determined:
             return np.full((now.parameters, now.parameters), np.inf)
         half = np.linalg.inv(now.factor[:, :-1])
         return np.asarray(self._scale * (half @ half.T))
@@ -313,7 +313,7 @@ class OnlineIdentifier:
             rows = np.concatenate(each)
             old = self._memory.forgotten(self._keep, rows, self.settings.forgetting)
             new = old.absorbed(rows)
-            alarm = self._innovated(old, new, each, moving) if moving and old.determined() else None
+            alarm = self._innovated(old, new, each, moving) if moving and old.determined else None
         self._memory = new
         self._samples += self._filled
         self._filled = 0
@@ -323,14 +323,12 @@ class OnlineIdentifier:
 
     def _innovated(self, old: Memory, new: Memory, each: Sequence[Array], moving: int) -> Alarm | None:
         """Take the innovations of a block into the noise and the averages, and look for a change."""
-        from scipy.linalg import solve_triangular
-
         value = old.value()
         parts = [rows[:, :-1] for rows in each]
         columns, torque = np.concatenate(parts), np.concatenate([rows[:, -1] for rows in each])
         left = np.column_stack([torque - columns @ value, self._suspects.torques(parts, value)])
         # With V = 1 + A P A', x' V^-1 y = x' y - (A' x)' (P^-1 + A' A)^-1 (A' y), and the sum is the new memory's square.
-        known = solve_triangular(new.factor[:, :-1], columns.T @ left, trans="T", check_finite=False)
+        known = new.solved(left.T @ columns)
         products = left.T @ left - known.T @ known
         scale = self._scale
         fade = max(0.0, 1.0 - moving / NOISE_SAMPLES)

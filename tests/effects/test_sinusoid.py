@@ -7,9 +7,10 @@ import pytest
 
 from scara_ident.effects import Member
 from scara_ident.effects.periodic import TorqueRipple
-from scara_ident.effects.sinusoid import amplitude_and_phase, least_amplitude, sine_and_cosine
+from scara_ident.effects.signals import Signals
+from scara_ident.effects.sinusoid import amplitude_and_phase, least_amplitude, sine_and_cosine, sines
 from scara_ident.robot.robot import load_robot
-from tests.effects.scenes import scene_of
+from tests.effects.scenes import moving, scene_of
 
 
 def test_amplitude_and_phase_have_the_deviations_of_a_sample():
@@ -42,3 +43,13 @@ def test_both_coefficients_are_named_and_reported_in_the_unit_of_the_columns():
 
 def test_an_amplitude_is_believed_two_deviations_smaller():
     assert least_amplitude(np.array([3.0, 4.0]), np.array([0.1, 0.2])) == pytest.approx(4.6)
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.5, 12.0])
+def test_sines_of_whole_and_other_orders_are_those_of_the_angle(order: float):
+    scene = scene_of(load_robot(), name="basic")
+    motion = moving(scene.robot, duration=5.0)
+    turns = scene.robot.reduction[1] * motion.q[1]
+    found = sines(Signals(scene, motion), 1, order)
+    # Rounding of an angle of some hundred rad.
+    assert np.allclose(found, [np.sin(order * turns), np.cos(order * turns)], rtol=0.0, atol=1e-11)

@@ -7,8 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.fleet.changes import LEVEL, find_changes, fleet_scatter, grown_residuals, trials_of
-from scara_ident.fleet.history import with_dates
+from scara_ident.fleet.changes import (
+    LEVEL,
+    _best,
+    find_changes,
+    fleet_scatter,
+    grown_residuals,
+    residual_scatter,
+    trials_of,
+)
+from scara_ident.fleet.history import common_removed, with_dates
 from tests.fleet.made import DATES, WEAR, WORN
 
 
@@ -52,10 +60,10 @@ def test_a_residual_that_grew_is_named_where_no_cause_is(histories):
     )
     grown = replace(arm, visits=worse)
     tried = 400.0
-    (found,) = grown_residuals(grown, [grown, *histories[1:]], tried)
+    (found,) = grown_residuals(grown, *residual_scatter([grown, *histories[1:]]), tried)
     assert found.cause is None and found.joint == "joint2" and found.since == DATES[3]
     np.testing.assert_allclose(found.size[0], 3.0, rtol=0.3)
-    assert grown_residuals(histories[3], histories, tried) == ()
+    assert grown_residuals(histories[3], *residual_scatter(histories), tried) == ()
 
 
 def test_the_tests_of_an_arm_are_worth_fewer_than_they_are_many_and_more_dates_ask_for_more(histories, noise):
@@ -63,3 +71,21 @@ def test_the_tests_of_an_arm_are_worth_fewer_than_they_are_many_and_more_dates_a
     shapes = 2 * len(arm.dates) - 3
     few, many = trials_of(with_dates(arm, 2), noise), trials_of(arm, noise)
     assert 5.0 < few < many < shapes * len(arm.causes)
+
+
+def test_what_dates_differ_by_in_one_size_widens_that_one_only(histories, noise):
+    arm = histories[0]
+    k, cause = next((k, item) for k, item in enumerate(arm.causes) if item.sizes == 2)
+    assert noise.causes[cause.label].shape == (2,) and np.all(noise.causes[cause.label] >= 1.0)
+    rows = arm.whitened(noise.runs)
+    left, basis = common_removed(rows)
+    step = [(1, False, (np.arange(len(rows)) >= 1).astype(float))]
+    ratios = [np.ones(2), np.array([1.0, 25.0])]
+    even, uneven = (
+        _best(k, cause, rows, left, basis, step, replace(noise, causes={cause.label: ratio})) for ratio in ratios
+    )
+    assert even is not None and uneven is not None
+    np.testing.assert_allclose(uneven.covariance, even.covariance * np.array([[1.0, 5.0], [5.0, 25.0]]))
+    for trial in (even, uneven):
+        expected = trial.size @ np.linalg.solve(trial.covariance, trial.size)
+        np.testing.assert_allclose(trial.explained, expected, rtol=1e-6)

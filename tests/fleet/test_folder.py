@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import os
+from contextlib import ExitStack
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -82,4 +83,5 @@ def test_a_key_is_that_of_the_content(tmp_path: Path):
     assert keys[0] == keys[1] != keys[2]
     with pytest.raises(OSError):
         content_key(str(tmp_path / "none"))
-    assert fetched(str(tmp_path / "a"), tmp_path) == tmp_path / "a"
+    with ExitStack() as copies:
+        assert fetched(str(tmp_path / "a"), copies) == tmp_path / "a"

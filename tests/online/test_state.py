@@ -13,12 +13,12 @@ def rows(seed: int, count: int = 40, parameters: int = 4) -> np.ndarray:
 
 def test_what_was_absorbed_in_parts_is_least_squares_of_all():
     memory = Memory.empty(4)
-    assert not memory.determined()
+    assert not memory.determined
     memory = memory.absorbed(rows(0)[:2])
-    assert not memory.determined() and memory.factor.shape == (4, 5)
+    assert not memory.determined and memory.factor.shape == (4, 5)
     memory = memory.absorbed(rows(0)[2:]).absorbed(rows(1))
     table = np.vstack([rows(0), rows(1)])
-    assert memory.determined()
+    assert memory.determined
     np.testing.assert_allclose(memory.value(), np.linalg.lstsq(table[:, :-1], table[:, -1], rcond=None)[0], rtol=1e-12)
 
 
