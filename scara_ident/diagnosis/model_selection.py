@@ -64,6 +64,8 @@ class Outcome:
     dependences : tuple of Dependence
         What the remainder depends on, ranked.
     unexplained : Unexplained or None
+    repeating : frozenset of str
+        Joints on which more repeats than noise, however small beside the torque, or of however few moments.
     demoted : tuple of Decision
         On effects that were found and are not believed, with why.
     """
@@ -76,6 +78,7 @@ class Outcome:
     fit_after: tuple[LackOfFit, ...]
     dependences: tuple[Dependence, ...]
     unexplained: Unexplained | None
+    repeating: frozenset[str]
     demoted: tuple[Decision, ...] = ()
 
 
@@ -136,7 +139,8 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     # What is spread evenly over frequency is no motion's doing even where it repeats: an encoder's steps do, and what a
     # controller makes of them.
     coloured = dict(zip(joints, coloured_shares(left) > criteria.least_colour, strict=True))
-    repeating = [fit for fit in fit_after if coloured[fit.joint] and _left_over(fit, criteria)]
+    standing_out = [fit for fit in fit_after if coloured[fit.joint] and _above_noise(fit, criteria)]
+    repeating = [fit for fit in standing_out if fit.p_value < criteria.significant]
     depending = [
         item for item in dependences if item.p_value < criteria.significant and item.explained > least[item.joint]
     ]
@@ -148,7 +152,8 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
         repeating = [fit for fit in repeating if fit.missing > large[fit.joint]]
         depending = [item for item in depending if item.rms > large[item.joint]]
     unexplained = _unexplained(repeating, depending, criteria)
-    return Outcome(found, after, training, residuals, lack_of_fit(before), fit_after, dependences, unexplained)
+    names, fit_before = frozenset(fit.joint for fit in standing_out), lack_of_fit(before)
+    return Outcome(found, after, training, residuals, fit_before, fit_after, dependences, unexplained, names)
 
 
 def _unexplained(
@@ -172,8 +177,8 @@ def _unexplained(
     return None
 
 
-def _left_over(fit: LackOfFit, criteria: SelectionCriteria) -> bool:
-    return fit.missing > criteria.remainder_to_noise * fit.noise and fit.p_value < criteria.significant
+def _above_noise(fit: LackOfFit, criteria: SelectionCriteria) -> bool:
+    return fit.missing > criteria.remainder_to_noise * fit.noise
 
 
 def _band(found: Outcome) -> float:
@@ -201,11 +206,12 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
 
 def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
     """Return the decisions on effects that remove little of a remainder most of which stays, with why."""
-    if found.unexplained is None or not found.fit_after:
+    # Not to believe an effect less is asked than to say that something is left: it may stand for what is too small, too.
+    left = found.repeating | ({found.unexplained.joint} if found.unexplained else set())
+    if not left or not found.fit_after:
         return []
     joints = found.search.base.robot.joints
     noise = {fit.joint: fit.noise for fit in found.fit_after}
-    left = {fit.joint for fit in found.fit_after if _left_over(fit, criteria)} | {found.unexplained.joint}
     proxies = []
     before = rms_of(found.search.start.value, found.search.uncorrected)
     for step in found.search.steps:
