@@ -16,10 +16,11 @@ from scara_ident.diagnosis.evidence import coloured_shares
 from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
 from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, SearchTask, search
-from scara_ident.diagnosis.selection_step import observed_at_every_sample
+from scara_ident.diagnosis.selection_step import observed, observed_at_every_sample
 from scara_ident.diagnosis.work import first, next_of, search_and_rest
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.bands import choose_bands
+from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
@@ -210,15 +211,22 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
     left = found.repeating | ({found.unexplained.joint} if found.unexplained else set())
     if not left or not found.fit_after:
         return []
-    joints = found.search.base.robot.joints
+    search = found.search
+    joints = search.base.robot.joints
     noise = {fit.joint: fit.noise for fit in found.fit_after}
     proxies = []
-    before = rms_of(found.search.start.value, found.search.uncorrected)
-    for step in found.search.steps:
-        after = step.rms
-        owner = step.decision.candidate.joint(found.search.scene)
+    before, whole = rms_of(search.start.value, search.uncorrected), rms_of(found.after.value, found.training)
+    labels = [item.label(search.scene) for item in search.chosen]
+    for step in search.steps:
+        after, decision = step.rms, step.decision
+        old_rms, new_rms = before, after
+        if decision.label in labels:
+            # Beside all others, of which those that came later may have removed what was left when it came in.
+            fitted = observed(search.step.without(labels.index(decision.label)))
+            old_rms, new_rms = rms_of(value_and_weights(fitted)[0], fitted), whole
+        owner = decision.candidate.joint(search.scene)
         repeats = removed = 0.0
-        for joint, old, new in zip(joints, before, after, strict=True):
+        for joint, old, new in zip(joints, old_rms, new_rms, strict=True):
             if joint in noise and owner in (joint, None) and old is not None and new is not None:
                 repeats += (old / noise[joint]) ** 2 - 1.0
                 removed += (old**2 - new**2) / noise[joint] ** 2
@@ -226,7 +234,7 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
         if (owner is None or owner in left) and removed < criteria.least_of_repeatable * repeats:
             share = max(0.0, removed / repeats)
             why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"
-            proxies.append(step.decision.refused(why))
+            proxies.append(decision.refused(why))
     return proxies
 
 

@@ -16,7 +16,7 @@ from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.estimation.run_variation import ASSUMED_DELAY, LEAST_RUNS, RunVariation, assumed_delays, run_variation
 
 
-def variation_objection(step: SelectionStep, decision: Decision) -> str | None:
+def variation_objection(step: SelectionStep, decision: Decision, least_gain: float = 0.0) -> str | None:
     """Say so where an effect is not significant, or removes too little, beside what runs differ by.
 
     That is what they differ by with the effect in the model, for without it they seem to differ more. Only of an effect
@@ -28,6 +28,8 @@ def variation_objection(step: SelectionStep, decision: Decision) -> str | None:
         The model that the candidate was tried beside.
     decision : Decision
         That lets it in.
+    least_gain : float, optional
+        What it must remove there. While others are missing runs seem to differ more, and nothing is asked.
     """
     found = decision.examination
     (own,) = step.columns.rows(step.scene, [decision.candidate])
@@ -53,8 +55,8 @@ def variation_objection(step: SelectionStep, decision: Decision) -> str | None:
     tried = 1 if decision.candidate.corrects_data else step.tried
     if again.p_value * tried > step.criteria.family_error:
         return f"{why} p = {again.p_value:.1e}"
-    if gain < step.criteria.least_gain and not decision.candidate.corrects_data:
-        return f"{why} it removes {max(gain, 0.0):.1%} of the squared residual, {step.criteria.least_gain:.0%} is asked"
+    if gain < least_gain and not decision.candidate.corrects_data:
+        return f"{why} it removes {max(gain, 0.0):.1%} of the squared residual, {least_gain:.0%} is asked"
     return None
 
 

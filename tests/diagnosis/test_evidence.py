@@ -63,7 +63,12 @@ def test_one_short_run_cannot_tell():
 
 def test_what_does_not_hold_on_other_recordings_is_not_shown():
     shown = (Evidence("joint1", True, "whiteness", "", 0.1), Evidence("joint2", True, "whiteness", "", 0.1))
-    found = held_out_evidence(shown, (1.0, 1.0), (1.4, 1.6))
+    sure = np.zeros(2)
+    found = held_out_evidence(shown, (1.0, 1.0), (1.4, 1.6), sure)
     assert [item.shown for item in found] == [True, False]
     assert "1.6 times" in found[1].why
-    assert held_out_evidence(shown, (1.0, 1.0), (None, None)) == shown
+    assert held_out_evidence(shown, (1.0, 1.0), (None, None), sure) == shown
+    # What parameters that are not sure make there speaks against no model, and is said.
+    found = held_out_evidence(shown, (1.0, 1.0), (1.4, 6.0), np.array([0.0, 6.0]))
+    assert all(item.shown for item in found)
+    assert "6 times" in found[1].why
