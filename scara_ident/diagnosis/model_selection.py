@@ -59,7 +59,7 @@ class Outcome:
     training : Observations
         Of the training recordings, as corrected, with the effects found.
     residuals : Residuals
-        What is left of them.
+        What is left of them, without what runs differ by.
     fit_before, fit_after : tuple of LackOfFit
         Per joint; empty without repetitions.
     dependences : tuple of Dependence
@@ -129,8 +129,6 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     before, left = found.uncorrected.residuals(found.start.value), training.residuals(after.value)
     joints, criteria = task.model.robot.joints, task.criteria
     least = dict.fromkeys(joints, criteria.remainder)
-    # Runs may seem to differ where the model explains one motion better than another: nothing is shown to be noise by that.
-    residuals = left
     if after.variation:
         # What a run differs by from the others is no remainder of the model; of second order something of it is left.
         deviations = after.variation.deviations(training, after.value)
@@ -154,7 +152,7 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
         depending = [item for item in depending if item.rms > large[item.joint]]
     unexplained = _unexplained(repeating, depending, criteria)
     names, fit_before = frozenset(fit.joint for fit in standing_out), lack_of_fit(before)
-    return Outcome(found, after, training, residuals, fit_before, fit_after, dependences, unexplained, names)
+    return Outcome(found, after, training, left, fit_before, fit_after, dependences, unexplained, names)
 
 
 def _unexplained(
