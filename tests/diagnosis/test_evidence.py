@@ -10,11 +10,13 @@ from scipy.signal import lfilter
 
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import diagnose
-from scara_ident.diagnosis.evidence import Evidence, coloured_shares, held_out_evidence
+from scara_ident.diagnosis.evidence import Evidence, coloured_shares, held_out_evidence, unsure_of_others
+from scara_ident.estimation import wls
+from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.motion.prepared import prepare
 from scara_ident.robot.robot import load_robot
-from tests.diagnosis.made import BANDS, exact_runs, virtual_runs
+from tests.diagnosis.made import BANDS, exact_runs, observed, virtual_runs
 
 
 def left_of(noise: np.ndarray) -> np.ndarray:
@@ -59,6 +61,17 @@ def test_one_short_run_cannot_tell():
     assert result.verdict == "undecided"
     assert not result.effects
     assert any("would not have been significant" in item.why for item in result.evidence)
+
+
+def test_what_a_right_model_lacks_on_others_is_what_its_parameters_make_there():
+    first, second = (observed(exact_runs()[k : k + 1]) for k in (0, 2))
+    after = wls(first)
+    expected = []
+    for rows in second.joints:
+        columns, covariance = rows.table[:-1], after.covariance[np.ix_(rows.columns, rows.columns)]
+        expected.append(np.einsum("kn,kl,ln->", columns, covariance, columns) / np.sum(rows.counts))
+    square = unsure_of_others(after, second) ** 2 - noise_torque(second, after.value) ** 2
+    assert square == pytest.approx(np.array(expected), rel=1e-6)
 
 
 def test_what_does_not_hold_on_other_recordings_is_not_shown():
