@@ -120,6 +120,7 @@ def _compared(result: Diagnosis, made: VirtualSet, was: Item) -> Item:
         ],
         "corrected": _corrected(result),
         "events": told.get("events", []),
+        "not_shown": {item.joint: item.why for item in result.evidence if not item.shown},
         "unexplained": told["unexplained"] and told["unexplained"]["joint"],
         "band": list(told["band_hz"].values()),
         "noise": told["noise_floor"],

@@ -39,7 +39,8 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         why = why or uncertain(own, decision.examination, essential, least)
         small = candidate.effect.negligible(step.scene, candidate.member, own.at_least(least))
         why = why or (small and f"within its uncertainty {small}")
-        why = why or noise_objection(beside, decision) or variation_objection(beside, decision)
+        why = why or noise_objection(beside, decision)
+        why = why or variation_objection(beside, decision, step.criteria.least_gain)
         if why is not None:
             result.append(decision.refused(why))
     return result

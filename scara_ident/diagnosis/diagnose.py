@@ -14,7 +14,7 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
-from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
+from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence, unsure_of_others
 from scara_ident.diagnosis.found_effect import (
     FoundEffect,
     direct_readings,
@@ -261,10 +261,12 @@ def diagnose(
     events += in_held_out
     notes += [event.sentence(robot) for event in events]
     log_notes(_LOG, notes)
+    undisturbed = without_stretches(validation_after, in_held_out)
     shown = held_out_evidence(
         evidence(found, outcome.residuals, outcome.fit_after, outcome.small, criteria),
         rms_of(after.value, outcome.training),
-        rms_of(after.value, without_stretches(validation_after, in_held_out)),
+        rms_of(after.value, undisturbed),
+        unsure_of_others(after, undisturbed),
         criteria,
     )
     verdict = _verdict(outcome.unexplained is not None, bool(effects), shown)

@@ -16,7 +16,10 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.search import Search
+from scara_ident.estimation import Estimate
 from scara_ident.estimation.bands import binned_power
+from scara_ident.estimation.noise_bias import noise_torque
+from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
 
 # Bins of frequency within the band that a residual's power is compared in.
@@ -109,6 +112,7 @@ def held_out_evidence(
     shown: Sequence[Evidence],
     training: Sequence[float | None],
     held_out: Sequence[float | None],
+    unsure: Array,
     criteria: SelectionCriteria = CRITERIA,
 ) -> tuple[Evidence, ...]:
     """Take back what the training recordings showed where the model does not hold on others.
@@ -118,15 +122,46 @@ def held_out_evidence(
     shown : sequence of Evidence
     training, held_out : sequence of float or None
         Rms error of each joint; None without rows.
+    unsure : ndarray, shape (n,)
+        Rms error on the recordings held out that a right model has there, see `unsure_of_others`.
     criteria : SelectionCriteria, optional
     """
     found = []
-    for item, own, other in zip(shown, training, held_out, strict=True):
+    for item, own, other, known in zip(shown, training, held_out, unsure, strict=True):
         if item.shown and own and other is not None and other > criteria.worse_held_out * own:
             why = f"the error on the recordings held out is {other / own:.2g} times that of the training"
-            item = replace(item, shown=False, by="", why=why)
+            if other > np.hypot(criteria.worse_held_out * own, known):
+                item = replace(item, shown=False, by="", why=why)
+            else:
+                item = replace(item, why=f"{item.why}; {why}, as unsure as the parameters are there")
         found.append(item)
     return tuple(found)
+
+
+def unsure_of_others(after: Estimate, held_out: Observations) -> Array:
+    """Return the rms error of a right model on recordings held out that training's residual does not have.
+
+    It is made by the uncertainty of the parameters, which those recordings may excite more, and by the noise of the
+    positions there. Of parameters that the training leaves open nothing is counted.
+
+    Parameters
+    ----------
+    after : Estimate
+    held_out : Observations
+        Of the same model.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    known = np.isfinite(np.diag(after.covariance))
+    covariance = np.where(np.outer(known, known), after.covariance, 0.0)
+    square = noise_torque(held_out, after.value) ** 2
+    for joint, rows in enumerate(held_out.by_joint):
+        if rows.rows:
+            factor = rows.regressor_factor
+            square[joint] += max(0.0, float(np.sum((factor @ covariance) * factor))) / rows.rows
+    return np.asarray(np.sqrt(square))
 
 
 def detection_limits(found: Search, criteria: SelectionCriteria = CRITERIA) -> Array:

@@ -27,6 +27,8 @@ from scara_ident.estimation.residuals import Residuals
 POINTS_PER_WIDTH = 3.0
 # Line width over the lowest order from which on its neighbours, that give the noise floor, reach down to order zero.
 COARSEST_WIDTH = 0.3
+# A line in time may be so many bands high: the low-pass leaves a 257th of it there, which noise may be smaller than.
+ABOVE_BAND = 2.0
 # Highest over lowest frequency below which the range holds too few neighbours for a noise floor.
 NARROWEST_RANGE = 3.0
 
@@ -63,9 +65,14 @@ def line_candidates(
         rate, band = rates[0], residuals.data.bands[j]
         white = whitened(pieces, rate, highest=band)
         order = _strongest_order(white, turns, criteria)
-        frequency = _strongest_frequency(white, rate, band or HIGHEST_FREQUENCY_SHARE * rate, criteria)
         strongest = [] if order is None else [SpectralLine("order", order)]
-        strongest += [] if frequency is None else [SpectralLine("frequency", frequency)]
+        highest = HIGHEST_FREQUENCY_SHARE * rate
+        within = _strongest_frequency(white, rate, (0.0, band or highest), criteria)
+        strongest += [] if within is None else [SpectralLine("frequency", within)]
+        if band is not None and band < highest:
+            reach = min(ABOVE_BAND * band, highest)
+            above = _strongest_frequency(whitened(pieces, rate, highest=reach), rate, (band, reach), criteria)
+            strongest += [] if above is None else [SpectralLine("frequency", above)]
         found += [
             Candidate(effect, member)
             for line in strongest
@@ -86,24 +93,24 @@ def _strongest_order(residuals: Sequence[Array], turns: Sequence[Array], criteri
 
 
 def _strongest_frequency(
-    residuals: Sequence[Array], rate: float, highest: float, criteria: SelectionCriteria
+    residuals: Sequence[Array], rate: float, reach: tuple[float, float], criteria: SelectionCriteria
 ) -> float | None:
+    """Return the strongest line between two frequencies, Hz."""
     width = frequency_width(residuals, rate)
-    lowest = criteria.least_line_periods * 0.5 * width
+    lowest, highest = criteria.least_line_periods * 0.5 * width, reach[1]
     if highest < NARROWEST_RANGE * lowest:
         return None
     frequencies = np.arange(lowest, highest, width / POINTS_PER_WIDTH)
     power = frequency_spectrum(residuals, rate, frequencies)
-    return _strongest(
-        lines(
-            frequencies,
-            power,
-            width,
-            degrees=2 * len(residuals),
-            neighbours=NEIGHBOURS_IN_TIME,
-            significance=criteria.line_significance,
-        )
+    found = lines(
+        frequencies,
+        power,
+        width,
+        degrees=2 * len(residuals),
+        neighbours=NEIGHBOURS_IN_TIME,
+        significance=criteria.line_significance,
     )
+    return _strongest([line for line in found if line.position >= reach[0]])
 
 
 def _strongest(found: Sequence[Line]) -> float | None:

@@ -16,10 +16,11 @@ from scara_ident.diagnosis.evidence import coloured_shares
 from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
 from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, SearchTask, search
-from scara_ident.diagnosis.selection_step import observed_at_every_sample
+from scara_ident.diagnosis.selection_step import observed, observed_at_every_sample
 from scara_ident.diagnosis.work import first, next_of, search_and_rest
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.bands import choose_bands
+from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
@@ -58,7 +59,7 @@ class Outcome:
     training : Observations
         Of the training recordings, as corrected, with the effects found.
     residuals : Residuals
-        What is left of them.
+        What is left of them, without what runs differ by.
     fit_before, fit_after : tuple of LackOfFit
         Per joint; empty without repetitions.
     dependences : tuple of Dependence
@@ -66,6 +67,8 @@ class Outcome:
     unexplained : Unexplained or None
     small : tuple of float
         What is too small on each joint to be called a remainder, where one is significant; 0 elsewhere. N m or N.
+    repeating : frozenset of str
+        Joints on which more repeats than noise, however small beside the torque, or of however few moments.
     demoted : tuple of Decision
         On effects that were found and are not believed, with why.
     """
@@ -79,6 +82,7 @@ class Outcome:
     dependences: tuple[Dependence, ...]
     unexplained: Unexplained | None
     small: tuple[float, ...]
+    repeating: frozenset[str]
     demoted: tuple[Decision, ...] = ()
 
 
@@ -128,8 +132,6 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     before, left = found.uncorrected.residuals(found.start.value), training.residuals(after.value)
     joints, criteria = task.model.robot.joints, task.criteria
     least = dict.fromkeys(joints, criteria.remainder)
-    # Runs may seem to differ where the model explains one motion better than another: nothing is shown to be noise by that.
-    residuals = left
     if after.variation:
         # What a run differs by from the others is no remainder of the model; of second order something of it is left.
         deviations = after.variation.deviations(training, after.value)
@@ -139,7 +141,8 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     # What is spread evenly over frequency is no motion's doing even where it repeats: an encoder's steps do, and what a
     # controller makes of them.
     coloured = dict(zip(joints, coloured_shares(left) > criteria.least_colour, strict=True))
-    repeating = [fit for fit in fit_after if coloured[fit.joint] and _left_over(fit, criteria)]
+    standing_out = [fit for fit in fit_after if coloured[fit.joint] and _above_noise(fit, criteria)]
+    repeating = [fit for fit in standing_out if fit.p_value < criteria.significant]
     depending = [
         item for item in dependences if item.p_value < criteria.significant and item.explained > least[item.joint]
     ]
@@ -152,8 +155,9 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     repeating = [fit for fit in repeating if fit.missing > least_rms[fit.joint]]
     depending = [item for item in depending if item.rms > least_rms[item.joint]]
     unexplained = _unexplained(repeating, depending, criteria)
+    names, fit_before = frozenset(fit.joint for fit in standing_out), lack_of_fit(before)
     return Outcome(
-        found, after, training, residuals, lack_of_fit(before), fit_after, dependences, unexplained, tuple(small)
+        found, after, training, left, fit_before, fit_after, dependences, unexplained, tuple(small.tolist()), names
     )
 
 
@@ -178,8 +182,8 @@ def _unexplained(
     return None
 
 
-def _left_over(fit: LackOfFit, criteria: SelectionCriteria) -> bool:
-    return fit.missing > criteria.remainder_to_noise * fit.noise and fit.p_value < criteria.significant
+def _above_noise(fit: LackOfFit, criteria: SelectionCriteria) -> bool:
+    return fit.missing > criteria.remainder_to_noise * fit.noise
 
 
 def _band(found: Outcome) -> float:
@@ -207,18 +211,26 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
 
 def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
     """Return the decisions on effects that remove little of a remainder most of which stays, with why."""
-    if found.unexplained is None or not found.fit_after:
+    # Not to believe an effect less is asked than to say that something is left: it may stand for what is too small, too.
+    left = found.repeating | ({found.unexplained.joint} if found.unexplained else set())
+    if not left or not found.fit_after:
         return []
-    joints = found.search.base.robot.joints
+    search = found.search
+    joints = search.base.robot.joints
     noise = {fit.joint: fit.noise for fit in found.fit_after}
-    left = {fit.joint for fit in found.fit_after if _left_over(fit, criteria)} | {found.unexplained.joint}
     proxies = []
-    before = rms_of(found.search.start.value, found.search.uncorrected)
-    for step in found.search.steps:
-        after = step.rms
-        owner = step.decision.candidate.joint(found.search.scene)
+    before, whole = rms_of(search.start.value, search.uncorrected), rms_of(found.after.value, found.training)
+    labels = [item.label(search.scene) for item in search.chosen]
+    for step in search.steps:
+        after, decision = step.rms, step.decision
+        old_rms, new_rms = before, after
+        if decision.label in labels:
+            # Beside all others, of which those that came later may have removed what was left when it came in.
+            fitted = observed(search.step.without(labels.index(decision.label)))
+            old_rms, new_rms = rms_of(value_and_weights(fitted)[0], fitted), whole
+        owner = decision.candidate.joint(search.scene)
         repeats = removed = 0.0
-        for joint, old, new in zip(joints, before, after, strict=True):
+        for joint, old, new in zip(joints, old_rms, new_rms, strict=True):
             if joint in noise and owner in (joint, None) and old is not None and new is not None:
                 repeats += (old / noise[joint]) ** 2 - 1.0
                 removed += (old**2 - new**2) / noise[joint] ** 2
@@ -226,7 +238,7 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
         if (owner is None or owner in left) and removed < criteria.least_of_repeatable * repeats:
             share = max(0.0, removed / repeats)
             why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"
-            proxies.append(step.decision.refused(why))
+            proxies.append(decision.refused(why))
     return proxies
 
 

@@ -160,10 +160,15 @@ def observed_at_every_sample(step: SelectionStep) -> Observations:
 
 
 def folds_of(data: PreparedData, owner: NDArray[np.intp], parts: int) -> NDArray[np.intp]:
-    """Return the fold of each block: its trajectory, or which of so many parts of the only one."""
+    """Return the fold of each block: its trajectory, or which of so many parts of the only one.
+
+    Repetitions are parted alike: what one shows of a moment of the motion, the others only repeat.
+    """
     names = data.trajectories
     if len(names) == 1:
-        return np.minimum(np.arange(len(owner)) * parts // max(1, len(owner)), parts - 1)
+        count = np.bincount(owner)
+        first = np.cumsum(count) - count
+        return np.asarray((np.arange(len(owner)) - first[owner]) * parts // np.maximum(1, count[owner]), dtype=np.intp)
     place = np.array([names.index(label) for label in data.labels], dtype=np.intp)
     return np.asarray(place[owner], dtype=np.intp)
 

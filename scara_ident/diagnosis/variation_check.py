@@ -16,8 +16,11 @@ from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.estimation.run_variation import ASSUMED_DELAY, LEAST_RUNS, RunVariation, assumed_delays, run_variation
 
 
-def variation_objection(step: SelectionStep, decision: Decision) -> str | None:
-    """Say so where an effect is not significant beside what runs differ by when it is in the model.
+def variation_objection(step: SelectionStep, decision: Decision, least_gain: float = 0.0) -> str | None:
+    """Say so where an effect is not significant, or removes too little, beside what runs differ by.
+
+    That is what they differ by with the effect in the model, for without it they seem to differ more. Only of an effect
+    that acts in some recordings it is what they differ by without: they may differ by it, or by what runs differ by.
 
     Parameters
     ----------
@@ -25,12 +28,16 @@ def variation_objection(step: SelectionStep, decision: Decision) -> str | None:
         The model that the candidate was tried beside.
     decision : Decision
         That lets it in.
+    least_gain : float, optional
+        What it must remove there. While others are missing runs seem to differ more, and nothing is asked.
     """
     found = decision.examination
     (own,) = step.columns.rows(step.scene, [decision.candidate])
     chosen = step.columns.rows(step.scene, step.chosen)
-    value = np.concatenate([found.model_value, found.value])
-    joints = with_columns(step.observations, [*chosen, own])
+    value, added = np.concatenate([found.model_value, found.value]), [*chosen, own]
+    if decision.candidate.effect.by_recording:
+        value, added = step.model.root @ step.model.projected, chosen
+    joints = with_columns(step.observations, added)
     variation = run_variation(step.observations, joints, value)
     why = "runs differ from one another by as much: with that counted as noise"
     if len(step.observations.data.recordings) < LEAST_RUNS and not decision.candidate.corrects_data:
@@ -46,9 +53,11 @@ def variation_objection(step: SelectionStep, decision: Decision) -> str | None:
         again = examine_rows(model, rows, again)
     # One delay for all runs is their mean, which they confirm by themselves however few they are.
     tried = 1 if decision.candidate.corrects_data else step.tried
-    if again.p_value * tried <= step.criteria.family_error:
-        return None
-    return f"{why} p = {again.p_value:.1e}"
+    if again.p_value * tried > step.criteria.family_error:
+        return f"{why} p = {again.p_value:.1e}"
+    if gain < least_gain and not decision.candidate.corrects_data:
+        return f"{why} it removes {max(gain, 0.0):.1%} of the squared residual, {least_gain:.0%} is asked"
+    return None
 
 
 def whitened(model: FittedModel, variation: RunVariation) -> FittedModel:

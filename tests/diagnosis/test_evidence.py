@@ -10,12 +10,14 @@ from scipy.signal import lfilter
 
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import diagnose
-from scara_ident.diagnosis.evidence import Evidence, coloured_shares, evidence, held_out_evidence
+from scara_ident.diagnosis.evidence import Evidence, coloured_shares, evidence, held_out_evidence, unsure_of_others
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
+from scara_ident.estimation import wls
+from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.motion.prepared import prepare
 from scara_ident.robot.robot import load_robot
-from tests.diagnosis.made import BANDS, exact_runs, virtual_runs
+from tests.diagnosis.made import BANDS, exact_runs, observed, virtual_runs
 
 
 def left_of(noise: np.ndarray) -> np.ndarray:
@@ -62,12 +64,28 @@ def test_one_short_run_cannot_tell():
     assert any("would not have been significant" in item.why for item in result.evidence)
 
 
+def test_what_a_right_model_lacks_on_others_is_what_its_parameters_make_there():
+    first, second = (observed(exact_runs()[k : k + 1]) for k in (0, 2))
+    after = wls(first)
+    expected = []
+    for rows in second.joints:
+        columns, covariance = rows.table[:-1], after.covariance[np.ix_(rows.columns, rows.columns)]
+        expected.append(np.einsum("kn,kl,ln->", columns, covariance, columns) / np.sum(rows.counts))
+    square = unsure_of_others(after, second) ** 2 - noise_torque(second, after.value) ** 2
+    assert square == pytest.approx(np.array(expected), rel=1e-6)
+
+
 def test_what_does_not_hold_on_other_recordings_is_not_shown():
     shown = (Evidence("joint1", True, "whiteness", "", 0.1), Evidence("joint2", True, "whiteness", "", 0.1))
-    found = held_out_evidence(shown, (1.0, 1.0), (1.4, 1.6))
+    sure = np.zeros(2)
+    found = held_out_evidence(shown, (1.0, 1.0), (1.4, 1.6), sure)
     assert [item.shown for item in found] == [True, False]
     assert "1.6 times" in found[1].why
-    assert held_out_evidence(shown, (1.0, 1.0), (None, None)) == shown
+    assert held_out_evidence(shown, (1.0, 1.0), (None, None), sure) == shown
+    # What parameters that are not sure make there speaks against no model, and is said.
+    found = held_out_evidence(shown, (1.0, 1.0), (1.4, 6.0), np.array([0.0, 6.0]))
+    assert all(item.shown for item in found)
+    assert "6 times" in found[1].why
 
 
 @pytest.mark.parametrize(("missing", "shown"), [(0.009, False), (0.005, True)])

@@ -8,7 +8,7 @@ import pytest
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.effects.periodic import TorqueRipple, Vibration
 from scara_ident.effects.position import Spring
-from tests.diagnosis.made import exact_runs, residuals_of, step_beside, with_torque
+from tests.diagnosis.made import BANDS, exact_runs, residuals_of, step_beside, with_torque
 
 WIDE = (40.0, 40.0)
 PERIODIC = (TorqueRipple(), Vibration(), Spring())
@@ -36,6 +36,17 @@ def test_a_line_in_time_becomes_a_vibration_of_its_frequency():
     assert found
     assert all(item.member.joint == 0 for item in found)
     assert all(item.member.nonlinear[0] == pytest.approx(17.3, abs=0.05) for item in found)
+
+
+def test_a_line_just_above_the_band_is_tried_beside_the_strongest_within():
+    def torque(motion):
+        return 0.01 * np.sin(2.0 * np.pi * 7.1 * motion.time) + 0.3 * np.sin(2.0 * np.pi * 15.2 * motion.time)
+
+    scene = step_beside(exact_runs()).scene
+    found = line_candidates(
+        scene, residuals_of(scene.value, with_torque(exact_runs(), 0, torque), BANDS), (Vibration(),)
+    )
+    assert [item.member.nonlinear[0] for item in found] == pytest.approx([7.1, 15.2], abs=0.05)
 
 
 def test_only_families_of_the_catalogue_are_offered():

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.lack_of_fit import lack_of_fit
-from scara_ident.diagnosis.model_selection import Outcome, rms_of, select_model
+from scara_ident.diagnosis.model_selection import Outcome, _proxies, rms_of, select_model
 from scara_ident.diagnosis.search import SearchTask
 from scara_ident.effects import CATALOGUE
 from scara_ident.effects.elasticity import JointElasticity
@@ -86,6 +88,12 @@ def test_nothing_is_demoted_where_the_rest_is_noise() -> None:
     assert found(outcome) == {"asymmetric_friction of joint1"}
     assert outcome.unexplained is None
     assert outcome.demoted == ()
+    # Had a little been left that repeats, an effect that removes most of what repeats would stay all the same.
+    little = replace(outcome, repeating=frozenset({"joint1"}))
+    assert _proxies(little, CRITERIA) == []
+    (proxy,) = _proxies(little, replace(CRITERIA, least_of_repeatable=1.5))
+    assert proxy.label == "asymmetric_friction of joint1"
+    assert _proxies(replace(outcome, repeating=frozenset({"joint2"})), replace(CRITERIA, least_of_repeatable=1.5)) == []
     # What is judged as left is what is kept.
     for joint, after in zip(lack_of_fit(outcome.residuals), outcome.fit_after, strict=True):
         assert joint == after

@@ -151,6 +151,15 @@ def test_parts_of_the_only_trajectory_are_its_folds():
     assert folds_of(seen.data, seen.owner[:2], 4).max() < 4
 
 
+def test_repetitions_of_the_only_trajectory_are_parted_alike():
+    # Else what one shows is held out by showing it again, and an effect that stands for the motion itself is believed.
+    seen = observed(exact_runs()[:2])
+    fold = folds_of(seen.data, seen.owner, 4)
+    first, second = fold[seen.owner == 0], fold[seen.owner == 1]
+    assert_array_equal(np.unique(first), range(4))
+    assert_array_equal(first, second)
+
+
 def test_blocks_without_any_row_are_left_out():
     first, second = exact_runs()[:2]
     position = first.position.copy()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.variation_check import variation_objection
 from scara_ident.effects import Member
 from scara_ident.effects.measurement import TimeDelay, shifted
+from scara_ident.effects.payload import PayloadOfRecordings
 from scara_ident.effects.position import Spring
 from tests.diagnosis.made import step_beside, with_torque
 from tests.estimation.test_run_variation import runs
@@ -20,6 +23,22 @@ def test_a_spring_of_the_arm_stands_beside_runs_that_differ(stiffness: float):
     step = step_beside(made)
     (decision,) = step.judge([Candidate(Spring(), Member(1))])
     assert (variation_objection(step, decision) is None) is bool(stiffness)
+    # In the last look it must gain enough there, too.
+    assert "100% is asked" in (variation_objection(step, decision, 0.999) or "") or not stiffness
+
+
+def test_a_payload_of_some_runs_is_asked_beside_what_runs_differ_by_without_it():
+    # Four runs of which two have 4 % more torque: with a payload in these nothing would be left that runs differ by.
+    made = runs(np.random.default_rng(6), (0.0,) * 4, 4)
+    made[2:] = [replace(item, effort=1.04 * item.effort) for item in made[2:]]
+    step = step_beside(made)
+    effect = PayloadOfRecordings()
+    member = effect.in_recordings(step.scene, Member(None), frozenset(item.name for item in made[2:]))
+    (decision,) = step.judge([Candidate(effect, member)])
+    assert decision.examination.p_value < 1e-3
+    why = variation_objection(step, decision)
+    assert why is not None
+    assert "runs differ" in why
 
 
 def test_what_differs_from_run_to_run_is_no_effect():
