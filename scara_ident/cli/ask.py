@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from scara_ident.cli import options
 from scara_ident.cli.console import output_console, progress
+from scara_ident.cli.joint_values import with_motion_limits
+
+if TYPE_CHECKING:
+    from scara_ident.excitation import Limits
+    from scara_ident.robot.robot import Robot
 
 
+@with_motion_limits
 def ask(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Holds recordings/; keeps all else.")],
     robot: options.Robot = None,
     model: options.Model = "complete",
     duration: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Of each asked motion, s.")] = 15.0,
-    ranges: options.Ranges = None,
-    velocities: options.Velocities = None,
-    accelerations: options.Accelerations = None,
-    jerks: options.Jerks = None,
-    torques: options.Torques = None,
-    share: options.Share = 0.8,
-    floor: options.Floor = None,
-    box: options.Boxes = None,
-    clearance: options.Clearance = 0.01,
+    *,
+    limits: Callable[[Robot], Limits],
     starts: Annotated[int, typer.Option(min=1, help="Random starts of each design.")] = 8,
     seed: Annotated[int, typer.Option(min=0, help="Of the random starts, and of the virtual arm.")] = 0,
     virtual: Annotated[bool, typer.Option("--virtual", help="Let the virtual arm record what is asked for.")] = False,
@@ -39,7 +39,6 @@ def ask(
     """Say what to record next: diagnose the recordings so far, and design the motion that settles what they leave open."""
     from scara_ident.asking import Settings, recordings_in
     from scara_ident.asking import ask as run
-    from scara_ident.cli.joint_values import motion_limits
     from scara_ident.errors import UsageError
     from scara_ident.excitation import Effort
     from scara_ident.files import check_output, written_together
@@ -49,27 +48,16 @@ def ask(
         raise UsageError("--effect is what the virtual arm has; give --virtual with it")
     check_output(folder)
     arm = load_robot(robot)
-    limits = motion_limits(
-        arm,
-        ranges=ranges,
-        velocities=velocities,
-        accelerations=accelerations,
-        jerks=jerks,
-        torques=torques,
-        boxes=box,
-        floor=floor,
-        clearance=clearance,
-        share=share,
-    )
-    settings = Settings(arm, model, duration, Effort(starts=starts, seed=seed), limits)
+    within = limits(arm)
+    settings = Settings(arm, model, duration, Effort(starts=starts, seed=seed), within)
     console = output_console()
     made = 0
     while True:
         with progress() as work:
             found = run(folder, settings, work)
         console.print(found.words)
-        if found.state == "record" and limits.clearance is not None:
-            console.note(limits.clearance.notes)
+        if found.state == "record" and within.clearance is not None:
+            console.note(within.clearance.notes)
         if not virtual or found.state != "record" or made >= steps:
             return
         from scara_ident.simulation import parse_effect, read_trajectory, simulate, virtual_arm, write_simulation

@@ -30,12 +30,12 @@ def check(
     json: options.Json = False,
 ) -> None:
     """Say whether an arm can run a motion, what limits it, and what energy it takes; exit status 1 if it cannot."""
-    from scara_ident.cli.joint_values import joint_numbers, joint_ranges
+    from scara_ident.cli.joint_values import limits_by_joint
     from scara_ident.errors import ScaraIdentError
     from scara_ident.export.result import read_identified
     from scara_ident.files import write_json
+    from scara_ident.use.check import CLOSE, check_dict, read_motion
     from scara_ident.use.check import check as run
-    from scara_ident.use.check import check_dict, read_motion
     from scara_ident.use.joint_limits import joint_limits
 
     check_report(output, "check")
@@ -45,11 +45,7 @@ def check(
     arm = known.robot
     limits = joint_limits(
         arm,
-        ranges=joint_ranges(ranges, "--range"),
-        velocities=joint_numbers(velocities, "--velocity"),
-        accelerations=joint_numbers(accelerations, "--acceleration"),
-        torques=joint_numbers(torques, "--torque"),
-        powers=joint_numbers(powers, "--power"),
+        **limits_by_joint(ranges, velocities=velocities, accelerations=accelerations, torques=torques, powers=powers),
     )
     with progress() as work:
         work("reading the motion")
@@ -58,10 +54,12 @@ def check(
         found = run(known, motion, limits)
     content = check_dict(found)
     console = result_console(content, json)
+    spread = {f"{each.joint}.torque": CLOSE * each.std for each in found.peaks}
     rows = table("limits", "limit", "reached", "bound", "at [s]", "used", right=("reached", "bound", "at [s]", "used"))
     for each in found.margins:
         used = "-" if each.share is None else f"{each.share:.0%}"
-        rows.add_row(each.name, f"{each.reached:.4g}", f"{each.bound:.4g} {each.unit}", f"{each.time:.3f}", used)
+        more = f" ± {spread[each.name]:.2g}" if each.name in spread else ""
+        rows.add_row(each.name, f"{each.reached:.4g}{more}", f"{each.bound:.4g} {each.unit}", f"{each.time:.3f}", used)
     console.print(rows)
     energy = table("energy, J", "joint", "given", "taken back", "heat", right=("given", "taken back", "heat"))
     for joint, row in content["energy"].items():

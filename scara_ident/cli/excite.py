@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from scara_ident.cli import options
 from scara_ident.cli.console import check_report, progress, result_console, writing
+from scara_ident.cli.joint_values import with_motion_limits
+
+if TYPE_CHECKING:
+    from scara_ident.excitation import Limits
+    from scara_ident.robot.robot import Robot
 
 # Share of a design that its searches take; the rest is the verification of limits.
 SEARCHES_SHARE = 0.97
 
 
+@with_motion_limits
 def excite(
     robot: options.Robot = None,
     model: options.ModelIfGiven = None,
@@ -64,20 +71,8 @@ def excite(
     start: Annotated[
         str | None, typer.Option(metavar="Q1,Q2,..", help="Positions of all joints to start at, rad or m.")
     ] = None,
-    ranges: options.Ranges = None,
-    velocities: options.Velocities = None,
-    accelerations: options.Accelerations = None,
-    jerks: options.Jerks = None,
-    torques: options.Torques = None,
-    share: options.Share = 0.8,
-    floor: options.Floor = None,
-    box: options.Boxes = None,
-    clearance: options.Clearance = 0.01,
-    tool: Annotated[str | None, typer.Option(metavar="LINK", help="Link whose origin is the tool.")] = None,
-    tool_acceleration: Annotated[
-        float | None, typer.Option(metavar="A", help="Most, m/s^2; default: 9 on the SCARA03, else no limit.")
-    ] = None,
-    tool_speed: Annotated[float | None, typer.Option(metavar="V", help="Most, m/s.")] = None,
+    *,
+    limits: Callable[[Robot], Limits],
     seed: Annotated[int, typer.Option(min=0, help="Of the random starts.")] = 0,
     starts: Annotated[int, typer.Option(min=1, help="Random starts; more take longer and may find better.")] = 8,
     rate: Annotated[float, typer.Option(min=1.0, max=1e5, help="Samples per second of trajectory.csv.")] = 1000.0,
@@ -87,7 +82,7 @@ def excite(
     """Design an excitation trajectory within the limits of the joints, the motors and the tool."""
     import numpy as np
 
-    from scara_ident.cli.joint_values import joint_numbers, motion_limits, numbers
+    from scara_ident.cli.joint_values import joint_numbers, numbers
     from scara_ident.diagnosis.answerability import inquiry_of
     from scara_ident.errors import UsageError
     from scara_ident.estimation.estimate import PAPER_SAMPLES
@@ -132,21 +127,7 @@ def excite(
     equation = build_model(arm, (model or "complete") if asked is None else str(asked["model"]))
     goal = None if asked is not None else criterion_of(criterion or "logdet", equation, wanted or ())
     place = numbers(start, "--start")
-    limits = motion_limits(
-        arm,
-        ranges=ranges,
-        velocities=velocities,
-        accelerations=accelerations,
-        jerks=jerks,
-        torques=torques,
-        boxes=box,
-        floor=floor,
-        clearance=clearance,
-        share=share,
-        tool=tool,
-        tool_acceleration=tool_acceleration,
-        tool_speed=np.inf if tool_speed is None else tool_speed,
-    )
+    within = limits(arm)
     durations = durations_of(duration or 25.0, trajectories)
     longest = max(durations)
     count = default_harmonics(longest, arm.n, len(durations)) if harmonics is None else harmonics
@@ -181,7 +162,7 @@ def excite(
             harmonics=count,
             criterion=goal,
             tell=inquiry,
-            limits=limits,
+            limits=within,
             known=nominal,
             trajectories=len(durations),
             torque_std=std,

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from functools import partial, wraps
+from inspect import Parameter, signature
+from typing import TYPE_CHECKING, Any, get_type_hints
 
+from scara_ident.cli import options
 from scara_ident.errors import UsageError
 
 if TYPE_CHECKING:
@@ -14,6 +17,10 @@ if TYPE_CHECKING:
 
 Range = tuple[float, float]
 Triple = tuple[float, float, float]
+_OPTIONS = {
+    "velocities": "--velocity", "accelerations": "--acceleration", "jerks": "--jerk", "torques": "--torque",
+    "powers": "--power",
+}  # fmt: skip
 
 
 def joint_numbers(words: Sequence[str] | None, option: str) -> dict[str, float]:
@@ -38,32 +45,61 @@ def numbers(word: str | None, option: str) -> list[float] | None:
     return None if word is None else [_number(text, option, word) for text in word.split(",")]
 
 
+def limits_by_joint(ranges: Sequence[str] | None, **numbers: Sequence[str] | None) -> dict[str, Any]:
+    """Read the limits of joints by kind: ``velocities=`` words of ``--velocity``, and so on."""
+    return {"ranges": joint_ranges(ranges, "--range")} | {
+        kind: joint_numbers(words, _OPTIONS[kind]) for kind, words in numbers.items()
+    }
+
+
 def motion_limits(
     robot: Robot,
-    *,
-    ranges: Sequence[str] | None,
-    velocities: Sequence[str] | None,
-    accelerations: Sequence[str] | None,
-    jerks: Sequence[str] | None,
-    torques: Sequence[str] | None,
-    boxes: Sequence[str] | None,
-    floor: float | None,
-    **more: Any,
+    ranges: options.Ranges = None,
+    velocities: options.Velocities = None,
+    accelerations: options.Accelerations = None,
+    jerks: options.Jerks = None,
+    torques: options.Torques = None,
+    share: options.Share = 0.8,
+    floor: options.Floor = None,
+    boxes: options.Boxes = None,
+    clearance: options.Clearance = 0.01,
+    tool: options.Tool = None,
+    tool_acceleration: options.ToolAcceleration = None,
+    tool_speed: options.ToolSpeed = None,
 ) -> Limits:
-    """Return the limits of a motion from the words of their options; ``more`` are arguments of `limits_of`."""
+    """Return the limits of a motion from the words of their options."""
     from scara_ident.excitation import limits_of
 
     return limits_of(
         robot,
-        ranges=joint_ranges(ranges, "--range"),
-        velocities=joint_numbers(velocities, "--velocity"),
-        accelerations=joint_numbers(accelerations, "--acceleration"),
-        jerks=joint_numbers(jerks, "--jerk"),
-        torques=joint_numbers(torques, "--torque"),
-        boxes=_boxes(boxes, "--box"),
+        **limits_by_joint(ranges, velocities=velocities, accelerations=accelerations, jerks=jerks, torques=torques),
+        share=share,
         floor=-math.inf if floor is None else floor,
-        **more,
+        boxes=_boxes(boxes, "--box"),
+        clearance=clearance,
+        tool=tool,
+        tool_acceleration=tool_acceleration,
+        tool_speed=math.inf if tool_speed is None else tool_speed,
     )
+
+
+def with_motion_limits(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a command with the options of `motion_limits` instead of its argument ``limits``, a function of the robot."""
+    # The robot and the limits are no options, and their modules take time to import.
+    unread = {"Robot": Any, "Limits": Any}
+    types = get_type_hints(motion_limits, localns=unread, include_extras=True)
+    given = [p.replace(annotation=types[p.name]) for p in list(signature(motion_limits).parameters.values())[1:]]
+
+    @wraps(command)
+    def limited(*arguments: Any, **words: Any) -> Any:
+        limits = {each.name: words.pop(each.name, each.default) for each in given}
+        return command(*arguments, limits=partial(motion_limits, **limits), **words)
+
+    own = get_type_hints(command, localns=unread, include_extras=True)
+    found: list[Parameter] = []
+    for each in signature(command).parameters.values():
+        found += given if each.name == "limits" else [each.replace(annotation=own[each.name])]
+    return options.with_signature(limited, found)
 
 
 def _boxes(words: Sequence[str] | None, option: str) -> list[tuple[Triple, Triple]]:

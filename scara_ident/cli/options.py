@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -109,6 +109,12 @@ Boxes = Annotated[
 Clearance = Annotated[
     float, typer.Option("--clearance", metavar="D", help="Distance from links to one another and to obstacles, m.")
 ]
+Tool = Annotated[str | None, typer.Option("--tool", metavar="LINK", help="Link whose origin is the tool.")]
+ToolAcceleration = Annotated[
+    float | None,
+    typer.Option("--tool-acceleration", metavar="A", help="Most, m/s^2; default: 9 on the SCARA03, else no limit."),
+]
+ToolSpeed = Annotated[float | None, typer.Option("--tool-speed", metavar="V", help="Most, m/s.")]
 
 Folder = Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")]
 
@@ -132,11 +138,15 @@ def limited(command: Callable[..., Any]) -> Callable[..., Any]:
     types = get_type_hints(command, include_extras=True)
     own = [each.replace(annotation=types[each.name]) for each in signature(command).parameters.values()]
     extra = Parameter("max_memory", Parameter.KEYWORD_ONLY, default=None, annotation=MaxMemory)
-    # typer asks for both; a function's type has no signature.
-    run: Any = limited
-    run.__signature__ = Signature([*own, extra])
-    run.__annotations__ = {**types, "max_memory": MaxMemory}
-    return limited
+    return with_signature(limited, [*own, extra])
+
+
+def with_signature(run: Any, parameters: Sequence[Parameter]) -> Callable[..., Any]:
+    """Return a function that shows these parameters; typer asks for the signature and for the annotations."""
+    run.__signature__ = Signature(parameters)
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
+    shown: Callable[..., Any] = run
+    return shown
 
 
 class Command(TyperCommand):

@@ -33,8 +33,10 @@ class IdentifiedModel:
     ----------
     model : TorqueModel
         With the effects that were found as further terms.
-    value, std : ndarray, shape (p,)
-        Of its parameters; ``std`` is NaN where they are not determined.
+    value : ndarray, shape (p,)
+        Of its parameters.
+    covariance : ndarray, shape (p, p)
+        Infinite variance where a parameter is not determined.
     before : ndarray, shape (q,)
         The first ``q <= p`` parameters without the effects found.
     undetermined : ndarray of bool, shape (p,)
@@ -55,7 +57,7 @@ class IdentifiedModel:
 
     model: TorqueModel
     value: Array
-    std: Array
+    covariance: Array
     before: Array
     undetermined: NDArray[np.bool_]
     weights: Array
@@ -70,6 +72,11 @@ class IdentifiedModel:
     def robot(self) -> Robot:
         """The robot."""
         return self.model.robot
+
+    @property
+    def std(self) -> Array:
+        """Standard deviation of each parameter, shape (p,); NaN where it is not determined."""
+        return np.where(self.undetermined, np.nan, np.sqrt(np.clip(np.diag(self.covariance), 0.0, None)))
 
     @property
     def removed(self) -> tuple[str, ...]:
@@ -106,7 +113,7 @@ class IdentifiedModel:
             self,
             model=base,
             value=self.before,
-            std=self.std[own],
+            covariance=self.covariance[np.ix_(own, own)],
             undetermined=self.undetermined[own],
             training=tuple(item.select(own) for item in self.training),
             validation=tuple(item.select(own) for item in self.validation),
@@ -132,6 +139,19 @@ class IdentifiedModel:
         columns = self.model.joint_columns(motion)
         return np.array([self.value[own] @ rows for own, rows in zip(self.model.active, columns, strict=True)])
 
+    def torque_std(self, motion: Motion) -> Array:
+        """Return by how much the parameters leave the torque along a motion open, recorded side, shape (n, N).
+
+        One standard deviation; NaN where a parameter that counts there is not determined.
+        """
+        covariance = np.where(np.isfinite(self.covariance), self.covariance, np.nan)
+        columns = self.model.joint_columns(motion)
+        variance = [
+            np.sum((covariance[np.ix_(own, own)] @ rows) * rows, axis=0)
+            for own, rows in zip(self.model.active, columns, strict=True)
+        ]
+        return np.sqrt(np.maximum(variance, 0.0))
+
 
 def identified_model(found: Identification | Diagnosis) -> IdentifiedModel:
     """Return the model of an identification, or of a diagnosis with the effects found."""
@@ -154,7 +174,7 @@ def identified_model(found: Identification | Diagnosis) -> IdentifiedModel:
     return IdentifiedModel(
         model=estimate.model,
         value=estimate.value,
-        std=np.where(estimate.undetermined, np.nan, estimate.std),
+        covariance=estimate.covariance,
         before=before.value,
         undetermined=estimate.undetermined,
         weights=estimate.weights,

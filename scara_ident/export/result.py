@@ -38,12 +38,13 @@ def rebuild_entry(estimate: Estimate, training: Observations, validation: Observ
     effects = [term for term in terms if isinstance(term, EffectTerm)]
     return {
         "robot": _robot_entry(robot),
+        "covariance": _packed(estimate.covariance),
         "weights": estimate.weights,
         "standard": estimate.standard if isinstance(estimate, ConsistentEstimate) else None,
         "scene": _scene_entry(effects[0].scene) if effects else None,
         "effects": [_effect_entry(term) for term in effects],
         "observations": {
-            kind: [_packed(item, own) for item, own in zip(rows.by_joint, rows.model.active, strict=True)]
+            kind: [_factor_entry(item, own) for item, own in zip(rows.by_joint, rows.model.active, strict=True)]
             for kind, rows in (("training", training), ("validation", validation))
         },
     }
@@ -89,18 +90,19 @@ def _model_of(content: Mapping[str, Any], path: Path, robot: Path | str | None, 
             f"{path}: its parameters are not those of {arm.urdf}; give --robot of the arm it was found on"
         )
     observations = {
-        kind: tuple(_unpacked(item, own, len(parameters)) for item, own in zip(rows, model.active, strict=True))
+        kind: tuple(_information(item, own, len(parameters)) for item, own in zip(rows, model.active, strict=True))
         for kind, rows in known["observations"].items()
     }
     open_ = np.array([bool(item.get("undetermined", item["std"] is None)) for item in parameters])
     if determined and open_.any():
         missing = model.names[int(np.argmax(open_))]
         raise ScaraIdentError(f"{path}: parameter {missing!r} has no value; record motion that determines it")
+    upper = _unpacked(known["covariance"], len(parameters), len(parameters))
     bands = content.get("band_hz") or {}
     return IdentifiedModel(
         model=model,
         value=_array([item["value"] for item in parameters]),
-        std=np.where(open_, np.nan, _array([item["std"] for item in parameters])),
+        covariance=upper + np.triu(upper, 1).T,
         before=_array([item.get("before", item["value"]) for item in parameters[: len(base.columns)]]),
         undetermined=open_,
         weights=_array(known["weights"]),
@@ -230,22 +232,27 @@ def _family(entry: Mapping[str, Any], path: Path) -> Effect:
     )
 
 
-def _packed(information: Information, active: NDArray[np.intp]) -> dict[str, Any]:
-    """Return the upper triangle of a joint's factor, row by row, as base64 of little-endian doubles."""
+def _factor_entry(information: Information, active: NDArray[np.intp]) -> dict[str, Any]:
     factor = information.select(active).factor
-    numbers = factor[np.triu_indices(*_shape(factor))]
-    text = base64.b64encode(numbers.astype("<f8").tobytes()).decode("ascii")
-    return {"samples": information.rows, "rows": len(factor), "factor": text}
+    return {"samples": information.rows, "rows": len(factor), "factor": _packed(factor)}
 
 
-def _unpacked(entry: Mapping[str, Any], active: NDArray[np.intp], parameters: int) -> Information:
-    factor = np.zeros((entry["rows"], len(active) + 1))
-    factor[np.triu_indices(*_shape(factor))] = np.frombuffer(base64.b64decode(entry["factor"]), dtype="<f8")
+def _information(entry: Mapping[str, Any], active: NDArray[np.intp], parameters: int) -> Information:
+    factor = _unpacked(entry["factor"], entry["rows"], len(active) + 1)
     return Information(factor, float(entry["samples"])).embed(active, parameters)
 
 
-def _shape(factor: Array) -> tuple[int, int, int]:
-    return factor.shape[0], 0, factor.shape[1]
+def _packed(matrix: Array) -> str:
+    """Return the upper triangle of a matrix, row by row, as base64 of little-endian doubles."""
+    numbers = matrix[np.triu_indices(len(matrix), 0, matrix.shape[1])]
+    return base64.b64encode(numbers.astype("<f8").tobytes()).decode("ascii")
+
+
+def _unpacked(text: str, rows: int, columns: int) -> Array:
+    """Return a matrix with this upper triangle and zeros below."""
+    matrix = np.zeros((rows, columns))
+    matrix[np.triu_indices(rows, 0, columns)] = np.frombuffer(base64.b64decode(text), dtype="<f8")
+    return matrix
 
 
 def _array(values: Sequence[Any]) -> Array:

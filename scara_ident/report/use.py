@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,8 @@ from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.use import Use
 from scara_ident.use.worth import EffectWorth, worth
 
+# What is fed forward does harm where it leaves so many times the error that is left without.
+HARM = 1.1
 # What is fed forward, in words.
 WORDS = {
     "pid": "PID alone",
@@ -88,10 +90,9 @@ def _cost_said(item: EffectWorth, rms: Mapping[str, Array]) -> str:
     said = f"{item.entry['effect']}{where}: without it the PID alone would leave {total(item.alone, alone):.0%} of its error"
     if item.not_fed is None:
         return f"{said}."
-    return (
-        f"{said}; fed forward with all else it leaves {total(rms['effects'], alone):.0%}, and all else without it "
-        f"{total(item.not_fed, alone):.0%}."
-    )
+    fed, without = total(rms["effects"], alone), total(item.not_fed, alone)
+    harm = ": it does harm, so leave it out of what is fed forward" if fed > HARM * without else ""
+    return f"{said}; fed forward with all else it leaves {fed:.0%}, and all else without it {without:.0%}{harm}."
 
 
 def total(errors: Array, alone: Array) -> float:
@@ -110,9 +111,21 @@ def _shares_said(rms: Mapping[str, Array]) -> str:
     )
 
 
+def _harm_said(joints: Sequence[str], rms: Mapping[str, Array]) -> list[str]:
+    """Say on which joints the effects fed forward leave a larger error than the model without them."""
+    if "effects" not in rms:
+        return []
+    worse = [
+        f"{joint} ({fed / alone:.0%} of the PID's error, without them {without / alone:.0%})"
+        for joint, alone, without, fed in zip(joints, rms["pid"], rms["identified"], rms["effects"], strict=True)
+        if fed > HARM * without and alone > 0.0
+    ]
+    return [f"Fed forward the effects do harm on {', '.join(worse)}: leave them out there."] if worse else []
+
+
 def sentences(result: Use) -> list[str]:
     """Say in words what was won."""
-    said = [_shares_said(result.rms())]
+    said = [_shares_said(result.rms()), *_harm_said(result.model.robot.joints, result.rms())]
     for name, rows in result.rollouts.items():
         place = int(np.argmin(np.abs(np.array(result.horizons) - 0.2)))
         if not np.all(np.isfinite(rows[place])):

@@ -22,12 +22,40 @@ from scara_ident.simulation.reference import read_trajectory
 from scara_ident.use.energy import Drive, Energy, drive, energy_of
 from scara_ident.use.joint_limits import JointLimits, Margin, margins
 
-# A margin below so many rms errors of the model is close.
-CLOSE = 2.0
+# A margin below so many standard deviations of the foreseen torque is close; a peak is unsure where they are above this
+# share of it.
+CLOSE, UNSURE = 2.0, 0.1
 # Slowest share of the speed that is tried, and how finely the largest that can be run is found.
 SLOWEST, STEPS = 0.02, 14
 # Samples at which slower motions are looked at.
 MOST_SAMPLES = 5000
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The largest torque of a joint, recorded side, N m or N.
+
+    Attributes
+    ----------
+    joint : str
+    torque : float
+        With its sign.
+    time : float
+        s.
+    model_std : float
+        By how much the parameters leave it open: one standard deviation.
+    std : float
+        That, with the model's rms error on recordings, which is what measurement, controller and all that the model lacks
+        made there.
+    unit : str
+    """
+
+    joint: str
+    torque: float
+    time: float
+    model_std: float
+    std: float
+    unit: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +69,8 @@ class Check:
     drives : tuple of Drive
         The motion, stretch by stretch, with its torque.
     margins : tuple of Margin
+    peaks : tuple of Peak
+        A joint each.
     energy : Energy
     """
 
@@ -48,6 +78,7 @@ class Check:
     limits: JointLimits
     drives: tuple[Drive, ...]
     margins: tuple[Margin, ...]
+    peaks: tuple[Peak, ...]
     energy: Energy
 
     @property
@@ -129,7 +160,20 @@ def check(known: IdentifiedModel, motions: Sequence[Motion], limits: JointLimits
     limits : JointLimits
     """
     drives = tuple(drive(known, motion) for motion in motions)
-    return Check(known, limits, drives, margins(known.robot, limits, drives), energy_of(drives))
+    return Check(known, limits, drives, margins(known.robot, limits, drives), _peaks(known, drives), energy_of(drives))
+
+
+def _peaks(known: IdentifiedModel, drives: Sequence[Drive]) -> tuple[Peak, ...]:
+    time = np.concatenate([each.motion.time for each in drives])
+    torque = np.concatenate([each.torque for each in drives], axis=1)
+    open_ = np.concatenate([known.torque_std(each.motion) for each in drives], axis=1)
+    found = []
+    for j, (joint, k) in enumerate(zip(known.robot.joints, np.argmax(np.abs(torque), axis=1), strict=True)):
+        # An error that is not known is left out.
+        std = float(np.hypot(open_[j, k], np.nan_to_num(known.rms[j])))
+        unit = known.robot.torque_unit(j)
+        found.append(Peak(joint, float(torque[j, k]), float(time[k]), float(open_[j, k]), std, unit))
+    return tuple(found)
 
 
 def slowed(motion: Motion, share: float) -> Motion:
@@ -180,6 +224,10 @@ def check_dict(found: Check) -> dict[str, Any]:
         "limited_by": None if limiting is None else _entry(limiting),
         "speed_share": found.speed_share,
         "limits": {each.name: _entry(each) for each in found.margins},
+        "peaks": {
+            each.joint: {key: getattr(each, key) for key in ("torque", "time", "model_std", "std")}
+            for each in found.peaks
+        },
         "model_error": dict(zip(robot.joints, found.known.rms, strict=True)),
         "recorded_minus_foreseen": None
         if found.recorded_rms is None
@@ -236,7 +284,18 @@ def sentences(found: Check) -> list[str]:
             said.append(f"Also beyond their limits: {_listed(others)}.")
     close = _close(found)
     if close:
-        said.append(f"Within twice the model's own error of the limit: {', '.join(each.name for each in close)}.")
+        said.append(
+            f"Within two standard deviations of the foreseen torque of the limit: {', '.join(each.name for each in close)}."
+        )
+    unsure = [
+        f"{each.joint} ({each.torque:.3g} ± {CLOSE * each.std:.2g} {each.unit})"
+        for each in found.peaks
+        if CLOSE * each.std > UNSURE * abs(each.torque)
+    ]
+    if unsure:
+        said.append(
+            f"By two standard deviations the largest torque is known to no better than a tenth on {_listed(unsure)}."
+        )
     said.append(
         f"The drives give {energy.given.sum():.4g} J and take {energy.returned.sum():.4g} J back; "
         f"{energy.heated.sum():.4g} J become heat in the joints."
@@ -245,8 +304,8 @@ def sentences(found: Check) -> list[str]:
 
 
 def _close(found: Check) -> list[Margin]:
-    rms = dict(zip(found.known.robot.joints, found.known.rms, strict=True))
-    return [each for each in found.margins if each.kind == "torque" and abs(each.margin) < CLOSE * rms[each.joint]]
+    std = {each.joint: each.std for each in found.peaks}
+    return [each for each in found.margins if each.kind == "torque" and abs(each.margin) < CLOSE * std[each.joint]]
 
 
 def _named(each: Margin) -> str:

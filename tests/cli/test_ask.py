@@ -9,11 +9,13 @@ QUICK = ("--starts", "1", "--duration", "4", "--model", "basic")
 
 
 def test_an_empty_folder_asks_for_a_first_motion(command, steps, tmp_path: Path):
-    result = command("ask", tmp_path / "arm", *QUICK)
+    result = command("ask", tmp_path / "arm", *QUICK, "--tool-speed", "0.5")
     assert steps[0] == "designing: search 1" and steps[-1].endswith(" done")
     assert result.status == 0 and "Nothing is recorded yet" in result.out
     assert "Collisions were not looked for" in result.out + result.err
     assert (tmp_path / "arm" / "next" / "trajectory.csv").is_file()
+    limit = json.loads((tmp_path / "arm" / "next" / "excitation.json").read_text())["limits"]["tool.speed"]
+    assert limit["bound"] == 0.5 and limit["share"] <= 1.0
     assert json.loads((tmp_path / "arm" / "ask.json").read_text())["state"] == "record"
 
 

@@ -49,7 +49,7 @@ def test_an_identification_reads_back_with_its_errors(found, content, read):
     np.testing.assert_allclose(back.information.rms(), found.estimate.information.rms(), rtol=1e-9)
     own = identified_model(found)
     assert (back.bands, back.found, back.undetermined.tolist()) == (own.bands, (), own.undetermined.tolist())
-    for name in ("value", "std", "before", "rms", "standard"):
+    for name in ("value", "std", "covariance", "before", "rms", "standard"):
         np.testing.assert_allclose(getattr(back, name), getattr(own, name), rtol=1e-9)
     assert back.errors(back.value) == pytest.approx(own.errors(own.value), rel=1e-9)
     assert back.held_out[0] == "validation"

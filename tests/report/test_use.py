@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.report.use import sentences, total, use_dict
+from scara_ident.report.use import _cost_said, sentences, total, use_dict
 from scara_ident.simulation import parse_effect, virtual_arm
 from scara_ident.use import Use
 from scara_ident.use.tracking import Tracked
 from scara_ident.use.trial_motion import trial_motion
+from scara_ident.use.worth import EffectWorth
 from tests.use.made import with_spring
 
 
@@ -50,4 +51,20 @@ def test_the_words_give_shares_of_the_pids_error() -> None:
     lost = replace(result(), rollouts={"identified": np.full((2, 2), np.inf)})
     assert "gets lost" in sentences(lost)[1]
     assert others[-1] == "Not simulated: drive_coupling."
+    assert not any("harm" in words for words in others)
     assert total(np.array([3.0, 0.0]), np.array([3.0, 1.0])) == pytest.approx(np.sqrt(0.5))
+
+
+def test_where_an_effect_fed_forward_makes_worse_it_is_said_of_the_joint() -> None:
+    made = result()
+    (run,) = made.runs
+    # As a ripple did that the controller was too slow for.
+    worse = tuple(replace(item, error=item.error * ([[1.0], [6.0]] if item.name == "effects" else 1.0)) for item in run)
+    said = sentences(replace(made, runs=(worse,)))[1]
+    assert said == (
+        "Fed forward the effects do harm on joint2 (60% of the PID's error, without them 25%): leave them out there."
+    )
+    found = EffectWorth({"effect": "spring", "joint": "joint1"}, np.full(2, 2.0), np.full(2, 1.0))
+    rms = {"pid": np.full(2, 4.0), "effects": np.full(2, 2.0)}
+    assert _cost_said(found, rms).endswith("without it 25%: it does harm, so leave it out of what is fed forward.")
+    assert _cost_said(replace(found, not_fed=np.full(2, 1.9)), rms).endswith("without it 48%.")

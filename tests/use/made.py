@@ -23,7 +23,7 @@ def known_as(model: TorqueModel, value: np.ndarray, *, found: tuple[Entry, ...] 
     """A model with these parameters, each known to a thousandth, on no observations."""
     n, p = model.robot.n, len(value)
     return IdentifiedModel(
-        model=model, value=value, std=1e-3 * np.abs(value), before=value, undetermined=np.zeros(p, dtype=bool),
+        model=model, value=value, covariance=np.diag(1e-6 * value**2), before=value, undetermined=np.zeros(p, dtype=bool),
         weights=np.ones(n), training=(Information.empty(p),) * n, validation=(Information.empty(p),) * n, standard=None,
         found=found, **{"bands": (None,) * n, "rms": np.full(n, np.nan), **more},
     )  # fmt: skip

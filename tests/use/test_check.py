@@ -75,6 +75,24 @@ def test_torque_and_energy_of_six_and_seven_joints_are_the_virtual_arms_within_5
     assert found.energy.given.sum() == pytest.approx(np.trapezoid(np.maximum(power, 0.0), dx=0.002).sum(), rel=0.05)
 
 
+def test_peaks_are_within_what_is_stated_of_them_and_unsure_ones_are_named(rehearsed):
+    known, run, path = rehearsed
+    motions = read_motion(path, known)
+    found = check(known, motions, joint_limits(known.robot))
+    inside = np.isin(run.recording.time, motions[0].time)
+    for j, each in enumerate(found.peaks):
+        needed = np.abs(run.true.effort[j, inside]).max()
+        assert abs(abs(each.torque) - needed) < 2.0 * each.std
+        assert each.std == pytest.approx(np.hypot(each.model_std, known.rms[j]))
+        assert 0.0 < each.model_std < 0.01 * needed
+        assert check_dict(found)["peaks"][each.joint]["std"] == each.std
+    assert not any("no better than" in words for words in check_dict(found)["summary"])
+    # Far from what was recorded on joint2, as where the loop rang.
+    lost = check(replace(known, rms=known.rms * np.array([1.0, 100.0])), motions, joint_limits(known.robot))
+    (said,) = (words for words in check_dict(lost)["summary"] if "no better than a tenth" in words)
+    assert "joint2 (" in said and "joint1" not in said
+
+
 def test_the_limiting_joint_and_time_are_named(rehearsed):
     known, run, path = rehearsed
     motions = read_motion(path, known)

@@ -24,7 +24,7 @@ from scara_ident.report.html.blocks import (
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection
 from scara_ident.report.plot import Figure, Grid, Layer, Level, Line, Mark, Panel, Plot, single, style
-from scara_ident.use.check import Check, limits_of_joint, sentences
+from scara_ident.use.check import CLOSE, Check, limits_of_joint, sentences
 
 # Points of a line, at the most.
 MOST_POINTS = 6000
@@ -64,6 +64,7 @@ _KINDS = ("position", "velocity", "acceleration", "torque", "power")
 def _limits(found: Check) -> list[Block]:
     """What is reached of each limit, and when."""
     rows: list[list[Cell | str]] = []
+    std = {f"{each.joint}.torque": each.std for each in found.peaks}
     for each in found.margins:
         tag = None if each.kept else Tag("broken", "bad")
         used = Cell("" if each.share is None else f"{each.share:.0%}", track=each.share, tag=tag)
@@ -74,6 +75,7 @@ def _limits(found: Check) -> list[Block]:
             [
                 name(each.name),
                 number(each.reached, 4),
+                number(CLOSE * std[each.name], 2) if each.name in std else "",
                 number(each.bound, 4),
                 unit,
                 f"{each.time:.3f}",
@@ -81,9 +83,9 @@ def _limits(found: Check) -> list[Block]:
                 spans + more,
             ]
         )
-    head = ("limit", "reached", "bound", "unit", "at [s]", "used", "beyond it [s]")
-    words = "The value of each that is nearest to its limit, or farthest beyond. Torque is that of the drive, with its rotor, on the side where effort is recorded."
-    return [Paragraph(words), Table(head, rows, (1, 2, 4))] if rows else []
+    head = ("limit", "reached", "±", "bound", "unit", "at [s]", "used", "beyond it [s]")
+    words = "The value of each that is nearest to its limit, or farthest beyond. Torque is that of the drive, with its rotor, on the side where effort is recorded; ± is two standard deviations of it, by the parameters and the model's error on recordings."
+    return [Paragraph(words), Table(head, rows, (1, 2, 3, 5))] if rows else []
 
 
 def _motion(found: Check) -> list[Block]:
