@@ -27,6 +27,7 @@ from scara_ident.excitation.tell import SURE, Told
 from scara_ident.files import write_json, written_together
 from scara_ident.model.model import build_model
 from scara_ident.progress import Work
+from scara_ident.recording.files.parquet_csv import SUFFIXES
 from scara_ident.recording.recording import read_usable
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.html import DiagnosisContext, diagnosis_report
@@ -171,6 +172,11 @@ def recordings_in(folder: Path) -> list[Path]:
     """Return the recordings that lie in a folder, by name; the truth of virtual ones is none."""
     place = folder / "recordings"
     return sorted(path for path in place.glob("*") if not path.name.startswith(".") and path.suffix != ".json")
+
+
+def beside_recordings(folder: Path) -> list[Path]:
+    """Return tables that lie in a folder itself, where no recording is looked for."""
+    return sorted(path for path in folder.glob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
 
 
 def read_asked(folder: Path) -> Asked | None:

@@ -37,7 +37,7 @@ def ask(
     steps: Annotated[int, typer.Option(min=1, help="Motions that the virtual arm records at most.")] = 4,
 ) -> None:
     """Say what to record next: diagnose the recordings so far, and design the motion that settles what they leave open."""
-    from scara_ident.asking import Settings, recordings_in
+    from scara_ident.asking import Settings, beside_recordings, recordings_in
     from scara_ident.asking import ask as run
     from scara_ident.errors import UsageError
     from scara_ident.excitation import Effort
@@ -51,6 +51,8 @@ def ask(
     within = limits(arm)
     settings = Settings(arm, model, duration, Effort(starts=starts, seed=seed), within)
     console = output_console()
+    if not recordings_in(folder) and (aside := beside_recordings(folder)):
+        console.note([f"{aside[0].name} lies beside recordings/ and is not read: move recordings into it"])
     made = 0
     while True:
         with progress() as work:
