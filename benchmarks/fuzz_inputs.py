@@ -223,7 +223,7 @@ def _table(path: Path, random: Random) -> str:
                 (values[: count // 2], values.reshape(1, -1), np.stack([values] * 3), values[:0])
             )
         elif what == "constant":
-            made[name] = np.full(count, float(values[0]) if count else 0.0)
+            made[name] = np.full(count, float(values.ravel()[0]) if values.size else 0.0)
         elif what == "copy":
             made[random.choice(sorted(made))] = values
     writer = {".mat": write_mat73 if "73" in path.name else write_mat, ".h5": write_hdf5}.get(
