@@ -32,6 +32,7 @@ TOKENS = (
     "${x}", "&lt;", "]]>", "<joint/>", "{joint}", "time", "rpm", "deg", "\n", "\t", ",", ";", "1e5", "1e29", "-0.0",
 )  # fmt: skip
 NUMBERS = (np.nan, np.inf, -np.inf, 0.0, -1.0, 1e308, -1e308, 1e160, 1e29, 1e-300, 5e-324, 1e9, 360.0)
+LARGEST = 200_000_000  # bytes of a file whose lines are repeated: more than may be read, less than the machine has
 KINDS = ("robot.yaml", "scara.urdf", "run.csv", "run.parquet", "run.mat", "run73.mat", "run.h5", "run.mcap", "run.db3",
          "bag", "trajectory.csv", "identification.json")  # fmt: skip
 
@@ -161,7 +162,8 @@ def _line(content: bytes, random: Random) -> bytes:
     elif what == 2:
         lines[place], lines[other] = lines[other], lines[place]
     else:
-        lines[place:place] = [lines[place]] * random.choice((2, 2000))
+        times = random.choice((2, 2000))
+        lines[place:place] = [lines[place]] * min(times, 1 + LARGEST // max(len(lines[place]), 1))
     return b"".join(lines)
 
 
@@ -223,7 +225,7 @@ def _table(path: Path, random: Random) -> str:
                 (values[: count // 2], values.reshape(1, -1), np.stack([values] * 3), values[:0])
             )
         elif what == "constant":
-            made[name] = np.full(count, float(values[0]) if count else 0.0)
+            made[name] = np.full(count, float(values.ravel()[0]) if values.size else 0.0)
         elif what == "copy":
             made[random.choice(sorted(made))] = values
     writer = {".mat": write_mat73 if "73" in path.name else write_mat, ".h5": write_hdf5}.get(

@@ -199,9 +199,28 @@ def _unmake(made: list[Path]) -> None:
 
 
 def _refused(folder: Path, error: OSError) -> ScaraIdentError:
-    what = "is a file" if isinstance(error, FileExistsError | NotADirectoryError) else error.strerror or str(error)
-    remedy = "make room or " if error.errno in (errno.ENOSPC, errno.EDQUOT) else ""
-    return ScaraIdentError(f"{folder}: results cannot be written here: {what}; {remedy}give another folder")
+    return ScaraIdentError(f"{folder}: results cannot be written here: {why_unwritten(error)}")
+
+
+def why_unwritten(error: Exception) -> str:
+    """Say why something cannot be written, and what to do.
+
+    Parameters
+    ----------
+    error : Exception
+        Of the system, or of a library that only has the system's words.
+
+    Returns
+    -------
+    str
+        The end of a line.
+    """
+    number, what = getattr(error, "errno", None), getattr(error, "strerror", None) or str(error).partition("\n")[0]
+    if isinstance(error, FileExistsError | NotADirectoryError):
+        return "is a file; give another folder"
+    if number in (errno.ENOSPC, errno.EDQUOT) or (number is None and os.strerror(errno.ENOSPC) in what):
+        return f"{os.strerror(number or errno.ENOSPC)}; make room or give another folder"
+    return f"{what}; give another folder"
 
 
 def write_whole(path: Path, write: Callable[[Path], None]) -> None:
@@ -225,7 +244,7 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
         with replacing(path) as temporary:
             write(temporary)
     except OSError as error:
-        raise ScaraIdentError(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise ScaraIdentError(f"{path}: cannot be written: {why_unwritten(error)}") from None
     finally:
         _unmake(made)
 

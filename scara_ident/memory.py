@@ -16,6 +16,8 @@ SHARE = 0.5
 # Where the system does not say how much it has.
 USUAL = 8e9
 LEAST = 0.05
+# Memory that JSON takes when it is read, by its bytes: a number of three signs is an object of 24 bytes, and a place in a list.
+JSON_FACTOR = 10.0
 
 _given: list[float] = []
 
@@ -47,6 +49,19 @@ def check_memory(path: Path, needed: float) -> None:
     """
     if needed > limit():
         raise _too_much(path, f"about {needed / GIGA:.2g} GB of memory, more than {limit() / GIGA:.2g} GB")
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file of results, which is read as JSON then, within the limit.
+
+    Raises
+    ------
+    MemoryLimit
+        If what is in it takes more.
+    OSError, UnicodeDecodeError
+    """
+    check_memory(path, JSON_FACTOR * path.stat().st_size)
+    return path.read_text(encoding="utf-8")
 
 
 @contextmanager

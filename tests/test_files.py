@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import stat
@@ -20,6 +21,7 @@ from scara_ident.files import (
     plain,
     real_path,
     slug,
+    why_unwritten,
     write_json,
     write_text,
     write_whole,
@@ -171,6 +173,22 @@ except ScaraIdentError as error:
     assert len(told.stdout.splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
     assert (tmp_path / "a.json").read_text() == "old"
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), "No space left on device; make room or give another folder"),
+        # As Polars has it.
+        (OSError("No space left on device (os error 28)"), "No space left on device; make room or give another folder"),
+        (ValueError("parquet: IO error: No space left on device"), "No space left on device; make room or give another folder"),
+        (OSError(errno.EDQUOT, os.strerror(errno.EDQUOT)), "Disk quota exceeded; make room or give another folder"),
+        (PermissionError(errno.EACCES, "Permission denied"), "Permission denied; give another folder"),
+        (NotADirectoryError(errno.ENOTDIR, "Not a directory"), "is a file; give another folder"),
+    ],
+)  # fmt: skip
+def test_why_something_is_not_written_ends_in_what_to_do(error: Exception, words: str):
+    assert why_unwritten(error) == words
 
 
 def test_a_pipe_a_device_and_a_socket_are_no_files(tmp_path: Path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import sys
 import zlib
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import MemoryLimit, UsageError
-from scara_ident.memory import LEAST, check_memory, limit, set_limit, within_limit
+from scara_ident.memory import LEAST, check_memory, limit, read_text, set_limit, within_limit
 from scara_ident.recording.files import column_names, read_columns
 
 GIGA = 1e9
@@ -40,6 +41,15 @@ def write_zeros_mat(path: Path, count: int) -> None:
     packed += packer.flush()
     start = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x100) + b"IM"
     path.write_bytes(start + struct.pack("<II", 15, len(packed)) + packed)
+
+
+def test_results_of_gigabytes_are_refused_unread(tmp_path: Path):
+    path = tmp_path / "identification.json"
+    path.write_text("{}")
+    assert read_text(path) == "{}"
+    os.truncate(path, 30_000_000)
+    with pytest.raises(MemoryLimit, match="--max-memory"):
+        read_text(path)
 
 
 def test_the_limit_is_half_of_the_machine_unless_set():

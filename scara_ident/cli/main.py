@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
@@ -129,8 +130,10 @@ def run(arguments: list[str]) -> int:
         _complain("out of memory; give fewer recordings at a time, or shorter ones")
         return 1
     except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        _complain(f"{where}{error.strerror or error}")
+        # Results say themselves what they are: this is what is printed, or what a library keeps.
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        where = error.filename or ("standard output or a temporary file" if full else None)
+        _complain(f"{'' if where is None else f'{where}: '}{error.strerror or error}{'; make room' if full else ''}")
         return 1
     except Exception as error:
         # A fault of ours: one line for the user, the whole trace for who wants to report it.

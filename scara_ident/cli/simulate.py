@@ -38,7 +38,7 @@ def simulate(
 ) -> None:
     """Record the virtual arm in closed loop, with what it really was in a JSON beside."""
     from scara_ident.errors import UsageError
-    from scara_ident.files import check_output, written_together
+    from scara_ident.files import check_output
     from scara_ident.robot.robot import load_robot
     from scara_ident.simulation import parse_effect, virtual_arm, write_simulation
     from scara_ident.simulation import simulate as simulate_run
@@ -65,6 +65,5 @@ def simulate(
                 result = simulate_run(
                     arm, motion, effects=effects, seed=seed, repetition=repetition, link_encoders=link_encoder or ()
                 )
-                with written_together(output) as folder:
-                    path = write_simulation(result, folder)
+                path = write_simulation(result, output)
                 console.written(output, path.name)

@@ -14,6 +14,7 @@ from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.estimation.consistent.shape import ShapeChoice
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information
+from scara_ident.memory import read_text
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.robot.robot import Robot
 
@@ -81,7 +82,7 @@ def load_estimate(path: Path | str, robot: Robot) -> Estimate:
     """
     path = Path(path)
     try:
-        held = json.loads(path.read_text(encoding="utf-8"))["estimate"]
+        held = json.loads(read_text(path))["estimate"]
         name, joints, names = held["model"], tuple(held["joints"]), tuple(held["names"])
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror or error}; give an identification.json") from None

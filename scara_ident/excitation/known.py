@@ -10,6 +10,7 @@ import numpy as np
 
 from scara_ident.errors import ScaraIdentError
 from scara_ident.files import path_fault
+from scara_ident.memory import read_text
 from scara_ident.model.model import TorqueModel
 
 
@@ -35,7 +36,7 @@ def read_parameters(path: Path, model: TorqueModel) -> dict[str, float]:
     if (fault := path_fault(path)) is not None:
         raise ScaraIdentError(fault)
     try:
-        rows = json.loads(path.read_text(encoding="utf-8"))["parameters"]
+        rows = json.loads(read_text(path))["parameters"]
         found = {str(row["name"]): float(row["value"]) for row in rows if not _undetermined(row)}
         if not np.isfinite(list(found.values())).all():
             raise ValueError("a value is not finite")
@@ -65,7 +66,7 @@ def read_diagnosis(path: Path) -> dict[str, Any]:
         If the file cannot be read or is no diagnosis.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_text(path))
     except OSError as error:
         raise ScaraIdentError(f"{path}: cannot be read: {error.strerror or error}; give a diagnosis.json") from None
     except ValueError:

@@ -199,7 +199,6 @@ def excitation_dict(design: Design, stopping: Stopping | None = None) -> dict[st
             "failed": len(design.costs) - len(finite),
             "cost_best": min(finite),
             "cost_median": float(np.median(finite)),
-            "seconds": design.seconds,
         },
     }
 

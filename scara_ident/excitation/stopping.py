@@ -14,6 +14,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information, merge
 from scara_ident.excitation.design import Design, information_of
+from scara_ident.memory import read_text
 from scara_ident.robot.robot import Robot
 
 # Noise of a torque is given as its rms below this frequency, Hz.
@@ -238,7 +239,7 @@ def noise_of(robot: Robot, given: Mapping[str, float], identification: Path | No
 def _residual(path: Path) -> dict[str, float]:
     """Largest rms of the residual over the training recordings by joint, as if it were white up to `NOISE_BAND`."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_text(path))
         bands = content.get("band_hz") or {}
         rms: dict[str, float] = {}
         for joints in content["errors"]["training"].values():

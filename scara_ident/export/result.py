@@ -22,6 +22,7 @@ from scara_ident.estimation.information import Information
 from scara_ident.estimation.observations import Observations
 from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.files import path_fault
+from scara_ident.memory import read_text
 from scara_ident.model import MODELS
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.robot.description import check_description
@@ -143,7 +144,7 @@ def read_content(path: Path) -> dict[str, Any]:
     if (fault := path_fault(path)) is not None:
         raise ScaraIdentError(fault)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_text(path))
     except OSError as error:
         raise ScaraIdentError(f"{path}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError):

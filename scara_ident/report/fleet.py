@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,11 +31,12 @@ def write_fleet(folder: Path, fleet: Fleet, table: pl.DataFrame) -> None:
     ScaraIdentError
         In one line, if they cannot be written.
     """
-    with tempfile.TemporaryDirectory() as stage, written_together(folder) as place:
-        table.write_parquet(Path(stage) / TABLE)
-        fleet_report(Path(stage) / REPORT, fleet)
+    content = BytesIO()
+    table.write_parquet(content)
+    with written_together(folder) as place:
+        (place / TABLE).write_bytes(content.getvalue())
+        fleet_report(place / REPORT, fleet)
         for name in (TABLE, REPORT):
-            content = (Path(stage) / name).read_bytes()
             held = folder / name
-            if not held.is_file() or held.read_bytes() != content:
-                (place / name).write_bytes(content)
+            if held.is_file() and held.read_bytes() == (place / name).read_bytes():
+                (place / name).unlink()

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from scara_ident.errors import RecordingError
-from scara_ident.files import slug
+from scara_ident.files import slug, written_together
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import write_recording
 from scara_ident.simulation.arm import VirtualArm
@@ -63,7 +62,7 @@ def truth(arm: VirtualArm, effects: Sequence[Effect] = ()) -> dict[str, Any]:
 
 
 def write_simulation(result: SimulationResult, folder: Path | str) -> Path:
-    """Write a simulated recording and what was behind it.
+    """Write a simulated recording and what was behind it, both or neither.
 
     Parameters
     ----------
@@ -79,7 +78,7 @@ def write_simulation(result: SimulationResult, folder: Path | str) -> Path:
 
     Raises
     ------
-    RecordingError
+    ScaraIdentError
         If the folder cannot be written to.
     """
     folder = Path(folder)
@@ -91,12 +90,11 @@ def write_simulation(result: SimulationResult, folder: Path | str) -> Path:
         "rate": result.rate,
         "substeps": result.substeps,
     }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_recording(result.recording, path, effort_gain=result.arm.robot.effort_gain)
-        path.with_suffix(".truth.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise RecordingError(f"{folder}: cannot be written to: {error.strerror}; name another folder") from None
+    with written_together(folder) as place:
+        write_recording(result.recording, place / path.name, effort_gain=result.arm.robot.effort_gain)
+        (place / path.name).with_suffix(".truth.json").write_text(
+            json.dumps(content, indent=1) + "\n", encoding="utf-8"
+        )
     return path
 
 

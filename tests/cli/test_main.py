@@ -163,6 +163,17 @@ def test_a_reader_that_goes_away_is_no_trouble():
     assert done.returncode == 0
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_behind_the_output_is_one_line(monkeypatch, capfd: pytest.CaptureFixture[str]):
+    full = open("/dev/full", "w", encoding="utf-8")  # noqa: SIM115
+    monkeypatch.setattr(sys, "stdout", full)
+    assert run(["--help"]) == 1
+    with pytest.raises(OSError, match="No space"):
+        full.close()
+    told = capfd.readouterr().err
+    assert told == "scara-ident: standard output or a temporary file: No space left on device; make room\n"
+
+
 def test_importing_the_package_is_quick():
     """Heavy libraries wait until they are needed."""
     heavy = ("cvxpy", "matplotlib", "polars", "pandas", "pinocchio", "numba", "yourdfpy", "rich")

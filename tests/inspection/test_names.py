@@ -42,6 +42,8 @@ UR = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint
         ("vitesse mesurée axe 5 (deg/s)", "velocity", None, 5, "deg/s"),
         ("Accélération 1", "acceleration", None, 1, None),
         ("couple_articulation_6", "effort", None, 6, None),
+        # A number of more digits than Python reads.
+        ("position_" + 5000 * "9", "position", None, None, None),
     ],
 )
 def test_a_name_says_quantity_joint_and_unit(name, quantity, joint, number, unit):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
-from scara_ident.files import replacing
+from scara_ident.files import replacing, why_unwritten
 from scara_ident.memory import check_memory
 from scara_ident.recording.files.dates import is_date, seconds
 from scara_ident.recording.files.files import check_file
@@ -133,11 +133,9 @@ def write_columns(path: Path, columns: Mapping[str, Array]) -> None:
                 frame.write_csv(file)
             else:
                 frame.write_parquet(file)
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
-    except pl.exceptions.PolarsError as error:
+    except (OSError, pl.exceptions.PolarsError) as error:
         # The Parquet writer wraps what the disk says.
-        raise RecordingError(f"{path}: cannot be written: {str(error).splitlines()[0]}") from error
+        raise RecordingError(f"{path}: cannot be written: {why_unwritten(error)}") from error
 
 
 def check_suffix(path: Path) -> None:
