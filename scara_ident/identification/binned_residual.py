@@ -77,9 +77,10 @@ class Binned:
     def bounded(self, bound: float) -> Array:
         """Return the mean residual of bins with samples bounded at so many standard deviations, shape (n, M)."""
         shape = (*self.taken.shape, self.size)
-        most = (bound * self.noise)[:, None, None]
         inside = self.raw.reshape(shape) - self.taken[:, :, None]
-        np.clip(inside, -most, most, out=inside)
+        if np.isfinite(bound):
+            most = (bound * self.noise)[:, None, None]
+            np.clip(inside, -most, most, out=inside)
         inside *= self.used.reshape(shape)
         return np.asarray(inside.mean(axis=2) / np.maximum(self.known, 1.0 / self.size))
 

@@ -10,6 +10,7 @@ import pytest
 
 from scara_ident.errors import RecordingError
 from scara_ident.identification import long_recordings
+from scara_ident.identification.binned_residual import BIN
 from scara_ident.identification.identify import Identification, identify
 from scara_ident.recording import long_file
 from scara_ident.recording.recording import Recording, read_recording, write_recording
@@ -76,8 +77,9 @@ def test_bands_chosen_and_events_found_are_those_of_the_whole_beside_another_rec
     (event,), (same,) = parts.events, whole.events
     assert (event.recording, event.kind, event.joints) == (same.recording, same.kind, same.joints)
     assert (event.start, event.stop) == pytest.approx((43.0, 44.2), abs=0.1)
-    assert (event.start, event.stop) == pytest.approx((same.start, same.stop), abs=1e-9)
-    assert_same(parts, whole)
+    # Each part has its own noise, by which an end may be a bin earlier or later, and what is left out of the fit with it.
+    assert (event.start, event.stop) == pytest.approx((same.start, same.stop), abs=1.01 * BIN)
+    assert np.all(np.abs(parts.estimate.value - whole.estimate.value) < 0.1 * whole.estimate.std)
     assert [item.name for item in parts.training.each] == ["swing_1", "other"]
 
 
