@@ -61,7 +61,7 @@ def test_what_they_stand_behind_keeps_its_order():
         ({"least_gain": 1.01}, "unexplained", []),
         ({"most_effects": 0}, "unexplained", []),
         # Where so much may be left over, nothing is.
-        ({"least_gain": 1.01, "remainder": 1.01, "remainder_to_noise": 1e3}, "complete", []),
+        ({"least_gain": 1.01, "remainder": 1.01, "remainder_to_noise": 1e3, "least_remainder": 1.0}, "complete", []),
     ],
 )
 def test_a_diagnosis_obeys_the_criteria_that_it_is_given(change: dict, verdict: str, found: list[str]):
@@ -89,7 +89,9 @@ def test_what_may_be_left_over_is_obeyed():
     none = replace(CRITERIA, most_effects=0)
     share = spring_diagnosed(none).dependences[0].explained
     lenient = replace(none, remainder=min(1.5 * share, 1.01), remainder_to_noise=1e3)
-    assert spring_diagnosed(lenient).verdict == "complete"
+    # What may be left over is nothing in particular, and what surely repeats no noise either.
+    assert spring_diagnosed(lenient).verdict == "undecided"
+    assert spring_diagnosed(replace(lenient, least_remainder=1.0)).verdict == "complete"
     assert spring_diagnosed(replace(lenient, remainder=0.5 * lenient.remainder)).verdict == "unexplained"
 
 

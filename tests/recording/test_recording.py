@@ -195,7 +195,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(robot, tmp_path, mo
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(pl.DataFrame, "write_parquet", full)
-    with pytest.raises(RecordingError, match="no space left on device"):
+    with pytest.raises(RecordingError, match="No space left on device; make room"):
         write_recording(recording, path)
     assert path.read_bytes() == before
     assert os.listdir(tmp_path) == ["OJD_1.parquet"]
