@@ -11,8 +11,9 @@ from scipy.spatial import ConvexHull, QhullError
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
+from scara_ident.quiet import quiet_stderr
 from scara_ident.robot.robot import Robot
-from scara_ident.robot.urdf_file import quiet_stderr, read_urdf
+from scara_ident.robot.urdf_file import read_urdf
 from scara_ident.robot.visual_boxes import find_mesh
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,6 +9,7 @@ import pinocchio as pin
 
 from scara_ident.errors import RobotError
 from scara_ident.files import path_fault
+from scara_ident.quiet import quiet_stderr
 from scara_ident.robot.urdf_validation import XACRO, urdf_fault
 
 # Bytes: those of a humanoid are a few hundred thousand.
@@ -54,23 +52,6 @@ def read_urdf(urdf: Path, source: Path) -> ElementTree.Element:
     if (fault := urdf_fault(root)) is not None:
         raise RobotError(f"{urdf}: not a usable URDF: {fault}")
     return root
-
-
-@contextmanager
-def quiet_stderr() -> Iterator[None]:
-    """Keep what the URDF and mesh readers write to the C stream from the user, who gets our line instead."""
-    try:
-        saved = os.dup(2)
-    except OSError:
-        yield
-        return
-    try:
-        with open(os.devnull, "wb") as sink:
-            os.dup2(sink.fileno(), 2)
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
 
 
 def pinocchio_model(urdf: Path, tree: ElementTree.Element) -> pin.Model:

@@ -12,6 +12,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.files import replacing, why_unwritten
 from scara_ident.memory import check_memory
+from scara_ident.quiet import quiet_stderr
 from scara_ident.recording.files.dates import is_date, seconds
 from scara_ident.recording.files.files import check_file
 
@@ -61,7 +62,7 @@ def column_names(path: Path) -> tuple[str, ...]:
             unnamed = _is_data(header)
             names = [f"column_{k + 1}" if unnamed else name.strip() for k, name in enumerate(header)]
         else:
-            with path.open("rb") as file:
+            with path.open("rb") as file, quiet_stderr():
                 names = list(pl.read_parquet_schema(file))
     except UnicodeDecodeError as error:
         raise RecordingError(f"{path}: not a text file in UTF-8; save the CSV again in UTF-8") from error
@@ -102,7 +103,9 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
             frame = _read_csv(path, names)
         else:
             _check_parquet(path, names)
-            frame = pl.read_parquet(path, columns=list(names), glob=False, hive_partitioning=False)
+            # What is damaged may make it panic, and say so on its own.
+            with quiet_stderr():
+                frame = pl.read_parquet(path, columns=list(names), glob=False, hive_partitioning=False)
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
         raise damaged_table(path, error) from error
     return {name: numbers(path, frame[name]) for name in names}

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from scara_ident.arrays import Array
+from scara_ident.quiet import quiet_stderr
 from scara_ident.recording.files.parquet_csv import damaged_table, numbers
 
 _MAGIC = b"PAR1"
@@ -102,7 +103,8 @@ def _frame(path: Path, names: Sequence[str], start: int, stop: int) -> Any:
 
     try:
         rows = pl.scan_parquet(path, glob=False, hive_partitioning=False).select(names).slice(start, stop - start)
-        return rows.collect()
+        with quiet_stderr():
+            return rows.collect()
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
         raise damaged_table(path, error) from error
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import polars as pl
 import pytest
 
 from scara_ident.errors import RecordingError
+from scara_ident.recording.files.parquet_csv import read_columns
 from scara_ident.recording.recording import (
     read_recording,
 )
@@ -184,3 +186,17 @@ def test_blanks_separate_where_nothing_else_does(tmp_path):
     found = read_recording(tmp_path / "rtde.csv", robot)
     np.testing.assert_allclose(found.effort, stacked("effort"), rtol=1e-12)
     np.testing.assert_array_equal(found.position, stacked("position"))
+
+
+def test_what_the_reader_prints_of_a_damaged_file_does_not_reach_the_user(tmp_path, capfd, monkeypatch):
+    path = tmp_path / "run.parquet"
+    pl.DataFrame({"time": [0.0, 0.1]}).write_parquet(path)
+
+    def panics(*_, **__):
+        os.write(2, b"thread 'async-executor-0' panicked\nstack backtrace:\n")
+        raise pl.exceptions.PanicException("assertion failed")
+
+    monkeypatch.setattr(pl, "read_parquet", panics)
+    with pytest.raises(RecordingError, match="not a whole parquet file"):
+        read_columns(path, ["time"])
+    assert capfd.readouterr().err == ""
