@@ -5,17 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.questions import HALF_THE_SPEED, Question, possible, questions
 from scara_ident.diagnosis.selection_step import best_of_each
+from scara_ident.threads import one_blas_thread
 
 # A motion that is designed to tell, s, and how that is asked for.
 ASKED_SECONDS, ASKED_MOTION = 15.0, "excite --tell"
+# Kinds of questions whose motions come before recordings of another kind.
+URGENT = ("rivals", "unexplained")
 # Effects of which more could be said, and joints that are named of each.
 MOST, MOST_LABELS = 4, 3
+# By diagnosis: its file, its report and its story in words all hold them, and they take all its recordings.
+_FOUND: WeakKeyDictionary[Diagnosis, tuple[NextStep, ...]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -68,14 +74,26 @@ def next_steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
     ----------
     diagnosis : Diagnosis
     """
+    found = _FOUND.get(diagnosis)
+    if found is None:
+        found = _FOUND[diagnosis] = _steps(diagnosis)
+    return found
+
+
+@one_blas_thread()
+def _steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
     asked = questions(diagnosis)
-    urgent = [item for item in asked if item.kind in ("rivals", "unexplained")]
-    late = [item for item in asked if item not in urgent]
+    sigmas = inquire(diagnosis, asked).sigmas()
+    motions = [
+        NextStep(question.text, ASKED_MOTION, ASKED_SECONDS, float(sigma), question)
+        for question, sigma in zip(asked, sigmas, strict=True)
+    ]
+    urgent = [item for item in asked if item.kind in URGENT]
     return (
-        *_motions(diagnosis, urgent),
+        *(step for step, question in zip(motions, asked, strict=True) if question.kind in URGENT),
         *_remainder(diagnosis, urgent),
         *_recordings(diagnosis),
-        *_motions(diagnosis, late),
+        *(step for step, question in zip(motions, asked, strict=True) if question.kind not in URGENT),
         *_confirmations(diagnosis),
         *_faint(diagnosis),
         *(
@@ -83,12 +101,6 @@ def next_steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
             for item in diagnosis.aliases
         ),
     )
-
-
-def _motions(diagnosis: Diagnosis, asked: Sequence[Question]) -> Iterator[NextStep]:
-    sigmas = inquire(diagnosis, asked).sigmas()
-    for question, sigma in zip(asked, sigmas, strict=True):
-        yield NextStep(question.text, ASKED_MOTION, ASKED_SECONDS, float(sigma), question)
 
 
 def _remainder(diagnosis: Diagnosis, asked: Sequence[Question]) -> Iterator[NextStep]:

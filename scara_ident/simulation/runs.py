@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.signal import lfilter
 
 from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
@@ -64,6 +63,9 @@ class TorqueNoise:
         keep = float(np.exp(-1.0 / (rate * self.correlation_time)))
         drive = np.sqrt(1.0 - keep**2) * white
         drive[:, 0] = white[:, 0]
+        # Over a second to import, and seldom wanted.
+        from scipy.signal import lfilter
+
         return np.asarray(lfilter([1.0], [1.0, -keep], drive, axis=1))
 
 

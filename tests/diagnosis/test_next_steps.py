@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from scara_ident.diagnosis import diagnose
+from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.next_steps import ASKED_MOTION, capital, next_steps
 from scara_ident.effects.position import Spring
+from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.asked import PAIR, open_diagnosis
 from tests.diagnosis.made import BANDS, exact_runs, with_torque
@@ -29,6 +32,19 @@ def test_what_the_recordings_lack_is_asked_for(lean):
     length = sum(np.ptp(run.time) for run in exact_runs()[::2])
     assert found["the noise floor"].seconds == pytest.approx(length, rel=0.01)
     assert found["whether the result holds elsewhere"].motion.endswith("give it with --validate")
+
+
+def test_they_are_found_once_for_the_file_the_report_and_the_story(monkeypatch):
+    found = open_diagnosis()
+    asked = []
+    monkeypatch.setattr(
+        sys.modules[next_steps.__module__], "inquire", lambda *given: asked.append(given) or inquire(*given)
+    )
+    fresh = replace(found)
+    content = diagnosis_dict(fresh)
+    assert diagnosis_dict(fresh)["next"] == content["next"] and next_steps(fresh) is next_steps(fresh)
+    # One inquiry holds all questions: the factor of the recordings' rows is made once.
+    assert len(asked) == 1 and len(asked[0][1]) == sum("kind" in item for item in content["next"])
 
 
 def test_what_no_motion_settles_names_the_experiment(lean):
