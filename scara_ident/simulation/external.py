@@ -18,11 +18,14 @@ SHAFT_WAY = 1e-4
 @compiled
 def carry(plant: Plant, t: float, bodies: Array) -> None:
     """Fill ``bodies``, shape (n, 10), with the plant's own and what the last one carries from ``t`` on."""
-    bodies[:] = plant.bodies
+    n = bodies.shape[0]
+    for i in range(n):
+        for j in range(10):
+            bodies[i, j] = plant.bodies[i, j]
     for k in range(plant.payload_span.shape[0]):
-        begin, end = plant.payload_span[k]
-        if begin <= t + SAME < end:
-            bodies[-1] += plant.payload_body[k]
+        if plant.payload_span[k, 0] <= t + SAME < plant.payload_span[k, 1]:
+            for j in range(10):
+                bodies[n - 1, j] += plant.payload_body[k, j]
 
 
 @compiled

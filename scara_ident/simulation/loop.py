@@ -51,6 +51,15 @@ class Trace(NamedTuple):
     velocity: Array
 
 
+class Controller(NamedTuple):
+    """What the controller holds: its integral, the torque it gives, the last position, and the velocity filter's memory."""
+
+    integral: Array
+    drive: Array
+    before: Array
+    memory: Array
+
+
 def make_trace(samples: int, n: int) -> Trace:
     """Allocate a trace."""
     return Trace(*(np.empty((samples, n)) for _ in range(12)))
@@ -64,19 +73,16 @@ def _track(
     room: Room,
     x: State,
     s: Stages,
+    held: Controller,
     period: float,
     substeps: int,
     reference: Array,
     feed: Array,
-    start: Array,
     controlled: bool,
     out: Trace,
 ) -> int:
     samples, n = out.theta.shape
-    integral = start.copy()
-    drive = np.zeros(n)
-    before = np.zeros(n)
-    memory = np.zeros((n, 4))
+    integral, drive, before, memory = held.integral, held.drive, held.before, held.memory
     h = period / substeps
     events = 0
     b0, b1, b2, a1, a2 = gains.filter
@@ -92,7 +98,8 @@ def _track(
                 seen = grid * np.floor(seen / grid + sensors.shift[j])
             if k == 0:
                 # As if it had been moving at this speed before.
-                memory[j, :] = x.omega[j]
+                for m in range(4):
+                    memory[j, m] = x.omega[j]
                 raw = x.omega[j]
             else:
                 raw = (seen - before[j]) / period
@@ -135,8 +142,9 @@ def _track(
                     break
                 now += part
                 first_stage(plant, room, x, s, now, drive)
-        if not np.all(np.isfinite(x.theta)):
-            return k
+        for j in range(n):
+            if not np.isfinite(x.theta[j]):
+                return k
     return -1 - events
 
 
@@ -187,10 +195,10 @@ def track(
     # As if it had been moving so before: friction that builds up over a distance is there.
     x.dahl[:n] = np.sign(x.omega)
     out = make_trace(samples, n)
-    room = make_room(n)
+    held = Controller(start.copy(), np.zeros(n), np.zeros(n), np.zeros((n, 4)))
     status = _track(
-        plant, sensors, gains, room, x, make_stages(x), period, substeps, np.ascontiguousarray(reference),
-        np.ascontiguousarray(feed), start, controlled, out,
+        plant, sensors, gains, make_room(n), x, make_stages(x), held, period, substeps, np.ascontiguousarray(reference),
+        np.ascontiguousarray(feed), controlled, out,
     )  # fmt: skip
     return out, -1 - status
 
