@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 from numba import njit
 
@@ -27,13 +27,22 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     Numba keeps the code of a function as long as its own file does not change, also when a function that it calls
     has changed in another file. So the stamp of its file is replaced by one of all the sources.
     """
-    dispatcher = njit(cache=True, **OPTIONS)(function)
+    return _compiled(function, OPTIONS)
+
+
+def compiled_within(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function that compiled ones call, and Python never: without a door for it the first run is a third shorter."""
+    return _compiled(function, {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True})
+
+
+def _compiled(function: Callable[P, R], options: Mapping[str, Any]) -> Callable[P, R]:
+    dispatcher = njit(cache=True, **options)(function)
     kept = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if kept is not None and hasattr(kept, "_source_stamp"):
         kept._source_stamp = _stamp()
     else:
         # Another numba: better compile in every run than run what was compiled from older sources.
-        dispatcher = njit(**OPTIONS)(function)
+        dispatcher = njit(**options)(function)
     return cast(Callable[P, R], dispatcher)
 
 

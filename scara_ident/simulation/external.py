@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.simulation.compiled import compiled
+from scara_ident.simulation.compiled import compiled_within
 from scara_ident.simulation.plant import Plant
 from scara_ident.simulation.spatial import rotate, rotate_back
 
@@ -15,7 +15,7 @@ SAME = 1e-9
 SHAFT_WAY = 1e-4
 
 
-@compiled
+@compiled_within
 def carry(plant: Plant, t: float, bodies: Array) -> None:
     """Fill ``bodies``, shape (n, 10), with the plant's own and what the last one carries from ``t`` on."""
     n = bodies.shape[0]
@@ -28,7 +28,7 @@ def carry(plant: Plant, t: float, bodies: Array) -> None:
                 bodies[n - 1, j] += plant.payload_body[k, j]
 
 
-@compiled
+@compiled_within
 def until_change(plant: Plant, t: float, left: float) -> float:
     """Return how long, at most ``left``, the arm carries what it does at ``t``."""
     for k in range(plant.payload_span.shape[0]):
@@ -38,7 +38,7 @@ def until_change(plant: Plant, t: float, left: float) -> float:
     return left
 
 
-@compiled
+@compiled_within
 def push(plant: Plant, t: float, e: Array, p: Array, force: Array, bias: Array) -> None:
     """Take the torques ``J^T f`` of pushes off the bias torques.
 
@@ -72,7 +72,7 @@ def push(plant: Plant, t: float, e: Array, p: Array, force: Array, bias: Array) 
             link = plant.parent[link]
 
 
-@compiled
+@compiled_within
 def shaft_inertia(plant: Plant, mass: Array) -> None:
     """Add the inertia of what turns with two joints together to the mass matrix."""
     for k in range(plant.shaft_joint.shape[0]):
@@ -83,7 +83,7 @@ def shaft_inertia(plant: Plant, mass: Array) -> None:
         mass[j, i] += plant.shaft_sign[k] * size
 
 
-@compiled
+@compiled_within
 def shaft_friction(plant: Plant, theta: Array, omega: Array, start: Array, dahl: Array, smooth: Array) -> None:
     """Add the friction of what turns with two joints together to the torques of their drives.
 
@@ -98,7 +98,7 @@ def shaft_friction(plant: Plant, theta: Array, omega: Array, start: Array, dahl:
         smooth[j] += sign * torque
 
 
-@compiled
+@compiled_within
 def slid(before: float, way: float, distance: float) -> float:
     """Return Dahl's state after a way in one direction, exactly."""
     end = 1.0 if way > 0.0 else (-1.0 if way < 0.0 else 0.0)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.simulation.compiled import compiled
+from scara_ident.simulation.compiled import compiled_within
 from scara_ident.simulation.external import push, shaft_friction, shaft_inertia, slid
 from scara_ident.simulation.plant import Plant
 from scara_ident.simulation.spatial import dynamics
@@ -68,7 +68,7 @@ def make_room(n: int) -> Room:
     )  # fmt: skip
 
 
-@compiled
+@compiled_within
 def _solve(matrix: Array, x: Array) -> None:
     """Solve in place by elimination with pivoting; n is the number of joints."""
     n = x.shape[0]
@@ -95,7 +95,7 @@ def _solve(matrix: Array, x: Array) -> None:
         x[k] = total / matrix[k, k]
 
 
-@compiled
+@compiled_within
 def _spring_torque(plant: Plant, j: int, stretch: float, rate: float) -> float:
     """Torque of an elastic joint; inside the clearance none, and a contact cannot pull."""
     half = 0.5 * plant.width[j]
@@ -110,7 +110,7 @@ def _spring_torque(plant: Plant, j: int, stretch: float, rate: float) -> float:
     return torque
 
 
-@compiled
+@compiled_within
 def _friction(plant: Plant, room: Room, t: float, x: State, start: Array) -> None:
     """Fill the torques that do not depend on acceleration: ``smooth``, ``dry`` and ``direction``."""
     theta, omega, mode, dahl = x.theta, x.omega, x.mode, x.dahl
@@ -158,7 +158,7 @@ def _friction(plant: Plant, room: Room, t: float, x: State, start: Array) -> Non
         room.smooth[plant.vibration_joint[i]] += plant.vibration_amplitude[i] * np.sin(angle)
 
 
-@compiled
+@compiled_within
 def _loss(plant: Plant, j: int, load: float, direction: float) -> float:
     """Drive torque per load: 1/eta where the motor drives, eta where it is driven, in between while presliding."""
     eta: float = plant.efficiency[j]
@@ -166,7 +166,7 @@ def _loss(plant: Plant, j: int, load: float, direction: float) -> float:
     return 1.0 + share * abs(direction)
 
 
-@compiled
+@compiled_within
 def accelerate(
     plant: Plant, room: Room, t: float, x: State, start: Array, drive: Array, a: Array, alpha: Array
 ) -> None:
@@ -248,7 +248,7 @@ def accelerate(
             alpha[j] = rest / plant.armature[j]
 
 
-@compiled
+@compiled_within
 def settle(plant: Plant, room: Room, t: float, x: State, drive: Array, a: Array, alpha: Array) -> None:
     """Find which joints stick, and the accelerations; ``x.mode`` is updated.
 

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.model.regressor.recursion import joint_geometry
-from scara_ident.simulation.compiled import compiled
+from scara_ident.simulation.compiled import compiled, compiled_within
 
 # Largest difference from Pinocchio, relative to the largest torque or inertia of the state.
 TOLERANCE = 1e-12
 
 
-@compiled
+@compiled_within
 def rotate(e: Array, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Turn a vector by the i-th of ``e``, shape (n, 9): from a joint's frame to its parent's."""
     return (
@@ -30,7 +30,7 @@ def rotate(e: Array, i: int, x: float, y: float, z: float) -> tuple[float, float
     )
 
 
-@compiled
+@compiled_within
 def rotate_back(e: Array, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Turn a vector the other way: from the frame of a joint's parent to its own."""
     return (

@@ -28,7 +28,9 @@ def test_a_compiled_function_gives_what_the_function_gives():
 
 def test_every_module_with_compiled_functions_counts_among_the_sources():
     """Else machine code of an older source would be run after a change of it."""
-    using = {path.name for path in ROOM.glob("*.py") if re.search(r"^@compiled$", path.read_text(), re.MULTILINE)}
+    using = {
+        path.name for path in ROOM.glob("*.py") if re.search(r"^@compiled(_within)?$", path.read_text(), re.MULTILINE)
+    }
     assert using
     assert using <= set(SOURCES)
     # What they read of the package at compile time counts as well.
