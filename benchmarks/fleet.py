@@ -12,7 +12,7 @@ import platform
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +25,7 @@ from scara_ident.fleet import Fleet, Settings, watch_fleet
 from scara_ident.fleet.changes import Change
 from scara_ident.fleet.fleet import changes_of
 from scara_ident.fleet.history import with_dates
+from scara_ident.fleet.table import Quantity
 from scara_ident.paper import OJD
 from scara_ident.recording.recording import Recording, write_recording
 from scara_ident.robot.robot import load_robot
@@ -145,7 +146,7 @@ def faults(folder: Path, seed: int) -> None:
     missed = 0
     for arm, fault in FAULTS.items():
         name = f"arm{arm:03d}"
-        due = first_at(fleet, name, fault, 4.0)
+        due = first_at(fleet.quantities[name], fault, 4.0)
         named = next((count for count, found in looks if found[name]), None)
         right = next((count for count, found in looks if is_right(found[name], fault)), None)
         missed += right is None or (due is not None and right > due)
@@ -164,12 +165,13 @@ def is_right(changes: tuple[Change, ...], fault: SlowFault) -> bool:
     return first is not None and first.effect == fault.effect and first.joint == fault.joint
 
 
-def first_at(fleet: Fleet, arm: str, fault: SlowFault, stds: float) -> int | None:
+def first_at(dates: Sequence[Sequence[Quantity]], fault: SlowFault, stds: float) -> int | None:
     """Return after how many dates the true change is so many standard deviations of its quantity's change.
 
-    That is of the difference between this date and the mean of those before the fault began.
+    That is of the difference between this date and the mean of those before the fault began; the standard deviation of one
+    date is the table's, which holds what differs from date to date.
     """
-    for month, each in enumerate(fleet.quantities[arm]):
+    for month, each in enumerate(dates):
         std = next((item.std for item in each if item.name == fault.quantity), np.inf)
         if abs(fault.at(month)) >= stds * std * np.sqrt(1.0 + 1.0 / fault.start):
             return month + 1

@@ -110,8 +110,7 @@ def fleet_scatter(histories: Sequence[History]) -> Scatter:
     runs, freedom = run_scatter(histories)
     found: dict[str, list[Array]] = {}
     for history in histories:
-        count = len(history.dates)
-        if count < 2:
+        if len(history.dates) < 2:
             continue
         rows = history.whitened(runs)
         left, _ = common_removed(rows)
@@ -121,8 +120,8 @@ def fleet_scatter(histories: Sequence[History]) -> Scatter:
             spread = _inverses(own)
             sizes = np.einsum("dij,dj->di", spread, aims)
             step, noise = np.diff(sizes, axis=0), np.einsum("dii->di", spread[1:] + spread[:-1])
-            # What all dates share took its part of the differences too.
-            squares = np.where(noise > 0.0, step**2 / np.where(noise > 0.0, noise, 1.0), 0.0) * count / (count - 1.0)
+            # What all dates share is the same on both dates of a difference, and takes nothing of it.
+            squares = np.where(noise > 0.0, step**2 / np.where(noise > 0.0, noise, 1.0), 0.0)
             found.setdefault(cause.label, []).append(squares)
     ratios = {}
     for label, parts in found.items():

@@ -16,7 +16,7 @@ from scara_ident.fleet.changes import (
     residual_scatter,
     trials_of,
 )
-from scara_ident.fleet.history import common_removed, with_dates
+from scara_ident.fleet.history import common_removed, noise_of, with_dates
 from tests.fleet.made import DATES, WEAR, WORN
 
 
@@ -44,6 +44,26 @@ def test_more_arms_ask_for_more(histories, noise):
     few = find_changes(histories[1], noise, 400.0)[0]
     many = find_changes(histories[1], noise, 40000.0)[0]
     np.testing.assert_allclose(many.p_value, 100.0 * few.p_value)
+
+
+def test_dates_that_differ_by_noise_alone_widen_nothing(histories):
+    random, arm = np.random.default_rng(0), histories[0]
+    first = arm.visits[0]
+
+    def drawn():
+        """A date of nothing but noise, in the columns of the first."""
+        factors = []
+        for factor, rows in zip(first.factors, first.rows, strict=True):
+            own = factor.copy()
+            known = factor.shape[1] - 1
+            own[:known, known] = noise_of(factor, rows) * random.standard_normal(known)
+            factors.append(own)
+        return replace(first, factors=tuple(factors))
+
+    fleet = [replace(arm, dates=DATES[:3], visits=(drawn(), drawn(), drawn())) for _ in range(20)]
+    ratios = np.concatenate(list(fleet_scatter(fleet).causes.values()))
+    # Forty differences tell a ratio to a quarter, of which the half above 1 stays: 1.1 on average.
+    assert 1.0 <= np.mean(ratios) < 1.2
 
 
 def test_where_dates_differ_more_by_nature_less_is_named(histories, noise):
