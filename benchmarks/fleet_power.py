@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 from fleet import DAILY, FAULTS, FLEET, MONTHS, SlowFault, date_name, first_at, is_right, run_of_fleet
+from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from scara_ident.arrays import Array
@@ -119,7 +120,7 @@ def best_probabilities(known: Design, torque: Array, count: int) -> Array:
     return np.array(found)
 
 
-def named_of(probabilities: Array) -> Array:
+def named_of(probabilities: Array) -> NDArray[np.bool_]:
     """Return which of the faulty arms are named at `LEVEL`; of the others none helps."""
     whole = np.concatenate([np.minimum(1.0, probabilities), np.ones(FLEET - len(probabilities))])
     return np.asarray(probabilities * arms_counted(list(whole)) < LEVEL)
@@ -128,7 +129,8 @@ def named_of(probabilities: Array) -> Array:
 def faults(fleets: int, seed: int) -> None:
     known = design()
     ways = ("the one test that knows all", "the same, paying for all", "ours")
-    hits, looks, false, dues = {way: [] for way in ways}, range(FIRST, MONTHS + 1), 0, []
+    hits: dict[str, list[NDArray[np.bool_]]] = {way: [] for way in ways}
+    false, dues = 0, []
     start = time.process_time()
     for number in range(fleets):
         torque = drawn(known, np.random.default_rng([seed, number]), True)
@@ -143,15 +145,15 @@ def faults(fleets: int, seed: int) -> None:
             found = changes_of(some)
             wrong |= any(found[f"arm{arm:03d}"] for arm in range(FLEET) if arm not in FAULTS)
             best = best_probabilities(known, torque, count)
-            tried = trials_of(some[0], Scatter(daily(), {}, np.inf))
-            ours = [is_right(found[f"arm{arm:03d}"], fault) for arm, fault in FAULTS.items()]
+            tried = trials_of(some[0], Scatter(daily(), {}, 1.0, {}))
+            ours = np.array([is_right(found[f"arm{arm:03d}"], fault) for arm, fault in FAULTS.items()])
             for way, right in zip(ways, (named_of(best), named_of(2.0 * tried * best), ours), strict=True):
-                seen[way] = np.where(right, np.minimum(seen[way], count), seen[way])
+                seen[way][right] = np.minimum(seen[way][right], count)
         false += wrong
         for way in ways:
             hits[way].append(seen[way] <= due)
     seconds = (time.process_time() - start) / fleets
-    print(f"{fleets} fleets drawn, seed {seed}, looks after {looks[0]} dates and more; {seconds:.1f} s of CPU a fleet")
+    print(f"{fleets} fleets drawn, seed {seed}, looks after {FIRST} dates and more; {seconds:.1f} s of CPU a fleet")
     print(f"{'fault':28}{'due':>5}" + "".join(f"{way:>30}" for way in ways))
     for k, fault in enumerate(FAULTS.values()):
         shares = "".join(f"{np.mean([hit[k] for hit in hits[way]]):30.2f}" for way in ways)

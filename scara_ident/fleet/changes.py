@@ -28,6 +28,7 @@ from scara_ident.fleet.history import (
     pseudo_inverses,
     run_scatter,
     scatter,
+    variance_prior,
 )
 
 # Chance that a report names any arm of a fleet in which nothing changed, and share of the arms named that are wrong on average.
@@ -36,7 +37,9 @@ LEVEL = 0.02
 MOST_CAUSES = 3
 AS_GOOD = 0.05
 # Draws of noise that say how many independent tests an arm's are worth, and the probability at which they do.
-SIMULATED, SIMULATED_LEVEL = 400, 0.1
+SIMULATED, SIMULATED_LEVEL = 2000, 0.1
+# Causes of which runs are less than this share of the variance tell each other how much larger than noise it is.
+BY_RUNS = 0.5
 # A combination of which less is left beside the common parameters, as a share of its square, is one of them.
 LEFT_SHARE = 1e-9
 
@@ -91,46 +94,66 @@ class Scatter:
         By a cause's label how much larger than their noise differences of each of its sizes are, as a ratio of squares, at
         least 1: a tilt about one axis may differ from date to date and that about the other not.
     freedom : float
-        Degrees of freedom of both.
+        Degrees of freedom of ``runs``.
+    freedoms : mapping of str to float
+        By a cause's label of both together.
     """
 
     runs: Array
     causes: Mapping[str, Array]
     freedom: float
+    freedoms: Mapping[str, float]
 
 
 def fleet_scatter(histories: Sequence[History]) -> Scatter:
     """Return what differs from date to date in a fleet.
+
+    A cause's variance is that of runs and of noise. The first is as sure as `run_scatter` tells it; how much larger the second
+    is than noise all causes tell each other, see `variance_prior`. The degrees of freedom of the sum are Satterthwaite's (1946).
 
     Parameters
     ----------
     histories : sequence of History
         Of one robot and model.
     """
-    runs, freedom = run_scatter(histories)
+    runs, told = run_scatter(histories)
+    freedom = max(1.0, told)
     found: dict[str, list[Array]] = {}
+    parts: dict[str, list[float]] = {}
     for history in histories:
         if len(history.dates) < 2:
             continue
         rows = history.whitened(runs)
         left, _ = common_removed(rows)
         for k, cause in enumerate(history.causes):
-            own = np.array([row.directions[k].T @ row.directions[k] for row in rows])
             aims = np.array([row.directions[k].T @ rest for row, rest in zip(rows, left, strict=True)])
-            spread = _inverses(own)
+            spread, alone = (
+                _inverses(np.array([row.directions[k].T @ row.directions[k] for row in each]))
+                for each in (rows, history.rows)
+            )
             sizes = np.einsum("dij,dj->di", spread, aims)
             step, noise = np.diff(sizes, axis=0), np.einsum("dii->di", spread[1:] + spread[:-1])
             # What all dates share is the same on both dates of a difference, and takes nothing of it.
             squares = np.where(noise > 0.0, step**2 / np.where(noise > 0.0, noise, 1.0), 0.0)
             found.setdefault(cause.label, []).append(squares)
-    ratios = {}
-    for label, parts in found.items():
-        squares = np.concatenate(parts)
-        # As `scatter` does: in noise the median alone is worth a third as many differences.
-        usual = np.median(squares, axis=0) / NORMAL_MEDIAN**2
-        kept = np.where(squares <= CUT**2 * usual, squares, np.nan)
-        ratios[label] = np.maximum(1.0, np.nanmean(kept, axis=0) / LEFT)
-    return Scatter(runs, ratios, freedom)
+            own, whole = np.einsum("dii->i", alone), np.einsum("dii->i", spread)
+            parts.setdefault(cause.label, []).append(1.0 - float(np.min(own / np.where(whole > 0.0, whole, np.inf))))
+    # As `scatter` does: in noise the median alone is worth a third as many differences.
+    raw = {label: _mean_square(np.concatenate(squares)) for label, squares in found.items()}
+    by_runs = {label: float(np.mean(part)) for label, part in parts.items()}
+    noisy = [ratio for label, ratio in raw.items() if by_runs[label] < BY_RUNS]
+    prior, usual = variance_prior(np.concatenate(noisy) if noisy else np.zeros(0), freedom)
+    weight = freedom / (freedom + prior)
+    ratios = {label: np.maximum(1.0, usual + weight * (ratio - usual)) for label, ratio in raw.items()}
+    freedoms = {
+        label: 1.0 / (part**2 / freedom + (1.0 - part) ** 2 / (freedom + prior)) for label, part in by_runs.items()
+    }
+    return Scatter(runs, ratios, freedom, freedoms)
+
+
+def _mean_square(squares: Array) -> Array:
+    usual = np.median(squares, axis=0) / NORMAL_MEDIAN**2
+    return np.asarray(np.nanmean(np.where(squares <= CUT**2 * usual, squares, np.nan), axis=0) / LEFT)
 
 
 def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Change, ...]:
@@ -151,27 +174,15 @@ def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Chan
     left, basis = common_removed(rows)
     shapes = list(_shapes(history.days))
     found: list[Change] = []
-    most = max(cause.sizes for cause in history.causes)
-    enough = [k * float(fdtri(k, scatter.freedom, 1.0 - AS_GOOD)) if k else 0.0 for k in range(most + 1)]
     while len(found) < MOST_CAUSES:
-        trials = [
-            trial
-            for k, cause in enumerate(history.causes)
-            if (trial := _best(k, cause, rows, left, basis, shapes, scatter)) is not None
-        ]
-        if not trials:
+        trials = _in_order(history, rows, left, basis, shapes, scatter)
+        if not trials or trials[0].p_value * tried >= LEVEL:
             break
-        trials.sort(key=lambda item: item.p_value)
         best = trials[0]
-        if best.p_value * tried >= LEVEL:
-            break
-        alike = tuple(
-            history.causes[item.cause]
-            for item in trials[1:]
-            if best.explained - item.explained < enough[best.size.size]
-        )
         start, gradual, _ = shapes[best.shape]
         cause = history.causes[best.cause]
+        enough = cause.sizes * float(fdtri(cause.sizes, scatter.freedom, 1.0 - AS_GOOD))
+        alike = tuple(history.causes[item.cause] for item in trials[1:] if best.explained - item.explained < enough)
         found.append(
             Change(
                 cause, cause.joint, history.dates[start], gradual, best.size, best.covariance,
@@ -200,9 +211,8 @@ def least_probability(history: History, scatter: Scatter, tried: float) -> float
     """Return the probability of the surest change of an arm, corrected for what was tried on it."""
     rows = history.whitened(scatter.runs)
     left, basis = common_removed(rows)
-    shapes = list(_shapes(history.days))
-    each = (_best(k, cause, rows, left, basis, shapes, scatter) for k, cause in enumerate(history.causes))
-    return min(1.0, tried * min((trial.p_value for trial in each if trial is not None), default=1.0))
+    trials = _in_order(history, rows, left, basis, list(_shapes(history.days)), scatter)
+    return min(1.0, tried * trials[0].p_value) if trials else 1.0
 
 
 def residual_scatter(histories: Sequence[History]) -> tuple[Array, float]:
@@ -288,6 +298,7 @@ class _Trial:
     cause: int
     shape: int
     explained: float
+    order: float
     p_value: float
     size: Array
     covariance: Array
@@ -325,8 +336,24 @@ def _best(
     value = np.einsum("sij,sj->si", inverse, share @ aims)
     explained = np.where(kept, np.einsum("si,sij,sj->s", value / wider, told, value / wider), -1.0)
     best = int(np.argmax(explained))
-    p_value = float(fdtrc(cause.sizes, max(1.0, scatter.freedom), explained[best] / cause.sizes))
-    return _Trial(k, best, float(explained[best]), p_value, value[best], np.outer(wider, wider) * inverse[best])
+    # Causes are compared as if all were as sure: else the surest scatter, not the best explanation, would come first.
+    freedoms = np.array([scatter.freedom, scatter.freedoms.get(cause.label, scatter.freedom)])
+    order, p_value = (float(p) for p in fdtrc(cause.sizes, freedoms, explained[best] / cause.sizes))
+    covariance = np.outer(wider, wider) * inverse[best]
+    return _Trial(k, best, float(explained[best]), order, p_value, value[best], covariance)
+
+
+def _in_order(
+    history: History,
+    rows: Sequence[DateRows],
+    left: Sequence[Array],
+    basis: Sequence[Array],
+    shapes: Sequence[tuple[int, bool, Array]],
+    scatter: Scatter,
+) -> list[_Trial]:
+    """Return the best shape of each cause, the best explanation first."""
+    each = (_best(k, cause, rows, left, basis, shapes, scatter) for k, cause in enumerate(history.causes))
+    return sorted((trial for trial in each if trial is not None), key=lambda item: item.order)
 
 
 def _without(

@@ -27,6 +27,8 @@ NORMAL_MEDIAN = 0.6745
 CUT, LEFT = 3.0, 0.9733
 # What differences of neighbouring dates are worth beside independent values: each date is in two of them.
 EFFICIENCY = 0.6
+# Fewer variances say nothing of each other; degrees of freedom that are as good as infinite; steps to find fewer.
+FEWEST_VARIANCES, LARGE, NEWTON_STEPS = 5, 1e6, 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,6 +217,41 @@ def scatter(steps: Array, noise: Array) -> Array:
             kept = own[np.abs(own) <= CUT * size]
             found[k] = max(0.0, 0.5 * float(np.mean(kept**2) / LEFT - np.median(var)))
     return found
+
+
+def variance_prior(ratios: Array, freedom: float) -> tuple[float, float]:
+    """Return what variances of one kind, as ratios to what they should be, tell of each other.
+
+    They are taken for draws of a scaled inverse chi-squared distribution, whose moments their logarithms tell (Smyth 2004).
+
+    Parameters
+    ----------
+    ratios : ndarray, shape (N,)
+    freedom : float
+        Of each.
+
+    Returns
+    -------
+    freedom : float
+        What the others are worth to one: infinity where they differ by no more than chance, 0 where there are too few.
+    usual : float
+        The ratio to which each is to be drawn.
+    """
+    from scipy.special import polygamma, psi
+
+    own = ratios[np.isfinite(ratios) & (ratios > 0.0)]
+    if len(own) < FEWEST_VARIANCES:
+        return 0.0, 1.0
+    logs = np.log(own) - psi(freedom / 2.0) + np.log(freedom / 2.0)
+    excess = float(np.var(logs, ddof=1) - polygamma(1, freedom / 2.0))
+    if excess <= 1.0 / LARGE:
+        return np.inf, float(np.exp(np.mean(logs)))
+    half = 0.5 + 1.0 / excess
+    for _ in range(NEWTON_STEPS):
+        # Newton's method on the reciprocal, which is convex: it converges from this side.
+        value = float(polygamma(1, half))
+        half += value * (1.0 - value / excess) / float(polygamma(2, half))
+    return 2.0 * half, float(np.exp(np.mean(logs) + psi(half) - np.log(half)))
 
 
 def with_dates(history: History, count: int) -> History:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scara_ident.fleet.history import common_removed, freedom_of, run_scatter, scatter, with_dates
+from scara_ident.fleet.history import common_removed, freedom_of, run_scatter, scatter, variance_prior, with_dates
 
 
 def test_the_scatter_is_that_which_was_put_in_and_a_slope_or_an_odd_arm_hardly_moves_it():
@@ -20,6 +20,18 @@ def test_the_scatter_is_that_which_was_put_in_and_a_slope_or_an_odd_arm_hardly_m
     np.testing.assert_allclose(np.sqrt(found[0]), runs, rtol=0.15)
     assert scatter(0.1 * steps, np.full_like(steps, 2.0 * noise**2))[0] == 0.0
     assert scatter(np.full((3, 1), np.nan), np.ones((3, 1)))[0] == 0.0
+
+
+def test_variances_tell_each_other_by_what_spread_they_were_drawn_with():
+    random = np.random.default_rng(0)
+    own, prior, usual = 30.0, 12.0, 2.0
+    drawn = usual * prior / random.chisquare(prior, 5000) * random.chisquare(own, 5000) / own
+    np.testing.assert_allclose(variance_prior(drawn, own), (prior, usual), rtol=0.1)
+    # Those that are all the same are worth as many as there are, or nearly.
+    freedom, ratio = variance_prior(random.chisquare(own, 5000) / own, own)
+    assert freedom > 20.0 * own
+    np.testing.assert_allclose(ratio, 1.0, rtol=0.02)
+    assert variance_prior(np.array([1.0, np.nan, 0.0, 3.0]), own) == (0.0, 1.0)
 
 
 def test_friction_differs_by_what_the_runs_were_made_with(histories):
