@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from scara_ident.arrays import Array
 from scara_ident.estimation.information import triangular
-from scara_ident.fleet.causes import sizes_in_words
+from scara_ident.fleet.causes import Cause, sizes_in_words
 from scara_ident.fleet.changes import Change
 from scara_ident.fleet.folder import Fault
 from scara_ident.fleet.history import History, noise_of, pseudo_inverses, scatter
@@ -63,26 +65,41 @@ def quantities(histories: Sequence[History]) -> dict[str, tuple[tuple[Quantity, 
     histories : sequence of History
         Of one robot and model.
     """
-    raw = {item.arm: [tuple(_of_date(item, k)) for k in range(len(item.dates))] for item in histories}
-    steps: dict[str, list[tuple[float, float]]] = {}
-    for dates in raw.values():
-        for before, after in zip(dates[:-1], dates[1:], strict=True):
-            known = {item.name: item for item in before}
-            for item in after:
-                if item.name in known:
-                    old = known[item.name]
-                    steps.setdefault(item.name, []).append((item.value - old.value, item.std**2 + old.std**2))
-    more = {}
-    for name, found in steps.items():
-        both = np.array(found)
-        more[name] = float(scatter(both[:, :1], both[:, 1:])[0])
+    sizes = {item.arm: [tuple(_sizes(item, visit)) for visit in item.visits] for item in histories}
+    # Of an effect the coefficients: an amplitude that is noise scatters less than one that has a size.
+    wider = _beyond_noise(
+        [{cause.label: (value, np.diag(cover)) for cause, value, cover in each} for each in dates]
+        for dates in sizes.values()
+    )
+    raw = {
+        item.arm: [tuple(_of_date(item, k, sizes[item.arm][k], wider)) for k in range(len(item.dates))]
+        for item in histories
+    }
+    more = _beyond_noise(
+        [{item.name: (np.array([item.value]), np.array([item.std**2])) for item in each} for each in dates]
+        for dates in raw.values()
+    )
     return {
         arm: tuple(
-            tuple(replace(item, std=float(np.sqrt(item.std**2 + more.get(item.name, 0.0)))) for item in each)
+            tuple(
+                replace(item, std=float(np.sqrt(item.std**2 + more[item.name][0]))) if item.name in more else item
+                for item in each
+            )
             for each in dates
         )
         for arm, dates in raw.items()
     }
+
+
+def _beyond_noise(arms: Iterable[Sequence[Mapping[str, tuple[Array, Array]]]]) -> dict[str, Array]:
+    """Return by name the variances from date to date beyond noise, of values and their variances by arm, date and name."""
+    steps: dict[str, list[Array]] = {}
+    for dates in arms:
+        for before, after in pairwise(dates):
+            for name in after.keys() & before.keys():
+                (old, old_noise), (new, new_noise) = before[name], after[name]
+                steps.setdefault(name, []).append(np.array([new - old, new_noise + old_noise]))
+    return {name: scatter(*np.swapaxes(np.array(found), 0, 1)) for name, found in steps.items()}
 
 
 def fleet_table(fleet: Fleet) -> pl.DataFrame:
@@ -132,7 +149,9 @@ def _change_of(item: Quantity, day: str, changes: Sequence[Change]) -> Change | 
     return None
 
 
-def _of_date(history: History, k: int) -> Iterator[Quantity]:
+def _of_date(
+    history: History, k: int, effects: Sequence[tuple[Cause, Array, Array]], wider: Mapping[str, Array]
+) -> Iterator[Quantity]:
     visit, model = history.visits[k], history.model
     labels = {cause.words: cause.label for cause in history.causes}
     inertia = next((cause.label for cause in history.causes if cause.effect == "inertia"), "")
@@ -141,7 +160,16 @@ def _of_date(history: History, k: int) -> Iterator[Quantity]:
         label = inertia if rigid.start <= place < rigid.stop else labels.get(column.meaning, "")
         value = float(visit.value[place]) if np.isfinite(visit.std[place]) else np.nan
         yield Quantity(column.name, column.joint, column.unit, value, float(visit.std[place]), label)
-    yield from _watched(history, visit)
+    for cause, size, cover in effects:
+        told = bool(np.all(np.isfinite(size)))
+        if told:
+            cover = cover + np.diag(wider.get(cause.label, np.zeros(len(size))))
+        each = sizes_in_words(
+            cause, history.scene, size if told else np.zeros(cause.sizes), cover if told else np.eye(cause.sizes)
+        )
+        for name, item in each.items():
+            own = (item.value, item.std) if told else (np.nan, np.inf)
+            yield Quantity(f"{name}: {cause.label}", cause.joint, item.unit, *own, cause.label)
     sizes, variances = (part[k] for part in history.run_sizes)
     for j, joint in enumerate(model.robot.joints):
         for kind, words in enumerate((f"friction of {joint}", f"torque scale of {joint}")):
@@ -151,8 +179,8 @@ def _of_date(history: History, k: int) -> Iterator[Quantity]:
                 yield Quantity(words, joint, "1", 1.0 + float(sizes[place]), std, labels[words])
 
 
-def _watched(history: History, visit: Visit) -> Iterator[Quantity]:
-    """Give the parameters of each watched effect beside the model alone."""
+def _sizes(history: History, visit: Visit) -> Iterator[tuple[Cause, Array, Array]]:
+    """Give the coefficients of each watched effect beside the model alone, and their covariance; NaN where not told."""
     base, total = len(history.model.columns), max(int(own.max(initial=0)) for own in visit.columns) + 1
     stacked = []
     for own, factor, rows in zip(visit.columns, visit.factors, visit.rows, strict=True):
@@ -171,14 +199,10 @@ def _watched(history: History, visit: Visit) -> Iterator[Quantity]:
         start += cause.sizes
         columns = left[:, own_columns]
         if np.any(np.linalg.norm(columns, axis=0) <= SEEN_SHARE * size[own_columns]) or not np.all(size[own_columns]):
-            nothing = sizes_in_words(cause, history.scene, np.zeros(cause.sizes), np.eye(cause.sizes))
-            for name, item in nothing.items():
-                yield Quantity(f"{name}: {cause.label}", cause.joint, item.unit, np.nan, np.inf, cause.label)
+            yield cause, np.full(cause.sizes, np.nan), np.full((cause.sizes, cause.sizes), np.nan)
             continue
         covariance = pseudo_inverses((columns.T @ columns)[None], np.finfo(float).eps)[0]
-        value = covariance @ (columns.T @ left[:, -1])
-        for name, item in sizes_in_words(cause, history.scene, value, covariance).items():
-            yield Quantity(f"{name}: {cause.label}", cause.joint, item.unit, item.value, item.std, cause.label)
+        yield cause, covariance @ (columns.T @ left[:, -1]), covariance
 
 
 def _finite(value: float | None) -> float | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scara_ident.effects.catalogue import available_effects
-from scara_ident.fleet.table import quantities
+from scara_ident.fleet.table import _beyond_noise, quantities
 from tests.fleet.made import WORN
 
 
@@ -37,3 +37,13 @@ def test_the_effects_parameters_stand_beside_the_models(histories):
     assert shown == watched
     loss = next(item for item in found if item.name.startswith("loss_coefficient"))
     assert abs(loss.value) < 5.0 * loss.std and loss.unit == "1" and loss.joint == "joint1"
+
+
+def test_scatter_is_told_of_coefficients_as_that_of_an_amplitude_near_zero_is_less():
+    random = np.random.default_rng(0)
+    values = 2.0 * random.standard_normal((40, 8, 2)) + random.standard_normal((40, 8, 2))
+    arms = [[{"coefficients": (value, np.ones(2))} for value in dates] for dates in values]
+    np.testing.assert_allclose(np.sqrt(_beyond_noise(arms)["coefficients"]), 2.0, rtol=0.15)
+    amplitudes = np.linalg.norm(values, axis=2)[:, :, None]
+    alone = [[{"amplitude": (value, np.ones(1))} for value in dates] for dates in amplitudes]
+    assert np.sqrt(_beyond_noise(alone)["amplitude"][0]) < 1.3
