@@ -29,7 +29,7 @@ from virtual_motions import RATE, random_motion, ranges
 from virtual_sets import _random_effect
 
 from scara_ident.diagnosis import Diagnosis, diagnose
-from scara_ident.diagnosis.answerability import Inquiry, inquire, known_rows
+from scara_ident.diagnosis.answerability import Inquiry, inquire, knowing, known_rows
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.fitted_model import FittedModel
@@ -183,7 +183,7 @@ def one_set(robot: str, number: int, seed: int) -> dict[str, Any]:
         result[f"found_{way}"], result[f"why_{way}"] = _found(found), _why(found, truth)
         if way == "tell":
             later = replace(inquiry, noise=noise_density(found), bands=found.search.bands)
-            later = replace(later, known=known_rows(later, first.search.step.columns))
+            later = knowing(later, first.search.step.columns)
             moved = [design.motion()]
             result["own"] = own(first, inquiry, moved, truth)
             result["noise"] = [each.noise.tolist() for each in (inquiry, later)]
