@@ -160,14 +160,20 @@ def told(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[Told, ...]:
     new = [rows_in_blocks(inquiry, motion) for motion in motions]
     before = inquiry.sigmas()
     after = inquiry.sigmas(merge([information_of(blocks) for blocks in new]))
+    sure = _sure_of(inquiry, new)
+    hidden = [tuple(own.label for own in item.suspects if sure.get(own.label, 1.0) < 1.0) for item in inquiry.questions]
+    each = zip(inquiry.questions, before, after, hidden, strict=True)
+    return tuple(Told(item, float(one), float(other), unshown) for item, one, other, unshown in each)
+
+
+def sure_of(inquiry: Inquiry, motions: Sequence[Motion]) -> dict[str, float]:
+    """Return `believed` of what is known and motions to be recorded."""
+    return _sure_of(inquiry, [rows_in_blocks(inquiry, motion) for motion in motions])
+
+
+def _sure_of(inquiry: Inquiry, new: Sequence[Blocks]) -> dict[str, float]:
     known = known_blocks(inquiry)
-    sure = believed(inquiry, reduce(Blocks.with_more, new if known is None else [known, *new]))
-    return tuple(
-        Told(
-            item, float(one), float(other), tuple(own.label for own in item.suspects if sure.get(own.label, 1.0) < 1.0)
-        )
-        for item, one, other in zip(inquiry.questions, before, after, strict=True)
-    )
+    return believed(inquiry, reduce(Blocks.with_more, new if known is None else [known, *new]))
 
 
 def search_to_tell(
