@@ -161,9 +161,11 @@ def told(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[Told, ...]:
     before = inquiry.sigmas()
     after = inquiry.sigmas(merge([information_of(blocks) for blocks in new]))
     sure = _sure_of(inquiry, new)
-    hidden = [tuple(own.label for own in item.suspects if sure.get(own.label, 1.0) < 1.0) for item in inquiry.questions]
-    each = zip(inquiry.questions, before, after, hidden, strict=True)
-    return tuple(Told(item, float(one), float(other), unshown) for item, one, other, unshown in each)
+    found = []
+    for item, one, other in zip(inquiry.questions, before, after, strict=True):
+        asked = item.suspects if item.kind == "below_limit" else ()
+        found.append(Told(item, float(one), float(other), tuple(own.label for own in asked if sure[own.label] < 1.0)))
+    return tuple(found)
 
 
 def sure_of(inquiry: Inquiry, motions: Sequence[Motion]) -> dict[str, float]:

@@ -50,13 +50,12 @@ def test_the_motion_keeps_its_limits_and_is_said_to_tell(asked):
 
 def test_of_what_may_be_below_the_limit_that_which_would_not_be_let_in_is_named(asked):
     first, second = asked[0].questions[0].suspects
-    faint = replace(first, value=tuple(1e-3 * x for x in first.value))
-    questions_ = [Question("below_limit", item.label, (item,), experiment="weigh it") for item in (faint, second)]
-    inquiry = inquire(open_diagnosis(), questions_)
-    spring, tilt = told(inquiry, [asked[1].motion(rate=200.0)])
-    assert not spring.settled and spring.unshown == ("spring of joint1",)
-    assert spring.instead == "Would not tell: spring of joint1. What would: weigh it."
-    assert tilt.settled and tilt.instead == ""
+    faint = replace(second, value=tuple(1e-3 * x for x in second.value))
+    each = [Question("below_limit", item.label, (item,), experiment="weigh it") for item in (first, faint)]
+    spring, tilt = told(inquire(open_diagnosis(), each), [asked[1].motion(rate=200.0)])
+    assert spring.settled and spring.unshown == () and spring.instead == ""
+    assert not tilt.settled and tilt.unshown == ("base_tilt",)
+    assert tilt.instead == "Would not tell: base_tilt. What would: weigh it."
 
 
 def test_what_was_promised_is_seen_and_the_effect_is_told(asked):
