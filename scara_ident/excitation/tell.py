@@ -44,15 +44,15 @@ from scara_ident.threads import one_blas_thread
 # Samples per second of a motion in the search, where a suspect follows the motor's turns, and of what is promised.
 RATE, TURNING_RATE, FINE_RATE = 200.0, 500.0, 1000.0
 # Motions that a search draws first, and changes of the best of them per round.
-DRAWN, CHANGED = 24, 30
+DRAWN, CHANGED = 48, 60
 # Speeds of a drawn motion as shares of the limits, evenly in their logarithm; how often a joint stands still.
 SLOWEST, STILL = 0.03, 0.15
 # Sizes of a change, as shares of the motion; by how much a joint's motion grows or shrinks, in its logarithm.
 CHANGE, GROWTH = (0.05, 0.6), 0.4
 # What a motion that breaks a limit shrinks by, and how often at most.
 SHRINKING, TRIES = 0.85, 40
-# Weight of all parameters together against that of another kind of question.
-PARAMETERS = 0.5
+# Weights of kinds of questions against that of what may be below the limit: what was found comes first.
+WEIGHTS = {"rivals": 2.0, "unexplained": 2.0, "below_limit": 1.0, "parameter": 0.5}
 # Standard errors at which an answer is sure enough: beyond, other questions count as much.
 SURE = 5.0
 
@@ -260,7 +260,7 @@ class _Judge:
     def weights(self) -> Array:
         """Questions of one kind share its weight, so that many effects worth a look do not outweigh all others."""
         kinds = [(item.kind, len(item.suspects) > 1) for item in self.inquiry.questions]
-        shares = [(PARAMETERS if kind == "parameter" else 1.0) / kinds.count((kind, more)) for kind, more in kinds]
+        shares = [WEIGHTS[kind] / kinds.count((kind, more)) for kind, more in kinds]
         counts = [len(_alone(item)) for item in self.inquiry.questions]
         return np.repeat(np.array(shares) / counts, counts)
 

@@ -30,7 +30,7 @@ def column(where: list[int]) -> np.ndarray:
     return (found / np.linalg.norm(found)).reshape(1, -1)
 
 
-def let_in(model: FittedModel, own: np.ndarray, size: float, draws: int = 40) -> float:
+def let_in(model: FittedModel, own: np.ndarray, size: float, draws: int = 25) -> float:
     rng = np.random.default_rng(7)
     (rows,) = model.joints
     count = 0
