@@ -54,8 +54,8 @@ def test_much_less_than_is_needed_is_seldom_let_in_and_much_more_nearly_always(w
     own = column(where)
     model = blocks_of(own).fitted(range(PARAMETERS), CRITERIA.parts)
     needed = 1.0 / times_believed(model, [{0: own}], [np.ones((1, 1))], [0], TRIED)[0]
-    # Of few blocks the standard error itself is hardly known.
-    assert let_in(model, own, 0.4 * needed) <= 0.1
+    # Of few blocks the standard error itself is hardly known, to a third or so with four degrees of freedom.
+    assert let_in(model, own, 0.3 * needed) <= 0.1
     assert 0.2 < let_in(model, own, needed) < 0.8
     assert let_in(model, own, 2.5 * needed) > 0.9
 
