@@ -291,8 +291,12 @@ def still_open(inquiry: Inquiry, verdict: str, times: Mapping[str, int]) -> list
 
 
 def worth_recording(tells: Sequence[Told]) -> list[Told]:
-    """Return what a motion tells for sure and much surer than is known."""
-    return [item for item in tells if item.after >= SURE and item.after >= WORTH * item.before]
+    """Return what a motion tells for sure and much surer than is known, and some of which would be believed."""
+    return [
+        item
+        for item in tells
+        if item.after >= max(SURE, WORTH * item.before) and not 0 < len(item.question.suspects) == len(item.unshown)
+    ]
 
 
 def _written(folder: Path, design: Design) -> None:

@@ -103,6 +103,11 @@ def test_only_a_motion_that_makes_surer_is_recorded():
     one = Question("parameter", "a", parameter="a", size=1.0)
     told = [Told(one, 1.0, 8.0), Told(one, 1.0, 4.0), Told(one, 7.0, 8.0)]
     assert worth_recording(told) == told[:1]
+    first, *_ = questions(open_diagnosis())
+    hidden = replace(first, kind="below_limit")
+    names = tuple(item.label for item in hidden.suspects)
+    told = [Told(hidden, 1.0, 8.0, names), Told(hidden, 1.0, 8.0, names[:1])]
+    assert worth_recording(told) == told[1:]
 
 
 def test_where_nothing_is_open_it_says_so_and_no_motion_is_left(folder: Path, monkeypatch: pytest.MonkeyPatch):

@@ -50,6 +50,8 @@ from scara_ident.robot.robot import Robot
 LARGEST_SHAPE = 3.0
 # Columns of unit length span a direction above this share.
 _RANK = 1e-9
+# Candidates where no diagnosis says how many were tried.
+USUALLY_TRIED = 120
 # Of recordings that are not at hand, Hz and s.
 USUAL_RATE, USUAL_LENGTH = 1000.0, 30.0
 
@@ -71,6 +73,10 @@ class Inquiry:
         Hz.
     known : Information or None
         Of the recordings at hand, rows of unit noise; see `known_rows`.
+    columns : CandidateColumns or None
+        On the rows of these recordings.
+    tried : int
+        Candidates that the diagnosis tries.
     """
 
     scene: Scene
@@ -79,16 +85,34 @@ class Inquiry:
     noise: Array
     bands: tuple[float | None, ...]
     known: Information | None = None
+    columns: CandidateColumns | None = None
+    tried: int = USUALLY_TRIED
 
     @cached_property
     def suspects(self) -> tuple[Suspect, ...]:
         """Those in the model, then others, then the curves; the columns stand in this order behind the base model's."""
-        others = [item for item in all_suspects(self.questions) if item.label not in self._labels]
+        others = [item for item in all_suspects(self.questions) if item.label not in self.labels_in_model]
         return (*self.in_model, *others, *self._shapes.values())
 
     @cached_property
-    def _labels(self) -> frozenset[str]:
+    def labels_in_model(self) -> frozenset[str]:
+        """Labels of the effects in the model."""
         return frozenset(item.label for item in self.in_model)
+
+    def freed(self, item: Suspect) -> int:
+        """Return of how many nonlinear parameters the change of its torque is asked for, as it may stand for another."""
+        rivals = {own.label for asked in self.questions if asked.kind == "rivals" for own in asked.suspects}
+        return len(item.candidate.effect.nonlinear) if item.label in self.labels_in_model | rivals else 0
+
+    @cached_property
+    def places(self) -> tuple[tuple[slice, slice], ...]:
+        """Of each suspect its own columns, and those with its nonlinear parameters', behind the model's."""
+        found, start = [], 0
+        for item in self.suspects:
+            own = _width(item)
+            found.append((slice(start, start + own), slice(start, start + own + self.freed(item))))
+            start = found[-1][1].stop
+        return tuple(found)
 
     @cached_property
     def _shapes(self) -> dict[str, Suspect]:
@@ -112,12 +136,12 @@ class Inquiry:
         wanted: list[Candidate] = []
         for item in self.suspects:
             wanted.append(item.candidate)
-            wanted += [side for pair in _sides(item.candidate) for side in pair[:2]]
+            wanted += [side for pair in self._freed_sides(item) for side in pair[:2]]
         found = iter(made(wanted))
         result = []
         for item in self.suspects:
             wide = dict(next(found))
-            for _, _, reach in _sides(item.candidate):
+            for _, _, reach in self._freed_sides(item):
                 up, down = next(found), next(found)
                 for joint in wide:
                     change = np.asarray(item.value) @ (up[joint] - down[joint]) / (2.0 * reach)
@@ -125,13 +149,25 @@ class Inquiry:
             result.append(wide)
         return result
 
-    def sigmas(self, rows: Information | None = None) -> Array:
-        """Return standard errors between the answers to each question, from what is known and further rows; 0 if none."""
+    def _freed_sides(self, item: Suspect) -> list[tuple[Candidate, Candidate, float]]:
+        return _sides(item.candidate) if self.freed(item) else []
+
+    def sigmas(self, rows: Information | None = None, some: Sequence[Question] | None = None) -> Array:
+        """Return standard errors between the answers to each question, from what is known and further rows; 0 if none.
+
+        Parameters
+        ----------
+        rows : Information, optional
+            Further rows.
+        some : sequence of Question, optional
+            Of the questions; all by default.
+        """
+        asked = self.questions if some is None else some
         parts = [part for part in (self.known, rows) if part is not None]
         if not parts:
-            return np.zeros(len(self.questions))
+            return np.zeros(len(asked))
         view = self._view(parts[0] if len(parts) == 1 else merge(parts))
-        return np.array([view.sigma(item) for item in self.questions])
+        return np.array([view.sigma(item) for item in asked])
 
     @cached_property
     def just_seen(self) -> dict[str, Array]:
@@ -156,12 +192,7 @@ class Inquiry:
     def _view(self, rows: Information) -> _View:
         p = len(self.scene.model.columns)
         factor = rows.factor[:, :-1]
-        beside, places, start = factor[p:, p:], [], 0
-        for item in self.suspects:
-            columns = _widths(item, self.scene)
-            places.append((slice(start, start + columns[0]), slice(start, start + sum(columns))))
-            start += sum(columns)
-        return _View(self, factor, beside, places)
+        return _View(self, factor, factor[p:, p:], self.places)
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,14 +304,14 @@ def _sides(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
     return found
 
 
-def _widths(item: Suspect, scene: Scene) -> tuple[int, int]:
-    effect = item.candidate.effect
+def _width(item: Suspect) -> int:
     if item.value:
-        return len(item.value), len(effect.nonlinear)
+        return len(item.value)
     from scara_ident.diagnosis.shape import KNOTS, PAIR_KNOTS, Shape
 
+    effect = item.candidate.effect
     assert isinstance(effect, Shape)
-    return (KNOTS if len(effect.signals) == 1 else PAIR_KNOTS**2), 0
+    return KNOTS if len(effect.signals) == 1 else PAIR_KNOTS**2
 
 
 def known_rows(inquiry: Inquiry, columns: CandidateColumns) -> Information:
@@ -307,7 +338,12 @@ def inquire(diagnosis: Diagnosis, asked: Sequence[Question] | None = None) -> In
     search = diagnosis.search
     chosen = questions(diagnosis) if asked is None else tuple(asked)
     inquiry = Inquiry(search.scene, chosen, suspects_in_model(diagnosis), noise_density(diagnosis), search.bands)
-    return replace(inquiry, known=known_rows(inquiry, search.step.columns)) if chosen else inquiry
+    return knowing(replace(inquiry, tried=search.tried), search.step.columns) if chosen else inquiry
+
+
+def knowing(inquiry: Inquiry, columns: CandidateColumns) -> Inquiry:
+    """Return an inquiry with the recordings of columns as what is known."""
+    return replace(inquiry, known=known_rows(inquiry, columns), columns=columns)
 
 
 def inquiry_of(content: Mapping[str, Any], robot: Robot, recordings: Sequence[Recording] = ()) -> Inquiry:
@@ -334,18 +370,19 @@ def inquiry_of(content: Mapping[str, Any], robot: Robot, recordings: Sequence[Re
         in_model = tuple(suspect_of(item["suspect"]) for item in content["effects"] if item.get("suspect"))
         noise = np.array([content["noise_density"][joint] for joint in robot.joints], dtype=float)
         bands = tuple(content["band_hz"][joint] for joint in robot.joints)
+        tried = max(1, int(content.get("tried", USUALLY_TRIED)))
         armatures = {robot.joints.index(row["joint"]): float(row["armature"]) for row in content["rotors"]}
     except (KeyError, TypeError, ValueError) as error:
         raise ScaraIdentError(f"no questions in it ({error}); give the diagnosis.json of this version") from None
     if not recordings:
         scene = _unseen(model, value, bands, armatures)
-        return Inquiry(scene, asked, in_model, noise, bands)
+        return Inquiry(scene, asked, in_model, noise, bands, tried=tried)
     data, _, _ = usable_in_bands(model, recordings, (), bands, alike=True)
     observations: Observations = observe(model, data)
     scene = scene_of(model, value, observations)
     scene = replace(scene, armatures={**scene.armatures, **armatures})
-    inquiry = Inquiry(scene, asked, in_model, noise, bands)
-    return replace(inquiry, known=known_rows(inquiry, CandidateColumns(observations))) if asked else inquiry
+    inquiry = Inquiry(scene, asked, in_model, noise, bands, tried=tried)
+    return knowing(inquiry, CandidateColumns(observations)) if asked else inquiry
 
 
 def _unseen(model: TorqueModel, value: Array, bands: Sequence[float | None], armatures: Mapping[int, float]) -> Scene:

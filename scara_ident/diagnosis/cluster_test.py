@@ -69,13 +69,9 @@ def cluster_test(
     left = model.basis_scores - np.einsum("gbkr,gk->gbr", products.cross, value)
     reach = _each_block(products.cross, model.released)
     score = np.einsum("gki,gbk->gbi", into, scores + np.einsum("gbkr,gbr->gbk", reach, left))
-    inside = _both_sides(into, columns + reach @ products.cross.transpose(0, 1, 3, 2))
-    strength, turn = np.linalg.eigh(np.eye(inside.shape[-1]) - inside)
-    release = (turn / np.maximum(strength, _LEAST_REDUNDANCY)[..., None, :]) @ turn.transpose(0, 1, 3, 2)
+    release, own, links, strength = _without_blocks(into, reach, products.cross, columns)
     # What leaving a block out changes, and what that follows from where residuals are white.
     change = np.einsum("gbij,gbj->gbi", release, score)
-    own = release @ inside
-    links = np.concatenate([release @ (into.transpose(0, 2, 1)[:, None] @ reach), own], axis=-1)
     neighbours = _Neighbours.of(model)
     pairs = neighbours.pairs(change)
     expected, freedom = _if_white(neighbours, own, links)
@@ -83,13 +79,63 @@ def cluster_test(
     unbiased = scale @ np.einsum("gpi,gpj->gij", pairs, pairs) @ scale
     whitened = np.einsum("gij,gj->gi", back, value)
     known = np.all(strength > _LEAST_REDUNDANCY, axis=(1, 2))
-    # The direction of which least is known; one without any column takes no part.
-    least = np.min(freedom, axis=1)
-    least = np.where(np.isfinite(least), least, 1.0)
+    least = _least(freedom)
     together = _hotelling(whitened, unbiased, least, rank)
     few = (rank > 1) & (least - rank + 1.0 < FEW)
     p_value = np.where(few, _either(together, whitened, unbiased, freedom, rank), together)
     return ClusterTest(np.where(known, p_value, 1.0), into @ unbiased @ into.transpose(0, 2, 1), least)
+
+
+def freedom_of(model: FittedModel, products: Products) -> Array:
+    """Return `ClusterTest.freedom`, which no torque takes part in, shape (g,)."""
+    into, _, _ = _whitening(np.sum(products.columns, axis=1))
+    reach = _each_block(products.cross, model.released)
+    _, own, links, strength = _without_blocks(into, reach, products.cross, products.columns)
+    _, freedom = _if_white(_Neighbours.of(model), own, links)
+    return np.where(np.all(strength > _LEAST_REDUNDANCY, axis=(1, 2)), _least(freedom), 0.0)
+
+
+def needed(count: int, freedom: float, chance: float) -> float:
+    """Return the standard errors at which coefficients become significant, the inverse of `significance`.
+
+    Parameters
+    ----------
+    count : int
+        Coefficients k.
+    freedom : float
+        Degrees of freedom of their covariance.
+    chance : float
+        The probability asked for.
+
+    Returns
+    -------
+    float
+        Root of Wald's statistic, infinite where no size is significant.
+    """
+    from scipy.special import fdtri
+
+    rest = freedom - count + 1.0
+    few = count > 1 and rest < FEW
+    share = 0.5 * chance if few else chance
+    together = np.sqrt(fdtri(count, rest, 1.0 - share) * freedom * count / rest) if rest > 0.0 else np.inf
+    alone = np.sqrt(fdtri(1.0, freedom, 1.0 - share / count)) if few and freedom > 0.0 else np.inf
+    return float(min(together, alone))
+
+
+def _least(freedom: Array) -> Array:
+    """Return that of the direction of which least is known; one without any column takes no part."""
+    least = np.min(freedom, axis=1)
+    return np.where(np.isfinite(least), least, 1.0)
+
+
+def _without_blocks(into: Array, reach: Array, cross: Array, columns: Array) -> tuple[Array, Array, Array, Array]:
+    """Return how a block's scores move the coefficients once it is left out, with its products, links and redundancy."""
+    inside = _both_sides(into, columns + reach @ cross.transpose(0, 1, 3, 2))
+    strength, turn = np.linalg.eigh(np.eye(inside.shape[-1]) - inside)
+    release = (turn / np.maximum(strength, _LEAST_REDUNDANCY)[..., None, :]) @ turn.transpose(0, 1, 3, 2)
+    own = release @ inside
+    links = np.concatenate([release @ (into.transpose(0, 2, 1)[:, None] @ reach), own], axis=-1)
+    return release, own, links, strength
 
 
 def significance(value: Array, covariance: Array, freedom: float, products: Array) -> float:

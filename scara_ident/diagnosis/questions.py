@@ -13,6 +13,7 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.cluster_test import needed
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.selection_step import best_of_each
 from scara_ident.diagnosis.shape import shape_over
@@ -298,14 +299,8 @@ def _errors(found: Examination) -> float:
 
 def _limit(found: Examination, diagnosis: Diagnosis) -> float:
     """Return the standard errors that coefficients would have to have to be significant."""
-    from scipy.special import fdtri
-
-    count = len(found.value)
-    rest = found.freedom - count + 1.0
-    if rest <= 0.0 or not np.isfinite(rest):
-        return np.inf
-    chance = 1.0 - diagnosis.search.step.criteria.family_error / diagnosis.search.tried
-    return float(np.sqrt(fdtri(count, rest, chance) * found.freedom * count / rest))
+    chance = diagnosis.search.step.criteria.family_error / diagnosis.search.tried
+    return needed(len(found.value), found.freedom, chance) if np.isfinite(found.freedom) else np.inf
 
 
 def noise_density(diagnosis: Diagnosis) -> Array:

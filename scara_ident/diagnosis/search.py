@@ -15,7 +15,7 @@ from scara_ident.diagnosis.effect_parameters import parameters_beside
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.nonlinear_fit import tune
-from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, model_with, observed
+from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, model_with, observed, points_of_lines
 from scara_ident.diagnosis.variation_check import variation_objection
 from scara_ident.diagnosis.work import after_rounds
 from scara_ident.effects import Effect, Scene
@@ -279,6 +279,7 @@ def _choose(
     accepted = [item for item in best if item.accepted and not item.candidate.effect.fitted_first]
     found = _fitted(step, first, max((item.gain for item in accepted), default=0.0), known)
     refused = {item.label: item for _, item in found if not item.accepted}
+    accepted += _sure_once_refined(step, best, max((item.examination.held_out for item in accepted), default=0.0))
     open_ = [(step, item) for item in accepted] + [(own, item) for own, item in found if item.accepted]
     open_.sort(key=lambda pair: -pair[1].examination.held_out)
     # Where the best are refused, the next best may still be sound.
@@ -295,6 +296,26 @@ def _choose(
             refused[decision.label] = decision.refused(why)
         open_ = open_[len(leaders) :]
     return None, refused, step.scene
+
+
+def _sure_once_refined(step: SelectionStep, best: Sequence[Decision], enough: float) -> list[Decision]:
+    """Return those worth a look that are sure beside their grid point, which may lose most of their significance.
+
+    Every point on the way there is one more that was tried.
+    """
+    criteria = step.criteria
+    worth = [
+        item
+        for item in best
+        if item.tentative
+        and item.candidate.effect.nonlinear
+        and not item.candidate.effect.fitted_first
+        and item.examination.held_out >= criteria.near_best * enough
+    ]
+    worth.sort(key=lambda item: -item.examination.held_out)
+    worth = worth[: criteria.most_refined]
+    points = sum(points_of_lines(item.candidate) for item in worth)
+    return [item for item in replace(step, tried=step.tried + points).refine(worth) if item.accepted]
 
 
 def _fitted(

@@ -183,6 +183,11 @@ def best_of_each(decisions: Sequence[Decision]) -> dict[str, Decision]:
     return best
 
 
+def points_of_lines(candidate: Candidate) -> int:
+    """Return at most how many points `SelectionStep.refine` tries of a candidate."""
+    return LINE_ROUNDS * (LINE_POINTS - 1) * len(candidate.effect.nonlinear)
+
+
 def _line(scene: Scene, candidate: Candidate, round_: int) -> list[Candidate]:
     """Return variants of a candidate on a line for each nonlinear parameter, a third as long every round."""
     variants = []

@@ -234,6 +234,7 @@ def summary(design: Design) -> list[str]:
         else f"All limits hold, at {design.verified} samples and between them.",
         *(
             f"{item.question.text}: {item.before:.2g} standard errors apart so far, {item.after:.2g} expected with it."
+            + (f" {item.instead}" if item.instead else "")
             for item in design.tells
         ),
         f"Held back by {', '.join(held)}." if held else "No limit holds it back: use more harmonics.",

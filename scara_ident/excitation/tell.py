@@ -2,22 +2,24 @@
 
 Effects remember, turn with the sign of a speed and pass the bands of the diagnosis, so that their columns have no useful
 derivative by a motion's coefficients. The search draws motions, takes each as large as its limits allow or smaller, and
-changes the best of them; a motion is judged by what the diagnosis would see of it: its columns within the bands, by their
-spectra, over the noise, merged with what is known.
+changes the best of them; a motion is judged by what the diagnosis would see and believe of it: its columns within the
+bands, over the noise, block of time by block, beside what is known.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
+from itertools import compress
 
 import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.answerability import Inquiry
+from scara_ident.diagnosis.belief import Blocks, believed, known_blocks
 from scara_ident.diagnosis.candidates import Candidate, Rows
-from scara_ident.diagnosis.questions import Question
+from scara_ident.diagnosis.questions import MOST_NAMED, Question
 from scara_ident.effects import Signals
 from scara_ident.estimation.information import Information, merge, triangular
 from scara_ident.excitation.curves import Basis
@@ -36,39 +38,70 @@ from scara_ident.excitation.search import (
 )
 from scara_ident.excitation.verification import grid
 from scara_ident.motion.motion import Motion
+from scara_ident.motion.prepared import block_seconds
 from scara_ident.threads import one_blas_thread
 
 # Samples per second of a motion in the search, where a suspect follows the motor's turns, and of what is promised.
 RATE, TURNING_RATE, FINE_RATE = 200.0, 500.0, 1000.0
 # Motions that a search draws first, and changes of the best of them per round.
-DRAWN, CHANGED = 24, 30
+DRAWN, CHANGED = 48, 60
 # Speeds of a drawn motion as shares of the limits, evenly in their logarithm; how often a joint stands still.
 SLOWEST, STILL = 0.03, 0.15
 # Sizes of a change, as shares of the motion; by how much a joint's motion grows or shrinks, in its logarithm.
 CHANGE, GROWTH = (0.05, 0.6), 0.4
 # What a motion that breaks a limit shrinks by, and how often at most.
 SHRINKING, TRIES = 0.85, 40
-# Weight of all parameters together against that of another kind of question.
-PARAMETERS = 0.5
+# Weights of kinds of questions against that of what may be below the limit: what was found comes first.
+WEIGHTS = {"rivals": 2.0, "unexplained": 2.0, "below_limit": 1.0, "parameter": 0.5}
 # Standard errors at which an answer is sure enough: beyond, other questions count as much.
 SURE = 5.0
 
 
 @dataclass(frozen=True)
 class Told:
-    """What a motion tells of a question: standard errors between the answers, without and with it."""
+    """What a motion tells of a question.
+
+    Attributes
+    ----------
+    question : Question
+    before, after : float
+        Standard errors between the answers, without and with it.
+    unshown : tuple of str
+        Of effects of a size that the recordings at hand would just have shown, those which the diagnosis would not let in.
+    """
 
     question: Question
     before: float
     after: float
+    unshown: tuple[str, ...] = ()
+
+    @property
+    def settled(self) -> bool:
+        """Whether the diagnosis is expected to be sure of the answer afterwards."""
+        return not self.unshown if self.question.kind == "below_limit" else self.after >= SURE
+
+    @property
+    def instead(self) -> str:
+        """Say what the motion does not tell, and what would; nothing where it tells all."""
+        if self.settled:
+            return ""
+        which = ", ".join(self.unshown[:MOST_NAMED]) or self.question.text
+        more = f" and {len(self.unshown) - MOST_NAMED} more" if len(self.unshown) > MOST_NAMED else ""
+        return f"Would not tell: {which}{more}. What would: {self.question.experiment}."
 
     def entry(self) -> dict[str, object]:
         """Return it as plain values."""
-        return {"question": self.question.text, "sigma_before": self.before, "sigma_after": self.after}
+        return {
+            "question": self.question.text,
+            "sigma_before": self.before,
+            "sigma_after": self.after,
+            "settled": self.settled,
+            "unshown": list(self.unshown),
+        }
 
 
-def spectral_rows(inquiry: Inquiry, motion: Motion) -> Information:
-    """Return what a motion would say of an inquiry: the factor of its columns within the bands, rows of unit noise.
+def rows_in_blocks(inquiry: Inquiry, motion: Motion) -> Blocks:
+    """Return what a motion would say of an inquiry: rows of unit noise within the bands, in blocks of time.
 
     Parameters
     ----------
@@ -78,19 +111,19 @@ def spectral_rows(inquiry: Inquiry, motion: Motion) -> Information:
 
     Notes
     -----
-    By Parseval's theorem the sum of squares over time is that over frequencies; within the band every frequency is one
-    row of a real and one of an imaginary part, in which white noise is as large as in any other.
+    A period of a signal within a band is told by as many equal steps as it has Fourier coefficients there, and by
+    Parseval's theorem their squares are those of all samples; white noise is then as large in any of them.
     """
     signals = Signals(inquiry.scene, motion)
     model, count = inquiry.scene.model, motion.samples
+    seconds = count / motion.rate
 
     def within(joint: int, columns: Array) -> Array:
         band = inquiry.bands[joint]
-        kept = count // 2 + 1 if band is None else min(count // 2 + 1, int(band * count / motion.rate) + 1)
-        spectrum = np.fft.rfft(columns, axis=1)[:, :kept]
-        spectrum[:, 1:] *= np.sqrt(2.0)
-        size = np.sqrt(1.0 / (count * motion.rate * inquiry.noise[joint]))
-        return np.asarray(size * np.concatenate([spectrum.real, spectrum.imag], axis=1))
+        kept = count // 2 + 1 if band is None else min(count // 2 + 1, int(band * seconds) + 1)
+        steps = 2 * kept - 1
+        size = np.sqrt(steps / (count * motion.rate * inquiry.noise[joint]))
+        return np.asarray(size * np.fft.irfft(np.fft.rfft(columns, axis=1)[:, :kept], steps, axis=1))
 
     def made(wanted: Sequence[Candidate]) -> list[Rows]:
         each = [item.effect.by_joint(signals, item.member) for item in wanted]
@@ -99,27 +132,50 @@ def spectral_rows(inquiry: Inquiry, motion: Motion) -> Information:
     added = inquiry.rows(made)
     widths = [len(next(iter(rows.values()))) for rows in added]
     total = len(model.columns) + sum(widths)
-    factors = []
+    blocks = max(1, round(seconds / block_seconds(inquiry.bands)))
+    tables, starts = [], []
     for joint, (own, raw) in enumerate(zip(model.active, signals.columns, strict=True)):
         base = within(joint, raw)
-        table = np.zeros((total + 1, base.shape[1]))
-        table[np.flatnonzero(own) if own.dtype == bool else own] = base
+        table = np.zeros((total, base.shape[1]))
+        table[own] = base
         start = len(model.columns)
         for rows, width in zip(added, widths, strict=True):
             if joint in rows:
                 table[start : start + width] = rows[joint]
             start += width
-        factors.append(triangular(table.T))
-    return Information(triangular(np.vstack(factors)), float(model.robot.n * count))
+        tables.append(table)
+        starts.append(np.linspace(0, table.shape[1], blocks + 1).astype(np.intp))
+    owner = np.zeros(blocks, dtype=np.intp)
+    return Blocks(tuple(tables), tuple(starts), owner, owner)
+
+
+def information_of(blocks: Blocks) -> Information:
+    """Return the triangular factor of all rows."""
+    factors = [triangular(np.vstack([table, np.zeros((1, table.shape[1]))]).T) for table in blocks.tables]
+    return Information(triangular(np.vstack(factors)), float(sum(table.shape[1] for table in blocks.tables)))
 
 
 def told(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[Told, ...]:
     """Return what motions tell of every question, beside what is known."""
+    new = [rows_in_blocks(inquiry, motion) for motion in motions]
     before = inquiry.sigmas()
-    after = inquiry.sigmas(merge([spectral_rows(inquiry, motion) for motion in motions]))
-    return tuple(
-        Told(item, float(one), float(other)) for item, one, other in zip(inquiry.questions, before, after, strict=True)
-    )
+    after = inquiry.sigmas(merge([information_of(blocks) for blocks in new]))
+    sure = _sure_of(inquiry, new)
+    found = []
+    for item, one, other in zip(inquiry.questions, before, after, strict=True):
+        asked = item.suspects if item.kind == "below_limit" else ()
+        found.append(Told(item, float(one), float(other), tuple(own.label for own in asked if sure[own.label] < 1.0)))
+    return tuple(found)
+
+
+def sure_of(inquiry: Inquiry, motions: Sequence[Motion]) -> dict[str, float]:
+    """Return `believed` of what is known and motions to be recorded."""
+    return _sure_of(inquiry, [rows_in_blocks(inquiry, motion) for motion in motions])
+
+
+def _sure_of(inquiry: Inquiry, new: Sequence[Blocks]) -> dict[str, float]:
+    known = known_blocks(inquiry)
+    return believed(inquiry, reduce(Blocks.with_more, new if known is None else [known, *new]))
 
 
 def search_to_tell(
@@ -174,9 +230,20 @@ class _Judge:
     def cost(self, x: Array) -> float:
         """Return minus the weighted sum of the logarithms of what questions gain."""
         (basis,) = self.task.bases
-        motion = motion_of(basis, self.task.posture, x[0], self.rate)
-        sigma = self.each.sigmas(spectral_rows(self.each, motion))
-        return -float(self.weights @ np.log1p((sigma / SURE) ** 2))
+        new = rows_in_blocks(self.each, motion_of(basis, self.task.posture, x[0], self.rate))
+        sure = believed(self.each, new if self.known is None else self.known.with_more(new))
+        sizes = np.array(
+            [sure.get(item.text, 0.0) if item.kind == "below_limit" else 0.0 for item in self.each.questions]
+        )
+        rest = [item.kind != "below_limit" for item in self.each.questions]
+        if any(rest):
+            sizes[rest] = self.each.sigmas(information_of(new), [*compress(self.each.questions, rest)]) / SURE
+        return -float(self.weights @ np.log1p(sizes**2))
+
+    @cached_property
+    def known(self) -> Blocks | None:
+        """Rows of the recordings at hand."""
+        return known_blocks(self.each)
 
     @cached_property
     def each(self) -> Inquiry:
@@ -193,7 +260,7 @@ class _Judge:
     def weights(self) -> Array:
         """Questions of one kind share its weight, so that many effects worth a look do not outweigh all others."""
         kinds = [(item.kind, len(item.suspects) > 1) for item in self.inquiry.questions]
-        shares = [(PARAMETERS if kind == "parameter" else 1.0) / kinds.count((kind, more)) for kind, more in kinds]
+        shares = [WEIGHTS[kind] / kinds.count((kind, more)) for kind, more in kinds]
         counts = [len(_alone(item)) for item in self.inquiry.questions]
         return np.repeat(np.array(shares) / counts, counts)
 

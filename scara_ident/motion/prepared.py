@@ -126,8 +126,7 @@ class PreparedStretch:
     @made_once
     def blocks(self) -> NDArray[np.intp]:
         """Bounds of the blocks of time, samples, shape (blocks + 1,)."""
-        slowest = min((band for band in self.bands if band is not None), default=np.inf)
-        length = max(1, int(self.rate * max(BLOCK_SECONDS, BLOCK_PERIODS / slowest) * (1.0 + ROUNDING)))
+        length = max(1, int(self.rate * block_seconds(self.bands) * (1.0 + ROUNDING)))
         inside = self.samples - 2 * self.trim
         return np.linspace(self.trim, self.samples - self.trim, max(1, round(inside / length)) + 1).astype(np.intp)
 
@@ -310,6 +309,12 @@ def position_cuts(rate: float, bands: Bands) -> list[float | None]:
     return [
         None if band is None or POSITION_BAND * band > HIGHEST_CUT * rate else POSITION_BAND * band for band in bands
     ]
+
+
+def block_seconds(bands: Sequence[float | None]) -> float:
+    """Return how long blocks of time are, s."""
+    slowest = min((band for band in bands if band is not None), default=np.inf)
+    return float(max(BLOCK_SECONDS, BLOCK_PERIODS / slowest))
 
 
 def row_step(rate: float, band: float | None) -> int:

@@ -9,7 +9,7 @@ from scipy import stats
 from scipy.signal import lfilter
 
 from scara_ident.diagnosis.candidate_tests import examine
-from scara_ident.diagnosis.cluster_test import significance
+from scara_ident.diagnosis.cluster_test import needed, significance
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.estimation.joint_rows import JointRows
 
@@ -124,3 +124,10 @@ def test_of_many_coefficients_in_few_blocks_no_more_are_significant():
     rng = np.random.default_rng(4)
     found = np.concatenate([p_values(rng, 12, 4, 2.5, 8) for _ in range(60)])
     assert np.mean(found < 0.01) <= 0.03
+
+
+@pytest.mark.parametrize(("count", "freedom"), [(1, 4.0), (4, 4.5), (4, 2.5), (3, 60.0)])
+def test_as_many_standard_errors_as_are_needed_have_the_chance_asked_for(count: int, freedom: float):
+    value = np.zeros(count)
+    value[0] = needed(count, freedom, 1e-4)
+    assert significance(value, np.eye(count), freedom, np.eye(count)) == pytest.approx(1e-4, rel=0.01)

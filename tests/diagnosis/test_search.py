@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.model_selection import rms_of
-from scara_ident.diagnosis.search import SearchTask, _backward, columns_at_hand, corrected, scene_of, search
+from scara_ident.diagnosis.search import (
+    SearchTask,
+    _backward,
+    _sure_once_refined,
+    columns_at_hand,
+    corrected,
+    scene_of,
+    search,
+)
 from scara_ident.effects import Member
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
@@ -72,6 +82,24 @@ def test_the_error_falls_with_every_step_to_that_of_the_clean_recordings():
     assert sizes[0] > 2.0 * sizes[1] > 2.0 * sizes[2]
     clean = searched(exact_runs(), *SMALL)
     assert errors[1] == pytest.approx(rms_of(clean.start.value, clean.uncorrected), rel=0.02)
+
+
+def test_what_is_sure_only_beside_its_grid_point_is_refined_before_it_is_refused():
+    def dip(motion):
+        return 0.1 * np.sign(motion.v[0]) * np.exp(-((motion.v[0] / 0.43) ** 2))
+
+    step = step_beside(with_torque(exact_runs(), 0, dip))
+    members = [item for item in Stribeck().members(step.scene) if item.joint == 0]
+    grid = max(step.judge([Candidate(Stribeck(), item) for item in members]), key=lambda item: item.gain)
+    (fine,) = step.refine([grid])
+    between = np.sqrt(grid.examination.p_value * fine.examination.p_value)
+    strict = replace(step, tried=int(step.criteria.family_error / between))
+    (refused,) = strict.judge([grid.candidate])
+    assert refused.tentative and not refused.accepted
+    (found,) = _sure_once_refined(strict, [refused], 0.0)
+    assert found.accepted and found.candidate.member.nonlinear[0] == pytest.approx(0.43, rel=0.1)
+    # Where something else removes much more it is not its turn.
+    assert _sure_once_refined(strict, [refused], 2.0) == []
 
 
 def test_a_delay_is_corrected_in_the_data():

@@ -1,0 +1,84 @@
+"""What the diagnosis would let in: foreseen from products in blocks, and what it then does on draws of noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis.belief import Blocks, times_believed
+from scara_ident.diagnosis.candidate_tests import examine
+from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.fitted_model import FittedModel
+from scara_ident.diagnosis.gain import gains
+
+ROWS, BLOCKS, PARAMETERS, TRIED = 12, 40, 4, 100
+
+
+def blocks_of(*extra: np.ndarray) -> Blocks:
+    """Two trajectories, the second three times as long, of a model of a few columns and some more."""
+    rng = np.random.default_rng(5)
+    columns = np.vstack([rng.standard_normal((PARAMETERS, ROWS * BLOCKS)), *extra])
+    trajectory = (np.arange(BLOCKS) >= BLOCKS // 4).astype(np.intp)
+    return Blocks((columns,), (np.arange(0, ROWS * BLOCKS + 1, ROWS),), trajectory, trajectory)
+
+
+def column(where: list[int]) -> np.ndarray:
+    """A column of unit length in some of the blocks, as large in each."""
+    rng = np.random.default_rng(6)
+    found = np.zeros((BLOCKS, ROWS))
+    found[where] = rng.standard_normal((len(where), ROWS))
+    return (found / np.linalg.norm(found)).reshape(1, -1)
+
+
+def let_in(model: FittedModel, own: np.ndarray, size: float, draws: int = 25) -> float:
+    rng = np.random.default_rng(7)
+    (rows,) = model.joints
+    count = 0
+    for _ in range(draws):
+        torque = size * own[0] + rng.standard_normal(own.shape[1])
+        joint = type(rows)(rows.columns, np.vstack([rows.table[:-1], torque]), rows.starts, rows.counts)
+        now = FittedModel((joint,), model.parameters, model.owner, model.fold, model.weights)
+        (found,) = examine(now, [{0: own}])
+        (gain,) = gains(now, [{0: own}], [0], [found])
+        helps, voting = found.votes
+        sure = found.p_value * TRIED <= CRITERIA.family_error and gain >= CRITERIA.least_gain
+        count += sure and helps >= CRITERIA.least_votes * voting
+    return count / draws
+
+
+SPREAD, SHORT = list(range(BLOCKS)), [2, 7, 15, 22, 30]
+
+
+@pytest.mark.parametrize("where", [SPREAD, SHORT])
+def test_much_less_than_is_needed_is_seldom_let_in_and_much_more_nearly_always(where):
+    own = column(where)
+    model = blocks_of(own).fitted(range(PARAMETERS), CRITERIA.parts)
+    needed = 1.0 / times_believed(model, [{0: own}], [np.ones((1, 1))], [0], TRIED)[0]
+    # Of few blocks the standard error itself is hardly known, to a third or so with four degrees of freedom.
+    assert let_in(model, own, 0.3 * needed) <= 0.1
+    assert 0.2 < let_in(model, own, needed) < 0.8
+    assert let_in(model, own, 2.5 * needed) > 0.9
+
+
+def test_what_lives_in_few_blocks_is_believed_less_at_as_many_standard_errors():
+    spread, short = column(SPREAD), column(SHORT)
+    model = blocks_of(spread, short).fitted(range(PARAMETERS), CRITERIA.parts)
+    axes = [np.full((1, 1), 10.0)] * 3
+    one, other, none = times_believed(model, [{0: spread}, {0: short}, {}], axes, [0, 0, 0], TRIED)
+    assert one > 1.0 > other > none == 0.0
+
+
+def test_blocks_taken_together_hold_the_same_rows_and_more_are_of_other_trajectories():
+    some = blocks_of()
+    both = some.with_more(some)
+    assert both.tables[0].shape == (PARAMETERS, 2 * ROWS * BLOCKS)
+    assert both.starts[0][-1] == 2 * ROWS * BLOCKS and len(both.starts[0]) == 2 * BLOCKS + 1
+    assert both.trajectory.max() == 3 and len(both.owner) == 2 * BLOCKS
+    many = both
+    for _ in range(2):
+        many = many.with_more(many)
+    fewer = many.fewer()
+    assert len(fewer.owner) < len(many.owner) and set(fewer.owner) == set(many.owner)
+    products = many.fitted(range(PARAMETERS), CRITERIA.parts), fewer.fitted(range(PARAMETERS), CRITERIA.parts)
+    assert products[0].joints[0].table == pytest.approx(products[1].joints[0].table)
+    assert np.sum(products[1].basis_products, axis=0) == pytest.approx(np.eye(PARAMETERS), abs=1e-9)
