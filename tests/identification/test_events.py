@@ -48,7 +48,9 @@ def test_a_push_is_found_with_its_times_and_force_and_only_that():
     assert event.start == pytest.approx(START, abs=0.1)
     assert event.stop == pytest.approx(STOP, abs=0.1)
     assert event.force == pytest.approx(FORCE, abs=0.1 * float(np.linalg.norm(FORCE)))
-    assert set(event.entry) == {"recording", "from", "to", "joints", "rms", "kind", "force"}
+    assert event.begins[0] <= START <= event.begins[1] < event.begins[0] + 0.3
+    assert event.ends[0] <= STOP <= event.ends[1] < event.ends[0] + 0.3
+    assert set(event.entry) == {"recording", "from", "from_within", "to", "to_within", "joints", "rms", "kind", "force"}
     assert "left out of the fit" in event.sentence(ROBOT)
     other = observed(plain)
     assert find_events(other, robust_fit(other).value) == ()
