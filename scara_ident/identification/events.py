@@ -97,6 +97,11 @@ class Event:
                 found[name] = [round(time, 3) for time in value]
         return found if self.force is None else {**found, "force": list(self.force)}
 
+    def later(self, by: float) -> Event:
+        """Return it so many seconds later."""
+        begins, ends = ((span[0] + by, span[1] + by) if span else None for span in (self.begins, self.ends))
+        return replace(self, start=self.start + by, stop=self.stop + by, begins=begins, ends=ends)
+
     def sentence(self, robot: Robot) -> str:
         """Return it in words."""
         unit = robot.torque_unit(robot.joints.index(self.joints[0]))

@@ -91,3 +91,40 @@ def test_what_comes_three_seconds_later_is_something_else():
     trust, nothing, every = np.ones_like(left), np.full_like(left, np.nan), np.ones(300, dtype=bool)
     start, stop = pair(event_ends(left, trust, nothing, every, slice(70, 120), np.array([True]), WIDTH))
     assert (start, stop) == (pytest.approx(60, abs=1), pytest.approx(128, abs=1))
+
+
+def test_a_friction_at_rest_that_is_not_constant_does_not_move_an_end_seen_in_motion():
+    rng = np.random.default_rng(7)
+    left = rng.standard_normal((2, 300))
+    left[:, 60:92] += 20.0
+    trust, still = np.ones_like(left), np.full_like(left, np.nan)
+    trust[:, 100:150] = 0.0
+    still[:, REST] = rng.standard_normal((2, 42))
+    # It creeps at first, and yields before it moves on.
+    still[:, 104:108] += 60.0
+    still[:, 140:146] -= 60.0
+    free, shows = np.ones(300, dtype=bool), np.array([True, True])
+    assert pair(event_ends(left, trust, still, free, slice(62, 92), shows, WIDTH)) == (60, 92)
+
+
+def test_what_another_joint_keeps_after_it_is_not_taken_for_the_event():
+    left = np.random.default_rng(8).standard_normal((2, 300))
+    left[0, 60:100] += 30.0
+    left[1, 60:100] += 5.0
+    left[1, 100:112] -= 5.0
+    weight, nothing, every = np.ones_like(left), np.full_like(left, np.nan), np.ones(300, dtype=bool)
+    ends = event_ends(left, weight, nothing, every, slice(62, 98), np.array([True, True]), WIDTH)
+    assert pair(ends) == (60, 100)
+    assert ends.ends[0] <= 100 <= ends.ends[1] <= 102
+
+
+def test_a_force_that_is_wrong_about_a_joint_does_not_shorten_it():
+    left = np.random.default_rng(9).standard_normal((2, 300))
+    left[:, 60:100] += np.array([[8.0], [12.0]])
+    weight, nothing, every = np.ones_like(left), np.full_like(left, np.nan), np.ones(300, dtype=bool)
+    weight[0, 60:70] = 0.1
+    shape = np.repeat([[8.0], [-12.0]], 300, axis=1)
+    ends = event_ends(
+        left, weight, nothing, every, slice(72, 98), np.array([True, True]), WIDTH, lambda start, stop: shape
+    )
+    assert pair(ends) == (60, 100)
