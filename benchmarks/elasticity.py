@@ -4,8 +4,9 @@
 
 Of every size and seed four random motions are fitted and a fifth is held out (`virtual_motions.py`), at 500 Hz with the
 encoders' steps and the paper's noise. The held-out error is over that of the model with the true nonlinear parameters at
-the true estimate, its linear ones fitted to the same rows; the worst joint is shown. Behind each gear is a second encoder: what
-it tells by itself, without the fit, stands last.
+the true estimate, its linear ones fitted to the same rows; the worst joint is shown, beside what white noise lets the fit of all
+parameters of the true model expect, to first order. Behind each gear is a second encoder: what it tells by itself, without the
+fit, stands last.
 """
 
 from __future__ import annotations
@@ -17,8 +18,11 @@ from dataclasses import replace
 import numpy as np
 from virtual_motions import random_motion
 
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
 from scara_ident.diagnosis.model_selection import rms_of
+from scara_ident.diagnosis.nonlinear_fit import STEPLESS, linearise
 from scara_ident.effects import EffectTerm, Member, Scene
 from scara_ident.effects.catalogue import effects_named
 from scara_ident.effects.links import usual_link_inertia
@@ -85,6 +89,35 @@ def against_truth(found: Diagnosis, runs: Sequence[SimulationResult]) -> float:
     return max(a / b for a, b in zip(own, true, strict=True) if a is not None and b is not None)
 
 
+def expected_ratio(found: Diagnosis, runs: Sequence[SimulationResult]) -> float:
+    """Return that ratio as white noise lets the fit of all parameters of the true model expect, to first order."""
+    scene, member = true_member(found, runs)
+    (family,) = effects_named(runs[0].effects[0].name)
+    step, held_out = found.search.step, observe(found.search.base, found.validation_after.data)
+    fitted, held = (
+        linearise(
+            replace(scene, columns=columns_at_hand(item.observations)),
+            item,
+            step.weights,
+            [Candidate(family, member)],
+            CRITERIA.rotor_inertia_std,
+        )
+        for item in (step.columns, CandidateColumns(held_out))
+    )
+    rows = np.vstack([fitted.information.factor, fitted.prior.factor])[:, :-1]
+    size = np.linalg.norm(rows, axis=0)
+    size[size == 0.0] = 1.0
+    _, singular, right = np.linalg.svd(rows / size, full_matrices=False)
+    kept = singular > STEPLESS * singular[0]
+    root = (right[kept].T / singular[kept]) / size[:, None]
+    # Of weighted rows the noise is the same on every joint, and divides out.
+    more = [
+        weight**2 * np.mean(np.sum((joint.table[:-1].T @ root[joint.columns]) ** 2, axis=1))
+        for joint, weight in zip(held.joints, step.weights, strict=True)
+    ]
+    return float(np.sqrt(1.0 + max(more)))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=2)
@@ -92,7 +125,9 @@ def main() -> None:
     parser.add_argument("--kind", nargs="+", default=["elastic", "backlash", "sensor"])
     parser.add_argument("--seconds", type=float, default=15.0)
     given = parser.parse_args()
-    print(f"{'effect':52}{'seed':>5} {'verdict':12}{'found':>24}{'error':>8}{'held out':>9}  other effects")
+    print(
+        f"{'effect':52}{'seed':>5} {'verdict':12}{'found':>24}{'error':>8}{'held out':>9}{'expected':>9}  other effects"
+    )
     for kind in given.kind:
         for effect, name, true in cases(kind):
             for seed in range(given.first, given.first + given.seeds):
@@ -106,13 +141,13 @@ def main() -> None:
                 if own:
                     value = own[0].parameters[name]
                     line += f"{f'{value.value:.5g} +- {value.std:.2g}':>24}{value.value / true - 1.0:8.1%}"
-                    line += f"{against_truth(found, made):9.3f}"
+                    line += f"{against_truth(found, made):9.3f}{expected_ratio(found, made):9.3f}"
                     others += "".join(
                         f"; {item.value:.5g} +- {item.std:.2g} ({item.value / true - 1.0:.1%})"
                         for item in own[0].direct.values()
                     )
                 others += "".join(f"; {note}" for note in found.notes if "channel of its own" in note)
-                print(line + ("" if own else f"{'-':>24}{'-':>8}{'-':>9}") + f"  {others}", flush=True)
+                print(line + ("" if own else f"{'-':>24}{'-':>8}{'-':>9}{'-':>9}") + f"  {others}", flush=True)
 
 
 if __name__ == "__main__":

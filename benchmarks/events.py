@@ -175,6 +175,14 @@ def matches(event: Event, push: Push) -> bool:
     return event.recording == push.recording and min(event.stop, push.stop) > max(event.start, push.start)
 
 
+def _held(own: list[Event], push: Push) -> tuple[bool, bool] | None:
+    """Whether what is stated of the ends holds them; None where nothing is stated."""
+    first, last = min(own, key=lambda e: e.start, default=None), max(own, key=lambda e: e.stop, default=None)
+    if first is None or last is None or first.begins is None or last.ends is None:
+        return None
+    return first.begins[0] <= push.start <= first.begins[1], last.ends[0] <= push.stop <= last.ends[1]
+
+
 def main() -> None:
     """Print how many pushes are found, when, and what is called an event and is none."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -220,6 +228,8 @@ def main() -> None:
                     "size": size,
                     "found": bool(own),
                     "ends": ends,
+                    "held": _held(own, push),
+                    "unsure": [item[1] - item[0] for event in own for item in (event.begins, event.ends) if item],
                     "noise": made.noise,
                     "missing": made.missing,
                     "differ": made.differ,
@@ -242,6 +252,11 @@ def main() -> None:
         contact = [row for row in got if "contact" in row["kinds"]]
         print(f"pushes above {CLEAR:g} times the noise: {len(clear)} of {len(rows)}; found {len(got)} ({len(got) / len(clear):.0%}), "
               f"both ends within {TIMELY:g} s {len(timely)}, called contact {len(contact)}")  # fmt: skip
+        stated = [held for row in got if row["held"] for held in row["held"]]
+        widths = np.quantile([width for row in got for width in row["unsure"]] or [np.nan], (0.5, 0.95))
+        print(f"  ends within what is stated of them: {sum(stated)} of {len(stated)}, which is {widths[0]:.2f} s wide (95 %: {widths[1]:.2f} s)")  # fmt: skip
+        late = [row for row in got if row not in timely]
+        print(f"  both of those late: {sum(all(row['held'] or (False,)) for row in late)} of {len(late)}")
         for kind in ("white", "coloured", "heavy"):
             part = [row for row in clear if row["noise"] == kind]
             print(f"  {kind}: {sum(row['found'] for row in part)} of {len(part)}")

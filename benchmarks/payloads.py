@@ -6,6 +6,10 @@ Names say nothing. In every fifth set no recording has a payload. One of the rec
 the diagnosis to find. The true model knows which recordings are loaded, and no more.
 
     python benchmarks/payloads.py --robot ur5 --sets 40 --seed 1
+    python benchmarks/payloads.py --measured DATA/ur10e --sets 3 --seed 1
+
+With `--measured` the recordings are those of a folder with robot.yaml, of an arm without load: `ident*` to train on, and the
+first `val_ptp*` held out. The payload's torque along their filtered motion is added.
 """
 
 from __future__ import annotations
@@ -14,8 +18,8 @@ import argparse
 import json
 import tempfile
 import time
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +29,7 @@ from numpy.typing import NDArray
 from rigid_runs import RigidRuns, rigid_runs
 from virtual_conditions import Asked
 
+from scara_ident import Recording, load_robot, read_recordings
 from scara_ident.diagnosis import Diagnosis, diagnose
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.selection_step import model_with
@@ -33,7 +38,9 @@ from scara_ident.effects.links import tool_of
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.least_squares import wls
 from scara_ident.estimation.observations import observe
+from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import prepare
+from scara_ident.robot.robot import Robot
 
 Array = NDArray[np.float64]
 NAME = "payload_change"
@@ -41,26 +48,65 @@ SHARES = (0.02, 0.15)
 MOUNTING = 0.1
 SIDES = (0.05, 0.2)
 EMPTY_EVERY = 5
+# Of measured motion, Hz: above the band of any diagnosis of it.
+MOTION_BAND = 15.0
 
 
-def random_payload(runs: RigidRuns, rng: np.random.Generator) -> pin.Inertia:
+@dataclass(frozen=True, eq=False)
+class MeasuredRuns:
+    """Measured recordings of an arm without load, the last held out, and their filtered motion at their own times."""
+
+    robot: Robot
+    recordings: tuple[Recording, ...]
+    true: tuple[Motion, ...]
+
+    def with_torque(self, added: Callable[[int, Motion], Array]) -> tuple[list[Recording], list[Recording]]:
+        """Add ``added(k, motion)``, (n, N) on the recorded side, to run k; return training and held-out recordings."""
+        made = [
+            replace(item, effort=item.effort + added(k, motion))
+            for k, (item, motion) in enumerate(zip(self.recordings, self.true, strict=True))
+        ]
+        return made[:-1], made[-1:]
+
+
+def measured_runs(folder: Path) -> MeasuredRuns:
+    """Read the recordings of a folder."""
+    robot = load_robot(folder / "robot.yaml")
+    paths = [*sorted(folder.glob("ident*.parquet")), *sorted(folder.glob("val_ptp*.parquet"))[:1]]
+    recordings = [
+        replace(item, name=f"run_{k + 1:02d}", trajectory=f"run_{k + 1:02d}", repetition=1)
+        for k, item in enumerate(read_recordings(paths, robot))
+    ]
+    return MeasuredRuns(robot, tuple(recordings), tuple(_motion(robot, item) for item in recordings))
+
+
+def _motion(robot: Robot, recording: Recording) -> Motion:
+    (item,) = prepare([recording], (MOTION_BAND,) * robot.n).recordings
+    motion = item.longest.motion
+    q, v, a = (
+        np.array([np.interp(recording.time, motion.time, row) for row in part])
+        for part in (motion.q, motion.v, motion.a)
+    )
+    return Motion(recording.name, recording.name, recording.time, q, v, a, None, motion.rate)
+
+
+def random_payload(robot: Robot, arm_mass: float, rng: np.random.Generator) -> pin.Inertia:
     """Draw a box of a share of the arm's mass near the tool, in the frame of the last joint."""
-    mass = float(np.sum(runs.arm.bodies[:, 0])) * float(rng.uniform(*SHARES))
+    mass = arm_mass * float(rng.uniform(*SHARES))
     away = rng.normal(size=3)
-    point = tool_of(runs.robot).point + MOUNTING * rng.uniform() * away / np.linalg.norm(away)
+    point = tool_of(robot).point + MOUNTING * rng.uniform() * away / np.linalg.norm(away)
     box = pin.Inertia.FromBox(mass, *rng.uniform(*SIDES, 3))
     turned = pin.Quaternion(*(lambda x: x / np.linalg.norm(x))(rng.normal(size=4))).toRotationMatrix()
     return pin.Inertia(mass, point, turned @ box.inertia @ turned.T)
 
 
-def payload_torque(runs: RigidRuns, payload: pin.Inertia, motion: Any) -> Array:
+def payload_torque(robot: Robot, payload: pin.Inertia, position: Array, velocity: Array, acceleration: Array) -> Array:
     """Return the torque of a payload along a motion, on the recorded side, shape (n, N)."""
-    robot = runs.robot
     with_it = robot.model.copy()
     with_it.appendBodyToJoint(int(robot.order[tool_of(robot).joint]) + 1, payload, pin.SE3.Identity())
     data = [(model, model.createData()) for model in (with_it, robot.model)]
     back = np.argsort(robot.order)
-    state = [np.ascontiguousarray(part[back].T) for part in (motion.position, motion.velocity, motion.acceleration)]
+    state = [np.ascontiguousarray(part[back].T) for part in (position, velocity, acceleration)]
     zero = pin.neutral(robot.model)
     found = np.array(
         [
@@ -78,17 +124,38 @@ def one_set(robot: str, seed: int, empty: bool, varied: bool) -> dict[str, Any]:
     asked = Asked(rate=200.0, recordings=count, motions=count, duration=(10.0, 15.0), varied=varied)
     with tempfile.TemporaryDirectory() as place:
         runs = rigid_runs(robot, seed, Path(place) / "set", asked)
-    payload = random_payload(runs, rng)
+    item = {"seed": seed, "noise": runs.conditions.noise}
+    return item | _diagnosed(runs, float(np.sum(runs.arm.bodies[:, 0])), rng, empty)
+
+
+def measured_set(runs: MeasuredRuns, seed: int, empty: bool) -> dict[str, Any]:
+    """Add a payload to measured recordings and diagnose them."""
+    mass = sum(body.mass for body in list(runs.robot.model.inertias)[1:])
+    return {"seed": seed, "noise": np.nan} | _diagnosed(runs, mass, np.random.default_rng([seed, 9]), empty)
+
+
+def _diagnosed(
+    runs: RigidRuns | MeasuredRuns, arm_mass: float, rng: np.random.Generator, empty: bool
+) -> dict[str, Any]:
+    count = len(runs.recordings) - 1
+    payload = random_payload(runs.robot, arm_mass, rng)
     places = rng.permutation(count)[: int(rng.integers(1, count))]
     loaded = frozenset() if empty else frozenset([*places.tolist(), count])
-    training, held_out = runs.with_torque(
-        lambda k, motion: payload_torque(runs, payload, motion) if k in loaded else np.zeros_like(motion.velocity)
-    )
+
+    def added(k: int, motion: Any) -> Array:
+        signals = (
+            (motion.q, motion.v, motion.a)
+            if isinstance(motion, Motion)
+            else (motion.position, motion.velocity, motion.acceleration)
+        )
+        return payload_torque(runs.robot, payload, *signals) if k in loaded else np.zeros_like(signals[1])
+
+    training, held_out = runs.with_torque(added)
     began = time.perf_counter()
     found = diagnose(runs.robot, training, validation=held_out)
-    item: dict[str, Any] = {"seed": seed, "empty": empty, "verdict": found.verdict, "noise": runs.conditions.noise}
+    item: dict[str, Any] = {"empty": empty, "verdict": found.verdict}
     item |= {"seconds": time.perf_counter() - began, "recordings": count, "loaded": sorted(loaded)}
-    item |= {"share": payload.mass / float(np.sum(runs.arm.bodies[:, 0]))}
+    item |= {"share": payload.mass / arm_mass}
     names = [recording.name for recording in runs.recordings]
     group = {names[k] for k in loaded if k < count}
     first = payload.mass * np.asarray(payload.lever)
@@ -161,16 +228,23 @@ def main() -> None:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--robot", default="ur5", help="a robot of example-robot-data or a URDF")
+    parser.add_argument("--measured", type=Path, help="folder of measured recordings without load")
     parser.add_argument("--sets", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--empty", action="store_true", help="no recording of any set has a payload")
     parser.add_argument("--varied", action="store_true", help="runs differ in friction, torque scale or offset, delay")
     parser.add_argument("--output", type=Path, help="JSON of all results")
     options = parser.parse_args()
+    measured = None if options.measured is None else measured_runs(options.measured)
     items = []
     for k in range(options.sets):
         empty = options.empty or k % EMPTY_EVERY == EMPTY_EVERY - 1
-        items.append(one_set(options.robot, 100_000 * options.seed + k, empty, options.varied))
+        seed = 100_000 * options.seed + k
+        items.append(
+            one_set(options.robot, seed, empty, options.varied)
+            if measured is None
+            else measured_set(measured, seed, empty)
+        )
         item = items[-1]
         said = f"mass {item['mass_error']:.1%}, moments {item['moment_error']:.1%}" if item["group"] else ""
         ratio = "" if item["empty"] else f"held out {item['ratio']:.2f} ({item['ratio_before']:.1f} before)"

@@ -19,7 +19,7 @@ from scara_ident.diagnosis.search import Search, SearchTask, search
 from scara_ident.diagnosis.selection_step import observed, observed_at_every_sample
 from scara_ident.diagnosis.work import first, next_of, search_and_rest
 from scara_ident.estimation import Estimate, wls
-from scara_ident.estimation.bands import choose_bands
+from scara_ident.estimation.bands import HIGHEST_BAND, choose_bands
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations, observe
@@ -103,17 +103,42 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
     now, left = first(task.progress)
     found = _searched(replace(task, progress=now), columns, ())
     for _ in range(criteria.most_widenings if free else 0):
-        if not found.search.chosen:
-            break
         left("choosing the band again")
-        wider = max(choose_bands(found.search.model, found.search.data).bands)
+        # What was missing had hidden how far up the motion explains the torque, and other effects with it.
+        explains = max(choose_bands(found.search.model, found.search.data).bands) if found.search.chosen else 0.0
+        promised = _promised_band(found.search, criteria)
+        wider = max(explains, promised)
         if wider < criteria.wider * _band(found):
             break
-        # What was missing had hidden how far up the motion explains the torque, and other effects with it.
-        columns = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands))))
+        more = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands))))
         now, left = next_of(left)
-        found = _searched(replace(task, progress=now), columns, (), found.search)
+        again = _searched(replace(task, progress=now), more, (), found.search)
+        if promised > explains and not _new(again.search, found.search):
+            # The motion says less of what is so far up, and there is nothing.
+            break
+        columns, found = more, again
     return _without_proxies(replace(task, progress=left), columns, found)
+
+
+def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
+    """Return the band that would tell effects that are not in the model and may be there, Hz; 0 where there are none."""
+    chosen = {item.label(found.scene) for item in found.chosen}
+    promising = [
+        item.candidate.effect.band(item.candidate.member)
+        for item in found.decisions
+        if (item.accepted or item.tentative)
+        and item.label not in chosen
+        and item.examination.p_value * found.tried <= 1.0
+        and item.gain >= criteria.least_gain
+    ]
+    highest = HIGHEST_BAND * min(part.rate for part in found.data.stretches)
+    return min(max(promising, default=0.0), highest)
+
+
+def _new(found: Search, before: Search) -> bool:
+    """Whether effects that need a wide band were found that were not before."""
+    labels = {item.label(before.scene) for item in before.chosen}
+    return any(item.effect.band(item.member) > 0.0 and item.label(found.scene) not in labels for item in found.chosen)
 
 
 def _searched(

@@ -237,6 +237,10 @@ class Effect(ABC):
         """Return the members that a line of a joint's residual suggests."""
         return (Member(joint, (line.position,)),) if line.kind == self.seeded_by else ()
 
+    def band(self, member: Member) -> float:
+        """Return the band, Hz, that holds where a member shows most; 0 where every band does."""
+        return 0.0
+
     def knowing(self, unloaded: frozenset[str]) -> Effect:
         """Return the family that knows the names of recordings in which the arm carries nothing."""
         return self

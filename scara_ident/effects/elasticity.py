@@ -30,6 +30,8 @@ LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 2.0, 200.0
 DAMPING = 0.2
 # Damping ratios that the fit may reach: below it swings for longer than a move, above it does not swing.
 LOWEST_DAMPING, HIGHEST_DAMPING = 0.02, 0.7
+# A resonance is told from a softer gear by what is above it: the band reaches so many times its frequency.
+BOTH_SIDES = 1.5
 # Clearances tried, rad or m at the joint: three times apart, which refinement bridges.
 WIDTHS = (3e-4, 1e-3, 3e-3)
 # A clearance of more, rad or m, is felt by hand.
@@ -86,6 +88,10 @@ class JointElasticity(BehindGear):
         highest = min(HIGHEST_TRIED * scene.band, HIGHEST_FREQUENCY)
         count = max(1, round(np.log(highest / LOWEST_FREQUENCY) / np.log(SPACING)))
         return ((float(frequency), DAMPING) for frequency in np.geomspace(LOWEST_FREQUENCY, highest, count + 1))
+
+    def band(self, member: Member) -> float:
+        """Return a band that holds both sides of the resonance."""
+        return BOTH_SIDES * member.nonlinear[0]
 
     def words(self, scene: Scene, member: Member) -> dict[str, Any]:
         """Add the unit of the compliance, at the joint."""

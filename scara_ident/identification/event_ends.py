@@ -8,6 +8,7 @@ residual is usually small then. While the whole arm stands still the torque step
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,28 @@ GAP = 0.6
 EDGE = (0.3, 0.6)
 # A step of the torque at rest is bounded at that of the event by this factor, and so many standard deviations of bins.
 LARGEST_STEP, LOOSE = 2.0, 4.0
+# What has under this share of the power that an event has at its strongest, after that, is what friction keeps of it or none of it.
+WEAK = 0.1
+# An end is stated to lie within the bins that hold so much of its likelihood, and one on either side, which it may cut.
+SURE = 0.95
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Where an event lies.
+
+    Attributes
+    ----------
+    start, stop : int
+        First bin, and the first one after it.
+    begins, ends : tuple of int
+        The least and the largest that each of them may be.
+    """
+
+    start: int
+    stop: int
+    begins: tuple[int, int]
+    ends: tuple[int, int]
 
 
 def event_ends(
@@ -34,8 +57,8 @@ def event_ends(
     shows: NDArray[np.bool_],
     width: float,
     shape: Callable[[int, int], Array | None] = lambda start, stop: None,
-) -> tuple[int, int]:
-    """Return the first bin of an event, and the first one after it.
+) -> Ends:
+    """Find where an event begins and ends.
 
     Parameters
     ----------
@@ -73,14 +96,19 @@ def event_ends(
     near, far = (round(seconds / width) for seconds in EDGE)
     trust = np.where(free, trust, 1.0)
 
-    def again(start: int, stop: int, shape: Array | None) -> tuple[int, int]:
+    def again(start: int, stop: int, shape: Array | None) -> Ends:
         parts = (open_, trust, still, *(() if shape is None else (shape,)))
-        start = stop - _lasting([part[:, :stop][:, ::-1] for part in parts], stop - start, near, far)
-        return start, start + _lasting([part[:, start:] for part in parts], stop - start, near, far)
+        back, least, most = _lasting([part[:, :stop][:, ::-1] for part in parts], stop - start, near, far)
+        start, begins = stop - back, (stop - most, stop - least)
+        on, least, most = _lasting([part[:, start:] for part in parts], stop - start, near, far)
+        return Ends(start, start + on, begins, (start + least, start + most))
 
-    start, stop = again(start, stop, None)
-    expected = shape(start, stop)
-    return (start, stop) if expected is None else again(start, stop, expected)
+    strong = np.sum(trust * open_**2, axis=0)
+    stop = start + _strong(strong[start:stop], near)
+    start = stop - _strong(strong[start:stop][::-1], near)
+    found = again(start, stop, None)
+    expected = shape(found.start, found.stop)
+    return found if expected is None else again(found.start, found.stop, expected)
 
 
 def _first_peak(likelihood: Array, gap: int) -> int:
@@ -93,11 +121,18 @@ def _first_peak(likelihood: Array, gap: int) -> int:
     return best
 
 
-def _lasting(parts: Sequence[Array], length: int, near: int, far: int) -> int:
-    """Return how many bins from the first on a shift lasts, which is known to last about so many.
+def _strong(power: Array, near: int) -> int:
+    """Return how many bins of an event, by their power, there are up to the last that is not weak beside its strongest part."""
+    wide = min(near, len(power))
+    strongest = float(np.max(np.convolve(power, np.full(wide, 1.0 / wide), mode="valid")))
+    return int(np.flatnonzero(power >= WEAK * strongest)[-1]) + 1
 
-    ``parts`` are residual, trust, what is left at rest, and the shift, by default the mean of each joint shortly before the end;
-    a joint that shows nothing counts for nothing.
+
+def _lasting(parts: Sequence[Array], length: int, near: int, far: int) -> tuple[int, int, int]:
+    """Return how many bins from the first on a shift lasts, which is known to last about so many, and at least and at most.
+
+    ``parts`` are residual, trust, what is left at rest, and the shift where one is expected; by default, and on joints where that
+    makes the residual larger, it is the mean shortly before the end. A joint that shows nothing counts for nothing.
     """
     relative, trust, still = parts[:3]
     first = max(0, length - near)
@@ -106,13 +141,21 @@ def _lasting(parts: Sequence[Array], length: int, near: int, far: int) -> int:
     last = length + int(np.searchsorted(seen, far, side="right"))
     inside, weight = slice(first, last), trust[:, first:length]
     mean = np.sum(weight * relative[:, first:length], axis=1) / np.maximum(np.sum(weight, axis=1), 1e-300)
-    shift = parts[3][:, inside] if len(parts) > 3 else np.repeat(mean[:, None], last - first, axis=1)
+    shift = np.repeat(mean[:, None], last - first, axis=1)
+    if len(parts) > 3:
+        # A force that is told by other joints may be wrong about one.
+        of_shape = parts[3][:, first:length]
+        agrees = np.sum(weight * (2.0 * relative[:, first:length] - of_shape) * of_shape, axis=1) >= 0.0
+        shift[agrees] = parts[3][agrees, inside]
     gain = np.cumsum(np.sum(trust[:, inside] * (2.0 * relative[:, inside] * shift - shift**2), axis=0))
     gain += _at_rest(still[:, inside], shift)
     best = int(np.argmax(gain))
     # Between bins that say something the middle is as good as any.
     as_good = int(np.argmin(np.append(gain[best:] == gain[best], False)))
-    return first + best + 1 + as_good // 2
+    likely = np.cumsum(np.exp(0.5 * (gain - gain[best])))
+    least, most = np.searchsorted(likely, np.array([0.5 - 0.5 * SURE, 0.5 + 0.5 * SURE]) * likely[-1]).tolist()
+    lasts = first + best + 1 + as_good // 2
+    return lasts, min(first + least, lasts), max(first + most + 2, lasts)
 
 
 def _at_rest(still: Array, shift: Array) -> Array:
@@ -127,6 +170,10 @@ def _at_rest(still: Array, shift: Array) -> Array:
         left = np.clip(left, -most, most)
         left -= np.mean(left, axis=1, keepdims=True)
         before = np.arange(1, count + 1)
-        gain = 2.0 * mean * np.cumsum(left, axis=1) - mean**2 * before * (count - before) / count
+        up = np.cumsum(left, axis=1)
+        gain = 2.0 * mean * up - mean**2 * before * (count - before) / count
+        # What one step does not explain is how constant friction is there.
+        by_step = np.max(up[:, :-1] ** 2 * count / (before[:-1] * (count - before[:-1])), axis=1, initial=0.0)
+        gain /= np.maximum((np.sum(left**2, axis=1) - by_step) / count, 1.0)[:, None]
         found[begin:end] = np.nansum(gain, axis=0)
     return found

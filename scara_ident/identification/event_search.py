@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.identification.binned_residual import BOUND, FILLED, NORMAL, Binned
 from scara_ident.identification.event_background import without_states, without_trends
-from scara_ident.identification.event_ends import event_ends
+from scara_ident.identification.event_ends import Ends, event_ends
 
 # Lengths of the windows, s.
 WINDOWS = (0.16, 0.32, 0.6, 1.2, 2.0)
@@ -58,16 +58,24 @@ class Segment:
     Attributes
     ----------
     binned : Binned
-    start, stop : int
-        Bins, the second not in it.
+    ends : Ends
     score : ndarray, shape (n,)
         By how much each joint stands out, 1 where that alone would be an event.
     """
 
     binned: Binned
-    start: int
-    stop: int
+    ends: Ends
     score: Array
+
+    @property
+    def start(self) -> int:
+        """First bin."""
+        return self.ends.start
+
+    @property
+    def stop(self) -> int:
+        """First bin after it."""
+        return self.ends.stop
 
 
 def standing_out(
@@ -258,9 +266,7 @@ def _segments(
             near = score[:, max(0, place - length // 2) : place + max(1, long - length // 2)]
             if near.shape[1]:
                 share = np.fmax(share, np.nanmax(np.nan_to_num(near, nan=0.0), axis=1))
-        start, stop = event_ends(
-            relative, trust, still, free, window, share >= min(AT_ENDS, best), item.width, expected
-        )
+        ends = event_ends(relative, trust, still, free, window, share >= min(AT_ENDS, best), item.width, expected)
         pad = max(1, round(0.1 / item.width))
-        free[max(0, min(start, place) - pad) : max(stop, place + long) + pad] = False
-        yield Segment(item, start, stop, share)
+        free[max(0, min(ends.start, place) - pad) : max(ends.stop, place + long) + pad] = False
+        yield Segment(item, ends, share)

@@ -23,6 +23,8 @@ from scara_ident.threads import one_blas_thread
 
 # Events closer than this are one; as much is left out on either side, because the ends are known to that, s.
 MARGIN = 0.1
+# In words an end that is known to less, s, is said to be so.
+SAID_UNSURE = 0.3
 # Time stamps are known to rounding only, s.
 ROUNDING = 1e-6
 # A constant force at the tool explains at least this share of the squared residual of a contact there.
@@ -63,6 +65,8 @@ class Event:
         Whether the recording took no part in the fit anyway.
     force : tuple of float or None
         What acts on the tool in a contact, in the base frame, N; a direction that the arm cannot feel is 0.
+    begins, ends : tuple of float or None
+        Between which times it begins, and ends, with 95 %; None of a whole recording.
     """
 
     recording: str
@@ -74,6 +78,8 @@ class Event:
     score: float = np.inf
     held_out: bool = False
     force: tuple[float, float, float] | None = None
+    begins: tuple[float, float] | None = None
+    ends: tuple[float, float] | None = None
 
     @property
     def entry(self) -> dict[str, Any]:
@@ -86,7 +92,15 @@ class Event:
             "rms": self.rms,
             "kind": self.kind,
         }
+        for name, value in (("from_within", self.begins), ("to_within", self.ends)):
+            if value is not None:
+                found[name] = [round(time, 3) for time in value]
         return found if self.force is None else {**found, "force": list(self.force)}
+
+    def later(self, by: float) -> Event:
+        """Return it so many seconds later."""
+        begins, ends = ((span[0] + by, span[1] + by) if span else None for span in (self.begins, self.ends))
+        return replace(self, start=self.start + by, stop=self.stop + by, begins=begins, ends=ends)
 
     def sentence(self, robot: Robot) -> str:
         """Return it in words."""
@@ -97,7 +111,13 @@ class Event:
         done = "" if self.held_out else "; left out of the fit"
         if np.isinf(self.score):
             return f"{self.recording} is explained much worse than the recordings fitted ({self.kind}): {where}{more}{done}"
-        return f"{self.recording}: {self.kind} from {self.start:.2f} to {self.stop:.2f} s, {where}{more}{force}{done}"
+        unsure = [
+            f", {word} between {least:.2f} and {most:.2f} s"
+            for word, (least, most) in (("beginning", self.begins or (0.0, 0.0)), ("ending", self.ends or (0.0, 0.0)))
+            if most - least > SAID_UNSURE
+        ]
+        time = f"from {self.start:.2f} to {self.stop:.2f} s{''.join(unsure)}"
+        return f"{self.recording}: {self.kind} {time}, {where}{more}{force}{done}"
 
 
 def event_notes(robot: Robot, events: Sequence[Event]) -> list[str]:
@@ -231,6 +251,11 @@ def _event(robot: Robot, data: PreparedData, segment: Segment, left: Array, *, h
     times = item.part.stretch.time[inside] - record.recording.time[0]
     shown = tuple(robot.joints[j] for j in ranked)
     force, fit = tool_force(robot, item, segment.start, segment.stop)
+    zero = float(times[0]) - segment.start * item.width
+    begins, ends = (
+        (zero + least * item.width, zero + most * item.width)
+        for least, most in (segment.ends.begins, segment.ends.ends)
+    )
     inner = max(ranked) < robot.n - 1
     kind = "contact" if fit >= FITS and len(ranked) > 1 else "push" if inner else "unknown"
     return Event(
@@ -243,6 +268,8 @@ def _event(robot: Robot, data: PreparedData, segment: Segment, left: Array, *, h
         float(np.max(segment.score)),
         held_out,
         (float(force[0]), float(force[1]), float(force[2])) if kind == "contact" else None,
+        begins,
+        ends,
     )
 
 

@@ -112,7 +112,7 @@ def _absorb(held: _Absorbed, observations: Observations, part: Recording, value:
     held.stop = float(part.time[-1])
     held.samples += rows.samples
     later = float(part.time[0]) - origin
-    held.events += [replace(event, start=event.start + later, stop=event.stop + later) for event in events]
+    held.events += [event.later(later) for event in events]
     for finding in part.findings:
         held.said.setdefault(finding.kind, []).append(finding.message)
     held.absorb(joints)

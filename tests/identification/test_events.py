@@ -48,7 +48,9 @@ def test_a_push_is_found_with_its_times_and_force_and_only_that():
     assert event.start == pytest.approx(START, abs=0.1)
     assert event.stop == pytest.approx(STOP, abs=0.1)
     assert event.force == pytest.approx(FORCE, abs=0.1 * float(np.linalg.norm(FORCE)))
-    assert set(event.entry) == {"recording", "from", "to", "joints", "rms", "kind", "force"}
+    assert event.begins[0] <= START <= event.begins[1] < event.begins[0] + 0.3
+    assert event.ends[0] <= STOP <= event.ends[1] < event.ends[0] + 0.3
+    assert set(event.entry) == {"recording", "from", "from_within", "to", "to_within", "joints", "rms", "kind", "force"}
     assert "left out of the fit" in event.sentence(ROBOT)
     other = observed(plain)
     assert find_events(other, robust_fit(other).value) == ()
@@ -70,6 +72,16 @@ def test_the_stretch_is_out_of_rows_and_found_again():
     assert rest.left_out_rest == pytest.approx(observations.left_out_rest, abs=0.03)
     assert same_events(find_events(rest, robust_fit(rest).value), events)
     assert left_out(rest.data, ()).stretches[0].left_out is False
+
+
+def test_an_event_of_a_later_part_is_later_with_what_is_stated_of_its_ends():
+    one = Event("a", 1.0, 2.0, ("joint1",), 1.0, "contact", 3.0, begins=(0.875, 1.125), ends=(1.75, 2.5)).later(10.0)
+    assert one == Event("a", 11.0, 12.0, ("joint1",), 1.0, "contact", 3.0, begins=(10.875, 11.125), ends=(11.75, 12.5))
+    assert (one.entry["from_within"], one.entry["to_within"]) == ([10.875, 11.125], [11.75, 12.5])
+    assert "from 11.00 to 12.00 s, ending between 11.75 and 12.50 s" in one.sentence(ROBOT)
+    whole = Event("a", 0.0, 2.0, ("joint1",), 1.0, "unknown")
+    assert whole.later(1.0).begins is None
+    assert "from_within" not in whole.entry
 
 
 def test_events_are_the_same_where_most_of_their_time_is():
