@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, SpectralLine, View
@@ -202,10 +201,15 @@ def _order_resolution(scene: Scene, joint: int) -> float:
     return float(2.0 * np.pi / (abs(scene.robot.reduction[joint]) * scene.travel[joint]))
 
 
-def _seen(signals: Signals, joint: int, order: float) -> NDArray[np.bool_]:
-    """Where a sampled line is itself and no alias, shape (N,)."""
+def _seen(signals: Signals, joint: int, order: float) -> Array:
+    """Return the share of a line that is taken for itself and no alias, shape (N,).
+
+    It falls without a step over an octave: a line that ended at once would leave a click within the band, which
+    whatever else has that order would take away again.
+    """
     per_second = np.abs(order * signals.scene.robot.reduction[joint] * signals.motion.v[joint]) / (2.0 * np.pi)
-    return np.asarray(per_second < HIGHEST_FREQUENCY_SHARE * signals.motion.rate)
+    octave = per_second / (HIGHEST_FREQUENCY_SHARE * signals.motion.rate) - 1.0
+    return np.asarray(np.cos(0.5 * np.pi * np.clip(octave, 0.0, 1.0)) ** 2)
 
 
 def _slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
