@@ -19,6 +19,7 @@ from scara_ident.effects.periodic import Vibration
 from scara_ident.effects.presliding import Presliding
 from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.observations import observe
+from scara_ident.estimation.run_variation import JointVariation, RunVariation
 from scara_ident.motion.prepared import prepare
 from tests.diagnosis.made import complete, searched, virtual_runs
 
@@ -82,6 +83,14 @@ def test_an_effect_that_stands_for_one_outside_the_catalogue_is_not_counted() ->
     assert abs(float(refused.why.split("remove ")[1].split("%")[0]) - 100.0 * share) < 2.0
 
 
+def _always_off(outcome: Outcome, joint: int, size: float) -> JointVariation:
+    """Runs whose torques on a joint are off the mean by this."""
+    runs = len(outcome.training.each)
+    bounds = np.linspace(0, 100 * runs, runs + 1).astype(int)
+    ones = np.ones((1, 100 * runs))
+    return JointVariation(ones, np.ones(1), np.full((runs, 1), size), 1.0, bounds)
+
+
 def test_nothing_is_demoted_where_the_rest_is_noise() -> None:
     runs = virtual_runs("asymmetric_friction:joint1:viscous_difference=0.03")
     outcome = selected(runs, AsymmetricFriction(), FrictionCoupling(), bands=(11.0, 11.0), free=False)
@@ -93,6 +102,12 @@ def test_nothing_is_demoted_where_the_rest_is_noise() -> None:
     assert _proxies(little, CRITERIA) == []
     (proxy,) = _proxies(little, replace(CRITERIA, least_of_repeatable=1.5))
     assert proxy.label == "asymmetric_friction of joint1"
+    # What runs differ by does not repeat: an effect need not remove it.
+    assert little.after.variation is None or not little.after.variation
+    off = np.sqrt(np.subtract(np.square(rms_of(outcome.search.start.value, outcome.search.uncorrected)), 1e-12))
+    differ = RunVariation(tuple(_always_off(outcome, joint, size) for joint, size in enumerate(off)))
+    varied = replace(little, after=replace(little.after, variation=differ))
+    assert _proxies(varied, replace(CRITERIA, least_of_repeatable=1.5)) == []
     assert _proxies(replace(outcome, repeating=frozenset({"joint2"})), replace(CRITERIA, least_of_repeatable=1.5)) == []
     # What is judged as left is what is kept.
     for joint, after in zip(lack_of_fit(outcome.residuals), outcome.fit_after, strict=True):
