@@ -223,7 +223,8 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
     joints = search.base.robot.joints
     noise = {fit.joint: fit.noise for fit in found.fit_after}
     # What runs differ by does not repeat, however much of the residual it is.
-    varied = np.zeros(len(joints)) if found.after.variation is None else found.after.variation.mean_squares()
+    variation = found.after.variation
+    varied = np.zeros(len(joints)) if variation is None else variation.mean_squares(found.training.joints)
     own = dict(zip(joints, varied.tolist(), strict=True))
     proxies = []
     before, whole = rms_of(search.start.value, search.uncorrected), rms_of(found.after.value, found.training)

@@ -149,13 +149,13 @@ class RunVariation:
                 found.append(off)
         return tuple(found)
 
-    def mean_squares(self) -> Array:
-        """Return the mean square of that on the rows of each joint, shape (n,)."""
+    def mean_squares(self, joints: Sequence[JointRows]) -> Array:
+        """Return the mean square of that over the samples that the rows of each joint stand for, shape (n,)."""
         found = np.zeros(len(self.joints))
-        for joint, item in enumerate(self.joints):
+        for joint, (item, rows) in enumerate(zip(self.joints, joints, strict=True)):
             if item is not None:
                 off = np.repeat(item.of_run, np.diff(item.bounds), axis=0).T * item.directions
-                found[joint] = float(np.mean(np.sum(off, axis=0) ** 2))
+                found[joint] = float(np.sum(np.sum(off, axis=0) ** 2) / np.sum(rows.counts))
         return found
 
     def covariance(self, inverse: Array, joints: Sequence[JointRows], weights: Array) -> Array:
