@@ -269,7 +269,7 @@ def diagnose(
         evidence(found, outcome.residuals, outcome.fit_after, outcome.small, criteria),
         rms_of(after.value, outcome.training),
         rms_of(after.value, undisturbed),
-        unsure_of_others(after, undisturbed),
+        unsure,
         criteria,
     )
     verdict = _verdict(outcome.unexplained is not None, bool(effects), shown)
