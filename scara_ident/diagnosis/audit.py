@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from scara_ident.arrays import Array
@@ -43,6 +44,32 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         why = why or variation_objection(beside, decision, step.criteria.least_gain)
         if why is not None:
             result.append(decision.refused(why))
+    return result
+
+
+def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[Decision]:
+    """Return the decisions on effects in whose place one that is not believed does as well, with why.
+
+    What was refused may have been there all the same, and what is found without it then stands for it.
+
+    Parameters
+    ----------
+    found : Search
+        Without the effects that are not believed.
+    weights : ndarray, shape (n,)
+        See `unsettled`.
+    refused : sequence of Decision
+        On the effects that are not believed.
+    """
+    step = replace(found.step, weights=weights)
+    result = []
+    for place, candidate in enumerate(step.chosen if refused else ()):
+        beside = step.without(place)
+        own, *others = beside.judge([candidate, *(item.candidate for item in refused)])
+        enough = step.criteria.least_share * own.examination.held_out
+        best = max(others, key=lambda item: item.examination.held_out)
+        if best.examination.held_out >= enough:
+            result.append(own.refused(f"{best.label}, which is not believed, does as well in its place"))
     return result
 
 

@@ -13,7 +13,7 @@ from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.motion import Motion
-from scara_ident.motion.position_noise import noisier
+from scara_ident.motion.position_noise import noisier, unresolved_joints
 from scara_ident.motion.prepared import PreparedStretch
 
 # Columns of a candidate, shape (k, N) on the N rows of each joint that it acts on.
@@ -83,6 +83,11 @@ class CandidateColumns:
     def noisier(self) -> CandidateColumns:
         """Columns on the rows that positions with their noise once more on top would have given."""
         return CandidateColumns(observe(self.observations.model, noisier(self.observations.data)))
+
+    @cached_property
+    def unresolved(self) -> dict[int, str]:
+        """Joints of which nothing is to be believed, and why, see `unresolved_joints`."""
+        return unresolved_joints(self.observations.data)
 
     def beside(self, observations: Observations) -> CandidateColumns:
         """Return the same columns beside other torques on the same motion."""

@@ -42,7 +42,7 @@ from scara_ident.identification.channel_check import channel_faults
 from scara_ident.identification.clock_check import clock_drift
 from scara_ident.identification.events import Event, find_events, same_events, without_events
 from scara_ident.identification.identify import check_bands, check_held_out
-from scara_ident.identification.recording_check import held_out_events, without_stretches
+from scara_ident.identification.recording_check import held_out_events, own_uncertainty, without_stretches
 from scara_ident.identification.usable import check_rows, usable_in_bands, with_rows
 from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
@@ -252,10 +252,13 @@ def diagnose(
     if uncounted is not None:
         notes.append(f"{uncounted}; corrected in the data, not counted as an effect")
     validation_after = _with_effects(found, held, validation_before)
+    in_held_out = held_out_events(after.value, outcome.training, validation_after)
+    unsure = unsure_of_others(after, validation_after)
+    in_held_out = tuple(own_uncertainty(event, dict(zip(robot.joints, unsure, strict=True))) for event in in_held_out)
     # Where something stays unexplained that is why a whole recording is, and no event.
     in_held_out = tuple(
         event
-        for event in held_out_events(after.value, outcome.training, validation_after)
+        for event in in_held_out
         if event.kind != "unknown" or np.isfinite(event.score) or outcome.unexplained is None
     )
     events += in_held_out
@@ -266,7 +269,7 @@ def diagnose(
         evidence(found, outcome.residuals, outcome.fit_after, outcome.small, criteria),
         rms_of(after.value, outcome.training),
         rms_of(after.value, undisturbed),
-        unsure_of_others(after, undisturbed),
+        unsure,
         criteria,
     )
     verdict = _verdict(outcome.unexplained is not None, bool(effects), shown)

@@ -76,8 +76,11 @@ def evidence(
     limits = detection_limits(found, criteria)
     coloured = coloured_shares(residuals)
     repeated = {item.joint: item for item in fit}
+    unresolved = found.step.columns.unresolved
     return tuple(
-        _of_joint(joint, repeated.get(joint), float(coloured[j]), float(limits[j]), small[j], criteria)
+        Evidence(joint, False, "", unresolved[j], float(limits[j]))
+        if j in unresolved
+        else _of_joint(joint, repeated.get(joint), float(coloured[j]), float(limits[j]), small[j], criteria)
         for j, joint in enumerate(found.scene.robot.joints)
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
-from scara_ident.diagnosis.audit import unsettled
+from scara_ident.diagnosis.audit import outdone, unsettled
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.evidence import coloured_shares
@@ -221,6 +221,7 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
     left = task.progress
     for _ in range(task.criteria.most_demotions):
         proxies = [*_proxies(found, task.criteria), *unsettled(found.search, found.after.weights)]
+        proxies += outdone(found.search, found.after.weights, tuple(demoted.values()))
         if not proxies:
             break
         demoted |= {item.label: item for item in reversed(proxies)}
@@ -228,7 +229,10 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
         found = _searched(replace(task, progress=now), columns, tuple(demoted), found.search)
     else:
         # No further search, but nothing is believed that does not stand.
-        while unstable := unsettled(found.search, found.after.weights):
+        while unstable := [
+            *unsettled(found.search, found.after.weights),
+            *outdone(found.search, found.after.weights, tuple(demoted.values())),
+        ]:
             demoted |= {item.label: item for item in unstable}
             found = _outcome(task, found.search.without([item.label for item in unstable]))
     return replace(found, demoted=tuple(demoted.values()))
@@ -243,6 +247,10 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
     search = found.search
     joints = search.base.robot.joints
     noise = {fit.joint: fit.noise for fit in found.fit_after}
+    # What runs differ by does not repeat, however much of the residual it is.
+    variation = found.after.variation
+    varied = np.zeros(len(joints)) if variation is None else variation.mean_squares(found.training.joints)
+    own = dict(zip(joints, varied.tolist(), strict=True))
     proxies = []
     before, whole = rms_of(search.start.value, search.uncorrected), rms_of(found.after.value, found.training)
     labels = [item.label(search.scene) for item in search.chosen]
@@ -257,7 +265,7 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
         repeats = removed = 0.0
         for joint, old, new in zip(joints, old_rms, new_rms, strict=True):
             if joint in noise and owner in (joint, None) and old is not None and new is not None:
-                repeats += (old / noise[joint]) ** 2 - 1.0
+                repeats += max(0.0, (old**2 - own[joint]) / noise[joint] ** 2 - 1.0)
                 removed += (old**2 - new**2) / noise[joint] ** 2
         before = after
         if (owner is None or owner in left) and removed < criteria.least_of_repeatable * repeats:

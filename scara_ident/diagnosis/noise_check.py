@@ -1,4 +1,4 @@
-"""Whether the noise of positions, rather than the arm, makes an effect."""
+"""Whether the noise of positions, or what they swing by, makes an effect rather than the arm."""
 
 from __future__ import annotations
 
@@ -25,6 +25,9 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
         That lets it in.
     """
     found, criteria = decision.examination, step.criteria
+    joint = decision.candidate.member.joint
+    if joint is not None and joint in step.columns.unresolved:
+        return step.columns.unresolved[joint]
     own = step.noisier.columns.rows(step.noisier.scene, [decision.candidate])
     (again,) = examine(step.noisier.model, own, criteria)
     left = without_noise(found, again)

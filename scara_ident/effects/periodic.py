@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, SpectralLine, View
@@ -27,6 +26,9 @@ ENCODER_ORDERS = (1.0, 2.0)
 PERIODS_COVERED = 2.0
 # Share of the joint's largest speed at which an order must lie within the band: a joint is hardly ever slower for long.
 SLOW_SHARE = 0.03
+# Share of the rate up to which a line is whole; what is left of it an octave higher has its alias at 0.4 of the rate, twice
+# the widest band that is chosen, and of ramps between 0.2 and 0.8 this one leaves the least in the band.
+WHOLE_SHARE = 0.3
 # No encoder errs by more than this, rad of the motor; beyond it the linear form ends too.
 LARGEST_ECCENTRICITY = 0.1
 
@@ -202,10 +204,15 @@ def _order_resolution(scene: Scene, joint: int) -> float:
     return float(2.0 * np.pi / (abs(scene.robot.reduction[joint]) * scene.travel[joint]))
 
 
-def _seen(signals: Signals, joint: int, order: float) -> NDArray[np.bool_]:
-    """Where a sampled line is itself and no alias, shape (N,)."""
+def _seen(signals: Signals, joint: int, order: float) -> Array:
+    """Return the share of a line that is taken for itself and no alias, shape (N,).
+
+    It falls without a step over an octave: a line that ended at once would leave a click within the band, which
+    whatever else has that order would take away again.
+    """
     per_second = np.abs(order * signals.scene.robot.reduction[joint] * signals.motion.v[joint]) / (2.0 * np.pi)
-    return np.asarray(per_second < HIGHEST_FREQUENCY_SHARE * signals.motion.rate)
+    octave = per_second / (WHOLE_SHARE * signals.motion.rate) - 1.0
+    return np.asarray(0.5 + 0.5 * np.cos(np.pi * np.clip(octave, 0.0, 1.0)))
 
 
 def _slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:

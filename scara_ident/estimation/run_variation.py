@@ -149,6 +149,15 @@ class RunVariation:
                 found.append(off)
         return tuple(found)
 
+    def mean_squares(self, joints: Sequence[JointRows]) -> Array:
+        """Return the mean square of that over the samples that the rows of each joint stand for, shape (n,)."""
+        found = np.zeros(len(self.joints))
+        for joint, (item, rows) in enumerate(zip(self.joints, joints, strict=True)):
+            if item is not None:
+                off = np.repeat(item.of_run, np.diff(item.bounds), axis=0).T * item.directions
+                found[joint] = float(np.sum(np.sum(off, axis=0) ** 2) / np.sum(rows.counts))
+        return found
+
     def covariance(self, inverse: Array, joints: Sequence[JointRows], weights: Array) -> Array:
         """Return what the differences add to the covariance of a least-squares estimate, shape (p, p).
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -17,6 +17,8 @@ from scara_ident.model.base_parameters import standard_regressor
 WORSE, WORSE_THAN_ALL = 2.0, 1.5
 # Another payload explains at least this share of its squared residual.
 PAYLOAD_FITS = 0.7
+# An error within so many of the standard deviations that the parameters make is theirs: 95 %.
+UNSURE_STDS = 2.0
 # Samples of a recording that a payload is fitted to.
 SAMPLES = 1500
 # Directions of the payload's parameters that show less than this share of the best are none.
@@ -59,6 +61,21 @@ def held_out_events(value: Array, training: Observations, held_out: Observations
         )
     whole_ones = {event.recording for event in found}
     return (*found, *(event for event in within if event.recording not in whole_ones))
+
+
+def own_uncertainty(event: Event, unsure: Mapping[str, float]) -> Event:
+    """Return an event as no event of its recording where the parameters' own uncertainty makes as much of it.
+
+    Parameters
+    ----------
+    event : Event
+        Of recordings held out; only a whole one of kind ``unknown`` is changed.
+    unsure : mapping of str to float
+        Rms error of each joint that a right model has there, known as it is.
+    """
+    theirs = event.rms <= UNSURE_STDS * unsure[event.joints[0]]
+    unnamed = event.kind == "unknown" and np.isinf(event.score)
+    return replace(event, kind="parameters unsure") if theirs and unnamed else event
 
 
 def without_stretches(observations: Observations, events: Sequence[Event]) -> Observations:

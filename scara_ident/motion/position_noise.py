@@ -13,7 +13,14 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.motion.motion import Stretch
-from scara_ident.motion.prepared import REST_NOISE, PreparedData, PreparedRecording, PreparedStretch, position_cuts
+from scara_ident.motion.prepared import (
+    REST_NOISE,
+    PreparedData,
+    PreparedRecording,
+    PreparedStretch,
+    position_cuts,
+    velocity_noise,
+)
 
 # Positions have steps where their changes are whole multiples of the least one, but for this much of it in the mean:
 # numbers of random size leave a quarter.
@@ -88,6 +95,36 @@ def coarse_positions(item: PreparedRecording) -> str | None:
         f"positions of {joints} go in steps of {step:.2g} (rad or m), so coarse that {within} rest and motion cannot be told "
         "apart; record with a finer encoder, faster motion, or give a narrower band"
     )
+
+
+def unresolved_joints(data: PreparedData) -> dict[int, str]:
+    """Return which joints swing so fast and far, most of the time recorded, that rest and motion cannot be told apart.
+
+    What swings beyond half the rate, as under a controller that shakes, stands at other frequencies in what is recorded;
+    the signs of speeds and the products of them that the columns hold then do not belong to the torque.
+
+    Returns
+    -------
+    dict of int to str
+        The place of each joint, and why in words.
+    """
+    parts = data.stretches
+    whole = sum(part.samples for part in parts)
+    found = {}
+    for joint, band in enumerate(data.bands):
+        shaken = 0
+        for part in parts:
+            apart = min(part.samples - 1, max(1, round(SPEED_OVER * part.rate)))
+            position = part.stretch.position[joint]
+            speed = np.sqrt(np.mean((position[apart:] - position[:-apart]) ** 2)) * part.rate / apart
+            swing = velocity_noise(part.stretch, part.motion, joint, band, 0.0)
+            shaken += part.samples * bool(REST_NOISE * swing > speed > 0.0)
+        if shaken > 0.5 * whole:
+            found[joint] = (
+                "its positions swing too fast and far for the rate, so that rest and motion cannot be told apart: "
+                "find what shakes it, record faster or smoother motions"
+            )
+    return found
 
 
 def noise_level(part: PreparedStretch, joint: int) -> float:

@@ -327,7 +327,7 @@ def standstill(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) 
     result = np.zeros(motion.q.shape, dtype=bool)
     for j, (band, speed) in enumerate(zip(bands, np.abs(motion.v), strict=True)):
         least = REST_SHARE / REST_NOISE * float(np.max(speed))
-        threshold = REST_NOISE * _velocity_noise(stretch, motion, j, band, least)
+        threshold = REST_NOISE * velocity_noise(stretch, motion, j, band, least)
         result[j] = _runs_longer_than(speed <= threshold, 1, widen=_widening(REST_WIDEN, stretch.rate, band))
     return result
 
@@ -364,7 +364,7 @@ def _widening(periods: float, rate: float, band: float | None) -> int:
     return max(1, int(rate * min(periods / (POSITION_BAND * band), LONGEST_WIDENING)))
 
 
-def _velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | None, least: float) -> float:
+def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | None, least: float) -> float:
     """Return the standard deviation of the filtered velocity's noise, from what the filter took out, or the least given.
 
     White position noise of density s/rate integrates to ``s (2 pi)^2 f^3 / 3`` in velocity up to f.

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.audit import uncertain, unsettled
+from scara_ident.diagnosis.audit import outdone, uncertain, unsettled
 from scara_ident.diagnosis.candidate_tests import Examination
+from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.diagnosis.effect_parameters import Coefficients
+from scara_ident.effects import Member
+from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.position import Spring
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, searched, with_torque
@@ -56,6 +62,16 @@ def test_a_spring_of_the_arm_stands():
     found = searched(made, Spring())
     assert [item.label(found.scene) for item in found.chosen] == ["spring of joint2"]
     assert unsettled(found, found.step.weights) == []
+    # Nor does anything do as well; but beside the spring itself, were it not believed, what stands for it falls.
+    (spring,) = (item.decision for item in found.steps)
+    assert outdone(found, found.step.weights, ()) == []
+    (other,) = found.step.without(0).judge([Candidate(AsymmetricFriction(), Member(1))])
+    assert other.examination.held_out < CRITERIA.least_share * spring.examination.held_out
+    assert outdone(found, found.step.weights, (other,)) == []
+    proxy = replace(found, step=replace(found.step, chosen=(other.candidate,)))
+    (fallen,) = outdone(proxy, found.step.weights, (other.refused(""), spring.refused("")))
+    assert (fallen.label, fallen.accepted, fallen.tentative) == (other.label, False, True)
+    assert fallen.why == "spring of joint2, which is not believed, does as well in its place"
 
 
 def test_without_effects_there_is_nothing_to_look_at():

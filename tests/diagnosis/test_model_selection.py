@@ -12,13 +12,16 @@ from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.lack_of_fit import lack_of_fit
 from scara_ident.diagnosis.model_selection import Outcome, _proxies, rms_of, select_model
 from scara_ident.diagnosis.search import SearchTask
+from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.effects import CATALOGUE
 from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.friction import AsymmetricFriction, FrictionCoupling
 from scara_ident.effects.periodic import Vibration
 from scara_ident.effects.presliding import Presliding
+from scara_ident.estimation import wls
 from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.observations import observe
+from scara_ident.estimation.run_variation import JointVariation, RunVariation
 from scara_ident.motion.prepared import prepare
 from tests.diagnosis.made import complete, searched, virtual_runs
 
@@ -80,9 +83,24 @@ def test_an_effect_that_stands_for_one_outside_the_catalogue_is_not_counted() ->
     assert before is not None
     assert after is not None
     noise = outcome.fit_after[1].noise
-    share = (before**2 - after**2) / (before**2 - noise**2)
+    seen = observed_at_every_sample(first.step)
+    variation = wls(seen).variation
+    assert variation is not None
+    share = (before**2 - after**2) / (before**2 - variation.mean_squares(seen.joints)[1] - noise**2)
     assert share < CRITERIA.least_of_repeatable
     assert abs(float(refused.why.split("remove ")[1].split("%")[0]) - 100.0 * share) < 2.0
+
+
+def _always_off(outcome: Outcome, joint: int, size: float | None) -> JointVariation:
+    """Runs whose torques on a joint are off the mean by this, of either sign."""
+    assert size is not None
+    rows = outcome.training.joints[joint]
+    runs = len(outcome.training.each)
+    bounds = np.append(rows.starts[np.searchsorted(outcome.training.owner, np.arange(runs))], rows.starts[-1])
+    # A row stands for so many samples, and is as much longer.
+    direction = np.full((1, rows.table.shape[1]), np.sqrt(np.sum(rows.counts) / rows.table.shape[1]))
+    signs = np.where(np.arange(runs) % 2, -1.0, 1.0)
+    return JointVariation(direction, np.ones(1), size * signs[:, None], 1.0, bounds)
 
 
 def test_nothing_is_demoted_where_the_rest_is_noise() -> None:
@@ -96,6 +114,13 @@ def test_nothing_is_demoted_where_the_rest_is_noise() -> None:
     assert _proxies(little, CRITERIA) == []
     (proxy,) = _proxies(little, replace(CRITERIA, least_of_repeatable=1.5))
     assert proxy.label == "asymmetric_friction of joint1"
+    # What runs differ by does not repeat: an effect need not remove it.
+    assert little.after.variation is None or not little.after.variation
+    off = rms_of(outcome.search.start.value, outcome.search.uncorrected)
+    differ = RunVariation(tuple(_always_off(outcome, joint, size) for joint, size in enumerate(off)))
+    assert differ.mean_squares(outcome.training.joints) == pytest.approx(np.square(off))
+    varied = replace(little, after=replace(little.after, variation=differ))
+    assert _proxies(varied, replace(CRITERIA, least_of_repeatable=1.5)) == []
     assert _proxies(replace(outcome, repeating=frozenset({"joint2"})), replace(CRITERIA, least_of_repeatable=1.5)) == []
     # What is judged as left is what is kept.
     for joint, after in zip(lack_of_fit(outcome.residuals), outcome.fit_after, strict=True):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from scara_ident.identification.events import Event
 from scara_ident.identification.identify import identify
-from scara_ident.identification.recording_check import without_stretches
+from scara_ident.identification.recording_check import own_uncertainty, without_stretches
 from scara_ident.robot.robot import load_robot
 from tests.truth.pushes import pushed
 from tests.truth.scenes import formula_run
@@ -46,3 +49,12 @@ def test_a_push_in_a_held_out_recording_is_no_other_payload():
     value = found.estimate.value
     assert rest.joints[0].rms(value) < 0.5 * found.validation.joints[0].rms(value)
     assert without_stretches(found.validation, ()) is found.validation
+
+
+def test_what_parameters_err_by_is_no_event_of_a_recording():
+    whole = Event("run", 0.0, 9.0, ("joint2", "joint1"), 18.4, "unknown", held_out=True)
+    unsure = {"joint1": 0.0, "joint2": 15.7}
+    assert own_uncertainty(whole, unsure).kind == "parameters unsure"
+    assert own_uncertainty(whole, {**unsure, "joint2": 5.0}) == whole
+    for other in (replace(whole, kind="other payload"), replace(whole, score=2.0)):
+        assert own_uncertainty(other, unsure) == other

@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 
 from scara_ident.errors import RecordingError
 from scara_ident.identification.identify import identify
-from scara_ident.motion.position_noise import coarse_positions, encoder_step, noise_level, noisier
+from scara_ident.motion.position_noise import (
+    coarse_positions,
+    encoder_step,
+    noise_level,
+    noisier,
+    unresolved_joints,
+)
 from scara_ident.motion.prepared import prepare
 from scara_ident.robot.robot import load_robot
 from tests.arms import recording
@@ -96,3 +102,18 @@ def test_an_encoder_too_coarse_for_its_band_is_named(bits: int, band: float, coa
     assert f"positions of joint1 go in steps of {step:.2g}" in said
     with pytest.raises(RecordingError, match="finer encoder"):
         identify(load_robot(), [replace(item, position=step * np.round(SMOOTH / step))], bands=[band, band])
+
+
+@pytest.mark.parametrize(("swing", "share", "unresolved"), [(3e-3, 1.0, True), (3e-3, 0.4, False), (1e-5, 1.0, False)])
+def test_a_joint_that_shakes_beyond_the_rate_is_not_resolved(swing: float, share: float, unresolved: bool):
+    # 72 Hz at 125 samples a second look like 53 Hz.
+    time = TIME[: TIME.size // 4 * 4 : 4]
+    still = SMOOTH[:, ::4].copy()
+    shaken = still + np.vstack([swing * np.sin(2.0 * np.pi * 72.0 * time), np.zeros_like(time)])
+    size = round(share * len(time))
+    runs = [
+        recording(load_robot(), name, time[:count], position[:, :count], np.zeros((2, count)))
+        for name, position, count in (("A_1", shaken, size), ("B_1", still, len(time) - size))
+        if count
+    ]
+    assert set(unresolved_joints(prepare(runs, (25.0, 25.0)))) == ({0} if unresolved else set())
