@@ -230,11 +230,11 @@ def _filtered(
 def _closed_length(count: int, reach: int, step: int) -> int:
     """Return how long a signal is, continued at both ends, that is transformed fast and falls on every step-th sample."""
     lead = -(-reach // step) * step
-    return step * _fast_length(-(-(lead + count + reach) // step))
+    return step * fast_length(-(-(lead + count + reach) // step))
 
 
 @lru_cache(maxsize=1024)
-def _fast_length(length: int) -> int:
+def fast_length(length: int) -> int:
     """Return the next length whose only prime factors are 2, 3 and 5."""
     best = 1 << (length - 1).bit_length()
     five = 1
