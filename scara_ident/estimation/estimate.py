@@ -109,7 +109,7 @@ def joint_errors(value: Array, observations: Observations) -> tuple[JointError |
     for rows, rms, whole in zip(observations.joints, left, torque, strict=True):
         known = rows.samples > 0.0 and np.isfinite(rms)
         within = rows.rms(value)
-        recorded = float(np.linalg.norm(rows.table[-1])) / np.sqrt(max(rows.samples, 1.0))
+        recorded = float(np.linalg.norm(rows.table[-1]) / np.sqrt(max(rows.samples, 1.0)))
         error = JointError(within, _share(within, recorded), float(rms), _share(float(rms), float(whole)))
         found.append(error if known else None)
     return tuple(found)
