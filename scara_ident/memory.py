@@ -1,4 +1,8 @@
-"""How much memory reading a file may take, in one place: a small file can unpack to more than the machine has."""
+"""How much memory reading a file may take, in one place: a small file can unpack to more than the machine has.
+
+And how much the C library keeps of what was freed: the system clears each page that it gives, which for arrays that live
+shortly takes as long as to fill them.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +22,11 @@ USUAL = 8e9
 LEAST = 0.05
 # Memory that JSON takes when it is read, by its bytes: a number of three signs is an object of 24 bytes, and a place in a list.
 JSON_FACTOR = 10.0
+# Arrays up to the first size are taken from what was freed, of which the second is kept, bytes: the largest size that the C
+# library knows, and what the arrays of one recording of minutes take.
+ARRAY, KEPT = 2**25, 2**27
+# Of mallopt(3).
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 
 _given: list[float] = []
 
@@ -86,6 +95,21 @@ def within_limit(path: Path) -> Iterator[None]:
             import resource
 
             resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+@cache
+def keep_freed() -> None:
+    """Keep freed memory for the next arrays, where the C library is glibc and nobody has set otherwise."""
+    import ctypes
+
+    if "GLIBC_TUNABLES" in os.environ or any(name.startswith("MALLOC_") for name in os.environ):
+        return
+    # One that has no such function, as musl's or the one of Windows, is left alone.
+    with suppress(OSError, AttributeError, TypeError):
+        library = ctypes.CDLL(None)
+        _ = library.gnu_get_libc_version
+        for option, size in ((_TRIM_THRESHOLD, KEPT), (_MMAP_THRESHOLD, ARRAY)):
+            library.mallopt(option, size)
 
 
 def _too_much(path: Path, what: str) -> MemoryLimit:

@@ -106,11 +106,11 @@ def joint_errors(value: Array, observations: Observations) -> tuple[JointError |
     """Return the error of parameters on recordings together, joint by joint; None where no sample of a joint was used."""
     left, torque = observations.unfiltered_rms(value), observations.unfiltered_torque_rms
     found: list[JointError | None] = []
-    nothing = np.zeros_like(value)
     for rows, rms, whole in zip(observations.joints, left, torque, strict=True):
         known = rows.samples > 0.0 and np.isfinite(rms)
         within = rows.rms(value)
-        error = JointError(within, _share(within, rows.rms(nothing)), float(rms), _share(float(rms), float(whole)))
+        recorded = float(np.linalg.norm(rows.table[-1]) / np.sqrt(max(rows.samples, 1.0)))
+        error = JointError(within, _share(within, recorded), float(rms), _share(float(rms), float(whole)))
         found.append(error if known else None)
     return tuple(found)
 

@@ -120,7 +120,7 @@ class Information(Frozen):
             if whole is None:
                 some = triangular(columns[:, :: count // PANEL_ROWS].T)
                 alone = _updated(some, columns, np.zeros((len(columns), len(columns))))
-                whole = None if alone is None else triangular(np.vstack([factor, alone]))
+                whole = alone if alone is None or not len(factor) else triangular(np.vstack([factor, alone]))
         if whole is None:
             # Equal panels, so that the last is not a sliver.
             bounds = np.linspace(0, count, max(1, -(-count // PANEL_ROWS)) + 1).astype(int)
@@ -141,7 +141,8 @@ class Information(Frozen):
         """Return the information in a larger model whose other columns are zero on these rows."""
         wide = np.zeros((len(self.factor), parameters + 1))
         wide[:, [*columns, parameters]] = self.factor
-        return Information(triangular(wide), self.rows)
+        # Columns in their order leave it triangular.
+        return Information(wide if np.all(np.diff(columns) > 0) else triangular(wide), self.rows)
 
     def solve(self) -> Solution:
         """Return the least-squares estimate and what it leaves undetermined."""

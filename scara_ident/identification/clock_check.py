@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import orthonormal, weighted
@@ -42,37 +44,32 @@ def clock_drift(value: Array, observations: Observations) -> str | None:
     noise = np.array([rows.rms(value) for rows in observations.joints])
     weight = np.where(noise > 0.0, 1.0 / np.where(noise > 0.0, noise, 1.0), 0.0)
 
-    def of_joint(j: int, rows: JointRows) -> tuple[Array, Array, Array]:
-        left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
-        delays, growing = _delayed(value, observations, j)
-        return rows.table[:-1] * weight[j], weight[j] * delays, weight[j] * np.vstack([growing, left])
-
-    parts = side_by_side(of_joint, range(len(observations.joints)), observations.joints)
-    models, lags, others = zip(*parts, strict=True)
+    joints = side_by_side(lambda j: _sums(value, observations, j, float(weight[j])), range(len(weight)))
     # What parameters and one delay for each recording explain is none of the drift's: the model's columns are projected out
     # by the triangular factor that is known, the delays by their few products.
     root = orthonormal(weighted(observations.by_joint, weight).regressor_factor)
-
-    def in_model(signals: Sequence[Array]) -> Array:
-        own = zip(observations.joints, models, signals, strict=True)
-        return np.asarray(sum(root[rows.columns].T @ (model @ signal.T) for rows, model, signal in own))
-
-    lag, right = np.hstack(lags), np.hstack(others)
-    shared, told = in_model(lags), in_model(others)
-    products, score = lag @ lag.T - shared.T @ shared, lag @ right.T - shared.T @ told
-    late = np.linalg.pinv(products, rcond=1e-9, hermitian=True) @ score
-    known = root @ (told - shared @ late)
-    by_model = [known[rows.columns].T @ model for rows, model in zip(observations.joints, models, strict=True)]
-    growing, left = right - np.hstack(by_model) - late.T @ lag
-    block = np.concatenate(
-        [np.repeat(np.arange(len(rows.starts) - 1), np.diff(rows.starts)) for rows in observations.joints]
+    shared, told = (
+        np.sum([root[joint.rows.columns].T @ getattr(joint, name) for joint in joints], axis=0)
+        for name in ("of_lags", "of_others")
     )
-    score, information = np.bincount(block, growing * left), np.bincount(block, growing**2)
-    if not np.sum(information) * np.sum(left**2) > 0.0:
+    products = np.diag(np.sum([joint.squares for joint in joints], axis=0)) - shared.T @ shared
+    late = np.linalg.pinv(products, rcond=1e-9, hermitian=True) @ (
+        np.sum([joint.scores for joint in joints], axis=0) - shared.T @ told
+    )
+    known = root @ (told - shared @ late)
+    score, information, square = np.zeros(observations.blocks), np.zeros(observations.blocks), 0.0
+    for joint, factor in zip(joints, weight, strict=True):
+        delayed = np.repeat(late, np.diff(joint.bounds), axis=0).T * joint.lag
+        growing, left = joint.others - factor * (known[joint.rows.columns].T @ joint.rows.table[:-1]) - delayed
+        block = np.repeat(np.arange(observations.blocks), np.diff(joint.rows.starts))
+        score += np.bincount(block, growing * left, observations.blocks)
+        information += np.bincount(block, growing**2, observations.blocks)
+        square += float(left @ left)
+    if not np.sum(information) * square > 0.0:
         return None
     rate = float(np.sum(score) / np.sum(information))
     std = float(np.sqrt(np.sum((score - information * rate) ** 2)) / np.sum(information))
-    if abs(rate) < CERTAIN * std or rate * np.sum(score) < SHARE * np.sum(left**2):
+    if abs(rate) < CERTAIN * std or rate * np.sum(score) < SHARE * square:
         return None
     longest = max(item.time[-1] - item.time[0] for item in observations.data.sources)
     return (
@@ -85,21 +82,55 @@ def _kept(observations: Observations, joint: int) -> int:
     return sum(len(part.kept[joint]) for part in observations.data.stretches if part.usable)
 
 
-def _delayed(value: Array, observations: Observations, joint: int) -> tuple[Array, Array]:
-    """Return what a joint's torque changes by when each recording is late, (recordings, K), and where all grow later, (K,)."""
-    rows, each, growing = observations.joints[joint], [], []
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Of one joint, weighted: its rows, and products of what each of r recordings changes by when it is late.
+
+    Attributes
+    ----------
+    rows : JointRows
+    lag : ndarray, shape (N,)
+        What the torque changes by when its own recording is late.
+    others : ndarray, shape (2, N)
+        What it changes by when all grow later, and what parameters leave of it.
+    bounds : ndarray of int, shape (r + 1,)
+        Where the rows of each recording begin.
+    of_lags, of_others : ndarray, shapes (k, r) and (k, 2)
+        Their products with the columns.
+    squares, scores : ndarray, shapes (r,) and (r, 2)
+        Those of the lags, and with the others.
+    """
+
+    rows: JointRows
+    lag: Array
+    others: Array
+    bounds: NDArray[np.intp]
+    of_lags: Array
+    of_others: Array
+    squares: Array
+    scores: Array
+
+
+def _sums(value: Array, observations: Observations, joint: int, weight: float) -> _Sums:
+    rows, parts = observations.joints[joint], []
+    columns, ends = rows.table[:-1], [0]
     for item, raws in zip(observations.data.recordings, observations.raw, strict=True):
-        parts = []
         start = item.stretches[0].stretch.time[0]
         for part, raw in zip(item.stretches, raws, strict=True):
             if part.usable:
                 slope = -np.gradient(value[rows.columns] @ raw[joint]) * part.rate
                 parts.append(part.rows(joint, np.array([slope, slope * (part.stretch.time - start)])))
-        late = np.concatenate(parts, axis=1) if parts else np.zeros((2, 0))
-        each.append(late[0])
-        growing.append(late[1])
-    delays = np.zeros((len(each), rows.table.shape[1]))
-    ends = np.cumsum([0, *map(len, each)])
-    for k, late in enumerate(each):
-        delays[k, ends[k] : ends[k + 1]] = late
-    return delays, np.concatenate(growing)
+        ends.append(sum(part.shape[1] for part in parts))
+    lag, growing = weight * np.concatenate(parts, axis=1)
+    others = np.array([growing, weight * (rows.table[-1] - value[rows.columns] @ columns)])
+    runs = [slice(a, b) for a, b in pairwise(ends)]
+    return _Sums(
+        rows,
+        lag,
+        others,
+        np.array(ends, dtype=np.intp),
+        weight * np.stack([columns[:, run] @ lag[run] for run in runs], axis=1),
+        weight * (columns @ others.T),
+        np.array([lag[run] @ lag[run] for run in runs]),
+        np.array([others[:, run] @ lag[run] for run in runs]),
+    )

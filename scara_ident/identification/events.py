@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from scara_ident.arrays import Array
+from scara_ident.estimation.information import LEAST_NOISE
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.binned_residual import Binned, binned, bounded_noise
@@ -163,6 +164,10 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
         for item in standing_out(stretches, plain, lambda *event: _of_tool_force(robot, *event))
         if item.binned.recording < len(data.recordings) and not _repeated(item, stretches, data)
     ]
+    if found:
+        # Of an exact fit only rounding is left, which may stand out from itself.
+        least = LEAST_NOISE * observations.unfiltered_torque_rms
+        found = [event for event in found if event.rms > least[robot.joints.index(event.joints[0])]]
     return tuple(sorted(found, key=lambda event: (data_place(data, event.recording), event.start)))
 
 

@@ -37,6 +37,7 @@ from scara_ident.progress import Tell, Work, log_notes, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.recording.shared_samples import shared_samples
 from scara_ident.robot.robot import Robot
+from scara_ident.threads import side_by_side
 
 _LOG = logging.getLogger(__name__)
 
@@ -111,11 +112,15 @@ class Identification(Saved, told_by="identification"):
 
     def training_errors(self) -> dict[str, tuple[JointError | None, ...]]:
         """Return the errors on the recordings that were fitted, by recording."""
-        return {item.name: self.estimate.errors(item) for item in self.training.each}
+        return self._errors(self.training)
 
     def validation_errors(self) -> dict[str, tuple[JointError | None, ...]]:
         """Return the errors on the recordings that were not, by recording."""
-        return {item.name: self.estimate.errors(item) for item in self.validation.each}
+        return self._errors(self.validation)
+
+    def _errors(self, observations: Observations) -> dict[str, tuple[JointError | None, ...]]:
+        each = observations.each
+        return dict(zip([item.name for item in each], side_by_side(self.estimate.errors, each), strict=True))
 
 
 def identify(
@@ -197,12 +202,15 @@ def identify(
     progress("looking for events", 0.6)
     # With a wrong sign or exchanged joints nothing is explained anywhere.
     robust = None if faults else robust_fit(training)
-    events = () if robust is None else find_events(training, robust.value)
+    # Both look at samples alone, so that they go side by side.
+    (events, noise) = side_by_side(
+        lambda work: work(),
+        [lambda: () if robust is None else find_events(training, robust.value), lambda: repeatability(data)],
+    )
     steady = None if robust is None else robust.value
     training, events, more = with_all_samples(training, events, steady, Work(progress, 0.6, 0.7))
     notes += more
     progress("estimating", 0.7)
-    noise = repeatability(data)
     estimate, history = estimate_by(method, training, options)
     # Both of the same samples.
     plain = estimate if training.kept is None else estimate_by(method, training.kept, options)[0]

@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.estimation.bands import BandChoice, choose_bands
 from scara_ident.estimation.observations import Observations, kept_rows
+from scara_ident.memory import keep_freed
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import torque_of
 from scara_ident.motion.position_noise import coarse_positions
@@ -59,6 +60,7 @@ def usable_in_bands(
     """
     if not recordings:
         raise UsageError("no recordings to identify from")
+    keep_freed()
     data, useless = usable_data(recordings, needed=True)
     held_out, more = usable_data(validation, needed=False)
     notes = [*useless, *more, *data_notes(data, held_out)]

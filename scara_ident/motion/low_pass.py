@@ -8,7 +8,7 @@ the same step, exactly.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -22,8 +22,8 @@ HIGHEST_CUT = 0.45
 MEMORY_PERIODS = 4.0
 # A low-passed signal has nothing beyond this many times its cut-off, where the filter would leave 6e-8.
 HIGHEST = 8.0
-# Signals that are transformed together: more of them leave the cache of a core.
-ROWS_AT_ONCE = 4
+# Signals that are transformed together: of more the memory leaves the cache, of fewer the calls take longer.
+ROWS_AT_ONCE = 8
 
 
 def low_pass(signal: Array, rate: float, cut: float | None, step: int = 1) -> Array:
@@ -51,8 +51,8 @@ def low_pass(signal: Array, rate: float, cut: float | None, step: int = 1) -> Ar
 def low_pass_every(signal: Array, rate: float, cut: float | None, step: int, weight: Array | None = None) -> Array:
     """Return every ``step``-th sample of `low_pass`, from the first on, without computing the others.
 
-    The spectrum is folded at the lower rate, which is what leaving out samples does to it, so that the result is the
-    same to rounding if `low_pass` is told the step.
+    What leaving out samples does to the spectrum is in the gains, so that the result is the same to rounding if `low_pass`
+    is told the step.
 
     Parameters
     ----------
@@ -72,90 +72,94 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int, wei
     if cut is None or step == 1:
         return low_pass(signal if weight is None else weight * signal, rate, cut)[..., ::step]
     count = signal.shape[-1]
-    folding = _folding(count, rate / cut, step)
-    reach, lead = folding.reach, folding.lead
-    kept, low = folding.of_chord.shape[1], folding.closed // step
-    result = np.empty((len(signal), kept))
-    buffer = np.empty((min(ROWS_AT_ONCE, len(signal)), folding.closed))
-    buffer[:, : lead - reach] = buffer[:, lead + count + reach :] = 0.0
-    whole = np.empty((len(buffer), folding.closed // 2 + 1), dtype=complex)
+    phases = _phases(count, rate / cut, step)
+    reach, first, low, kept = phases.reach, phases.first, phases.low, phases.of_chord.shape[1]
+    whole = count // step * step
+    size = np.broadcast_to(1.0 if weight is None else weight, signal.shape)
+    start, stop = (signal[:, part] * size[:, part] for part in (slice(reach + 1), slice(count - reach - 1, count)))
+    before, after = 2.0 * start[:, :1] - start[:, :0:-1], 2.0 * stop[:, -1:] - stop[:, -2::-1]
+    ends = np.hstack([before, stop[:, reach + 1 - count + whole :], after])
+    # Without its chord the continued signal closes on itself; what the filter does to the chord is known.
+    slope = (after[:, -1:] - before[:, :1]) / (count - 1 + 2 * reach)
+    result = np.hstack([before[:, :1], slope]) @ phases.of_chord
+    # By phase, as the transform takes them; what no sample is written to stays zero.
+    buffer = np.zeros((min(ROWS_AT_ONCE, len(signal)), step, low))
+    spectra = np.empty((*buffer.shape[:2], low // 2 + 1), dtype=complex)
     for begin in range(0, len(signal), ROWS_AT_ONCE):
-        rows = signal[begin : begin + ROWS_AT_ONCE]
-        flat = buffer[: len(rows)]
-        middle = flat[:, lead : lead + count]
-        if weight is None:
-            middle[:] = rows
-        else:
-            np.multiply(rows, weight if weight.ndim == 1 else weight[begin : begin + len(rows)], out=middle)
-        first, last = middle[:, :1], middle[:, -1:]
-        np.subtract(2.0 * first, middle[:, reach:0:-1], out=flat[:, lead - reach : lead])
-        np.subtract(2.0 * last, middle[:, -2 : -reach - 2 : -1], out=flat[:, lead + count : lead + count + reach])
-        np.fft.rfft(flat, axis=1, out=whole[: len(rows)])
-        smooth = np.fft.irfft(folding.folded(whole[: len(rows)]), low, axis=1)[:, lead // step : lead // step + kept]
-        # Without its chord the continued signal closes on itself; what the filter does to the chord is known.
-        start, stop = flat[:, lead - reach, None], flat[:, lead + count + reach - 1, None]
-        chord = np.column_stack([start, (stop - start) / (count - 1 + 2 * reach)])
-        np.add(smooth, chord @ folding.of_chord, out=result[begin : begin + len(rows)])
-    return result
+        some = slice(begin, begin + ROWS_AT_ONCE)
+        parts = buffer[: len(signal) - begin]
+        spectrum = spectra[: len(parts)]
+        middle = parts[:, :, first : first + whole // step]
+        np.multiply(_by_phase(signal[some, :whole], step), _by_phase(size[some, :whole], step), out=middle)
+        parts[:, phases.ends[0], phases.ends[1]] = ends[some]
+        np.fft.rfft(parts, axis=2, out=spectrum)
+        spectrum *= phases.gains
+        result[some] += np.fft.irfft(np.add.reduce(spectrum, axis=1), low, axis=1)[:, first : first + kept]
+    return np.asarray(result)
+
+
+def _by_phase(signals: Array, step: int) -> Array:
+    """Return signals, shape (..., N), as those of each phase, shape (..., step, N / step): every step-th sample from it on."""
+    return signals.reshape(*signals.shape[:-1], -1, step).swapaxes(-1, -2)
 
 
 @dataclass(frozen=True, eq=False)
-class _Folding:
-    """How the spectrum of a continued signal is filtered and folded at a lower rate.
+class _Phases:
+    """How each phase of a continued signal, its every step-th sample from the phase on, enters the filtered at that rate.
+
+    A filter followed by leaving out samples is the sum of filters of the phases (Vaidyanathan, *Multirate Systems and Filter
+    Banks*, 1993, section 4.3), whose transforms are short.
 
     Attributes
     ----------
-    reach, lead, closed : int
-        Samples that continue the signal, from the start to its first sample, and in all.
-    step : int
-        Samples per kept sample.
-    gain : ndarray
-        Of the filter, up to where it leaves nothing.
+    reach : int
+        Samples that continue the signal at either end.
+    first, low : int
+        Kept samples from the start to the signal's first, and in all.
+    ends : tuple of ndarray of int, shape (k,)
+        Phase and place of what is before the signal, and of what is after its last whole step.
+    gains : ndarray, shape (step, low // 2 + 1)
+        Of each phase.
     of_chord : ndarray, shape (2, kept)
         What is missing of a constant 1 and of the number of the sample, each over the continued signal and zero beyond.
     """
 
     reach: int
-    lead: int
-    closed: int
-    step: int
-    gain: Array
+    first: int
+    low: int
+    ends: tuple[NDArray[np.intp], NDArray[np.intp]]
+    gains: NDArray[np.complexfloating]
     of_chord: Array
 
-    def folded(self, spectrum: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
-        """Return the spectrum of the filtered signal at the lower rate; that given is overwritten."""
-        low = self.closed // self.step
-        half = low // 2 + 1
-        passed = spectrum[:, : len(self.gain)]
-        passed *= self.gain
-        folded = np.zeros((len(spectrum), half), dtype=complex)
-        for first in range(0, len(self.gain), low):
-            part = passed[:, first : first + half]
-            folded[:, : part.shape[1]] += part
-            # Frequencies just below a multiple of the lower rate mirror those just below zero.
-            mirrored = passed[:, first + low - half + 1 : first + low + 1][:, ::-1]
-            folded[:, half - mirrored.shape[1] :] += np.conj(mirrored)
-        return folded
 
-
-@lru_cache(maxsize=256)
-def _folding(count: int, ratio: float, step: int) -> _Folding:
-    """Return how signals of so many samples are low-passed at the sample rate over a ratio, and folded."""
+# Gains are as large as a signal.
+@lru_cache(maxsize=24)
+def _phases(count: int, ratio: float, step: int) -> _Phases:
+    """Return how signals of so many samples are low-passed at the sample rate over a ratio, and every step-th is kept."""
     reach = min(count - 1, int(np.ceil(MEMORY_PERIODS * ratio)) + 1)
     # The first sample must fall on the lower grid.
     lead = -(-reach // step) * step
     closed = _closed_length(count, reach, step)
+    low = closed // step
     frequency = np.arange(min(closed // 2, int(HIGHEST * closed / ratio)) + 1) * (ratio / closed)
     gain = np.asarray(1.0 / (step * (1.0 + frequency**8)), dtype=float)
     # Half the rate is its own mirror image.
     gain[2 * np.arange(len(frequency)) == closed] *= 0.5
-    kept = -(-count // step)
-    folding = _Folding(reach, lead, closed, step, gain, np.zeros((2, kept)))
+    phase, place = np.arange(step)[:, None], np.arange(low // 2 + 1)
+    gains = np.zeros((step, len(place)), dtype=complex)
+    # Leaving out samples folds every frequency that is a multiple of the lower rate away.
+    for fold in range(-(len(gain) // low) - 1, len(gain) // low + 1):
+        number = np.abs(place + fold * low)
+        size = np.where(number < len(gain), gain[np.minimum(number, len(gain) - 1)], 0.0)
+        gains += size * np.exp(-2j * np.pi / step * (phase * fold % step))
+    gains *= np.exp(-2j * np.pi / closed * (phase * place))
+    kept, whole = -(-count // step), count // step * step
+    outside = np.r_[lead - reach : lead, lead + whole : lead + count + reach]
     lines = np.zeros((2, closed))
     lines[:, lead - reach : lead + count + reach] = np.ones(count + 2 * reach), np.arange(count + 2 * reach)
-    smooth = np.fft.irfft(folding.folded(np.fft.rfft(lines, axis=1)), closed // step, axis=1)
-    kept_lines = np.array([np.ones(kept), reach + step * np.arange(kept)])
-    return replace(folding, of_chord=kept_lines - smooth[:, lead // step : lead // step + kept])
+    smooth = np.fft.irfft(np.sum(np.fft.rfft(_by_phase(lines, step), axis=2) * gains, axis=1), low, axis=1)
+    of_chord = np.array([np.ones(kept), reach + step * np.arange(kept)]) - smooth[:, lead // step : lead // step + kept]
+    return _Phases(reach, lead // step, low, (outside % step, outside // step), gains, of_chord)
 
 
 def differentiate(signal: Array, rate: float, cut: float | None) -> tuple[Array, Array, Array]:
@@ -195,7 +199,8 @@ def _filtered(
     # Without its chord the continued signal closes on itself; the chord is put back after.
     start = flat[..., :1].copy()
     slope = (flat[..., -1:] - start) / (length - 1)
-    ramp = start + slope * np.arange(length)
+    ramp = np.arange(length, dtype=float) * slope
+    ramp += start
     flat -= ramp
     if cut is None:
         # No filter would stop the kink where the ends meet from ringing through the derivatives.
@@ -204,9 +209,14 @@ def _filtered(
         flat[..., -reach:] *= fade[::-1]
     spectrum = np.fft.rfft(whole, axis=-1)
     frequency = np.arange(closed // 2 + 1) * (rate / closed)
-    gain = np.ones_like(frequency) if cut is None else 1.0 / (1.0 + (frequency / cut) ** 8)
+    # A power of 8 by squares: `**` takes as long as the transform.
+    eighth = frequency if cut is None else frequency / cut
+    for _ in range(3):
+        eighth = eighth * eighth
+    gain = np.ones_like(frequency) if cut is None else 1.0 / (1.0 + eighth)
     gain[frequency > highest] = 0.0
-    factors = np.array([gain * (2j * np.pi * frequency) ** order for order in orders])
+    omega = 2.0 * np.pi * frequency
+    factors = np.array([gain * (1.0, 1j * omega, -omega * omega)[order] for order in orders])
     spectra = factors.reshape(len(orders), *(1,) * (signal.ndim - 1), -1) * spectrum
     results = np.fft.irfft(spectra, closed, axis=-1)[..., reach : reach + count]
     for order, result in zip(orders, results, strict=True):
@@ -220,11 +230,11 @@ def _filtered(
 def _closed_length(count: int, reach: int, step: int) -> int:
     """Return how long a signal is, continued at both ends, that is transformed fast and falls on every step-th sample."""
     lead = -(-reach // step) * step
-    return step * _fast_length(-(-(lead + count + reach) // step))
+    return step * fast_length(-(-(lead + count + reach) // step))
 
 
 @lru_cache(maxsize=1024)
-def _fast_length(length: int) -> int:
+def fast_length(length: int) -> int:
     """Return the next length whose only prime factors are 2, 3 and 5."""
     best = 1 << (length - 1).bit_length()
     five = 1

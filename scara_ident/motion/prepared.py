@@ -154,8 +154,9 @@ class PreparedStretch:
             Columns of the joint's equation, or its torque.
         """
         step, band = self.steps[joint], self.bands[joint]
-        low = low_pass_every(signals, self.rate, band, step, self.fade[joint])
-        return np.asarray(np.sqrt(step) * low[:, self.kept[joint] // step])
+        rows = low_pass_every(signals, self.rate, band, step, self.fade[joint]).take(self.kept[joint] // step, axis=1)
+        rows *= np.sqrt(step)
+        return rows
 
     def rows_of(self, signals: Sequence[tuple[int, Array]]) -> list[Array]:
         """Return what `rows` does of single signals (N,), each given with its joint, that pass the filter together."""

@@ -52,6 +52,8 @@ def _scatter(longest: Sequence[Stretch]) -> Array | None:
         start = max(shift for _, shift in aligned)
         stop = min(torque.shape[1] + shift for torque, shift in aligned)
         if len(aligned) > 1 and start < stop:
-            stack = np.array([torque[:, start - shift : stop - shift] for torque, shift in aligned])
-            return np.asarray(np.sqrt(np.mean(np.var(stack, axis=0, ddof=1), axis=1)))
+            own = [torque[:, start - shift : stop - shift] for torque, shift in aligned]
+            mean = sum(own[1:], start=own[0]) / len(own)
+            square = np.sum([np.mean((torque - mean) ** 2, axis=1) for torque in own], axis=0)
+            return np.asarray(np.sqrt(square / (len(own) - 1)))
     return None

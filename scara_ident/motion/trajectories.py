@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.motion.low_pass import fast_length
 from scara_ident.motion.motion import Stretch
 
 # Repetitions start within this many seconds of each other after alignment; more is another motion.
@@ -170,7 +171,8 @@ def _distances(reference: Array, other: Array, largest: int) -> tuple[Array, int
     x, y = x - centre, y - centre
     size = x.shape[1]
     starts = np.arange(2 * largest + 1)
-    padded = 1 << (length + size).bit_length()
+    # No shift that is asked for reaches round the end.
+    padded = fast_length(length)
     spectrum = np.fft.rfft(y, padded, axis=1) * np.conj(np.fft.rfft(x, padded, axis=1))
     product = np.fft.irfft(np.sum(spectrum, axis=0), padded)[starts]
     square = np.concatenate([[0.0], np.cumsum(np.sum(y**2, axis=0))])
