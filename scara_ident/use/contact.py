@@ -15,7 +15,7 @@ from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.kinematics import tool_frame
 from scara_ident.robot.robot import Robot
-from scara_ident.use.alarm import Alarm, calibrate, clusters
+from scara_ident.use.alarm import Alarm, calibrate
 from scara_ident.use.external_torque import (
     BANDWIDTH,
     FEATURES,
@@ -24,6 +24,7 @@ from scara_ident.use.external_torque import (
     ObserverSettings,
     observe_recording,
 )
+from scara_ident.use.tail import clusters
 
 # Share of the samples whose speed is below the usual largest.
 USUAL = 0.99
