@@ -118,7 +118,7 @@ class ContactObserver:
             raise UsageError(f"step is {step:g} s; expected the time since the sample before, above 0")
         q, effort = self._one("q", q), self._one("effort", effort)
         v = self._one("v", v) if self.velocity and v is not None else None
-        if math.isfinite(sum(q) + sum(effort) + (0.0 if v is None else sum(v))):
+        if math.isfinite(sum([*q.tolist(), *effort.tolist(), *(() if v is None else v.tolist())])):
             step += self._lost
             if step > max(GAP_STEPS * self._step, GAP_SHARE * self._constant):
                 self.reset()

@@ -60,7 +60,7 @@ def test_sample_by_sample_is_the_same(observer: ContactObserver):
 def test_lost_samples_and_gaps_are_no_contact(observer: ContactObserver):
     run = quiet(7, seconds=6.0)
     lost = run.effort.copy()
-    lost[2, 200:203], lost[0, 300] = np.nan, np.inf
+    lost[2, 200:203], lost[:2, 300] = np.nan, (np.inf, -np.inf)
 
     def readings(effort: np.ndarray, left_out: slice) -> list[Reading]:
         observer.reset()
