@@ -10,7 +10,7 @@ of pushes is by logistic regression on its logarithm. The table says of each rat
 ``yes`` and ``no`` where the whole interval is, ``seen`` and ``open`` where only what was counted is, or is not.
 
     python benchmarks/contact.py --robot ur5 --seed 11 --output benchmarks/results/contact_ur5.json
-    python benchmarks/contact.py --measured DATA/ur10e --fit ident_50s_12harm ident_50s_14harm_noload
+    python benchmarks/contact.py --measured DATA/ur10e --fit ident_50s_12harm ident_50s_14harm_noload --rates 300 500
 """
 
 from __future__ import annotations
@@ -61,16 +61,17 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--measured", type=Path, help="folder with robot.yaml and recordings")
     parser.add_argument("--fit", nargs="+", default=[], help="recordings of it to identify from")
+    parser.add_argument("--rates", type=float, nargs="+", default=RATES, help="stated per hour")
     parser.add_argument("--output", type=Path)
     given = parser.parse_args()
-    found = measured(given.measured, given.fit, given.seed) if given.measured else virtual(given.robot, given.recordings, given.pushed, given.seed)  # fmt: skip
+    found = measured(given.measured, given.fit, given.seed, given.rates) if given.measured else virtual(given.robot, given.recordings, given.pushed, given.seed, given.rates)  # fmt: skip
     print("\n".join(table(found)))
     if given.output:
         given.output.parent.mkdir(parents=True, exist_ok=True)
         given.output.write_text(json.dumps(found, indent=1) + "\n")
 
 
-def virtual(name: str, count: int, pushed_count: int, seed: int) -> dict[str, Any]:
+def virtual(name: str, count: int, pushed_count: int, seed: int, rates: Sequence[float]) -> dict[str, Any]:
     """Count on a virtual arm."""
     arm = virtual_arm(load_robot(None if name == "scara03" else name))
     made = [record(arm, seed, k) for k in range(6 + count)]
@@ -81,7 +82,7 @@ def virtual(name: str, count: int, pushed_count: int, seed: int) -> dict[str, An
     parts = [runs[k : k + few] for k in range(0, max(1, len(runs) - few + 1), few)]
     halves = [runs[::2], runs[1::2]]
     splits = [(halves[0], halves[1]), (halves[1], halves[0])], list(zip(parts, parts[1:] + parts[:1], strict=True))
-    rows = [alarms(observer, rate, each) for each in splits for rate in RATES if len(each) > 1]
+    rows = [alarms(observer, rate, each) for each in splits for rate in rates if len(each) > 1]
     tries: list[tuple[float, bool, bool]] = []
     for k in range(pushed_count):
         rng = np.random.default_rng([seed, 10_000 + k])
@@ -193,7 +194,7 @@ def smallest(tries: Sequence[tuple[float, bool, bool]]) -> dict[str, Any]:
     }
 
 
-def measured(folder: Path, fit: Sequence[str], seed: int) -> dict[str, Any]:
+def measured(folder: Path, fit: Sequence[str], seed: int, rates: Sequence[float]) -> dict[str, Any]:
     """Count on measured recordings: each with thresholds from all others that were not fitted."""
     robot = load_robot(folder / "robot.yaml")
     recordings = read_recordings([folder], robot)
@@ -202,7 +203,7 @@ def measured(folder: Path, fit: Sequence[str], seed: int) -> dict[str, Any]:
     observer = contact_observer(known, others, rate=PUSH_RATE)
     runs = [observer.observe(item) for item in others]
     splits = [(runs[:k] + runs[k + 1 :], [runs[k]]) for k in range(len(runs))]
-    rows = [alarms(observer, rate, splits) for rate in RATES]
+    rows = [alarms(observer, rate, splits) for rate in rates]
     tries: list[tuple[float, bool, bool]] = []
     for k, (item, (free, _)) in enumerate(zip(others, splits, strict=True)):
         own = ContactObserver(known, observer.settings, calibrate(free, PUSH_RATE), velocity=observer.velocity)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -10,20 +11,23 @@ import numpy as np
 import pinocchio as pin
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RecordingError, ScaraIdentError
+from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
 from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.kinematics import tool_frame
 from scara_ident.robot.robot import Robot
-from scara_ident.use.alarm import Alarm, calibrate, clusters
+from scara_ident.use.alarm import Alarm, calibrate
 from scara_ident.use.external_torque import (
     BANDWIDTH,
     FEATURES,
+    GAP_STEPS,
+    SETTLES,
     ExternalTorque,
     Observed,
     ObserverSettings,
     observe_recording,
 )
+from scara_ident.use.tail import clusters
 
 # Share of the samples whose speed is below the usual largest.
 USUAL = 0.99
@@ -32,6 +36,8 @@ NAMED = 0.5
 # A constant force at the tool explains at least this share of the squared torque of a contact there, on at least so many
 # joints: on fewer nearly any torque is that of some force.
 FITS, LEAST_JOINTS = 0.75, 3
+# A step that is a gap is at least this share of the observer's time constant: shorter ones it bridges.
+GAP_SHARE = 0.25
 # States at which the tool's Jacobian is taken, and the share of a contact's peak from which on they are.
 STATES, STRONG = 40, 0.5
 
@@ -42,7 +48,7 @@ class Reading(NamedTuple):
     Attributes
     ----------
     contact : bool
-        Whether any joint is beyond its threshold.
+        Whether any joint is beyond its threshold; False until the observer has forgotten how it began, 0.4 s at 4 Hz.
     torque, threshold : ndarray
         External torque, and what it must exceed in size.
     """
@@ -74,13 +80,21 @@ class ContactObserver:
     def __init__(self, known: IdentifiedModel, settings: ObserverSettings, alarm: Alarm, *, velocity: bool) -> None:
         self.known, self.settings, self.alarm, self.velocity = known, settings, alarm, velocity
         self.external = ExternalTorque(known, settings)
+        # Time constants: how long the observer remembers, and follows its slowest low-pass.
+        self._constant = 1.0 / (2.0 * np.pi * settings.bandwidth)
+        self._wait = SETTLES / (2.0 * np.pi * min(settings.bandwidth, settings.differentiator))
+        self.reset()
 
     def reset(self) -> None:
-        """Forget all before, as after a gap."""
+        """Forget all before."""
         self.external.reset()
+        self._since, self._lost, self._step = 0.0, 0.0, np.inf
 
     def update(self, q: Array, v: Array | None, effort: Array, step: float = 1e-3) -> Reading:
         """Take one sample.
+
+        One with a value that is not finite is lost: the reading is that before, and the step counts to the next. After a gap, of
+        `GAP_STEPS` times the step before and `GAP_SHARE` of the observer's time constant or more, all before is forgotten.
 
         Parameters
         ----------
@@ -92,14 +106,43 @@ class ContactObserver:
             Times ``effort_gain``: N m or N on the recorded side.
         step : float
             s since the sample before.
+
+        Raises
+        ------
+        UsageError
+            If an array has another shape, velocities are missing, or the step is not above 0.
         """
-        torque = self.external.update(q, v if self.velocity else None, effort, step)
-        threshold = self.alarm.threshold(self.external.features)
-        return Reading(bool((np.abs(torque) > threshold).any()), torque, threshold)
+        if self.velocity and v is None:
+            raise UsageError("v is None; thresholds were taken with recorded velocities: give them to update")
+        if not 0.0 < step < np.inf:
+            raise UsageError(f"step is {step:g} s; expected the time since the sample before, above 0")
+        q, effort = self._one("q", q), self._one("effort", effort)
+        v = self._one("v", v) if self.velocity and v is not None else None
+        if math.isfinite(sum([*q.tolist(), *effort.tolist(), *(() if v is None else v.tolist())])):
+            step += self._lost
+            if step > max(GAP_STEPS * self._step, GAP_SHARE * self._constant):
+                self.reset()
+            self.external.update(q, v, effort, step)
+            self._since += step if math.isfinite(self._step) else 0.0
+            self._lost, self._step = 0.0, step
+        else:
+            self._lost += step
+        torque, threshold = self.external.torque, self.alarm.threshold(self.external.features)
+        touched = self._since > self._wait and bool((np.abs(torque) > threshold).any())
+        return Reading(touched, torque, threshold)
+
+    def _one(self, name: str, value: Array) -> Array:
+        """Return one number for each joint, or say that they are not."""
+        value, robot = np.asarray(value, dtype=float), self.known.robot
+        if value.shape != (robot.n,):
+            raise UsageError(f"{name} has the shape {value.shape}; expected ({robot.n},), one number for each joint of {robot.name}")  # fmt: skip
+        return value
 
     def observe(self, recording: Recording) -> Observed:
-        """Run over a recording, from its beginning."""
-        return _observed(self.external, recording, velocity=self.velocity)
+        """Run over a recording, from its beginning, and forget it."""
+        observed = _observed(self.external, recording, velocity=self.velocity)
+        self.reset()
+        return observed
 
 
 def contact_observer(

@@ -1,4 +1,4 @@
-"""Thresholds against laws whose tail is known."""
+"""Thresholds against noise whose law is known."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import RecordingError
-from scara_ident.use.alarm import Tail, calibrate, clusters, fit_tail, residual_scale
+from scara_ident.use.alarm import calibrate, residual_scale
 from scara_ident.use.external_torque import FEATURES, Observed
+from scara_ident.use.tail import clusters
 
 RATE = 20.0
 
@@ -44,27 +45,13 @@ def test_the_stated_rate_is_met_within_a_factor_of_one_and_a_half():
     assert 0.0 < alarm.spread < 1.0
 
 
-def test_a_tail_gives_back_its_rate_at_its_level():
-    for shape in (0.0, 0.2):
-        tail = Tail(1.0, 0.5, shape, 100, 2.0)
-        assert tail.rate(1.0) == pytest.approx(50.0)
-        assert tail.rate(tail.level(3.0)) == pytest.approx(3.0)
-    time = [np.arange(20_000) / RATE]
-    score = [np.random.default_rng(0).exponential(size=20_000)]
-    found = fit_tail(time, score, 1000.0)
-    # Exponential scores have peaks of an exponential law of the same width.
-    assert found.shape < 0.2
-    assert found.width == pytest.approx(1.0, rel=0.25)
-
-
-def test_clusters_are_parted_by_half_a_second():
-    time = np.arange(10) * 0.3
-    score = np.array([0, 2, 0, 2, 0, 0, 2, 0, 0, 0.0])
-    assert clusters(time, score, 1.0) == [(1, 1), (3, 3), (6, 6)]
-    assert clusters(time / 2.0, score, 1.0) == [(1, 6)]
-    assert clusters(time, score, 3.0) == []
-
-
 def test_too_little_is_one_line():
     with pytest.raises(RecordingError, match="thresholds need 20 s"):
         calibrate([noise(0, 5.0)], 1.0)
+
+
+def test_a_rate_higher_than_peaks_come_is_one_line():
+    with pytest.raises(
+        RecordingError, match=r"n0: 7000 false alarms an hour are more than peaks .*; ask for .* or fewer"
+    ):
+        calibrate([noise(0, 100.0)], 7000.0)
