@@ -8,6 +8,7 @@ depends on it is the more wrong the larger it is. How wrong is seen by adding as
 from __future__ import annotations
 
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -27,6 +28,8 @@ from scara_ident.motion.prepared import (
 WHOLE = 0.1
 # The noise of an unfiltered joint is what a filter at this share of the rate takes out.
 WIDE = 0.2
+# Drawn by seed: fits, candidates and what is left all look at the same.
+_NOISIER: WeakKeyDictionary[PreparedData, dict[int, PreparedData]] = WeakKeyDictionary()
 # Where steps fall anew is that of a position that has little left of them: with much left, the same ones would come
 # again. Whether it is the motion to less than a step matters not.
 STEPLESS = 0.02
@@ -161,8 +164,15 @@ def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
     ----------
     data : PreparedData
     seed : int, optional
-        Of the draw.
+        Of the draw; with the same seed the same data is drawn and prepared once.
     """
+    drawn = _NOISIER.setdefault(data, {})
+    if seed not in drawn:
+        drawn[seed] = _drawn(data, seed)
+    return drawn[seed]
+
+
+def _drawn(data: PreparedData, seed: int) -> PreparedData:
     rng = np.random.default_rng(seed)
     recordings = []
     for item in data.recordings:
