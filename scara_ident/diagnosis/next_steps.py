@@ -82,18 +82,19 @@ def next_steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
 
 @one_blas_thread()
 def _steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
-    asked = questions(diagnosis)
+    found = questions(diagnosis)
+    urgent = [item for item in found if item.kind in URGENT]
+    asked = [*urgent, *(item for item in found if item not in urgent)]
     sigmas = inquire(diagnosis, asked).sigmas()
     motions = [
         NextStep(question.text, ASKED_MOTION, ASKED_SECONDS, float(sigma), question)
         for question, sigma in zip(asked, sigmas, strict=True)
     ]
-    urgent = [item for item in asked if item.kind in URGENT]
     return (
-        *(step for step, question in zip(motions, asked, strict=True) if question.kind in URGENT),
+        *motions[: len(urgent)],
         *_remainder(diagnosis, urgent),
         *_recordings(diagnosis),
-        *(step for step, question in zip(motions, asked, strict=True) if question.kind not in URGENT),
+        *motions[len(urgent) :],
         *_confirmations(diagnosis),
         *_faint(diagnosis),
         *(

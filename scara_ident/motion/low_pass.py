@@ -229,22 +229,7 @@ def _filtered(
 
 def _closed_length(count: int, reach: int, step: int) -> int:
     """Return how long a signal is, continued at both ends, that is transformed fast and falls on every step-th sample."""
+    from scipy.fft import next_fast_len
+
     lead = -(-reach // step) * step
-    return step * fast_length(-(-(lead + count + reach) // step))
-
-
-@lru_cache(maxsize=1024)
-def fast_length(length: int) -> int:
-    """Return the next length whose only prime factors are 2, 3 and 5."""
-    best = 1 << (length - 1).bit_length()
-    five = 1
-    while five < best:
-        three = five
-        while three < best:
-            two = three
-            while two < length:
-                two *= 2
-            best = min(best, two)
-            three *= 3
-        five *= 5
-    return best
+    return step * int(next_fast_len(-(-(lead + count + reach) // step), real=True))

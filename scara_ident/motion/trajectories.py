@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.motion.low_pass import fast_length
 from scara_ident.motion.motion import Stretch
 
 # Repetitions start within this many seconds of each other after alignment; more is another motion.
@@ -158,6 +157,8 @@ def alignment(reference: Array, other: Array, largest: int) -> int | None:
 
 def _distances(reference: Array, other: Array, largest: int) -> tuple[Array, int]:
     """Return the mean squared distance in shares of the range for every shift, and the largest shift."""
+    from scipy.fft import next_fast_len
+
     length = min(reference.shape[1], other.shape[1])
     if length < 4:
         return np.zeros(0), 0
@@ -172,7 +173,7 @@ def _distances(reference: Array, other: Array, largest: int) -> tuple[Array, int
     size = x.shape[1]
     starts = np.arange(2 * largest + 1)
     # No shift that is asked for reaches round the end.
-    padded = fast_length(length)
+    padded = next_fast_len(length, real=True)
     spectrum = np.fft.rfft(y, padded, axis=1) * np.conj(np.fft.rfft(x, padded, axis=1))
     product = np.fft.irfft(np.sum(spectrum, axis=0), padded)[starts]
     square = np.concatenate([[0.0], np.cumsum(np.sum(y**2, axis=0))])
