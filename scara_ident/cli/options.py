@@ -127,12 +127,18 @@ MaxMemory = Annotated[
 
 
 def limited(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a command with the option ``--max-memory`` beside its own."""
+    """Return a command with the option ``--max-memory`` beside its own, which gives the same bytes on any machine.
+
+    The last digits of a sum depend on how many threads of BLAS share it.
+    """
 
     @wraps(command)
     def limited(*arguments: Any, max_memory: float | None = None, **more: Any) -> Any:
+        from scara_ident.threads import one_blas_thread
+
         set_limit(max_memory)
-        return command(*arguments, **more)
+        with one_blas_thread():
+            return command(*arguments, **more)
 
     # As typer finds no names of the command's module here.
     types = get_type_hints(command, include_extras=True)

@@ -23,6 +23,7 @@ from scara_ident.diagnosis.cluster_test import freedom_of, needed
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel, products_of
 from scara_ident.diagnosis.questions import all_suspects
+from scara_ident.estimation.information import Information, triangular
 from scara_ident.estimation.joint_rows import JointRows
 
 # Directions of a few columns below this share of the largest are not known without a fold.
@@ -84,6 +85,11 @@ class Blocks:
             begin = np.cumsum(count) - count
             fold = (np.arange(len(fold)) - begin[self.owner]) * parts // np.maximum(1, count[self.owner])
         return FittedModel(tuple(joints), len(columns), self.owner, fold, np.ones(len(joints)))
+
+    def information(self) -> Information:
+        """Return the triangular factor of all rows."""
+        factors = [triangular(np.vstack([table, np.zeros((1, table.shape[1]))]).T) for table in self.tables]
+        return Information(triangular(np.vstack(factors)), float(sum(table.shape[1] for table in self.tables)))
 
     def rows(self, columns: slice) -> Rows:
         """Return some columns on the rows of the joints that they act on."""

@@ -24,6 +24,7 @@ from scara_ident.excitation.verification import Reached, reached
 from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
+from scara_ident.threads import one_blas_thread
 
 # Samples of a trajectory in the criterion: those of Indri et al. 2002.
 SAMPLES = 2500
@@ -132,6 +133,7 @@ def default_harmonics(duration: float, joints: int, trajectories: int = 1) -> in
     return max(5, min(round(HIGHEST_FREQUENCY * duration), most))
 
 
+@one_blas_thread()
 def design_excitation(
     model: TorqueModel,
     *,

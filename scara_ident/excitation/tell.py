@@ -21,7 +21,7 @@ from scara_ident.diagnosis.belief import Blocks, believed, known_blocks
 from scara_ident.diagnosis.candidates import Candidate, Rows
 from scara_ident.diagnosis.questions import MOST_NAMED, Question
 from scara_ident.effects import Signals
-from scara_ident.estimation.information import Information, merge, triangular
+from scara_ident.estimation.information import merge
 from scara_ident.excitation.curves import Basis
 from scara_ident.excitation.limits import InfeasibleLimits
 from scara_ident.excitation.parallel import map_in_order
@@ -149,17 +149,11 @@ def rows_in_blocks(inquiry: Inquiry, motion: Motion) -> Blocks:
     return Blocks(tuple(tables), tuple(starts), owner, owner)
 
 
-def information_of(blocks: Blocks) -> Information:
-    """Return the triangular factor of all rows."""
-    factors = [triangular(np.vstack([table, np.zeros((1, table.shape[1]))]).T) for table in blocks.tables]
-    return Information(triangular(np.vstack(factors)), float(sum(table.shape[1] for table in blocks.tables)))
-
-
 def told(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[Told, ...]:
     """Return what motions tell of every question, beside what is known."""
     new = [rows_in_blocks(inquiry, motion) for motion in motions]
     before = inquiry.sigmas()
-    after = inquiry.sigmas(merge([information_of(blocks) for blocks in new]))
+    after = inquiry.sigmas(merge([blocks.information() for blocks in new]))
     sure = _sure_of(inquiry, new)
     found = []
     for item, one, other in zip(inquiry.questions, before, after, strict=True):
@@ -237,7 +231,7 @@ class _Judge:
         )
         rest = [item.kind != "below_limit" for item in self.each.questions]
         if any(rest):
-            sizes[rest] = self.each.sigmas(information_of(new), [*compress(self.each.questions, rest)]) / SURE
+            sizes[rest] = self.each.sigmas(new.information(), [*compress(self.each.questions, rest)]) / SURE
         return -float(self.weights @ np.log1p(sizes**2))
 
     @cached_property

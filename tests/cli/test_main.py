@@ -8,11 +8,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from threadpoolctl import threadpool_limits
 
 import scara_ident
+from scara_ident.cli import options
 from scara_ident.cli.main import app, main, run
 from scara_ident.errors import ScaraIdentError, UsageError
 from tests.shared import PATIENCE
+from tests.test_threads import blas_threads
 
 COMMANDS = tuple(command.name or command.callback.__name__ for command in app.registered_commands)
 
@@ -70,6 +73,13 @@ def test_errors_are_one_line_and_a_status(
     monkeypatch.setattr(sys.modules[run.__module__], "app", fails)
     assert run(["identify", "x"]) == status
     assert capfd.readouterr().err == said
+
+
+def test_a_command_has_one_blas_thread_on_which_the_last_digits_depend():
+    seen: list[set[int]] = []
+    with threadpool_limits(limits=2, user_api="blas"):
+        options.limited(lambda: seen.append(blas_threads()))()
+    assert seen == [{1}]
 
 
 def test_long_errors_are_not_wrapped(command, tmp_path: Path):

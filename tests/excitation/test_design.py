@@ -1,9 +1,11 @@
 """Designed motions: how much they show, within which limits."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from scara_ident.errors import UsageError
 from scara_ident.estimation.information import Information
@@ -24,6 +26,7 @@ from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import PLANAR_2R, example_urdf, rnea, write_urdf
 from tests.excitation.designs import COMPLETE, QUICK, SCARA, SHORT
 from tests.excitation.made import rigid_model
+from tests.test_threads import blas_threads
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +103,17 @@ def test_the_std_of_repetitions_falls_against_ojd_as_the_log_det_promises(paper_
     # Each parameter by itself, against the std that the design states.
     np.testing.assert_allclose(spreads[1], 0.03 * paper_length.std(), rtol=0.25)
     assert np.exp(np.mean(np.log(spreads[1] / spreads[0]))) < 0.6
+
+
+@pytest.mark.slow
+def test_a_design_has_one_blas_thread_on_which_the_last_digits_depend(monkeypatch: pytest.MonkeyPatch):
+    seen: list[set[int]] = []
+    monkeypatch.setattr(
+        sys.modules[design_excitation.__module__], "reached", lambda *_: seen.append(blas_threads()) or ()
+    )
+    with threadpool_limits(limits=2, user_api="blas"):
+        design_excitation(COMPLETE, **SHORT, effort=QUICK)
+    assert seen == [{1}]
 
 
 @pytest.mark.slow
