@@ -11,6 +11,10 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import held_out_gains
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
+from scara_ident.effects import Scene
+
+# Columns that follow the base model's estimate instead of the last one gain at least this share of what they would.
+LEAST_AT_FIRST = 0.5
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,7 @@ class Confounder:
     value: tuple[float, ...]
 
 
-def confounders(step: SelectionStep, decisions: Sequence[Decision]) -> list[tuple[Confounder, ...]]:
+def confounders(step: SelectionStep, decisions: Sequence[Decision], first: Scene) -> list[tuple[Confounder, ...]]:
     """Return for each chosen effect those that these recordings cannot tell from it.
 
     Parameters
@@ -48,12 +52,16 @@ def confounders(step: SelectionStep, decisions: Sequence[Decision]) -> list[tupl
         The model with the effects that stayed.
     decisions : sequence of Decision
         On the candidates that were tried beside it.
+    first : Scene
+        Where the columns of all of them are at hand.
     """
     pool = [decision.candidate for decision in decisions]
-    return [_confounders_of(step.without(k), candidate, pool) for k, candidate in enumerate(step.chosen)]
+    return [_confounders_of(step.without(k), candidate, pool, first) for k, candidate in enumerate(step.chosen)]
 
 
-def _confounders_of(step: SelectionStep, found: Candidate, pool: Sequence[Candidate]) -> tuple[Confounder, ...]:
+def _confounders_of(
+    step: SelectionStep, found: Candidate, pool: Sequence[Candidate], first: Scene
+) -> tuple[Confounder, ...]:
     # A rival is asked for once, not in every round of a search.
     scene, criteria = step.scene, replace(step.criteria, family_error=step.criteria.significant)
     step = replace(step, criteria=criteria)
@@ -62,8 +70,11 @@ def _confounders_of(step: SelectionStep, found: Candidate, pool: Sequence[Candid
     # no test.
     saved = own.examination.held_out
     least = criteria.near_confounder * saved
-    found_gains = held_out_gains(step.model, step.columns.rows(scene, pool), criteria)
-    enough = [item for item, gain in zip(pool, found_gains, strict=True) if gain > least]
+    enough = pool
+    # By the columns at hand first: most come nowhere near, and need no others.
+    for columns, asked in ((first, LEAST_AT_FIRST * least), (scene, least)):
+        found_gains = held_out_gains(step.model, step.columns.rows(columns, enough), criteria)
+        enough = [item for item, gain in zip(enough, found_gains, strict=True) if gain > asked]
     judged = best_of_each(step.judge(enough)).values()
     near = [item for item in judged if item.accepted and item.examination.held_out > least]
     others = []

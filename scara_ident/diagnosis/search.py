@@ -90,6 +90,8 @@ class Search:
         What was taken out of the data.
     decisions : tuple of Decision
         On the best member of every family at the end, rejected ones included.
+    first : Scene
+        At the base model's estimate, which the columns of all candidates were made at.
     """
 
     step: SelectionStep
@@ -98,6 +100,7 @@ class Search:
     steps: tuple[Step, ...]
     correction: Correction | None
     decisions: tuple[Decision, ...]
+    first: Scene
 
     @property
     def scene(self) -> Scene:
@@ -240,7 +243,7 @@ def search(
     labels = {item.label(scene) for item in kept}
     stayed = [item for item in steps if item.decision.label in labels or item.decision.candidate.corrects_data]
     final = SelectionStep(scene, columns, kept, weights, tried, criteria)
-    return Search(final, uncorrected, start, tuple(stayed), correction, tuple(decisions))
+    return Search(final, uncorrected, start, tuple(stayed), correction, tuple(decisions), first)
 
 
 def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Scene:

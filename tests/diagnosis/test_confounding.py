@@ -35,7 +35,7 @@ def groups(size: float, added) -> dict[str, dict[str, float]]:
     """Each effect found with its confounders and their gain as a share of its own."""
     runs = with_torque(exact_runs(size=size), 0, added)
     result = searched(runs, Spring(), Pendulum(), AsymmetricFriction())
-    found = confounders(result.step, result.decisions)
+    found = confounders(result.step, result.decisions, result.first)
     return {
         item.label(result.scene): {confounder.label: confounder.gain / confounder.found_gain for confounder in others}
         for item, others in zip(result.chosen, found, strict=True)
