@@ -30,7 +30,7 @@ from scara_ident.progress import Work
 from scara_ident.recording.files.parquet_csv import SUFFIXES
 from scara_ident.recording.recording import read_usable
 from scara_ident.report.diagnosis import diagnosis_dict
-from scara_ident.report.html import DiagnosisContext, diagnosis_report
+from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
 from scara_ident.robot.robot import Robot
 
 State = Literal["record", "settled", "untold"]

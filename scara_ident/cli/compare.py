@@ -38,7 +38,7 @@ def compare(
         console.print(each)
     console.say(content["summary"])
     if output is not None:
-        from scara_ident.report.html import comparison_report
+        from scara_ident.report.html.comparison import comparison_report
 
         with writing(output) as (place, _):
             comparison_report(place / "report.html", content)

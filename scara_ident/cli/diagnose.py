@@ -90,7 +90,7 @@ def diagnose(
     for each in tables(content, all_candidates=verbose):
         console.print(each)
     if output is not None:
-        from scara_ident.report.html import DiagnosisContext, diagnosis_report
+        from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
         from scara_ident.report.pictures import diagnosis_pictures, remove_stale
 
         context = DiagnosisContext(result, worth)

@@ -107,7 +107,7 @@ def excite(
     from scara_ident.identification.identify import known_information
     from scara_ident.model.model import build_model
     from scara_ident.recording.recording import read_usable
-    from scara_ident.report.html import excitation_report
+    from scara_ident.report.html.excitation import excitation_report
     from scara_ident.report.pictures import design_picture
     from scara_ident.report.told.design import limit_table
     from scara_ident.robot.robot import load_robot

@@ -65,7 +65,7 @@ def identify(
     if output is not None:
         from scara_ident.export.identified_model import identified_model
         from scara_ident.export.robots import robot_files
-        from scara_ident.report.html import IdentificationContext, identification_report
+        from scara_ident.report.html.identification import IdentificationContext, identification_report
         from scara_ident.report.pictures import torque_picture
 
         context = IdentificationContext(result)

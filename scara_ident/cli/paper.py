@@ -60,7 +60,7 @@ def paper_in_short(output: Path) -> None:
 
 def _write(output: Path, report: PaperReport, console: PlainConsole) -> None:
     from scara_ident.files import write_json, written_together
-    from scara_ident.report.html import paper_report
+    from scara_ident.report.html.paper import paper_report
 
     with written_together(output) as place:
         paper_report(place / "report.html", report)

@@ -11,10 +11,10 @@ from scara_ident.arrays import Array
 from scara_ident.excitation.criteria import Condition
 from scara_ident.excitation.interior_point import Minimum, Schedule, minimise, shrunk_inside
 from scara_ident.excitation.limits import InfeasibleLimits
-from scara_ident.excitation.parallel import map_in_order
 from scara_ident.excitation.problem import Problem, Task, row_names
 from scara_ident.excitation.verification import extremes, grid
 from scara_ident.motion.motion import Motion
+from scara_ident.processes import map_in_order
 from scara_ident.threads import one_blas_thread
 
 # Times of the limits per period of the highest frequency, in the search and for the winner.

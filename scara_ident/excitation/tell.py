@@ -24,7 +24,6 @@ from scara_ident.effects import Signals
 from scara_ident.estimation.information import merge
 from scara_ident.excitation.curves import Basis
 from scara_ident.excitation.limits import InfeasibleLimits
-from scara_ident.excitation.parallel import map_in_order
 from scara_ident.excitation.problem import Problem, Task, row_names
 from scara_ident.excitation.search import (
     BOUND,
@@ -39,6 +38,7 @@ from scara_ident.excitation.search import (
 from scara_ident.excitation.verification import grid
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import block_seconds
+from scara_ident.processes import map_in_order
 from scara_ident.threads import one_blas_thread
 
 # Samples per second of a motion in the search, where a suspect follows the motor's turns, and of what is promised.

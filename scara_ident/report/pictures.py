@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.excitation.curves import ExcitationTrajectory
-from scara_ident.excitation.design import Design
-from scara_ident.excitation.parallel import map_in_order
-from scara_ident.excitation.tool import tool_motion, tool_of
+from scara_ident.processes import map_in_order
 from scara_ident.report.drawing import draw
 from scara_ident.report.html.diagnosis import DiagnosisContext
 from scara_ident.report.html.identification import IdentificationContext
@@ -25,6 +23,10 @@ from scara_ident.report.plot import DASHES, Dots, Figure, Layer, Line, Panel, Pl
 from scara_ident.report.traces import FittedContext
 from scara_ident.robot.robot import Robot
 from scara_ident.threads import one_blas_thread
+
+if TYPE_CHECKING:
+    from scara_ident.excitation.curves import ExcitationTrajectory
+    from scara_ident.excitation.design import Design
 
 # Recordings shown, at the most; the first held-out ones before the fitted ones.
 MOST_RECORDINGS = 4
@@ -191,6 +193,9 @@ def _phases(design: Design) -> Figure:
 
 
 def _paths(design: Design) -> list[Figure]:
+    # Loaded where a design is drawn: searches for motions take long to load.
+    from scara_ident.excitation.tool import tool_motion, tool_of
+
     tool = design.limits.tool or tool_of(design.model.robot)
     return path_views([tool_motion(tool, *each.at(_times(each))).position for each in design.trajectories], tool.name)
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import ScaraIdentError
 from scara_ident.export.identified_model import IdentifiedModel
-from scara_ident.use import Use
-from scara_ident.use.worth import EffectWorth, worth
+
+if TYPE_CHECKING:
+    from scara_ident.use import Use
+    from scara_ident.use.worth import EffectWorth
 
 # What is fed forward does harm where it leaves so many times the error that is left without.
 HARM = 1.1
@@ -56,6 +58,9 @@ def worth_dict(model: IdentifiedModel) -> dict[str, Any]:
 
     Where that cannot be said ``tracking`` is None, and ``why`` says why.
     """
+    # Imported here since it loads the virtual arm.
+    from scara_ident.use.worth import worth
+
     try:
         found = worth(model)
     except ScaraIdentError as error:

@@ -18,7 +18,7 @@ from scara_ident.motion import position_noise as noise_module
 from scara_ident.motion import prepared as prepared_module
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import PreparedData
-from scara_ident.report.html import DiagnosisContext, diagnosis_report
+from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
 from scara_ident.report.pictures import diagnosis_pictures
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import held_out_run, virtual_runs

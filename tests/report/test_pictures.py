@@ -13,7 +13,8 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation import Effort, design_excitation
 from scara_ident.model.model import build_model
 from scara_ident.report.diagnosis_markdown import diagnosis_markdown
-from scara_ident.report.html import DiagnosisContext, IdentificationContext, diagnosis_report
+from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
+from scara_ident.report.html.identification import IdentificationContext
 from scara_ident.report.html.remainder import signal_of
 from scara_ident.report.pictures import (
     MOST_RECORDINGS,

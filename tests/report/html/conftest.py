@@ -18,18 +18,14 @@ from scara_ident.identification.compare import compare
 from scara_ident.motion.motion import Motion
 from scara_ident.paper import check_paper
 from scara_ident.report.comparison import comparison_dict
-from scara_ident.report.html import (
-    DiagnosisContext,
-    IdentificationContext,
-    comparison_report,
-    diagnosis_report,
-    excitation_report,
-    identification_report,
-    paper_report,
-)
 from scara_ident.report.html.check import check_report
+from scara_ident.report.html.comparison import comparison_report
 from scara_ident.report.html.contact import contact_report
+from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
+from scara_ident.report.html.excitation import excitation_report
 from scara_ident.report.html.fleet import fleet_report
+from scara_ident.report.html.identification import IdentificationContext, identification_report
+from scara_ident.report.html.paper import paper_report
 from scara_ident.report.html.use import use_report
 from scara_ident.robot.robot import load_robot
 from scara_ident.use.check import Check, check

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scara_ident.report.html import IdentificationContext, identification_report
+from scara_ident.report.html.identification import IdentificationContext, identification_report
 from tests.report.html.document import document
 from tests.report.simulated import made, run
 

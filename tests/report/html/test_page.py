@@ -7,7 +7,7 @@ import re
 import pytest
 
 from scara_ident.errors import ScaraIdentError
-from scara_ident.report.html import IdentificationContext, identification_report
+from scara_ident.report.html.identification import IdentificationContext, identification_report
 from tests.report.html.document import data_of, document
 from tests.report.simulated import made, run
 

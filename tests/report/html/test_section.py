@@ -13,8 +13,8 @@ import pytest
 
 from scara_ident.cli.console import check_report
 from scara_ident.errors import ScaraIdentError
-from scara_ident.report.html import IdentificationContext, identification_report
 from scara_ident.report.html.blocks import Block, Cell, Group, Paragraph, Table
+from scara_ident.report.html.identification import IdentificationContext, identification_report
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import ADDED, added_sections
 from scara_ident.report.plot import Line, Panel, Plot, single

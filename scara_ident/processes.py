@@ -1,4 +1,4 @@
-"""Independent searches on all cores, in one order whatever the number of processes."""
+"""Independent work on all cores, in one order whatever the number of processes."""
 
 from __future__ import annotations
 

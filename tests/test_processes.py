@@ -6,8 +6,8 @@ import os
 
 import pytest
 
-from scara_ident.excitation import parallel
-from scara_ident.excitation.parallel import available_cores, map_in_order
+from scara_ident import processes
+from scara_ident.processes import available_cores, map_in_order
 
 
 @pytest.mark.parametrize("processes", [1, 2, 3])
@@ -25,7 +25,7 @@ def test_the_work_is_done_in_other_processes_where_there_may_be_several():
 
 
 def test_without_fork_the_items_are_worked_on_here(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(parallel.multiprocessing, "get_all_start_methods", lambda: ["spawn"])
+    monkeypatch.setattr(processes.multiprocessing, "get_all_start_methods", lambda: ["spawn"])
     assert set(map_in_order(lambda _: os.getpid(), range(4), 2)) == {os.getpid()}
 
 
