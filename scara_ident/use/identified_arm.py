@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, UsageError
@@ -16,7 +17,7 @@ from scara_ident.robot.robot import Robot
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.defaults import placed_poles, virtual_arm
 from scara_ident.simulation.effects import EFFECTS, Effect
-from scara_ident.simulation.spatial import mass_and_bias
+from scara_ident.simulation.spatial import configuration, with_bodies
 
 # Models whose parameters the virtual arm has.
 _MODELS = ("complete", "reduced", "basic")
@@ -147,11 +148,13 @@ def _mean_inertia(arm: VirtualArm) -> Array:
     lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
     upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
     random, total = np.random.default_rng(0), np.zeros(robot.n)
+    model = with_bodies(robot.model, arm.bodies[back])
+    data = model.createData()
     for _ in range(_POSES):
         pose = random.uniform(lower, upper)[back]
-        mass, _ = mass_and_bias(robot.model, arm.bodies[back], pose, np.zeros(robot.n))
-        mass = mass + np.diag(arm.armature[back])
-        if np.linalg.eigvalsh(mass)[0] <= 0.0:
+        # Pinocchio fills the upper triangle.
+        mass = pin.crba(model, data, configuration(model, pose)) + np.diag(arm.armature[back])
+        if np.linalg.eigvalsh(mass, "U")[0] <= 0.0:
             raise RobotError(
                 f"{robot.name}: no arm with these parameters can move, its inertia is not positive; identify with "
                 "--method consistent, or from motion that tells more"
