@@ -256,13 +256,23 @@ def noise_floor(
     around = np.concatenate([below, above])
     if np.any(inner) and len(around):
         floor[grid[inner]] = np.median(power[grid[inner][:, None] + around], axis=1) * to_mean
-    for k in grid[~inner | (len(around) == 0)]:
-        near = np.concatenate(
-            [power[max(0, k - reach) : max(0, k - guard) : stride], power[k + above[k + above < len(power)]]]
-        )
-        floor[k] = np.median(near) * to_mean if len(near) else np.nan
+    edge = grid[~inner | (len(around) == 0)]
+    first = np.maximum(0, edge - reach)[:, None]
+    lower = first + stride * np.arange(-(-reach // stride))
+    places = np.concatenate([np.where(lower < edge[:, None] - guard, lower, len(power)), edge[:, None] + above], axis=1)
+    floor[edge] = _median_of_some(power, np.minimum(places, len(power))) * to_mean
     held = np.isfinite(floor[grid])
     return np.interp(np.arange(len(power)), grid[held], floor[grid][held]) if np.any(held) else np.zeros_like(power)
+
+
+def _median_of_some(power: Array, places: NDArray[np.intp]) -> Array:
+    """Return the median of power at places (K, m), shape (K,); one beyond its end does not count, and none of any is NaN."""
+    near = np.sort(np.append(power, np.inf)[places], axis=1)
+    count = np.count_nonzero(places < len(power), axis=1)
+    row, some = np.arange(len(near)), np.maximum(count, 1)
+    if not near.shape[1]:
+        return np.full(len(near), np.nan)
+    return np.where(count > 0, 0.5 * (near[row, (some - 1) // 2] + near[row, some // 2]), np.nan)
 
 
 def _transform(weights: Array, angle: Array, step: float, orders: Array) -> NDArray[np.complex128]:

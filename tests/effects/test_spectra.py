@@ -7,10 +7,12 @@ import pytest
 from numpy.typing import NDArray
 
 from scara_ident.effects.spectra import (
+    GUARD,
     NEIGHBOURS_IN_TIME,
     frequency_spectrum,
     frequency_width,
     lines,
+    noise_floor,
     order_spectrum,
     order_width,
     whitened,
@@ -109,3 +111,13 @@ def test_noise_alone_seldom_has_a_line():
         )
     # One in a hundred is asked for; four of thirty have a chance of 3e-4 then.
     assert np.all(false < 4), false
+
+
+def test_the_floor_at_the_ends_is_the_median_of_the_neighbours_that_there_are():
+    positions, power = np.arange(60.0), np.random.default_rng(3).chisquare(2, 60)
+    floor = noise_floor(positions, power, 2.0, neighbours=20.0)
+    # Of chi-squared with two degrees of freedom.
+    to_mean, guard = 1.0 / np.log(2.0), round(GUARD * 2.0)
+    for k in (0, 1, 7, 30, 58, 59):
+        near = np.concatenate([power[max(0, k - 40) : max(0, k - guard)], power[k + guard + 1 : k + 41]])
+        assert floor[k] == pytest.approx(np.median(near) * to_mean, rel=1e-12)
