@@ -191,14 +191,14 @@ def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Ar
     signals : Signals
     joint : int
     lag : tuple of ndarray (N,)
-        Motor's position less the link's, at the joint, with its first two derivatives.
+        Motor's position less the link's, at the joint, with its first two derivatives; may be of the first samples alone.
 
     Returns
     -------
     ndarray, shape (n, N)
         Recorded side.
     """
-    by_q, by_v, by_a = rigid_slopes(signals, joint)
+    by_q, by_v, by_a = (slope[:, : len(lag[0])] for slope in rigid_slopes(signals, joint))
     result = -(by_q * lag[0] + by_v * lag[1] + by_a * lag[2])
     result[joint] += signals.scene.robot.row_scale[joint] * signals.scene.armature(joint) * lag[2]
     return np.asarray(result)

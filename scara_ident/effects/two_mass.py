@@ -42,6 +42,8 @@ LEAST_INERTIA = 0.1
 LEAST_SPRING = 0.1
 # A swing at the beginning that is seen with less than this share of the other one's strength is not looked for.
 UNSEEN = 1e-3
+# It is followed until no more than this share is left of it, and then for so many periods of the band.
+FADED, FADED_PERIODS = 1e-9, 8.0
 
 Lag = tuple[Array, Array, Array]
 
@@ -119,9 +121,18 @@ class TwoMasses:
         trim = int(np.ceil(signals.motion.rate / signals.scene.band))
         if signals.motion.torque is None or signals.motion.samples <= 4 * trim:
             return None
-        free = self.swing.solve(np.zeros((2, signals.motion.samples)), np.array([[1.0, 1.0], [0.0, self.swing.step]]))
+        count = self.swing.memory(FADED) + int(FADED_PERIODS * signals.motion.rate / signals.scene.band)
+        count = max(min(count, signals.motion.samples), 4 * trim)
+        free = self.swing.solve(np.zeros((2, count)), np.array([[1.0, 1.0], [0.0, self.swing.step]]))
         torque = np.array([lagging(signals, j, (free[0][k], free[1][k], free[2][k])) for k in range(2)])
-        return InitialState(free, torque, j, signals.motion.rate, signals.scene.band, slice(trim, -trim))
+        return InitialState(
+            free,
+            torque,
+            j,
+            signals.motion.rate,
+            signals.scene.band,
+            slice(trim, min(count, signals.motion.samples - trim)),
+        )
 
     @cached_property
     def change(self) -> Array:
@@ -161,9 +172,11 @@ class TwoMasses:
             result[:, k] += lagging(self.signals, j, (lags[0][k], lags[1][k], lags[2][k]))
         if self._initial is not None:
             # The swing at the beginning is fitted again whatever the parameters are.
-            whole = result[j].copy()
-            whole[:p] += recorded[j]
-            result -= np.einsum("kc,cjt->jkt", self._initial.state(whole, (x, first)), self._initial.torque)
+            begun = self._initial.count
+            whole = result[j, :, :begun].copy()
+            whole[:p] += recorded[j, :, :begun]
+            state = self._initial.state(whole, (x, first))
+            result[..., :begun] -= np.einsum("kc,cjt->jkt", state, self._initial.torque)
         share = np.append(usual[:, 0] / self.inertia, [2.0 / self.frequency, 0.0])
         return result + share[:, None] * self.change[:, None]
 
@@ -204,9 +217,9 @@ class InitialState:
 
     Attributes
     ----------
-    free : tuple of ndarray, each of shape (2, N)
-        x and its derivatives after a unit of x, and of its derivative, at the first sample.
-    torque : ndarray, shape (2, n, N)
+    free : tuple of ndarray, each of shape (2, M)
+        x and its derivatives after a unit of x, and of its derivative, at the first sample; after M samples it has faded.
+    torque : ndarray, shape (2, n, M)
         What they add to the torques.
     joint : int
     rate, band : float
@@ -222,6 +235,11 @@ class InitialState:
     band: float
     used: slice
 
+    @property
+    def count(self) -> int:
+        """Samples M."""
+        return int(self.torque.shape[-1])
+
     @cached_property
     def _seen(self) -> Array:
         return low_pass(self.torque[:, self.joint], self.rate, self.band)[:, self.used]
@@ -232,6 +250,7 @@ class InitialState:
         Parameters
         ----------
         torque : ndarray, shape (..., N)
+            Of which the first M samples are taken.
         lag : tuple of ndarray, shape (N,)
             x and its derivative, as large as which a swing at the beginning may be.
 
@@ -239,7 +258,7 @@ class InitialState:
         -------
         ndarray, shape (..., 2)
         """
-        left = low_pass(torque, self.rate, self.band)[..., self.used]
+        left = low_pass(torque[..., : self.count], self.rate, self.band)[..., self.used]
         sizes = np.array([np.mean(part**2) for part in lag])
         normal = self._seen @ self._seen.T
         # What cannot be seen stays as assumed.
@@ -248,7 +267,9 @@ class InitialState:
 
     def added(self, lag: Lag, state: Array) -> Lag:
         """Return x and its derivatives with the swing that a state at the first sample makes."""
-        x, first, second = (part + state @ own for part, own in zip(lag, self.free, strict=True))
+        x, first, second = (part.copy() for part in lag)
+        for part, own in zip((x, first, second), self.free, strict=True):
+            part[: self.count] += state @ own
         return x, first, second
 
 
@@ -274,7 +295,7 @@ class Swing:
         Parameters
         ----------
         torque : ndarray, shape (..., N)
-            N at least 3.
+            N at least 3; may be of the first samples alone.
         start : ndarray, shape (..., 2), optional
             x at the first two samples, by default the static x.
 
@@ -291,15 +312,23 @@ class Swing:
         from scipy.linalg.lapack import dtbtrs
 
         shape, (beta, bands) = np.shape(torque), self._system
+        inertia, damping, stiffness = (part[: shape[-1]] for part in (self.inertia, self.damping, self.stiffness))
         rows = np.reshape(torque, (-1, shape[-1]))
         right = np.empty(rows.shape)
         right[:, :2] = rows[:, :2] / self.stiffness[:2] if start is None else np.reshape(start, (-1, 2))
         right[:, 2:] = beta * (rows[:, 2:] + rows[:, :-2]) + (1.0 - 2.0 * beta) * rows[:, 1:-1]
         # Row after row: a solver that exchanges rows takes five times as long and loses digits to the length of the run.
-        x = np.asarray(dtbtrs(bands, right.T, uplo="L", overwrite_b=True)[0]).T
+        x = np.asarray(dtbtrs(bands[:, : shape[-1]], right.T, uplo="L", overwrite_b=True)[0]).T
         first = np.gradient(x, self.step, axis=1)
-        second = (rows - self.damping * first - self.stiffness * x) / self.inertia
+        second = (rows - damping * first - stiffness * x) / inertia
         return x.reshape(shape), first.reshape(shape), second.reshape(shape)
+
+    def memory(self, share: float) -> int:
+        """Return after how many samples no more than a share is left of a free swing; all if it does not fade so far."""
+        # An overdamped link creeps back at no less than the stiffness over the damping.
+        swinging, creeping = self.damping * self.stiffness, 2.0 * self.inertia * self.stiffness
+        fading = swinging / np.maximum(creeping, self.damping**2)
+        return int(np.searchsorted(np.cumsum(fading) * self.step, -np.log(share)))
 
     @cached_property
     def _system(self) -> tuple[float, Array]:

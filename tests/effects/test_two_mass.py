@@ -44,6 +44,21 @@ def test_a_link_let_go_swings_at_its_own_frequency_and_dies_away():
     assert np.abs(second + omega**2 * x + 2.0 * ratio * omega * first).max() < 1e-9
 
 
+@pytest.mark.parametrize("ratio", [0.02, 0.2, 3.0])
+def test_a_free_swing_is_over_after_its_memory_and_its_first_samples_are_those_of_the_whole(ratio: float):
+    count, omega = 18000, 2 * np.pi * 6.0
+    varied = 1.0 + 0.3 * np.sin(np.arange(count) * STEP)
+    swing = Swing(varied, 2.0 * ratio * omega * np.ones(count), omega**2 * np.ones(count), STEP)
+    start = np.array([1.0, 1.0 - ratio * STEP])
+    x = swing.solve(np.zeros(count), start)
+    memory = swing.memory(1e-9)
+    assert memory < count
+    assert np.abs(x[0][memory:]).max() < 3e-9
+    for part, whole in zip(swing.solve(np.zeros(memory), start), x, strict=True):
+        # But for the derivative at the last sample, which has no next one.
+        np.testing.assert_array_equal(part[:-1], whole[: memory - 1])
+
+
 def test_no_digits_are_lost_to_the_length_of_a_run():
     # Beside the same recursion with three more digits, which rounding of 2e-16 moves by the steps in a radian of the swing.
     count, omega, step = 6000, 2 * np.pi * 3.0, 1e-3
