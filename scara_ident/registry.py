@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from difflib import get_close_matches
-from functools import cached_property
+from functools import cache, cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 from warnings import warn
@@ -12,7 +12,7 @@ from warnings import warn
 from scara_ident.errors import PluginWarning, ScaraIdentError, UsageError
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
+    from importlib.metadata import EntryPoint, EntryPoints
 
 T = TypeVar("T")
 
@@ -126,6 +126,7 @@ class Registry(Generic[T]):
 
     def refresh(self) -> None:
         """Look again at what is installed, as after an installation into a running Python."""
+        _scanned.cache_clear()
         self.__dict__.pop("_installed", None)
 
     def _load(self, name: str) -> T:
@@ -138,13 +139,18 @@ class Registry(Generic[T]):
 
     @cached_property
     def _installed(self) -> dict[str, list[EntryPoint]]:
-        # Finding out what is installed takes longer than loading the program's own help.
-        from importlib.metadata import entry_points
-
         found: dict[str, list[EntryPoint]] = {}
-        for point in entry_points(group=self.group):
+        for point in _scanned().select(group=self.group):
             found.setdefault(point.name, []).append(point)
         return found
+
+
+@cache
+def _scanned() -> EntryPoints:
+    """Return what is installed, looked for once for all lists: it takes longer than loading the program's own help."""
+    from importlib.metadata import entry_points
+
+    return cast("EntryPoints", entry_points())
 
 
 def _owner(point: EntryPoint) -> str:
