@@ -14,7 +14,8 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 # A division by zero is infinite, as NumPy's; the caller of the arrays holds them.
-OPTIONS = {"error_model": "numpy", "_nrt": False}
+# The interpreter is free meanwhile, so that two arms move side by side.
+OPTIONS = {"error_model": "numpy", "_nrt": False, "nogil": True}
 SOURCES = ("compiled.py", "spatial.py", "plant.py", "external.py", "forces.py", "integrate.py", "loop.py")
 
 

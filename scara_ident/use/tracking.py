@@ -16,6 +16,7 @@ from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.inverse_dynamics import inverse_dynamics
 from scara_ident.simulation.reference import ReferenceMotion
 from scara_ident.simulation.simulate import simulate
+from scara_ident.threads import side_by_side
 
 # Rounds in which the torque that effects ask for is found; each leaves a few per cent of what the last one missed. The
 # controller in them is so many times as fast as the arm's: with no noise about, the faster the nearer.
@@ -151,8 +152,9 @@ def tracked(
     ScaraIdentError
         If the controller loses the arm.
     """
-    found = []
-    for name, feed in feeds.items():
+
+    def follow(name: str, feed: Array | None) -> Tracked:
         run = simulate(arm, motion, effects=effects, feed=feed, rate=RATE, seed=seed)
-        found.append(Tracked(name, run.motion.time, run.motion.position - run.true.position))
-    return tuple(found)
+        return Tracked(name, run.motion.time, run.motion.position - run.true.position)
+
+    return tuple(side_by_side(follow, feeds.keys(), feeds.values()))

@@ -12,6 +12,7 @@ from scara_ident.effects import EffectTerm
 from scara_ident.errors import UsageError
 from scara_ident.export.identified_model import Entry, IdentifiedModel
 from scara_ident.simulation.reference import ReferenceMotion
+from scara_ident.threads import side_by_side
 from scara_ident.use.identified_arm import arms_of, simulated
 from scara_ident.use.tracking import foreseen_torque, tracked
 from scara_ident.use.trial_motion import trial_motion
@@ -83,16 +84,19 @@ def worth(model: IdentifiedModel, *, seed: int = 0) -> Worth:
         raise UsageError(f"the virtual arm has none of the effects found: {', '.join(missing)}")
     found = use(model, trial_motion(arms_of(model)[1], seed, poses=POSES), arms=1, seed=seed)
     arm, effects = found.drawn[0]
-    each = []
-    for k, (_, entry) in enumerate(pairs[:MOST]):
+
+    def of_one(k: int) -> EffectWorth:
+        entry = pairs[k][1]
         (alone,) = tracked(arm, effects[:k] + effects[k + 1 :], found.motion, {"pid": None}, seed)
         own, not_fed = _of_effect(model, entry), None
         if own is not None:
             feed = found.feeds["effects"] - foreseen_torque(replace(model, value=own), found.motion)
             (less,) = tracked(arm, effects, found.motion, {"less": feed}, seed)
             not_fed = less.rms
-        each.append(EffectWorth(entry, alone.rms, not_fed))
-    return Worth(model, found.motion, found.rms(), tuple(each), missing)
+        return EffectWorth(entry, alone.rms, not_fed)
+
+    each = tuple(side_by_side(of_one, range(min(len(pairs), MOST))))
+    return Worth(model, found.motion, found.rms(), each, missing)
 
 
 def _of_effect(model: IdentifiedModel, entry: Entry) -> Array | None:
