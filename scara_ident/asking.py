@@ -29,7 +29,6 @@ from scara_ident.model.model import build_model
 from scara_ident.progress import Work
 from scara_ident.recording.files.parquet_csv import SUFFIXES
 from scara_ident.recording.recording import read_usable
-from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
 from scara_ident.robot.robot import Robot
 
@@ -216,9 +215,10 @@ def _first(folder: Path, settings: Settings, asked: Asked, work: Work) -> Asked:
 def _diagnosed(folder: Path, settings: Settings, recordings: Sequence[Path], work: Work) -> None:
     read, useless = read_usable(recordings, settings.robot)
     found = diagnose(settings.robot, read, model=settings.model, progress=work)
-    content = diagnosis_dict(found)
+    context = DiagnosisContext(found)
+    content = context.content
     with written_together(folder) as place:
-        diagnosis_report(place / "report.html", DiagnosisContext(found))
+        diagnosis_report(place / "report.html", context)
         write_json(place / "diagnosis.json", {**content, "notes": [*useless, *content["notes"]]})
 
 

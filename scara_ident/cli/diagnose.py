@@ -80,7 +80,14 @@ def diagnose(
         if output is not None and result.effects:
             work("what the effects cost", 1.0)
             worth = worth_dict(identified_model(result))
-    content = diagnosis_dict(result, worth)
+    if output is None:
+        content = diagnosis_dict(result)
+    else:
+        from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
+
+        # What it holds is made once, for what is printed and for all files.
+        context = DiagnosisContext(result, worth)
+        content = context.content
     console = result_console(content, json)
     if verbose:
         show_recordings(console, (*training, *held_out))
@@ -90,14 +97,12 @@ def diagnose(
     for each in tables(content, all_candidates=verbose):
         console.print(each)
     if output is not None:
-        from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
         from scara_ident.report.pictures import diagnosis_pictures, remove_stale
 
-        context = DiagnosisContext(result, worth)
         with writing(output) as (place, work):
             work("drawing pictures")
             pictures = diagnosis_pictures(place, context)
-            write_text(place / "diagnosis.md", diagnosis_markdown(result, pictures, worth))
+            write_text(place / "diagnosis.md", diagnosis_markdown(result, pictures, content))
             work("drawing report.html", 0.6)
             diagnosis_report(place / "report.html", context)
             write_json(place / "diagnosis.json", content)

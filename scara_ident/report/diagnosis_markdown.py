@@ -13,7 +13,7 @@ from scara_ident.report.diagnosis import diagnosis_dict
 
 
 def diagnosis_markdown(
-    diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]] = (), worth: Mapping[str, Any] | None = None
+    diagnosis: Diagnosis, pictures: Sequence[tuple[str, str]] = (), content: Mapping[str, Any] | None = None
 ) -> str:
     """Return the story as Markdown.
 
@@ -22,10 +22,10 @@ def diagnosis_markdown(
     diagnosis : Diagnosis
     pictures : sequence of (str, str), optional
         Title and file name of figures that stand beside it; see `scara_ident.report.pictures`.
-    worth : mapping, optional
-        See `diagnosis_dict`.
+    content : mapping, optional
+        What `diagnosis_dict` returns, where it is at hand.
     """
-    content = diagnosis_dict(diagnosis, worth)
+    content = diagnosis_dict(diagnosis) if content is None else content
     lines = [f"# Diagnosis of {diagnosis.robot.name}: {diagnosis.verdict}", ""]
     lines += [f"{sentence}  " for sentence in content["summary"]]
     for kind in ("training", "validation"):
@@ -75,7 +75,7 @@ def diagnosis_markdown(
     return "\n".join(lines) + "\n"
 
 
-def _certainty(content: dict[str, Any], diagnosis: Diagnosis) -> list[str]:
+def _certainty(content: Mapping[str, Any], diagnosis: Diagnosis) -> list[str]:
     """Return events, what is worth a look, whether what is left is noise, and how runs differ, as Markdown."""
     lines = []
     if content["events"]:
