@@ -6,9 +6,10 @@ import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from scara_ident.threads import one_blas_thread
+from scara_ident.threads import forget_threads, one_blas_thread
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -43,10 +44,39 @@ def map_in_order(
         with one_blas_thread():
             yield from map(work, wanted)
         return
+    with _forked(count, work) as pool:
+        yield from pool.map(_apply, wanted)
+
+
+@contextmanager
+def beside(work: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
+    """Do work in another process meanwhile, whose memory goes with it; yields what waits for the result.
+
+    Where the system cannot fork, the work is done when it is waited for.
+
+    Parameters
+    ----------
+    work : callable
+        Its result is sent to the caller, as is its error.
+    """
+    if "fork" not in multiprocessing.get_all_start_methods():
+        yield work
+        return
+
+    def alone(_: None) -> Result:
+        forget_threads()
+        return work()
+
+    with _forked(1, alone) as pool:
+        yield pool.submit(_apply, None).result
+
+
+@contextmanager
+def _forked(count: int, work: Callable[[Any], Any]) -> Iterator[ProcessPoolExecutor]:
     context = multiprocessing.get_context("fork")
     with ProcessPoolExecutor(count, mp_context=context, initializer=_adopt, initargs=(work,)) as pool:
         try:
-            yield from pool.map(_apply, wanted)
+            yield pool
         except BaseException:
             # Leaving the pool waits for its work, which nobody wants any more.
             pool.shutdown(wait=False, cancel_futures=True)

@@ -57,6 +57,11 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(max_workers=THREADS - 1, initializer=busy)
 
 
+def forget_threads() -> None:
+    """Forget the threads of the process that this one was forked from, which it does not have."""
+    _pool.cache_clear()
+
+
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Hold BLAS to one thread: on the small panels of a factor, two take seven times as long as one."""

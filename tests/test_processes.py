@@ -7,7 +7,8 @@ import os
 import pytest
 
 from scara_ident import processes
-from scara_ident.processes import available_cores, map_in_order
+from scara_ident.processes import available_cores, beside, map_in_order
+from scara_ident.threads import side_by_side
 
 
 @pytest.mark.parametrize("processes", [1, 2, 3])
@@ -45,3 +46,25 @@ def test_no_more_cores_are_used_than_this_process_may(monkeypatch: pytest.Monkey
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {3}, raising=False)
     assert available_cores() == 1
     assert set(map_in_order(lambda _: os.getpid(), range(3))) == {os.getpid()}
+
+
+def test_what_is_done_beside_is_done_in_another_process_on_threads_of_its_own():
+    def work() -> tuple[int, list[int]]:
+        return os.getpid(), side_by_side(lambda x: x * x, range(5))
+
+    assert work()[1] == [0, 1, 4, 9, 16]
+    with beside(work) as result:
+        process, squares = result()
+    assert process != os.getpid()
+    assert squares == [0, 1, 4, 9, 16]
+
+
+def test_without_fork_what_is_done_beside_is_done_here(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(processes.multiprocessing, "get_all_start_methods", lambda: ["spawn"])
+    with beside(os.getpid) as result:
+        assert result() == os.getpid()
+
+
+def test_an_error_of_what_is_done_beside_reaches_who_waits():
+    with pytest.raises(ZeroDivisionError), beside(lambda: 1 // 0) as result:
+        result()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Annotated
 
 import typer
@@ -52,6 +53,7 @@ def diagnose(
     from scara_ident.effects import effects_named
     from scara_ident.export.identified_model import identified_model
     from scara_ident.files import write_json, write_text
+    from scara_ident.processes import beside
     from scara_ident.recording.recording import read_usable
     from scara_ident.report.diagnosis import diagnosis_dict
     from scara_ident.report.diagnosis_markdown import diagnosis_markdown
@@ -79,7 +81,10 @@ def diagnose(
         worth = None
         if output is not None and result.effects:
             work("what the effects cost", 1.0)
-            worth = worth_dict(identified_model(result))
+            # The compiled arm takes a hundred megabytes, which go with its process; what draws is loaded meanwhile.
+            with beside(lambda: worth_dict(identified_model(result))) as told:
+                import_module("matplotlib.figure")
+                worth = told()
     if output is None:
         content = diagnosis_dict(result)
     else:
@@ -100,11 +105,9 @@ def diagnose(
         from scara_ident.report.pictures import diagnosis_pictures, remove_stale
 
         with writing(output) as (place, work):
-            work("drawing pictures")
-            pictures = diagnosis_pictures(place, context)
+            work("drawing pictures and report.html")
+            pictures = diagnosis_pictures(place, context, lambda: diagnosis_report(place / "report.html", context))
             write_text(place / "diagnosis.md", diagnosis_markdown(result, pictures, content))
-            work("drawing report.html", 0.6)
-            diagnosis_report(place / "report.html", context)
             write_json(place / "diagnosis.json", content)
         remove_stale(output, [name for _, name in pictures])
         console.written(output, "diagnosis.json", "diagnosis.md", *(name for _, name in pictures), "report.html")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -69,7 +70,9 @@ def torque_figures(
     return "Measured and predicted torque", rows
 
 
-def diagnosis_pictures(folder: Path, context: DiagnosisContext) -> tuple[tuple[str, str], ...]:
+def diagnosis_pictures(
+    folder: Path, context: DiagnosisContext, *others: Callable[[], None]
+) -> tuple[tuple[str, str], ...]:
     """Draw every effect found, and what no effect accounts for.
 
     Parameters
@@ -77,6 +80,8 @@ def diagnosis_pictures(folder: Path, context: DiagnosisContext) -> tuple[tuple[s
     folder : Path
         Where the PNG files are written.
     context : DiagnosisContext
+    *others : callable
+        What else is done meanwhile in other processes, such as to draw the page.
 
     Returns
     -------
@@ -94,12 +99,9 @@ def diagnosis_pictures(folder: Path, context: DiagnosisContext) -> tuple[tuple[s
         # Loaded once, for all processes.
         import_module("matplotlib.figure")
 
-    def draw_one(k: int) -> None:
-        title, name, figures = parts[k]
-        draw(folder / name, title, figures)
-
+    work = [*(partial(draw, folder / name, title, figures) for title, name, figures in parts), *others]
     # Matplotlib holds the interpreter's lock, so that threads would not help.
-    for _ in map_in_order(draw_one, range(len(found))):
+    for _ in map_in_order(lambda k: work[k](), range(len(work))):
         pass
     return found
 
