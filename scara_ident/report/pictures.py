@@ -99,7 +99,10 @@ def diagnosis_pictures(
         # Loaded once, for all processes.
         import_module("matplotlib.figure")
 
-    work = [*(partial(draw, folder / name, title, figures) for title, name, figures in parts), *others]
+    work: list[Callable[[], None]] = [
+        *(partial(draw, folder / name, title, figures) for title, name, figures in parts),
+        *others,
+    ]
     # Matplotlib holds the interpreter's lock, so that threads would not help.
     for _ in map_in_order(lambda k: work[k](), range(len(work))):
         pass
