@@ -67,11 +67,12 @@ def line_candidates(
         order = _strongest_order(white, turns, criteria)
         strongest = [] if order is None else [SpectralLine("order", order)]
         highest = HIGHEST_FREQUENCY_SHARE * rate
-        within = _strongest_frequency(white, rate, (0.0, band or highest), criteria)
+        within = _strongest_frequency(white, rate, (0.0, band or highest), criteria, band)
         strongest += [] if within is None else [SpectralLine("frequency", within)]
         if band is not None and band < highest:
             reach = min(ABOVE_BAND * band, highest)
-            above = _strongest_frequency(whitened(pieces, rate, highest=reach), rate, (band, reach), criteria)
+            wide = whitened(pieces, rate, highest=reach)
+            above = _strongest_frequency(wide, rate, (band, reach), criteria, reach)
             strongest += [] if above is None else [SpectralLine("frequency", above)]
         found += [
             Candidate(effect, member)
@@ -93,15 +94,19 @@ def _strongest_order(residuals: Sequence[Array], turns: Sequence[Array], criteri
 
 
 def _strongest_frequency(
-    residuals: Sequence[Array], rate: float, reach: tuple[float, float], criteria: SelectionCriteria
+    residuals: Sequence[Array],
+    rate: float,
+    reach: tuple[float, float],
+    criteria: SelectionCriteria,
+    cut: float | None,
 ) -> float | None:
-    """Return the strongest line between two frequencies, Hz."""
+    """Return the strongest line between two frequencies, Hz, of residuals that have nothing above a third one."""
     width = frequency_width(residuals, rate)
     lowest, highest = criteria.least_line_periods * 0.5 * width, reach[1]
     if highest < NARROWEST_RANGE * lowest:
         return None
     frequencies = np.arange(lowest, highest, width / POINTS_PER_WIDTH)
-    power = frequency_spectrum(residuals, rate, frequencies)
+    power = frequency_spectrum(residuals, rate, frequencies, highest=cut)
     found = lines(
         frequencies,
         power,

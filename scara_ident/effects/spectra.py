@@ -20,6 +20,8 @@ HIGHEST_FREQUENCY_SHARE = 0.4
 GRID_POINTS = 8
 # Points of the transform per line width: between them it is interpolated linearly.
 FINENESS = 16
+# Of residuals that have nothing above a frequency so many samples in its period are enough: what folds lies beyond it twice.
+SAMPLES_PER_PERIOD = 4.0
 # The noise floor at a line is taken from this many line widths on either side, without the nearest few. Noise changes
 # faster over frequency, where the loop and the trajectory shape it, than over order.
 NEIGHBOURS = 40.0
@@ -95,7 +97,9 @@ def order_spectrum(residual: Array, motor_angle: Array, orders: Array) -> Array:
     return np.asarray(np.maximum(explained, 0.0) / count)
 
 
-def frequency_spectrum(residuals: Sequence[Array], rate: float, frequencies: Array) -> Array:
+def frequency_spectrum(
+    residuals: Sequence[Array], rate: float, frequencies: Array, *, highest: float | None = None
+) -> Array:
     """Return the power of lines at frequencies, whatever their phase in each recording.
 
     Parameters
@@ -106,6 +110,8 @@ def frequency_spectrum(residuals: Sequence[Array], rate: float, frequencies: Arr
         Samples per second.
     frequencies : ndarray, shape (K,)
         Hz.
+    highest : float, optional
+        Hz above which the residuals have nothing, see `whitened`: then they need not be transformed at their full rate.
 
     Returns
     -------
@@ -121,8 +127,11 @@ def frequency_spectrum(residuals: Sequence[Array], rate: float, frequencies: Arr
         count = len(residual)
         window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(count) + 0.5) / count)
         length = next_fast_len(FINENESS * count)
+        most = 1 if highest is None else max(1, int(rate / (SAMPLES_PER_PERIOD * highest)))
+        # Of as many samples the frequencies are the same.
+        step = next(step for step in range(most, 0, -1) if length % step == 0)
         shape = np.asarray(residual, dtype=np.float64) - np.average(residual, weights=window)
-        spectrum = np.abs(np.fft.rfft(window * shape, length)) * 2.0 / np.sum(window)
+        spectrum = np.abs(np.fft.rfft((window * shape)[::step], length // step)) * 2.0 * step / np.sum(window)
         amplitude = np.interp(wanted, np.arange(len(spectrum)) * (rate / length), spectrum)
         power += 0.5 * count * amplitude**2
         samples += count

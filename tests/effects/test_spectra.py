@@ -113,6 +113,16 @@ def test_noise_alone_seldom_has_a_line():
     assert np.all(false < 4), false
 
 
+def test_a_spectrum_of_what_has_nothing_above_a_frequency_needs_fewer_samples():
+    time, random = np.arange(20_000) / RATE, np.random.default_rng(5)
+    parts = [random.standard_normal(len(time)) + 0.2 * np.sin(2 * np.pi * 11.3 * time) for _ in range(2)]
+    low = whitened(parts, RATE, highest=20.0)
+    frequencies = np.arange(1.0, 20.0, 0.03)
+    whole = frequency_spectrum(low, RATE, frequencies)
+    # A piece that is cut off leaks a little of itself to all frequencies.
+    assert np.abs(frequency_spectrum(low, RATE, frequencies, highest=20.0) - whole).max() < 1e-6 * whole.max()
+
+
 def test_the_floor_at_the_ends_is_the_median_of_the_neighbours_that_there_are():
     positions, power = np.arange(60.0), np.random.default_rng(3).chisquare(2, 60)
     floor = noise_floor(positions, power, 2.0, neighbours=20.0)
