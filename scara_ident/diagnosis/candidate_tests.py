@@ -119,6 +119,8 @@ def _in_groups(
     groups: list[list[int]] = []
     for k in dict.fromkeys(widths):
         same = [place for place, width in enumerate(widths) if width == k]
+        # Those of the same joints follow each other.
+        same.sort(key=lambda place: tuple(sorted(candidates[place])))
         size = max(1, _COLUMNS // k)
         groups += [same[start : start + size] for start in range(0, len(same), size)]
     if len(groups) > 1:

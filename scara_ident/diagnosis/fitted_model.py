@@ -95,6 +95,21 @@ class FittedModel:
             for basis, places in zip(self.basis, self.in_blocks, strict=True)
         )
 
+    def rows_of(self, joints: tuple[int, ...]) -> tuple[Array, Array]:
+        """Return the orthonormal columns (blocks, m, r) and the residual (blocks, m) of joints by block, made once."""
+        if joints not in self._rows:
+            errors = [_by_block(self.residual[j], self.in_blocks[j]) for j in joints]
+            basis = [self.basis_blocks[j] for j in joints]
+            self._rows[joints] = (
+                np.concatenate(basis, axis=1) if len(joints) > 1 else basis[0],
+                np.concatenate(errors, axis=1),
+            )
+        return self._rows[joints]
+
+    @cached_property
+    def _rows(self) -> dict[tuple[int, ...], tuple[Array, Array]]:
+        return {}
+
     @cached_property
     def squares(self) -> Array:
         """Weighted squared residual of every block, shape (blocks,)."""
@@ -104,7 +119,7 @@ class FittedModel:
     @cached_property
     def basis_products(self) -> Array:
         """Products of the orthonormal columns in every block, shape (blocks, r, r)."""
-        together = np.concatenate(self.basis_blocks, axis=1)
+        together, _ = self.rows_of(tuple(range(len(self.joints))))
         found = np.empty((len(together), together.shape[2], together.shape[2]))
         # One after the other NumPy sees that a product with itself is symmetric.
         for rows, product in zip(together, found, strict=True):
@@ -185,28 +200,22 @@ def products_of(model: FittedModel, candidates: Sequence[Rows]) -> Products:
     """
     g, k = len(candidates), len(next(iter(candidates[0].values())))
     blocks, r = len(model.owner), model.root.shape[1]
-    inner, outer = np.zeros((blocks, g, k, k)), np.zeros((blocks, g, k, r))
-    scores = np.zeros((blocks, g, k))
-
-    def of_joint(j: int) -> tuple[list[int], Array, Array, Array]:
-        places, own = model.in_blocks[j], [i for i, candidate in enumerate(candidates) if j in candidate]
-        if not own:
-            return own, inner[:, own], outer[:, own], scores[:, own]
-        columns = model.weights[j] * np.concatenate([candidates[i][j] for i in own])
-        part = np.ascontiguousarray(_by_block(columns, places))
-        each = part.reshape(blocks, len(own), k, -1)
-        error = _by_block(model.residual[j], places)
-        return (
-            own,
-            each @ each.transpose(0, 1, 3, 2),
-            (part @ model.basis_blocks[j]).reshape(blocks, len(own), k, r),
-            (part @ error[:, :, None]).reshape(blocks, len(own), k),
-        )
-
-    for own, columns, sums, score in map(of_joint, range(len(model.joints))):
-        inner[:, own] += columns
-        outer[:, own] += sums
-        scores[:, own] += score
+    inner, outer = np.empty((blocks, g, k, k)), np.empty((blocks, g, k, r))
+    scores = np.empty((blocks, g, k))
+    alike: dict[tuple[int, ...], list[int]] = {}
+    for place, candidate in enumerate(candidates):
+        alike.setdefault(tuple(sorted(candidate)), []).append(place)
+    for joints, places in alike.items():
+        # Into what follows each other nothing is copied twice.
+        own = slice(places[0], places[-1] + 1) if places[-1] - places[0] < len(places) else places
+        columns = [model.weights[j] * np.concatenate([candidates[i][j] for i in places]) for j in joints]
+        in_blocks = [_by_block(part, model.in_blocks[j]) for j, part in zip(joints, columns, strict=True)]
+        rows = np.concatenate(in_blocks, axis=2)
+        basis, error = model.rows_of(joints)
+        each = rows.reshape(blocks, len(places), k, -1)
+        inner[:, own] = each @ each.transpose(0, 1, 3, 2)
+        outer[:, own] = (rows @ basis).reshape(blocks, len(places), k, r)
+        scores[:, own] = (rows @ error[:, :, None]).reshape(blocks, len(places), k)
     sums = np.sum(outer, axis=0)
     # S' (Z_b' Z_b S / 2 - Z_b' C_b) and its transpose are what the model takes from the products.
     spanned = (sums.reshape(g * k, r) @ model.basis_products).reshape(blocks, g, k, r)
@@ -216,6 +225,5 @@ def products_of(model: FittedModel, candidates: Sequence[Rows]) -> Products:
     scores -= (model.basis_scores @ sums.reshape(g * k, r).T).reshape(blocks, g, k)
     outside = np.diagonal(np.sum(inner, axis=0), axis1=1, axis2=2)
     sizes = np.sum(sums**2, axis=2) + outside
-    return Products(
-        sums, sizes, inner.transpose(1, 0, 2, 3), scores.transpose(1, 0, 2), (outer - spanned).transpose(1, 0, 2, 3)
-    )
+    outer -= spanned
+    return Products(sums, sizes, inner.transpose(1, 0, 2, 3), scores.transpose(1, 0, 2), outer.transpose(1, 0, 2, 3))
