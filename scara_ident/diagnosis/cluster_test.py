@@ -134,7 +134,7 @@ def _without_blocks(into: Array, reach: Array, cross: Array, columns: Array) -> 
     strength, turn = np.linalg.eigh(np.eye(inside.shape[-1]) - inside)
     release = (turn / np.maximum(strength, _LEAST_REDUNDANCY)[..., None, :]) @ turn.transpose(0, 1, 3, 2)
     own = release @ inside
-    links = np.concatenate([release @ (into.transpose(0, 2, 1)[:, None] @ reach), own], axis=-1)
+    links = np.concatenate([(release @ into.transpose(0, 2, 1)[:, None]) @ reach, own], axis=-1)
     return release, own, links, strength
 
 
