@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, median
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, orthonormal, weighted
 from scara_ident.estimation.joint_rows import JointRows
@@ -87,7 +87,7 @@ def robust_fit(observations: Observations) -> RobustFit:
             point = solved()
             for j, joint in enumerate(joints):
                 rms = joint.rms(point)
-                floor = float(np.median(rms[joint.rows > 0])) if np.any(joint.rows) else 0.0
+                floor = median(rms[joint.rows > 0]) if np.any(joint.rows) else 0.0
                 # Weights as with one joint's own noise, so that none is fitted at another's cost.
                 noise[j] = floor or noise[j]
                 weights[j] = weigh(rms / noise[j])
