@@ -64,11 +64,12 @@ def expected(products: Array, aims: Array, variance: Array) -> tuple[Array, Arra
     tuple of ndarray, each of shape (..., runs, k)
     """
     root = np.sqrt(variance)[..., None, :]
-    inner = products * (root[..., :, None] * root[..., None, :])
-    place = np.arange(inner.shape[-1])
-    inner[..., place, place] += 1.0
-    spread = root[..., :, None] * np.linalg.inv(inner) * root[..., None, :]
-    return (spread @ aims[..., None])[..., 0], spread[..., place, place]
+    roots = root[..., :, None] * root[..., None, :]
+    inner = products * roots
+    inner += np.eye(inner.shape[-1])
+    spread = np.linalg.inv(inner)
+    spread *= roots
+    return (spread @ aims[..., None])[..., 0], np.einsum("...kk->...k", spread)
 
 
 def _most_likely(products: Array, aims: Array, active: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -92,7 +93,7 @@ def _most_likely(products: Array, aims: Array, active: NDArray[np.bool_]) -> tup
     variance = np.where(active, guess, 0.0)
     for _ in range(STEPS):
         mean, spread = expected(products, aims, variance)
-        variance = np.mean(mean**2 + spread, axis=-2)
+        variance = np.add.reduce(mean * mean + spread, axis=-2) / mean.shape[-2]
     root = np.sqrt(variance)[..., None, :]
     grown = np.eye(guess.shape[-1]) + products * (root[..., :, None] * root[..., None, :])
     mean, _ = expected(products, aims, variance)
