@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.joint_rows import JointRows
-from scara_ident.threads import side_by_side
+from scara_ident.threads import THREADS, side_by_side
 
 # With fewer blocks than this many per parameter the matrix of scores is too noisy to stand for itself.
 BLOCKS_PER_PARAMETER = 2.5
@@ -109,7 +109,8 @@ def _scattered(joints: Sequence[_Scores], owner: NDArray[np.intp]) -> Array | No
     products = sum(joint.turn @ joint.products @ joint.turn.T for joint in joints)
     scores = sum(joint.scores @ joint.turn.T for joint in joints)
     # With H = half half', half' (1 - H)^-1/2 = (1 - half' half)^-1/2 half': the smaller of two symmetric problems.
-    leverage, directions = np.linalg.eigh(products)
+    halves = side_by_side(np.linalg.eigh, np.array_split(products, THREADS))
+    leverage, directions = (np.concatenate(parts) for parts in zip(*halves, strict=True))
     if np.any(leverage[:, -1] > FULL_LEVERAGE):
         return None
     turned = np.einsum("bji,bj->bi", directions, scores) / np.sqrt(1.0 - leverage)

@@ -65,12 +65,13 @@ class JointRows:
         """Return some of the blocks, in their order."""
         if np.array_equal(blocks, np.arange(len(self.counts))):
             return self
-        lengths = np.diff(self.starts)[blocks]
-        rows = [np.arange(self.starts[b], self.starts[b + 1]) for b in blocks]
-        chosen = np.concatenate(rows) if rows else np.zeros(0, dtype=np.intp)
-        starts = np.concatenate([[0], np.cumsum(lengths)])
+        starts = np.concatenate([[0], np.cumsum(np.diff(self.starts)[blocks])])
         sizes = None if self.sizes is None else self.sizes[blocks]
-        return JointRows(self.columns, self.table[:, chosen], starts, self.counts[blocks], sizes)
+        # Blocks that follow each other are taken together, and a single run of them is not copied.
+        runs = np.split(blocks, np.flatnonzero(np.diff(blocks) != 1) + 1)
+        parts = [self.table[:, self.starts[run[0]] : self.starts[run[-1] + 1]] for run in runs if len(run)]
+        table = parts[0] if len(parts) == 1 else np.concatenate([self.table[:, :0], *parts], axis=1)
+        return JointRows(self.columns, table, starts, self.counts[blocks], sizes)
 
     def faded(self, shares: Array) -> JointRows:
         """Return the rows with each block weighted to count for a share of its samples, shares of shape (blocks,)."""
