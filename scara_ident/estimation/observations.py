@@ -122,7 +122,6 @@ class Observations(Frozen):
 
         Over all samples of a joint that are neither at rest nor at the ends; NaN where there is none.
         """
-
         predicted = zip(self.data.stretches, self.predicted(value), strict=True)
         torque = [own for part, own in predicted if part.usable]
         return self._unfiltered(lambda part, place, j: part.torque[j] - torque[place][j])
