@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from importlib import import_module
 from typing import Any, Generic, TypeVar, overload
@@ -15,6 +15,8 @@ from threadpoolctl import ThreadpoolController
 T = TypeVar("T")
 # Loops of NumPy hold the interpreter's lock between their calls, so that more than two threads wait for each other.
 THREADS = 2
+# Samples of an array below which an operation on it takes no longer than to hand over that lock.
+LONG = 10_000
 _LOCAL = threading.local()
 
 
@@ -86,6 +88,13 @@ def one_thread() -> Iterator[None]:
             yield
         finally:
             _LOCAL.beside = before
+
+
+@contextmanager
+def threads_for(samples: int) -> Iterator[None]:
+    """Use both threads on arrays of so many samples where they are long, else one: two would wait for each other."""
+    with nullcontext() if samples >= LONG else one_thread():
+        yield
 
 
 def side_by_side(function: Callable[..., T], *items: Iterable[Any]) -> list[T]:

@@ -9,7 +9,6 @@ from tests.shared import ROOT
 # Modules without a file of their own, and where what they do is tested.
 ELSEWHERE = {
     "errors.py": "declarations of exceptions alone; test_main.py has what each becomes for a user",
-    "arrays.py": "one alias of a type; mypy reads it",
     "cli/options.py": "declarations of options alone; the test of each command uses them",
 }
 LARGEST = 400

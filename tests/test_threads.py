@@ -7,7 +7,7 @@ import threading
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from scara_ident.threads import made_once, one_blas_thread, side_by_side
+from scara_ident.threads import LONG, made_once, one_blas_thread, side_by_side, threads_for
 from tests.shared import PATIENCE
 
 
@@ -26,6 +26,22 @@ def test_results_come_in_the_order_of_the_items_whichever_is_done_first():
         return 10 * item + other
 
     assert side_by_side(work, range(4), range(4)) == [0, 11, 22, 33]
+
+
+def test_what_is_done_to_short_arrays_is_done_in_one_thread():
+    def names(samples: int) -> set[int]:
+        both = threading.Barrier(2)
+
+        def meet(item: int) -> int:
+            if samples >= LONG:
+                both.wait(PATIENCE)
+            return threading.get_ident()
+
+        with threads_for(samples):
+            return set(side_by_side(meet, range(2)))
+
+    assert len(names(LONG)) == 2
+    assert names(LONG - 1) == {threading.get_ident()}
 
 
 def test_an_error_reaches_the_caller():

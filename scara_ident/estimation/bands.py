@@ -26,7 +26,7 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Stretch, motion_of, torque_of
 from scara_ident.motion.prepared import END_PERIODS, PreparedData, PreparedStretch
 from scara_ident.motion.thinning import thinned
-from scara_ident.threads import side_by_side
+from scara_ident.threads import side_by_side, threads_for
 
 # Independent rows per parameter, at the least: what noise does to the estimate then adds a fifth to the noise variance of
 # a prediction, p / N of it (Seber and Lee, Linear Regression Analysis, 2003, section 12.2).
@@ -96,7 +96,8 @@ def choose_bands(model: TorqueModel, data: PreparedData) -> BandChoice:
     while True:
         level = _sample(_thinned(data, rate))
         allowed = HIGHEST_BAND * min(part.rate for part in level.stretches)
-        bands, fit = _widened(_Spectra(model, level, edges), bands, floor, allowed, fit)
+        with threads_for(max(part.samples for part in level.stretches)):
+            bands, fit = _widened(_Spectra(model, level, edges), bands, floor, allowed, fit)
         if allowed >= highest or np.max(bands) < NEAR_HIGHEST * allowed:
             return _told(model, bands, fit, edges, floor, moving)
         rate *= NEXT_RATE
@@ -239,7 +240,8 @@ def narrowest_bands(model: TorqueModel, stretches: int, moving: Array) -> Array:
 def _moving(data: PreparedData) -> Array:
     """Return the time in which each joint moves, s, shape (n,)."""
     slow = _thinned(data.at((FIRST_BAND,) * len(data.bands)), FIRST_BAND * FIRST_WIDENING / HIGHEST_BAND)
-    times = side_by_side(lambda part: np.count_nonzero(~part.rest, axis=1) / part.rate, slow.stretches)
+    with threads_for(max(part.samples for part in slow.stretches)):
+        times = side_by_side(lambda part: np.count_nonzero(~part.rest, axis=1) / part.rate, slow.stretches)
     return np.asarray(np.sum(times, axis=0))
 
 

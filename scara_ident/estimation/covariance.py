@@ -11,14 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.estimation.joint_rows import JointRows
-from scara_ident.threads import side_by_side
+from scara_ident.estimation.joint_rows import JointRows, block_products
+from scara_ident.threads import THREADS, side_by_side
 
 # With fewer blocks than this many per parameter the matrix of scores is too noisy to stand for itself.
 BLOCKS_PER_PARAMETER = 2.5
@@ -94,14 +93,11 @@ class _Scores:
 def _scores(rows: JointRows, weight: float, root: Array, value: Array) -> _Scores:
     # The columns of a joint are fewer than the parameters, so that its products need not be as large.
     turn, factor = np.linalg.qr(root[rows.columns].T)
-    half = weight * (factor @ rows.table[:-1])
-    residual = weight * (rows.table[-1] - value[rows.columns] @ rows.table[:-1])
-    size = len(half)
-    scores, products = np.zeros((len(rows.counts), size)), np.zeros((len(rows.counts), size, size))
-    for b, (start, stop) in enumerate(pairwise(rows.starts)):
-        part = half[:, start:stop]
-        scores[b], products[b] = part @ residual[start:stop], part @ part.T
-    return _Scores(turn, scores, products)
+    together = np.empty((len(factor) + 1, rows.table.shape[1]))
+    np.matmul(factor, rows.table[:-1], out=together[:-1])
+    together[-1] = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
+    products = weight**2 * block_products(together, rows.starts)
+    return _Scores(turn, products[:, :-1, -1], products[:, :-1, :-1])
 
 
 def _scattered(joints: Sequence[_Scores], owner: NDArray[np.intp]) -> Array | None:
@@ -109,7 +105,8 @@ def _scattered(joints: Sequence[_Scores], owner: NDArray[np.intp]) -> Array | No
     products = sum(joint.turn @ joint.products @ joint.turn.T for joint in joints)
     scores = sum(joint.scores @ joint.turn.T for joint in joints)
     # With H = half half', half' (1 - H)^-1/2 = (1 - half' half)^-1/2 half': the smaller of two symmetric problems.
-    leverage, directions = np.linalg.eigh(products)
+    halves = side_by_side(np.linalg.eigh, np.array_split(products, THREADS))
+    leverage, directions = (np.concatenate(parts) for parts in zip(*halves, strict=True))
     if np.any(leverage[:, -1] > FULL_LEVERAGE):
         return None
     turned = np.einsum("bji,bj->bi", directions, scores) / np.sqrt(1.0 - leverage)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.estimation.blas import add_products, solve_rows
 from scara_ident.manners import Frozen
 
 # Rounds in which joints are weighted by what they leave, and the least that one may leave, as a share of its torque.
@@ -25,6 +26,8 @@ LEAST_NOISE = 1e-6
 
 # Rows a QR takes at a time: small panels stay in cache, and LAPACK does not thread them.
 PANEL_ROWS = 512
+# Numbers that stay in cache as a whole, so that they are factored at once.
+AT_ONCE = 2**16
 # From so many rows on a preconditioned Gram matrix is made, of so many rows at a time; and how near to singular it may
 # be (reciprocal condition): of sixteen digits three are then lost of a matrix that is otherwise close to the identity.
 GRAM_ROWS = 2048
@@ -115,7 +118,9 @@ class Information(Frozen):
         factor = np.sqrt(decay) * self.factor
         count = columns.shape[1]
         whole = None
-        if count >= GRAM_ROWS:
+        if columns.size <= AT_ONCE:
+            whole = triangular(np.vstack([factor, columns.T]) if len(factor) else columns.T)
+        elif count >= GRAM_ROWS:
             whole = _updated(factor, columns, np.eye(len(columns)))
             if whole is None:
                 some = triangular(columns[:, :: count // PANEL_ROWS].T)
@@ -310,16 +315,15 @@ def _updated(factor: Array, columns: Array, gram: Array) -> Array | None:
     gram : ndarray, shape (k, k)
         What stands for other rows, in units of the factor: the identity for those that it is the factor of.
     """
-    from scipy.linalg.blas import dsyrk, dtrsm
     from scipy.linalg.lapack import dpocon, dpotrf
 
     if factor.shape[0] < factor.shape[1] or not np.all(np.diag(factor)):
         return None
-    upper, gram = np.asfortranarray(factor), np.asfortranarray(gram)
+    upper, gram = np.asfortranarray(factor), np.array(gram, order="F")
     for start in range(0, columns.shape[1], GRAM_ROWS):
         part = columns[:, start : start + GRAM_ROWS].copy()
-        solved = dtrsm(1.0, upper, part.T, side=1, overwrite_b=1)
-        gram = dsyrk(1.0, solved, 1.0, gram, trans=1, overwrite_c=1)
+        solve_rows(upper, part)
+        add_products(part, gram)
     # Only the upper half is filled.
     half = np.abs(gram)
     size = float(np.max(half.sum(axis=0) + np.triu(half, 1).sum(axis=1)))

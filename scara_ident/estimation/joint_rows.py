@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import Information, triangular
 
+# Blocks whose products are made together: more than fit into the cache are no faster.
+BLOCKS_AT_ONCE = 64
+
 
 @dataclass(frozen=True, eq=False)
 class JointRows:
@@ -65,12 +68,13 @@ class JointRows:
         """Return some of the blocks, in their order."""
         if np.array_equal(blocks, np.arange(len(self.counts))):
             return self
-        lengths = np.diff(self.starts)[blocks]
-        rows = [np.arange(self.starts[b], self.starts[b + 1]) for b in blocks]
-        chosen = np.concatenate(rows) if rows else np.zeros(0, dtype=np.intp)
-        starts = np.concatenate([[0], np.cumsum(lengths)])
+        starts = np.concatenate([[0], np.cumsum(np.diff(self.starts)[blocks])])
         sizes = None if self.sizes is None else self.sizes[blocks]
-        return JointRows(self.columns, self.table[:, chosen], starts, self.counts[blocks], sizes)
+        # Blocks that follow each other are taken together, and a single run of them is not copied.
+        runs = np.split(blocks, np.flatnonzero(np.diff(blocks) != 1) + 1)
+        parts = [self.table[:, self.starts[run[0]] : self.starts[run[-1] + 1]] for run in runs if len(run)]
+        table = parts[0] if len(parts) == 1 else np.concatenate([self.table[:, :0], *parts], axis=1)
+        return JointRows(self.columns, table, starts, self.counts[blocks], sizes)
 
     def faded(self, shares: Array) -> JointRows:
         """Return the rows with each block weighted to count for a share of its samples, shares of shape (blocks,)."""
@@ -91,6 +95,27 @@ class JointRows:
         table = np.concatenate([np.zeros((most, 0)), *tables], axis=1)
         counts, sizes = (np.add.reduceat(each, edges[:-1]) if len(each) else each for each in (self.counts, held))
         return JointRows(self.columns, table, starts, counts, sizes)
+
+
+def block_products(signals: Array, bounds: NDArray[np.intp]) -> Array:
+    """Return the products of signals with each other, block by block, shape (blocks, k, k).
+
+    Parameters
+    ----------
+    signals : ndarray, shape (k, N)
+    bounds : ndarray of int, shape (blocks + 1,)
+        Where each block begins.
+    """
+    lengths, size = np.diff(bounds), len(signals)
+    result = np.empty((len(lengths), size, size))
+    # Many blocks in one product, filled up with zeros: of one small product each, two threads take longer than one.
+    for first in range(0, len(lengths), BLOCKS_AT_ONCE):
+        some = lengths[first : first + BLOCKS_AT_ONCE]
+        filled = np.zeros((len(some), int(np.max(some)), size))
+        inside = np.arange(filled.shape[1]) < some[:, None]
+        filled[inside] = signals[:, bounds[first] : bounds[first + len(some)]].T
+        np.matmul(filled.swapaxes(1, 2), filled, out=result[first : first + len(some)])
+    return result
 
 
 def joined(

@@ -15,7 +15,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import weighted
 from scara_ident.estimation.observations import Observations, informations, observe
-from scara_ident.motion.position_noise import encoder_step, noise_level, noisier
+from scara_ident.motion.position_noise import NoiseSizes, noise_sizes, noisier
 from scara_ident.motion.prepared import PreparedData, PreparedRecording
 from scara_ident.threads import side_by_side
 
@@ -70,20 +70,20 @@ def noise_shares(data: PreparedData) -> list[float]:
     White position noise of variance s^2 at a rate r has the acceleration ``2 s^2 / r (2 pi)^4 f^5 / 5`` up to f.
     """
 
-    def of_recording(item: PreparedRecording) -> list[float]:
+    def of_recording(item: PreparedRecording, each: tuple[NoiseSizes, ...]) -> list[float]:
         part = item.longest
-        found = []
+        sizes, found = each[item.stretches.index(part)], []
         for joint, band in enumerate(data.bands):
             if band is None or not np.any(part.used[joint]):
                 continue
-            step = encoder_step(item.recording.position[joint])
-            noise = noise_level(part, joint) if step is None else step / np.sqrt(12.0)
+            step, level = sizes[joint]
+            noise = level if step is None else step / np.sqrt(12.0)
             power = 2.0 * noise**2 / part.rate * (2.0 * np.pi) ** 4 * band**5 / 5.0
             whole = float(np.mean(part.motion.a[joint][part.used[joint]] ** 2))
             found.append(power / whole if whole > 0.0 else 0.0)
         return found
 
-    return list(chain.from_iterable(side_by_side(of_recording, data.recordings)))
+    return list(chain.from_iterable(side_by_side(of_recording, data.recordings, noise_sizes(data))))
 
 
 def bias_sentence(names: Sequence[str], bias: Array, std: Array) -> str | None:

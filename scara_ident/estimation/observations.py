@@ -7,7 +7,7 @@ of these rows, by block, recording, fold or joint.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
@@ -96,7 +96,7 @@ class Observations(Frozen):
         """Return the observations of some recordings."""
         blocks = np.concatenate([np.flatnonzero(self.owner == k) for k in places])
         owner = np.concatenate([np.full(np.count_nonzero(self.owner == k), i) for i, k in enumerate(places)])
-        return replace(
+        found = replace(
             self,
             data=self.data.of(places),
             joints=tuple(joint.part(blocks) for joint in self.joints),
@@ -105,6 +105,12 @@ class Observations(Frozen):
             kept=None if self.kept is None else self.kept.of(places),
             counts=None if self.counts is None else tuple(self.counts[k] for k in places),
         )
+        if "_predicted" in self.__dict__:
+            value, torque = self.__dict__["_predicted"]
+            parts = iter(torque)
+            by_recording = [[next(parts) for _ in recording] for recording in self.raw]
+            found.__dict__["_predicted"] = value, tuple(chain.from_iterable(by_recording[k] for k in places))
+        return found
 
     @cached_property
     def by_joint(self) -> tuple[Information, ...]:
@@ -116,20 +122,18 @@ class Observations(Frozen):
 
         Over all samples of a joint that are neither at rest nor at the ends; NaN where there is none.
         """
-
-        def left(part: PreparedStretch, raw: Raw, j: int) -> Array:
-            return np.asarray(part.torque[j] - value[self.joints[j].columns] @ raw[j])
-
-        return self._unfiltered(left)
+        predicted = zip(self.data.stretches, self.predicted(value), strict=True)
+        torque = [own for part, own in predicted if part.usable]
+        return self._unfiltered(lambda part, place, j: part.torque[j] - torque[place][j])
 
     @cached_property
     def unfiltered_torque_rms(self) -> Array:
         """The rms of the recorded torque over the same samples, shape (n,)."""
-        return self._unfiltered(lambda part, raw, j: part.torque[j])
+        return self._unfiltered(lambda part, place, j: part.torque[j])
 
-    def _unfiltered(self, signal: Callable[[PreparedStretch, Raw, int], Array]) -> Array:
+    def _unfiltered(self, signal: Callable[[PreparedStretch, int, int], Array]) -> Array:
         def mean_square(j: int) -> float:
-            used = [signal(part, raw, j)[part.used[j]] for part, raw in self._stretches()]
+            used = [signal(part, place, j)[part.used[j]] for place, part in enumerate(self._usable)]
             count = sum(len(part) for part in used)
             return sum(float(part @ part) for part in used) / count if count else np.nan
 
@@ -157,7 +161,7 @@ class Observations(Frozen):
     @property
     def row_step(self) -> tuple[int, ...]:
         """For each joint how many samples one row stands for."""
-        return next((part.steps for part, _ in self._stretches()), (1,) * len(self.joints))
+        return next((part.steps for part in self._usable), (1,) * len(self.joints))
 
     @property
     def left_out_ends(self) -> float:
@@ -168,7 +172,7 @@ class Observations(Frozen):
     def left_out_rest(self) -> tuple[float, ...]:
         """For each joint the share of the remaining samples left out because it stood still."""
         used, rested = np.zeros(len(self.joints)), np.zeros(len(self.joints))
-        for part, _ in self._stretches():
+        for part in self._usable:
             used += np.count_nonzero(part.used, axis=1)
             rest = part.rest & np.logical_not(part.left_out | part.stretch.clipped)
             rested += np.count_nonzero(rest[:, part.trim : part.samples - part.trim], axis=1)
@@ -183,24 +187,29 @@ class Observations(Frozen):
         return replace(self, data=data, joints=tuple(joints))
 
     def predicted(self, value: Array) -> tuple[Array, ...]:
-        """Return the torque that parameters predict on every stretch, shape (n, N) each, not filtered."""
-        columns = [joint.columns for joint in self.joints]
-        return tuple(
-            np.array([value[own] @ row for own, row in zip(columns, raw, strict=True)])
-            for recording in self.raw
-            for raw in recording
-        )
+        """Return the torque that parameters predict on every stretch, shape (n, N) each, not filtered.
+
+        That of the last parameters is kept, for more than one ask for it.
+        """
+        known = self.__dict__.get("_predicted")
+        if known is None or not np.array_equal(known[0], value):
+            columns = [joint.columns for joint in self.joints]
+
+            def of_stretch(raw: Raw) -> Array:
+                return np.array([value[own] @ row for own, row in zip(columns, raw, strict=True)])
+
+            known = value.copy(), tuple(side_by_side(of_stretch, chain.from_iterable(self.raw)))
+            self.__dict__["_predicted"] = known
+        return known[1]
 
     def residuals(self, value: Array) -> Residuals:
         """Return what parameters leave of the recorded torque at every sample."""
         return Residuals(self.data, self.predicted(value))
 
-    def _stretches(self) -> Iterator[tuple[PreparedStretch, Raw]]:
-        """Give the stretches that are long enough, with their columns."""
-        for recording, raws in zip(self.data.recordings, self.raw, strict=True):
-            for part, raw in zip(recording.stretches, raws, strict=True):
-                if part.usable:
-                    yield part, raw
+    @property
+    def _usable(self) -> list[PreparedStretch]:
+        """The stretches that are long enough."""
+        return [part for part in self.data.stretches if part.usable]
 
 
 def observe(model: TorqueModel, data: PreparedData, known: Observations | None = None) -> Observations:

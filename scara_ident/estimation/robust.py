@@ -10,15 +10,14 @@ of which there are half as many.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, median
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, orthonormal, weighted
-from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.joint_rows import JointRows, block_products
 from scara_ident.estimation.observations import Observations
 from scara_ident.threads import one_blas_thread, side_by_side
 
@@ -87,7 +86,7 @@ def robust_fit(observations: Observations) -> RobustFit:
             point = solved()
             for j, joint in enumerate(joints):
                 rms = joint.rms(point)
-                floor = float(np.median(rms[joint.rows > 0])) if np.any(joint.rows) else 0.0
+                floor = median(rms[joint.rows > 0]) if np.any(joint.rows) else 0.0
                 # Weights as with one joint's own noise, so that none is fitted at another's cost.
                 noise[j] = floor or noise[j]
                 weights[j] = weigh(rms / noise[j])
@@ -116,15 +115,19 @@ class _Sums:
 
 def _sums(rows: JointRows, factor: Array, root: Array) -> _Sums:
     own_root = orthonormal(factor)
-    half, torque = own_root.T @ rows.table[:-1], rows.table[-1]
+    together = np.empty((own_root.shape[1] + 1, rows.table.shape[1]))
+    np.matmul(own_root.T, rows.table[:-1], out=together[:-1])
+    together[-1] = rows.table[-1]
     bounds = rows.starts[:: max(1, -(-len(rows.counts) // MOST_BLOCKS))]
     bounds = bounds if bounds[-1] == rows.starts[-1] else np.append(bounds, rows.starts[-1])
-    scores, products = np.zeros((len(bounds) - 1, len(half))), np.zeros((len(bounds) - 1, len(half), len(half)))
-    squares = np.zeros(len(bounds) - 1)
-    for b, (start, stop) in enumerate(pairwise(bounds)):
-        part, own = half[:, start:stop], torque[start:stop]
-        squares[b], scores[b], products[b] = own @ own, part @ own, part @ part.T
-    return _Sums(np.diff(bounds), squares, scores, products, (factor @ own_root).T @ (factor @ root))
+    products = block_products(together, bounds)
+    return _Sums(
+        np.diff(bounds),
+        products[:, -1, -1],
+        products[:, :-1, -1],
+        products[:, :-1, :-1].copy(),
+        (factor @ own_root).T @ (factor @ root),
+    )
 
 
 def disagreement(estimate: Estimate, robust: RobustFit) -> str | None:

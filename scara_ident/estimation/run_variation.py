@@ -207,6 +207,8 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
     if runs < LEAST_RUNS or any(rows.sizes is not None for rows in joints):
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
+    # Made once, and not in two threads.
+    _ = observations.predicted(value[: observations.parameters])
 
     def of_joint(joint: int, rows: JointRows) -> _Sums | None:
         directions = _directions(observations, joint, rows, value)
@@ -243,13 +245,12 @@ def assumed_delays(observations: Observations, joints: Sequence[JointRows], valu
 def _directions(observations: Observations, joint: int, rows: JointRows, value: Array) -> Array:
     """Return what one unit of each kind does on the rows of a joint, shape (kinds, N); zero where it does nothing."""
     # A torque that comes late lacks so much of its rate.
-    base = value[: observations.parameters]
-    parts = []
-    raws = (raw for recording in observations.raw for raw in recording)
-    for part, raw in zip(observations.data.stretches, raws, strict=True):
-        if part.usable:
-            torque = base[observations.joints[joint].columns] @ raw[joint]
-            parts.append(part.rows(joint, -np.gradient(torque, 1.0 / part.rate)[None])[0])
+    torques = observations.predicted(value[: observations.parameters])
+    parts = [
+        part.rows(joint, -np.gradient(torque[joint], 1.0 / part.rate)[None])[0]
+        for part, torque in zip(observations.data.stretches, torques, strict=True)
+        if part.usable
+    ]
     return _of_columns(observations, rows.columns, value, rows.table[:-1], np.concatenate(parts))
 
 

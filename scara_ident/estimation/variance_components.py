@@ -21,7 +21,7 @@ STEPS = 40
 def components(products: Array, aims: Array, kept: NDArray[np.bool_]) -> Array:
     """Return the variance of each kind on each joint, shape (joints, kinds); 0 where chance explains it.
 
-    Kinds are left out one by one, on all joints in the same steps.
+    Kinds are left out one by one.
 
     Parameters
     ----------
@@ -30,23 +30,21 @@ def components(products: Array, aims: Array, kept: NDArray[np.bool_]) -> Array:
     kept : ndarray of bool, shape (joints, kinds)
         Kinds that may differ.
     """
-    kept = kept.copy()
-    (variances, likely) = (found[:, 0] for found in _most_likely(products, aims, kept[:, None]))
-    going = np.flatnonzero(np.any(kept, axis=1))
-    while len(going):
-        active = kept[going]
-        # All that lack one more kind, in one go.
-        fewer = active[:, None] & ~np.eye(active.shape[1], dtype=bool)
-        found, likelihoods = _most_likely(products[going], aims[going], fewer)
-        likelihoods = np.where(active, likelihoods, -np.inf)
-        weakest = np.argmax(likelihoods, axis=1)
-        place = np.arange(len(going))
-        by_chance = 2.0 * (likely[going] - likelihoods[place, weakest]) <= CHANCE
-        place, weakest, going = place[by_chance], weakest[by_chance], going[by_chance]
-        kept[going, weakest] = False
-        variances[going], likely[going] = found[place, weakest], likelihoods[place, weakest]
-        going = going[np.any(kept[going], axis=1)]
-    return np.where(kept, variances, 0.0)
+    kinds = kept.shape[1]
+    # Every set of kinds that may be left, in the same steps: bit k of its place says whether kind k is in it.
+    sets = (np.arange(2**kinds)[:, None] >> np.arange(kinds)) & 1 == 1
+    variances, likelihoods = _most_likely(products, aims, kept[:, None] & sets)
+    found = np.zeros(kept.shape)
+    for joint, own in enumerate(kept):
+        place = int(np.sum(1 << np.flatnonzero(own)))
+        while place:
+            fewer = [place & ~(1 << kind) for kind in range(kinds) if place >> kind & 1]
+            likeliest = max(fewer, key=lambda other: float(likelihoods[joint, other]))
+            if not 2.0 * (likelihoods[joint, place] - likelihoods[joint, likeliest]) <= CHANCE:
+                break
+            place = likeliest
+        found[joint] = variances[joint, place]
+    return found
 
 
 def expected(products: Array, aims: Array, variance: Array) -> tuple[Array, Array]:
@@ -64,11 +62,12 @@ def expected(products: Array, aims: Array, variance: Array) -> tuple[Array, Arra
     tuple of ndarray, each of shape (..., runs, k)
     """
     root = np.sqrt(variance)[..., None, :]
-    inner = products * (root[..., :, None] * root[..., None, :])
-    place = np.arange(inner.shape[-1])
-    inner[..., place, place] += 1.0
-    spread = root[..., :, None] * np.linalg.inv(inner) * root[..., None, :]
-    return (spread @ aims[..., None])[..., 0], spread[..., place, place]
+    roots = root[..., :, None] * root[..., None, :]
+    inner = products * roots
+    inner += np.eye(inner.shape[-1])
+    spread = np.linalg.inv(inner)
+    spread *= roots
+    return (spread @ aims[..., None])[..., 0], np.einsum("...kk->...k", spread)
 
 
 def _most_likely(products: Array, aims: Array, active: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -92,7 +91,7 @@ def _most_likely(products: Array, aims: Array, active: NDArray[np.bool_]) -> tup
     variance = np.where(active, guess, 0.0)
     for _ in range(STEPS):
         mean, spread = expected(products, aims, variance)
-        variance = np.mean(mean**2 + spread, axis=-2)
+        variance = np.add.reduce(mean * mean + spread, axis=-2) / mean.shape[-2]
     root = np.sqrt(variance)[..., None, :]
     grown = np.eye(guess.shape[-1]) + products * (root[..., :, None] * root[..., None, :])
     mean, _ = expected(products, aims, variance)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, median
 from scara_ident.motion.prepared import PreparedStretch, standstill
 
 # Length of a bin, s.
@@ -139,7 +139,7 @@ def bounded_noise(parts: Sequence[PreparedStretch], left: Sequence[Array], owner
         found = []
         for j in range(len(left[0])):
             values = np.concatenate([left[k][j][used[k][j]][:: max(1, len(left[k][j]) // ENOUGH)] for k in chosen])
-            found.append(NORMAL * float(np.median(np.abs(values))) if len(values) else 0.0)
+            found.append(NORMAL * median(np.abs(values)) if len(values) else 0.0)
         return np.array(found)
 
     everything = scale(range(len(parts)))

@@ -43,6 +43,8 @@ def clock_drift(value: Array, observations: Observations) -> str | None:
         return None
     noise = np.array([rows.rms(value) for rows in observations.joints])
     weight = np.where(noise > 0.0, 1.0 / np.where(noise > 0.0, noise, 1.0), 0.0)
+    # Made once, and not in two threads.
+    _ = observations.predicted(value)
 
     joints = side_by_side(lambda j: _sums(value, observations, j, float(weight[j])), range(len(weight)))
     # What parameters and one delay for each recording explain is none of the drift's: the model's columns are projected out
@@ -114,11 +116,12 @@ class _Sums:
 def _sums(value: Array, observations: Observations, joint: int, weight: float) -> _Sums:
     rows, parts = observations.joints[joint], []
     columns, ends = rows.table[:-1], [0]
-    for item, raws in zip(observations.data.recordings, observations.raw, strict=True):
+    torques = iter(observations.predicted(value))
+    for item in observations.data.recordings:
         start = item.stretches[0].stretch.time[0]
-        for part, raw in zip(item.stretches, raws, strict=True):
+        for part, torque in zip(item.stretches, torques, strict=False):
             if part.usable:
-                slope = -np.gradient(value[rows.columns] @ raw[joint]) * part.rate
+                slope = -np.gradient(torque[joint]) * part.rate
                 parts.append(part.rows(joint, np.array([slope, slope * (part.stretch.time - start)])))
         ends.append(sum(part.shape[1] for part in parts))
     lag, growing = weight * np.concatenate(parts, axis=1)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, median
 from scara_ident.identification.binned_residual import FILLED, NORMAL, Binned
 
 # Standard deviations at which a sample is bounded where it is asked what other recordings have at the same state.
@@ -59,7 +59,7 @@ def _robust_trend(rows: Sequence[Array], left: Sequence[Array], known: Sequence[
         return [np.zeros_like(item) for item in left]
     for _ in range(6):
         off = target - value @ together
-        scale = NORMAL * float(np.median(np.abs(off[use > 0.0])))
+        scale = NORMAL * median(np.abs(off[use > 0.0]))
         if scale == 0.0:
             break
         weight = use * np.maximum(0.0, 1.0 - (off / (4.0 * scale)) ** 2) ** 2
@@ -109,7 +109,7 @@ def _of_others(columns: Array, left: Array, known: NDArray[np.bool_], group: NDA
     taken = np.zeros_like(left)
     for _ in range(MOST_FEATURES):
         off = left - taken
-        scale = NORMAL * float(np.median(np.abs(off[known])))
+        scale = NORMAL * median(np.abs(off[known]))
         use = known * np.minimum(1.0, INFLUENCE * scale / np.maximum(np.abs(off), 1e-300))
         weighted = columns * use
         scores, squares = (np.zeros((count, len(columns))) for _ in range(2))

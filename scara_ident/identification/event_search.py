@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, median
 from scara_ident.identification.binned_residual import BOUND, FILLED, NORMAL, Binned
 from scara_ident.identification.event_background import without_states, without_trends
 from scara_ident.identification.event_ends import Ends, event_ends
@@ -183,7 +183,7 @@ def _median(means: Sequence[Array]) -> Array:
     found = np.zeros(len(together))
     for j, row in enumerate(together):
         known = row[np.isfinite(row)]
-        found[j] = NORMAL * float(np.median(known)) if len(known) >= LEAST_WINDOWS else np.nan
+        found[j] = NORMAL * median(known) if len(known) >= LEAST_WINDOWS else np.nan
     return np.nan_to_num(found, nan=0.0)
 
 

@@ -82,6 +82,10 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int, wei
     # Without its chord the continued signal closes on itself; what the filter does to the chord is known.
     slope = (after[:, -1:] - before[:, :1]) / (count - 1 + 2 * reach)
     result = np.hstack([before[:, :1], slope]) @ phases.of_chord
+    sizes = _by_phase(size[:, :whole], step)
+    if weight is None or weight.ndim == 1:
+        # Put in that order once: to read both signal and weight out of order takes twice as long as one.
+        sizes = np.broadcast_to(np.ascontiguousarray(sizes[:1]), sizes.shape)
     # By phase, as the transform takes them; what no sample is written to stays zero.
     buffer = np.zeros((min(ROWS_AT_ONCE, len(signal)), step, low))
     spectra = np.empty((*buffer.shape[:2], low // 2 + 1), dtype=complex)
@@ -90,7 +94,7 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int, wei
         parts = buffer[: len(signal) - begin]
         spectrum = spectra[: len(parts)]
         middle = parts[:, :, first : first + whole // step]
-        np.multiply(_by_phase(signal[some, :whole], step), _by_phase(size[some, :whole], step), out=middle)
+        np.multiply(_by_phase(signal[some, :whole], step), sizes[some], out=middle)
         parts[:, phases.ends[0], phases.ends[1]] = ends[some]
         np.fft.rfft(parts, axis=2, out=spectrum)
         spectrum *= phases.gains
@@ -207,7 +211,22 @@ def _filtered(
         fade = np.sin(0.5 * np.pi * np.arange(reach) / reach) ** 2
         flat[..., :reach] *= fade
         flat[..., -reach:] *= fade[::-1]
-    spectrum = np.fft.rfft(whole, axis=-1)
+    factors = _gains(closed, rate, cut, tuple(orders), highest)
+    spectra = factors.reshape(len(orders), *(1,) * (signal.ndim - 1), -1) * np.fft.rfft(whole, axis=-1)
+    results = np.fft.irfft(spectra, closed, axis=-1)[..., reach : reach + count]
+    for order, result in zip(orders, results, strict=True):
+        if order == 0:
+            result += ramp[..., reach : reach + count]
+        elif order == 1:
+            result += slope * rate
+    return results
+
+
+@lru_cache(maxsize=24)
+def _gains(
+    closed: int, rate: float, cut: float | None, orders: tuple[int, ...], highest: float
+) -> NDArray[np.complexfloating]:
+    """Return by what the transform of a signal is multiplied for each derivative, shape (orders, closed // 2 + 1)."""
     frequency = np.arange(closed // 2 + 1) * (rate / closed)
     # A power of 8 by squares: `**` takes as long as the transform.
     eighth = frequency if cut is None else frequency / cut
@@ -216,15 +235,7 @@ def _filtered(
     gain = np.ones_like(frequency) if cut is None else 1.0 / (1.0 + eighth)
     gain[frequency > highest] = 0.0
     omega = 2.0 * np.pi * frequency
-    factors = np.array([gain * (1.0, 1j * omega, -omega * omega)[order] for order in orders])
-    spectra = factors.reshape(len(orders), *(1,) * (signal.ndim - 1), -1) * spectrum
-    results = np.fft.irfft(spectra, closed, axis=-1)[..., reach : reach + count]
-    for order, result in zip(orders, results, strict=True):
-        if order == 0:
-            result += ramp[..., reach : reach + count]
-        elif order == 1:
-            result += slope * rate
-    return results
+    return np.array([gain * (1.0, 1j * omega, -omega * omega)[order] for order in orders])
 
 
 def _closed_length(count: int, reach: int, step: int) -> int:

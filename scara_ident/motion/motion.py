@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, median
 from scara_ident.errors import RecordingError
 from scara_ident.manners import Frozen
 from scara_ident.motion.low_pass import differentiate
@@ -137,32 +137,32 @@ def stretches(recording: Recording) -> tuple[Stretch, ...]:
         If no part is long enough.
     """
     step = np.diff(recording.time)
-    median = float(np.median(step))
+    middle = median(step)
     # Nothing is interpolated across a gap.
-    cuts = np.flatnonzero(step > GAP_STEPS * median) + 1
+    cuts = np.flatnonzero(step > GAP_STEPS * middle) + 1
     bounds = cut_long(sorted({0, *cuts.tolist(), *recording.cuts, len(recording.time)}))
     found = []
     for start, stop in pairwise(bounds):
         if stop - start < 4:
             continue
-        found.append(_uniform(recording, start, stop, median))
+        found.append(_uniform(recording, start, stop, middle))
     if not found:
         raise RecordingError(f"{recording.path or recording.name}: no four samples in a row without a gap in time")
     return tuple(found)
 
 
-def _uniform(recording: Recording, start: int, stop: int, median: float) -> Stretch:
+def _uniform(recording: Recording, start: int, stop: int, step: float) -> Stretch:
     source = slice(start, stop)
     time, position = recording.time[source], recording.position[:, source]
     count = len(time)
     ideal = time[0] + (time[-1] - time[0]) / (count - 1) * np.arange(count)
-    if np.max(np.abs(time - ideal)) > UNIFORM_TOLERANCE * median:
+    if np.max(np.abs(time - ideal)) > UNIFORM_TOLERANCE * step:
         # The median of jittered steps is off by up to a per cent; the number of steps is not.
-        steps = int(np.sum(np.maximum(np.rint(np.diff(time) / median), 1.0)))
+        steps = int(np.sum(np.maximum(np.rint(np.diff(time) / step), 1.0)))
         ideal = np.linspace(time[0], time[-1], steps + 1)
         position = cubic_spline(time, position, ideal)
     rate = (len(ideal) - 1) / (ideal[-1] - ideal[0])
-    torque = _torque_at(recording, source, ideal, median)
+    torque = _torque_at(recording, source, ideal, step)
     clipped = _clipped_at(recording, source, ideal)
     return Stretch(recording.name, recording.trajectory, ideal, position, torque, float(rate), source, clipped)
 
@@ -179,20 +179,20 @@ def _clipped_at(recording: Recording, source: slice, grid: Array) -> NDArray[np.
     return clipped
 
 
-def _torque_at(recording: Recording, source: slice, grid: Array, median: float) -> Array | None:
+def _torque_at(recording: Recording, source: slice, grid: Array, step: float) -> Array | None:
     """Return the effort of a part of a recording on a uniform grid, as it is where the samples lie on it."""
     if recording.effort is None:
         return None
     time, effort = recording.time[source], recording.effort[:, source]
-    if len(time) == len(grid) and np.max(np.abs(time - grid)) <= UNIFORM_TOLERANCE * median:
+    if len(time) == len(grid) and np.max(np.abs(time - grid)) <= UNIFORM_TOLERANCE * step:
         return effort
     return np.array([np.interp(grid, time, row) for row in effort])
 
 
 def with_effort_of(stretch: Stretch, recording: Recording) -> Stretch:
     """Return a stretch with the effort of another recording of the same samples; the motion is shared."""
-    median = float(np.median(np.diff(recording.time)))
-    return replace(stretch, torque=_torque_at(recording, stretch.source, stretch.time, median))
+    middle = median(np.diff(recording.time))
+    return replace(stretch, torque=_torque_at(recording, stretch.source, stretch.time, middle))
 
 
 def torque_of(stretch: Stretch) -> Array:

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, median
 from scara_ident.motion.motion import Stretch
 from scara_ident.motion.prepared import (
     REST_NOISE,
@@ -30,6 +30,9 @@ WHOLE = 0.1
 WIDE = 0.2
 # Drawn by seed: fits, candidates and what is left all look at the same.
 _NOISIER: WeakKeyDictionary[PreparedData, dict[int, PreparedData]] = WeakKeyDictionary()
+# Of every joint of a stretch the step of its encoder, or else the standard deviation of its white noise.
+NoiseSizes = tuple[tuple[float | None, float], ...]
+_SIZES: WeakKeyDictionary[PreparedData, tuple[tuple[NoiseSizes, ...], ...]] = WeakKeyDictionary()
 # Where steps fall anew is that of a position that has little left of them: with much left, the same ones would come
 # again. Whether it is the motion to less than a step matters not.
 STEPLESS = 0.02
@@ -55,7 +58,7 @@ def encoder_step(position: Array) -> float | None:
     if len(change) < 4:
         return None
     least = float(np.min(change))
-    step = float(np.median(change[change < 1.5 * least]))
+    step = median(change[change < 1.5 * least])
     multiple = change / step
     # Beyond so many steps at once the error of the step itself adds up.
     near = multiple[multiple < 1.0 / WHOLE]
@@ -141,7 +144,7 @@ def noise_level(part: PreparedStretch, joint: int) -> float:
     stretch = part.stretch
     smooth, cut = _smooth(part, joint)
     # The median ignores the moments at which real motion is faster than the filter.
-    scatter = float(np.median(np.abs(stretch.position[joint] - smooth))) / NORMAL_MEDIAN
+    scatter = median(np.abs(stretch.position[joint] - smooth)) / NORMAL_MEDIAN
     nyquist = 0.5 * stretch.rate
     return float(scatter / np.sqrt(max(nyquist - cut, 0.1 * nyquist) / nyquist))
 
@@ -152,6 +155,21 @@ def _smooth(part: PreparedStretch, joint: int, widest: float = WIDE) -> tuple[Ar
     if cut is not None and cut <= widest:
         return part.motion.q[joint], cut
     return part.stretch.filtered(joint, widest)[0], widest
+
+
+def noise_sizes(data: PreparedData) -> tuple[tuple[NoiseSizes, ...], ...]:
+    """Return the sizes of the noise of every stretch of every recording, measured once."""
+    if data not in _SIZES:
+
+        def of_recording(item: PreparedRecording) -> tuple[NoiseSizes, ...]:
+            steps = tuple(encoder_step(row) for row in item.recording.position)
+            return tuple(
+                tuple((step, 0.0 if step else noise_level(part, joint)) for joint, step in enumerate(steps))
+                for part in item.stretches
+            )
+
+        _SIZES[data] = tuple(map(of_recording, data.recordings))
+    return _SIZES[data]
 
 
 def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
@@ -175,19 +193,20 @@ def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
 def _drawn(data: PreparedData, seed: int) -> PreparedData:
     rng = np.random.default_rng(seed)
     recordings = []
-    for item in data.recordings:
-        steps = [encoder_step(row) for row in item.recording.position]
-        parts = tuple(replace(part, stretch=_noisier(part, steps, rng)) for part in item.stretches)
+    for item, each in zip(data.recordings, noise_sizes(data), strict=True):
+        parts = tuple(
+            replace(part, stretch=_noisier(part, sizes, rng)) for part, sizes in zip(item.stretches, each, strict=True)
+        )
         recordings.append(PreparedRecording(item.recording, parts))
     return replace(data, recordings=tuple(recordings))
 
 
-def _noisier(part: PreparedStretch, steps: list[float | None], rng: np.random.Generator) -> Stretch:
+def _noisier(part: PreparedStretch, sizes: NoiseSizes, rng: np.random.Generator) -> Stretch:
     stretch = part.stretch
     position = stretch.position.copy()
-    for joint, step in enumerate(steps):
+    for joint, (step, level) in enumerate(sizes):
         if step is None:
-            position[joint] += noise_level(part, joint) * rng.standard_normal(position.shape[1])
+            position[joint] += level * rng.standard_normal(position.shape[1])
         else:
             smooth = _smooth(part, joint, STEPLESS)[0] + step * rng.choice((UNLIKE, 1.0 - UNLIKE))
             position[joint] += step * np.round(smooth / step) - smooth

@@ -14,7 +14,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, median
 from scara_ident.manners import Frozen
 from scara_ident.motion.low_pass import HIGHEST_CUT, ROWS_AT_ONCE, low_pass, low_pass_every
 from scara_ident.motion.motion import Motion, Stretch, motion_of, stretches, torque_of, with_effort_of
@@ -383,7 +383,7 @@ def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | N
     # The median ignores the moments at which real motion is faster than the filter.
     gain = 2.0 * np.pi * float(np.sqrt(reach**3 / (3.0 * removed))) / 0.6745
     small = 2 * np.count_nonzero(gain * rest <= least) > len(rest)
-    return least if small else max(least, gain * float(np.median(rest)))
+    return least if small else max(least, gain * median(rest))
 
 
 def _runs_longer_than(mask: NDArray[np.bool_], length: int, widen: int) -> NDArray[np.bool_]:

@@ -300,6 +300,7 @@ def test_many_rows_keep_the_digits_of_a_dense_solution(condition: float):
 
 
 def test_many_rows_unlike_the_first_are_absorbed_as_exactly(monkeypatch):
+    monkeypatch.setattr(information, "AT_ONCE", 0)
     # At rest, then a motion: what was known is no scale for what comes.
     table = weak_rows(1, 2 * GRAM_ROWS, 10.0)
     still = table[:GRAM_ROWS] * np.array([1e-9, 1.0, 0.0, 1.0, 1e-9, 1.0])
@@ -313,7 +314,10 @@ def test_many_rows_unlike_the_first_are_absorbed_as_exactly(monkeypatch):
         assert_allclose(one.solve().value, exact.solve().value, rtol=1e-12)
 
 
-def test_columns_of_any_size_and_dependent_ones_take_the_quick_way_and_keep_their_digits():
+def test_columns_of_any_size_and_dependent_ones_take_the_quick_way_and_keep_their_digits(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.setattr(information, "AT_ONCE", 0)
     table = weak_rows(2, 3 * GRAM_ROWS, 1e4)
     table[:, 3] = table[:, 1]
     table *= 10.0 ** np.array([8.0, -8.0, 0.0, 5.0, -3.0, 2.0])
@@ -331,7 +335,8 @@ def test_columns_of_any_size_and_dependent_ones_take_the_quick_way_and_keep_thei
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("value", [1e200, np.nan, np.inf])
-def test_what_the_quick_way_cannot_take_is_left_to_the_other(value: float):
+def test_what_the_quick_way_cannot_take_is_left_to_the_other(value: float, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(information, "AT_ONCE", 0)
     table = weak_rows(3, 2 * GRAM_ROWS, 10.0)
     known = Information.empty(5).absorb_columns(table[:GRAM_ROWS].T)
     table[-1, 2] = value

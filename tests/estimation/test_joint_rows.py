@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scara_ident.estimation.information import merge
-from scara_ident.estimation.joint_rows import JointRows, joined
+from scara_ident.estimation.joint_rows import BLOCKS_AT_ONCE, JointRows, block_products, joined
 
 COLUMNS = np.array([0, 2, 3])
 
@@ -54,3 +54,23 @@ def test_joined_rows_stand_one_after_the_other_with_their_owners():
     (none,), nobody = joined([], [COLUMNS])
     assert none.table.shape == (4, 0)
     assert len(nobody) == none.samples == 0
+
+
+def test_products_of_blocks_of_any_length_are_those_of_each_alone():
+    rng = np.random.default_rng(3)
+    bounds = np.cumsum([0, 4, 0, 1, *rng.integers(0, 7, BLOCKS_AT_ONCE)])
+    signals = rng.standard_normal((3, bounds[-1]))
+    found = block_products(signals, bounds)
+    for place, (start, stop) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
+        own = signals[:, start:stop]
+        assert found[place] == pytest.approx(own @ own.T, rel=1e-12, abs=1e-12)
+    assert block_products(signals[:, :0], np.array([0])).shape == (0, 3, 3)
+
+
+def test_consecutive_blocks_are_the_same_memory_and_others_keep_their_order():
+    item = rows(1)
+    assert np.shares_memory(item.part(np.array([2, 3, 4])).table, item.table)
+    found = item.part(np.array([5, 0, 1, 3]))
+    assert np.array_equal(found.table, item.table[:, [15, 16, 17, 0, 1, 2, 3, 4, 5, 9, 10, 11]])
+    assert found.starts.tolist() == [0, 3, 6, 9, 12]
+    assert item.part(np.zeros(0, dtype=np.intp)).table.shape == (4, 0)

@@ -1,0 +1,22 @@
+"""The median of real numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scara_ident.arrays import median
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 10, 1001])
+def test_the_median_is_that_of_numpy(count: int) -> None:
+    values = np.random.default_rng(count).standard_normal(count)
+    before = values.copy()
+    assert median(values) == np.median(values)
+    assert np.array_equal(values, before)
+
+
+def test_one_number_that_is_none_leaves_none() -> None:
+    assert np.isnan(median(np.array([1.0, np.nan, 2.0, 0.0])))
+    assert np.isnan(median(np.array([np.nan])))
+    assert median(np.array([1.0, np.inf, 2.0])) == 2.0
