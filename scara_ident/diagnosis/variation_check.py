@@ -22,6 +22,9 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     That is what they differ by with the effect in the model, for without it they seem to differ more. Only of an effect
     that acts in some recordings it is what they differ by without: they may differ by it, or by what runs differ by.
 
+    Nothing is said of what is taken out of the data: there is a mean of these runs whatever they differ by, and left in it
+    others would stand for it. Whether it is more than that is asked where it is named (`found_effect`).
+
     Parameters
     ----------
     step : SelectionStep
@@ -31,6 +34,8 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     least_gain : float, optional
         What it must remove there. While others are missing runs seem to differ more, and nothing is asked.
     """
+    if decision.candidate.corrects_data:
+        return None
     found = decision.examination
     (own,) = step.columns.rows(step.scene, [decision.candidate])
     chosen = step.columns.rows(step.scene, step.chosen)
@@ -40,7 +45,7 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     joints = with_columns(step.observations, added)
     variation = run_variation(step.observations, joints, value)
     why = "runs differ from one another by as much: with that counted as noise"
-    if len(step.observations.data.recordings) < LEAST_RUNS and not decision.candidate.corrects_data:
+    if len(step.observations.data.recordings) < LEAST_RUNS:
         variation = assumed_delays(step.observations, joints, value)
         why = f"a delay of each run by some {ASSUMED_DELAY * 1e3:g} ms does as much: with that counted as noise"
     if not variation:
@@ -51,11 +56,9 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     (gain,) = gains(model, [rows], [decision.candidate.member.joint], [again])
     if step.in_doubt(again, gain):
         again = examine_rows(model, rows, again)
-    # One delay for all runs is their mean, which they confirm by themselves however few they are.
-    tried = 1 if decision.candidate.corrects_data else step.tried
-    if again.p_value * tried > step.criteria.family_error:
+    if again.p_value * step.tried > step.criteria.family_error:
         return f"{why} p = {again.p_value:.1e}"
-    if gain < least_gain and not decision.candidate.corrects_data:
+    if gain < least_gain:
         return f"{why} it removes {max(gain, 0.0):.1%} of the squared residual, {least_gain:.0%} is asked"
     return None
 
