@@ -194,6 +194,8 @@ def search(
     first = scene = scene_of(task.model, start.value, observations)
     everything = [Candidate(effect, member) for effect in task.catalogue for member in effect.members(scene)]
     candidates = [item for item in everything if item.label(scene) not in without]
+    if columns.unresolved_for(None) is not None:
+        candidates = []
     tried = max(1, len(candidates))
     task.progress(f"making the columns of {len(candidates)} candidates", 0.0)
     columns.rows(first, candidates)
