@@ -13,7 +13,14 @@ from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.gain import gains
 from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.estimation.run_variation import ASSUMED_DELAY, LEAST_RUNS, RunVariation, assumed_delays, run_variation
+from scara_ident.estimation.run_variation import (
+    ASSUMED_DELAY,
+    ASSUMED_FRICTION,
+    LEAST_RUNS,
+    RunVariation,
+    assumed_variation,
+    run_variation,
+)
 
 
 def variation_objection(step: SelectionStep, decision: Decision, least_gain: float = 0.0) -> str | None:
@@ -46,8 +53,9 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     variation = run_variation(step.observations, joints, value)
     why = "runs differ from one another by as much: with that counted as noise"
     if len(step.observations.data.recordings) < LEAST_RUNS:
-        variation = assumed_delays(step.observations, joints, value)
-        why = f"a delay of each run by some {ASSUMED_DELAY * 1e3:g} ms does as much: with that counted as noise"
+        variation = assumed_variation(step.observations, joints, value)
+        each = f"friction that differs by some {ASSUMED_FRICTION:.0%} and a delay of some {ASSUMED_DELAY * 1e3:g} ms"
+        why = f"{each} in each run may do as much: with that counted as noise"
     if not variation:
         return None
     model = whitened(step.model, variation)

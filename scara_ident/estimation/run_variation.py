@@ -28,8 +28,9 @@ KINDS = ("friction", "torque scale", "offset", "delay")
 
 # With fewer recordings than this none can be told from the parameters.
 LEAST_RUNS = 3
-# Of fewer each is taken to have a delay of its own with this standard deviation, s: few samples of a slow recorder.
-ASSUMED_DELAY = 0.003
+# Of fewer each is taken to have friction and a delay of its own with these standard deviations, a share and s: what a gear
+# does as it warms, and few samples of a slow recorder.
+ASSUMED_FRICTION, ASSUMED_DELAY = 0.05, 0.003
 # Of differences below this share of the torque nothing is said in words.
 SPOKEN_OF = 0.01
 # Directions of a run below this share of the largest are not told apart.
@@ -219,8 +220,8 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
     return RunVariation(tuple(None if item is None else next(estimated) for item in sums))
 
 
-def assumed_delays(observations: Observations, joints: Sequence[JointRows], value: Array) -> RunVariation:
-    """Return how runs would differ had each a delay of its own, where they are too few to say so.
+def assumed_variation(observations: Observations, joints: Sequence[JointRows], value: Array) -> RunVariation:
+    """Return how runs would differ had each friction and a delay of its own, where they are too few to say so.
 
     Parameters
     ----------
@@ -229,12 +230,13 @@ def assumed_delays(observations: Observations, joints: Sequence[JointRows], valu
     """
     runs = len(observations.data.recordings)
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
-    std = np.where(np.array(KINDS) == "delay", ASSUMED_DELAY, 0.0)
+    assumed = {"friction": ASSUMED_FRICTION, "delay": ASSUMED_DELAY}
+    std = np.array([assumed.get(kind, 0.0) for kind in KINDS])
     found: list[JointVariation | None] = []
     for joint, rows in enumerate(joints):
         noise = float(np.sqrt(np.mean((rows.table[-1] - value[rows.columns] @ rows.table[:-1]) ** 2)))
         directions = _directions(observations, joint, rows, value)
-        told = noise > 0.0 and bool(np.any(directions[-1]))
+        told = noise > 0.0 and bool(np.any(directions[std > 0.0]))
         item = JointVariation(directions, std, np.zeros((runs, len(KINDS))), noise, rows.starts[firsts])
         found.append(item if told else None)
     return RunVariation(tuple(found))
