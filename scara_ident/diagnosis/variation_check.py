@@ -16,6 +16,7 @@ from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.estimation.run_variation import (
     ASSUMED_DELAY,
     ASSUMED_FRICTION,
+    ASSUMED_OFFSET,
     LEAST_RUNS,
     RunVariation,
     assumed_variation,
@@ -54,8 +55,8 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     why = "runs differ from one another by as much: with that counted as noise"
     if len(step.observations.data.recordings) < LEAST_RUNS:
         variation = assumed_variation(step.observations, joints, value)
-        each = f"friction that differs by some {ASSUMED_FRICTION:.0%} and a delay of some {ASSUMED_DELAY * 1e3:g} ms"
-        why = f"{each} in each run may do as much: with that counted as noise"
+        each = f"friction by some {ASSUMED_FRICTION:.0%}, an offset by {ASSUMED_OFFSET:.0%} of its torque, a delay by "
+        why = f"{each}{ASSUMED_DELAY * 1e3:g} ms: runs that differ so may do as much: with that counted as noise"
     if not variation:
         return None
     model = whitened(step.model, variation)

@@ -66,7 +66,7 @@ def test_in_two_runs_a_late_joint_may_be_late_in_each_by_itself():
     assert decision.accepted
     why = variation_objection(step, decision)
     assert why is not None
-    assert "a delay of some 3 ms in each run may do as much" in why
+    assert "a delay by 3 ms: runs that differ so may do as much" in why
     # One of all joints is taken out of the data instead, and asked nothing of the kind.
     (common,) = step.judge([Candidate(TimeDelay(), Member(None))])
     assert variation_objection(step, common) is None
