@@ -15,6 +15,8 @@ Item = dict[str, Any]
 BEHIND = {"time_delay": "delay", "torque_gain_mismatch": "scale"}
 # Of its size, by which what was taken out of the data may lie off.
 CLOSE = 0.25
+# Of the true model's held-out error, by which another's may be larger.
+CLOSE_TO = 1.05
 # Ways to part the sets: a heading, and the class of a set.
 SPLITS: tuple[tuple[str, Callable[[Item], str]], ...] = (
     ("robot", lambda item: item["robot"]),
@@ -162,7 +164,7 @@ def _by_condition(heading: str, split: Callable[[Item], str], items: Sequence[It
     if len(parts) < 2:
         return
     print(
-        f"\n{heading:24} sets  false  none: false unexpl.  above limit: right  held out <=1.05  within 2 std"
+        f"\n{heading:24} sets  false  none: false unexpl.  above limit: right  held out <=1.05, all fitted  within 2 std"
         "     s    MB  verdicts"
     )
     for name, each in sorted(parts.items(), key=lambda part: _number_of(part[0])):
@@ -173,7 +175,7 @@ def _by_condition(heading: str, split: Callable[[Item], str], items: Sequence[It
         print(
             f"{name:24} {len(each):4d} {_rate([bool(wrong(i)) for i in each])}  {_of(none, lambda i: bool(wrong(i)))} "
             f"{_of(none, lambda i: i['verdict'] == 'unexplained')}  {_of(above, right):>18} "
-            f"{_rate([ratio <= 1.05 for ratio in ratios]):>16} {covered(each):>13} "
+            f"{_rate([ratio <= CLOSE_TO for ratio in ratios]):>16} {_rate(_fitted(each)):>11} {covered(each):>13} "
             f"{np.median([i['seconds'] for i in each]):5.1f} {np.median([i['memory'] for i in each]):5.0f}  "
             + ", ".join(f"{verdict} {count}" for verdict, count in verdicts.most_common())
         )
@@ -225,7 +227,12 @@ def _summary(items: Sequence[Item], limits: dict[str, float]) -> None:
     _share("outside the catalogue: nothing believed that is not there", [not item["found"] for item in unlisted])
     _share("outside the catalogue: `complete`", [item["verdict"] == "complete" for item in unlisted])
     ratios = [item["to_true_model"] for item in items if item.get("to_true_model") is not None]
-    _share("held-out error of the worst joint at most 1.05 of the true model's", [ratio <= 1.05 for ratio in ratios])
+    _share(
+        "held-out error of the worst joint at most 1.05 of the true model's", [ratio <= CLOSE_TO for ratio in ratios]
+    )
+    _share("the same of the true structure with all parameters fitted to the same recordings", _fitted(items))
+    for why, count in Counter(_missing(item, limits) for item in items if _far(item)).most_common():
+        print(f"  more than that: {count:4d} {why}")
     if ratios:
         print(
             f"that ratio: median {np.median(ratios):.3f}, 95 % {np.quantile(ratios, 0.95):.3f}, largest {max(ratios):.3g}"
@@ -241,6 +248,31 @@ def _summary(items: Sequence[Item], limits: dict[str, float]) -> None:
         values = [item[name] for item in items if item.get(name) is not None]
         if values:
             print(f"{name} of a diagnosis: median {np.median(values):.1f}, largest {max(values):.1f} {unit}")
+
+
+def _fitted(items: Sequence[Item]) -> list[bool]:
+    """Return for each set whether the true structure, fitted to the same recordings, predicts as well as the true model."""
+    ratios = [item.get("fitted_to_true_model") for item in items if item.get("to_true_model") is not None]
+    return [ratio <= CLOSE_TO for ratio in ratios if ratio is not None]
+
+
+def _far(item: Item) -> bool:
+    return (item.get("to_true_model") or 0.0) > CLOSE_TO
+
+
+def _missing(item: Item, limits: dict[str, float]) -> str:
+    """Return why a set's held-out error is larger than the true model's."""
+    if (item.get("fitted_to_true_model") or 0.0) > CLOSE_TO:
+        return "what these recordings know of the parameters: the true structure does no better"
+    if wrong(item):
+        return "an effect believed that is not there"
+    if all(hits(item)):
+        return "all found, parameters worse than those of the true structure"
+    if item["kind"] in SEVERAL:
+        return "several effects, not all of them found"
+    return (
+        "an effect above its limit, not found" if above_limit(item, limits) else "an effect below its limit, not found"
+    )
 
 
 def varies(item: Item) -> str:

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from virtual_conditions import Asked, Conditions, draw_conditions, draw_states
-from virtual_motions import random_motion
-from virtual_sets import random_arm, usual_torque
+from virtual_motions import random_motion, refuse_shaking
+from virtual_sets import random_arm, under_control, usual_torque
 
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot
-from scara_ident.simulation import TorqueNoise, TrueMotion, VirtualArm, simulate
+from scara_ident.simulation import SimulationResult, TorqueNoise, TrueMotion, VirtualArm, simulate
 
 Array = NDArray[np.float64]
 
@@ -65,15 +65,21 @@ def rigid_runs(robot: str, seed: int, folder: Path, asked: Asked) -> RigidRuns:
             motions[run.motion] = random_motion(f"M{run.motion + 1}", arm, run.kind, run.duration, moves)
     usual = usual_torque(arm, [motions[run.motion] for run in conditions.runs if not run.held_out])
     arm = replace(arm, torque_noise=conditions.noise * usual)
+    drawn = draw_states(states, arm, conditions, usual)
     noise = TorqueNoise(conditions.noise_kind, conditions.correlation_time)
-    results = []
-    for run, state in zip(conditions.runs, draw_states(states, arm, conditions, usual), strict=True):
-        results.append(
-            simulate(
+
+    def simulated(arm: VirtualArm) -> list[SimulationResult]:
+        results = []
+        for run, state in zip(conditions.runs, drawn, strict=True):
+            result = simulate(
                 arm, motions[run.motion], seed=seed, repetition=run.repetition, rate=conditions.rate,
                 ticks=conditions.ticks, averaged=False, noise=noise, run=state,
-            )
-        )  # fmt: skip
+            )  # fmt: skip
+            refuse_shaking(motions[run.motion], result.true.acceleration)
+            results.append(result)
+        return results
+
+    arm, results = under_control(arm, simulated)
     # Names tell nothing, so that nothing can be told by them.
     named = [
         replace(item.recording, name=f"run_{k + 1:02d}", trajectory="run", repetition=k + 1)

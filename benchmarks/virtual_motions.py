@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.errors import RecordingError
 from scara_ident.robot.robot import Robot
 from scara_ident.simulation import ReferenceMotion, VirtualArm
 from scara_ident.simulation.inverse_dynamics import inverse_dynamics
@@ -33,6 +34,9 @@ EFFORT_SHARE = 0.7
 # What an attempt that exceeds a torque is slowed down by; where none is left gravity alone exceeds it, and the drive's
 # limit cuts in.
 SLOWER, ATTEMPTS = 0.8, 10
+# A controller that makes an arm accelerate by this many times what its motion asks drives it to and fro against its torque
+# limits. With a coarse encoder arms tremble, by up to ten times.
+SHAKING = 15.0
 # A motion comes out of rest and back to it within this time, s.
 RAMP = 1.0
 
@@ -75,6 +79,13 @@ def after_rest(motion: ReferenceMotion, lead: float) -> ReferenceMotion:
         velocity=np.concatenate([still, motion.velocity], axis=1),
         acceleration=np.concatenate([still, motion.acceleration], axis=1),
     )
+
+
+def refuse_shaking(motion: ReferenceMotion, acceleration: Array) -> None:
+    """Refuse the acceleration of an arm, (n, N), that its controller drives to and fro instead: nobody records that."""
+    asked, seen = (np.sqrt(np.mean(part**2, axis=1)) for part in (motion.acceleration, acceleration))
+    if np.any(seen > SHAKING * np.max(asked)):
+        raise RecordingError(f"{motion.name}: the controller shakes the arm; take a slower one")
 
 
 def ranges(robot: Robot) -> tuple[Array, Array]:

@@ -14,17 +14,17 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 from virtual_conditions import Asked, Conditions, Noise, Start, draw_conditions, draw_lead, draw_states
 from virtual_events import draw_events, event_truth
-from virtual_motions import after_rest, random_motion
+from virtual_motions import after_rest, random_motion, refuse_shaking
 
 from scara_ident.errors import ScaraIdentError
 from scara_ident.recording.recording import Recording, split_name, write_recording
@@ -44,6 +44,7 @@ from scara_ident.simulation import (
 from scara_ident.simulation.inverse_dynamics import inverse_dynamics
 from scara_ident.simulation.truth import truth
 
+T = TypeVar("T")
 # Every effect, with the parameter that a random factor scales its size by.
 SIZE = {
     "transmission_loss": "loss_coefficient",
@@ -266,20 +267,26 @@ def simulate_set(
     leads = [draw_lead(states, conditions) for _ in conditions.runs]
     moved = [after_rest(motions[run.motion], lead) for run, lead in zip(conditions.runs, leads, strict=True)]
     met = draw_events(meets, arm, moved) if asked.events else [()] * len(moved)
-    for _ in range(ATTEMPTS):
-        try:
-            recordings, events = _recorded(arm, moved, conditions, effects, drawn, met, seed)
-            break
-        except ScaraIdentError as error:
-            # An elastic joint may be more than a fast controller can hold, as on a real arm: then a slower one is taken.
-            lost, arm = error, replace(arm, controller=arm.controller.faster(SLOWER))
-    else:
-        raise lost
+    arm, (recordings, events) = under_control(
+        arm, lambda arm: _recorded(arm, moved, conditions, effects, drawn, met, seed)
+    )
     count = sum(not run.held_out for run in conditions.runs)
     return VirtualSet(
         kind, seed, arm, described, effects, factors, conditions, drawn, recordings[:count], recordings[count:],
         events if asked.events else None,
     )  # fmt: skip
+
+
+def under_control(arm: VirtualArm, record: Callable[[VirtualArm], T]) -> tuple[VirtualArm, T]:
+    """Return what an arm records, and the arm with a controller that holds it."""
+    for _ in range(ATTEMPTS):
+        try:
+            return arm, record(arm)
+        except ScaraIdentError as error:
+            # An elastic joint, or a light one, may be more than a fast controller can hold, as on a real arm: then a slower
+            # one is taken.
+            lost, arm = error, replace(arm, controller=arm.controller.faster(SLOWER))
+    raise lost
 
 
 def _recorded(
@@ -298,6 +305,7 @@ def _recorded(
             arm, motion, effects=[*effects, *own], seed=seed, repetition=run.repetition,
             rate=conditions.rate, ticks=conditions.ticks, averaged=conditions.averaged, noise=noise, run=state,
         )  # fmt: skip
+        refuse_shaking(motion, result.true.acceleration)
         name = f"run_{k + 1:02d}" if conditions.numbered else result.recording.name
         trajectory, repetition = split_name(name)
         recordings.append(replace(result.recording, name=name, trajectory=trajectory, repetition=repetition))

@@ -145,3 +145,21 @@ def test_the_torque_of_an_event_is_what_the_closed_loop_gives(sets: ModuleType, 
             # The edges of a push are counted with its full force.
             np.testing.assert_allclose(list(told["rms"].values()), rms, rtol=0.15, atol=0.05)
     assert "push" in kinds
+
+
+def test_an_arm_that_its_controller_shakes_gets_a_slower_one(sets: ModuleType) -> None:
+    import virtual_motions
+
+    arm = virtual_arm(load_robot("panda"))
+    motion = virtual_motions.random_motion("M", arm, "sweep", 4.0, np.random.default_rng(4))
+    tried = []
+
+    def record(arm: object) -> str:
+        tried.append(arm.controller.derivative[0])
+        virtual_motions.refuse_shaking(motion, (1.5 if len(tried) > 2 else 40.0) * motion.acceleration)
+        return "recorded"
+
+    held, recorded = sets.under_control(arm, record)
+    assert recorded == "recorded"
+    assert tried == pytest.approx([arm.controller.derivative[0] * sets.SLOWER**k for k in range(3)])
+    assert held.controller.derivative[0] == tried[-1]

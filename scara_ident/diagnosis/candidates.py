@@ -89,6 +89,12 @@ class CandidateColumns:
         """Joints of which nothing is to be believed, and why, see `unresolved_joints`."""
         return unresolved_joints(self.observations.data)
 
+    def unresolved_for(self, joint: int | None) -> str | None:
+        """Say why nothing is to be believed of a joint; of the whole arm, for None, where that is so of all joints."""
+        if joint is None and len(self.unresolved) == len(self.observations.joints):
+            return next(iter(self.unresolved.values()))
+        return None if joint is None else self.unresolved.get(joint)
+
     def beside(self, observations: Observations) -> CandidateColumns:
         """Return the same columns beside other torques on the same motion."""
         return CandidateColumns(observations, self._rows, self._raw, self._signals)

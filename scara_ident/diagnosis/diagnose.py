@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
+from scara_ident.diagnosis.correction import corrected
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
 from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence, unsure_of_others
@@ -26,7 +27,7 @@ from scara_ident.diagnosis.held_out_states import HeldOut, held_out_states
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.model_selection import Outcome, Unexplained, rms_of, select_model
 from scara_ident.diagnosis.screening import Dependence
-from scara_ident.diagnosis.search import Search, SearchTask, corrected
+from scara_ident.diagnosis.search import Search, SearchTask
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.diagnosis.tentative import TentativeEffect, tentative_effects
 from scara_ident.diagnosis.work import first, searching

@@ -10,7 +10,8 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
-from scara_ident.diagnosis.search import Search, corrected
+from scara_ident.diagnosis.correction import corrected
+from scara_ident.diagnosis.search import Search
 from scara_ident.effects import Scene
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.usable import with_rows

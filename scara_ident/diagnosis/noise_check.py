@@ -25,9 +25,9 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
         That lets it in.
     """
     found, criteria = decision.examination, step.criteria
-    joint = decision.candidate.member.joint
-    if joint is not None and joint in step.columns.unresolved:
-        return step.columns.unresolved[joint]
+    unresolved = step.columns.unresolved_for(decision.candidate.member.joint)
+    if unresolved is not None:
+        return unresolved
     own = step.noisier.columns.rows(step.noisier.scene, [decision.candidate])
     (again,) = examine(step.noisier.model, own, criteria)
     left = without_noise(found, again)

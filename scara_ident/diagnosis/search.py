@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
+from scara_ident.diagnosis.correction import Correction, taken_out
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import parameters_beside
 from scara_ident.diagnosis.lines import line_candidates
@@ -29,21 +30,6 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.motion.low_pass import HIGHEST_CUT
 from scara_ident.motion.prepared import PreparedData
 from scara_ident.progress import Work
-
-
-@dataclass(frozen=True, eq=False)
-class Correction:
-    """An effect that was taken out of the recordings, such as a delay.
-
-    Attributes
-    ----------
-    candidate : Candidate
-    value : ndarray, shape (k,)
-        In all.
-    """
-
-    candidate: Candidate
-    value: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,6 +183,8 @@ def search(
     first = scene = scene_of(task.model, start.value, observations)
     everything = [Candidate(effect, member) for effect in task.catalogue for member in effect.members(scene)]
     candidates = [item for item in everything if item.label(scene) not in without]
+    if columns.unresolved_for(None) is not None:
+        candidates = []
     tried = max(1, len(candidates))
     task.progress(f"making the columns of {len(candidates)} candidates", 0.0)
     columns.rows(first, candidates)
@@ -224,9 +212,9 @@ def search(
             break
         candidate, found = winner.candidate, winner.examination
         if candidate.corrects_data:
-            observations = observations.with_torque(corrected(observations.data, candidate, found.value))
-            columns = columns.beside(observations)
-            correction = Correction(candidate, found.value + (correction.value if correction else 0.0))
+            columns, value = taken_out(SelectionStep(scene, columns, chosen, weights, tried, criteria), candidate)
+            observations = columns.observations
+            correction = Correction(candidate, value + (correction.value if correction else 0.0))
         else:
             chosen = (*chosen, candidate)
         if not candidate.corrects_data or candidate.effect.settled(found.value):
@@ -238,6 +226,12 @@ def search(
         repeated = bool(steps) and steps[-1].decision.label == winner.label
         left = tuple(item.rms(value) if item.rows else None for item in fitted.by_joint)
         steps[len(steps) - repeated :] = [Step(winner, scene, chosen, observations.data, value, left)]
+    if correction is not None:
+        # What came in since had moved it.
+        columns, value = taken_out(
+            SelectionStep(scene, columns, chosen, weights, tried, criteria), correction.candidate
+        )
+        correction = replace(correction, value=value + correction.value)
     kept = _backward(SelectionStep(scene, columns, chosen, weights, tried, criteria))
     scene, kept = tune(scene, columns, weights, kept, criteria.rotor_inertia_std)
     labels = {item.label(scene) for item in kept}
@@ -263,13 +257,6 @@ def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Sc
     band = max((band for band in data.bands if band is not None), default=HIGHEST_CUT * slowest)
     scene = Scene(model, value, longest, slowest, band, travel, speed, start, columns=columns_at_hand(observations))
     return replace(scene, armatures=guessed_armatures(scene))
-
-
-def corrected(data: PreparedData, candidate: Candidate, value: Array) -> PreparedData:
-    """Return recordings without an effect that is taken out of them."""
-    effect, member = candidate.effect, candidate.member
-    mended = (item.with_effort_of(effect.corrected(item.recording, member, value)) for item in data.recordings)
-    return replace(data, recordings=tuple(mended))
 
 
 def _choose(

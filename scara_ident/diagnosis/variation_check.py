@@ -13,7 +13,15 @@ from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.gain import gains
 from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.estimation.run_variation import ASSUMED_DELAY, LEAST_RUNS, RunVariation, assumed_delays, run_variation
+from scara_ident.estimation.run_variation import (
+    ASSUMED_DELAY,
+    ASSUMED_FRICTION,
+    ASSUMED_OFFSET,
+    LEAST_RUNS,
+    RunVariation,
+    assumed_variation,
+    run_variation,
+)
 
 
 def variation_objection(step: SelectionStep, decision: Decision, least_gain: float = 0.0) -> str | None:
@@ -21,6 +29,9 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
 
     That is what they differ by with the effect in the model, for without it they seem to differ more. Only of an effect
     that acts in some recordings it is what they differ by without: they may differ by it, or by what runs differ by.
+
+    Nothing is said of what is taken out of the data: there is a mean of these runs whatever they differ by, and left in it
+    others would stand for it. Whether it is more than that is asked where it is named (`found_effect`).
 
     Parameters
     ----------
@@ -31,6 +42,8 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     least_gain : float, optional
         What it must remove there. While others are missing runs seem to differ more, and nothing is asked.
     """
+    if decision.candidate.corrects_data:
+        return None
     found = decision.examination
     (own,) = step.columns.rows(step.scene, [decision.candidate])
     chosen = step.columns.rows(step.scene, step.chosen)
@@ -40,9 +53,10 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     joints = with_columns(step.observations, added)
     variation = run_variation(step.observations, joints, value)
     why = "runs differ from one another by as much: with that counted as noise"
-    if len(step.observations.data.recordings) < LEAST_RUNS and not decision.candidate.corrects_data:
-        variation = assumed_delays(step.observations, joints, value)
-        why = f"a delay of each run by some {ASSUMED_DELAY * 1e3:g} ms does as much: with that counted as noise"
+    if len(step.observations.data.recordings) < LEAST_RUNS:
+        variation = assumed_variation(step.observations, joints, value)
+        each = f"friction by some {ASSUMED_FRICTION:.0%}, an offset by {ASSUMED_OFFSET:.0%} of its torque, a delay by "
+        why = f"{each}{ASSUMED_DELAY * 1e3:g} ms: runs that differ so may do as much: with that counted as noise"
     if not variation:
         return None
     model = whitened(step.model, variation)
@@ -51,11 +65,9 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     (gain,) = gains(model, [rows], [decision.candidate.member.joint], [again])
     if step.in_doubt(again, gain):
         again = examine_rows(model, rows, again)
-    # One delay for all runs is their mean, which they confirm by themselves however few they are.
-    tried = 1 if decision.candidate.corrects_data else step.tried
-    if again.p_value * tried > step.criteria.family_error:
+    if again.p_value * step.tried > step.criteria.family_error:
         return f"{why} p = {again.p_value:.1e}"
-    if gain < least_gain and not decision.candidate.corrects_data:
+    if gain < least_gain:
         return f"{why} it removes {max(gain, 0.0):.1%} of the squared residual, {least_gain:.0%} is asked"
     return None
 

@@ -28,8 +28,10 @@ KINDS = ("friction", "torque scale", "offset", "delay")
 
 # With fewer recordings than this none can be told from the parameters.
 LEAST_RUNS = 3
-# Of fewer each is taken to have a delay of its own with this standard deviation, s: few samples of a slow recorder.
-ASSUMED_DELAY = 0.003
+# Of fewer each is taken to have friction, an offset and a delay of its own with these standard deviations, shares of the
+# friction and of the joint's rms torque, and s: what a gear does as it warms, a sensor between days, and few samples of a
+# slow recorder. A torque scale of its own would hide one that differs between joints.
+ASSUMED_FRICTION, ASSUMED_OFFSET, ASSUMED_DELAY = 0.05, 0.02, 0.003
 # Of differences below this share of the torque nothing is said in words.
 SPOKEN_OF = 0.01
 # Directions of a run below this share of the largest are not told apart.
@@ -221,8 +223,8 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
     return RunVariation(tuple(None if item is None else next(estimated) for item in sums))
 
 
-def assumed_delays(observations: Observations, joints: Sequence[JointRows], value: Array) -> RunVariation:
-    """Return how runs would differ had each a delay of its own, where they are too few to say so.
+def assumed_variation(observations: Observations, joints: Sequence[JointRows], value: Array) -> RunVariation:
+    """Return how runs would differ had each friction, an offset and a delay of its own, where they are too few to say so.
 
     Parameters
     ----------
@@ -231,12 +233,13 @@ def assumed_delays(observations: Observations, joints: Sequence[JointRows], valu
     """
     runs = len(observations.data.recordings)
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
-    std = np.where(np.array(KINDS) == "delay", ASSUMED_DELAY, 0.0)
     found: list[JointVariation | None] = []
     for joint, rows in enumerate(joints):
         noise = float(np.sqrt(np.mean((rows.table[-1] - value[rows.columns] @ rows.table[:-1]) ** 2)))
         directions = _directions(observations, joint, rows, value)
-        told = noise > 0.0 and bool(np.any(directions[-1]))
+        offset = ASSUMED_OFFSET * float(np.sqrt(np.mean(directions[KINDS.index("torque scale")] ** 2)))
+        std = np.array([ASSUMED_FRICTION, 0.0, offset, ASSUMED_DELAY])
+        told = noise > 0.0 and bool(np.any(directions[std > 0.0]))
         item = JointVariation(directions, std, np.zeros((runs, len(KINDS))), noise, rows.starts[firsts])
         found.append(item if told else None)
     return RunVariation(tuple(found))

@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from scara_ident.arrays import Array, median
+from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import Stretch
 from scara_ident.motion.prepared import (
     REST_NOISE,
@@ -40,6 +41,9 @@ STEPLESS = 0.02
 UNLIKE = 0.5 - np.sqrt(1.0 / 12.0)
 # Median of a normal variable's size.
 NORMAL_MEDIAN = 0.6745
+# Torque and acceleration beyond any band that are so much alike are one swing of the arm; noise of either is no part of
+# the other.
+ALIKE = 0.5
 # Time over which a joint's speed is taken, s, in which the steps of its encoder hardly count.
 SPEED_OVER = 0.1
 
@@ -107,7 +111,8 @@ def unresolved_joints(data: PreparedData) -> dict[int, str]:
     """Return which joints swing so fast and far, most of the time recorded, that rest and motion cannot be told apart.
 
     What swings beyond half the rate, as under a controller that shakes, stands at other frequencies in what is recorded;
-    the signs of speeds and the products of them that the columns hold then do not belong to the torque.
+    the signs of speeds and the products of them that the columns hold then do not belong to the torque. Where one joint
+    shakes with more torque than it moves with, all are shaken: none is resolved.
 
     Returns
     -------
@@ -130,7 +135,32 @@ def unresolved_joints(data: PreparedData) -> dict[int, str]:
                 "its positions swing too fast and far for the rate, so that rest and motion cannot be told apart: "
                 "find what shakes it, record faster or smoother motions"
             )
+    shaking = _shaking(data)
+    if shaking is not None:
+        why = f"the arm shakes: {shaking}, and friction and sampling make of that what looks like effects: "
+        found |= dict.fromkeys(range(len(data.bands)), why + "find what shakes it, and record smoother motions")
     return found
+
+
+def _shaking(data: PreparedData) -> str | None:
+    """Name a joint whose torque swings more beyond any band than it changes within, and its position with it."""
+    parts = [(part.stretch, part.stretch.torque) for part in data.stretches if part.stretch.torque is not None]
+    for joint, name in enumerate(data.recordings[0].recording.joints if parts else ()):
+        sides = [_both_sides(torque[joint], part.rate) for part, torque in parts]
+        change, swing = (sum(float(own @ own) for own in side) for side in zip(*sides, strict=True))
+        if swing <= change:
+            continue
+        with_it = [_both_sides(np.diff(part.position[joint], 2), part.rate)[1] for part, _ in parts]
+        both = sum(float(a @ b[1:-1]) for a, (_, b) in zip(with_it, sides, strict=True))
+        if abs(both) > ALIKE * np.sqrt(swing * sum(float(own @ own) for own in with_it)):
+            return f"the torque of {name} swings more beyond {WIDE * parts[0][0].rate:.3g} Hz than it changes below"
+    return None
+
+
+def _both_sides(signal: Array, rate: float) -> tuple[Array, Array]:
+    """Return how a signal, shape (N,), changes within the widest band, and what is beyond it."""
+    within = low_pass(signal, rate, WIDE * rate)
+    return within - np.mean(within), signal - within
 
 
 def noise_level(part: PreparedStretch, joint: int) -> float:

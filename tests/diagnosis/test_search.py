@@ -14,7 +14,6 @@ from scara_ident.diagnosis.search import (
     _backward,
     _sure_once_refined,
     columns_at_hand,
-    corrected,
     scene_of,
     search,
 )
@@ -168,15 +167,3 @@ def test_the_scene_is_how_far_the_recordings_reach():
     for part in seen.data.stretches:
         for held, made in zip(columns_at_hand(seen)[part.motion], MODEL.joint_columns(part.motion), strict=True):
             assert np.array_equal(held, made)
-
-
-def test_corrected_torque_is_that_of_the_recording_corrected():
-    late = [shifted(run, -0.004) for run in exact_runs()[:2]]
-    candidate = Candidate(TimeDelay(), Member(None))
-    data = observed(late).data
-    mended = corrected(data, candidate, np.array([0.004]))
-    for part, old, run in zip(mended.stretches, data.stretches, late, strict=True):
-        whole = candidate.effect.corrected(run, candidate.member, np.array([0.004]))
-        assert np.array_equal(part.torque, whole.effort)
-        assert part.motion.q is not old.motion.q
-        assert np.array_equal(part.motion.a, old.motion.a)

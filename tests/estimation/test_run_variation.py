@@ -11,7 +11,14 @@ from numpy.testing import assert_allclose
 
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.estimation import Estimate, wls
-from scara_ident.estimation.run_variation import KINDS, run_variation
+from scara_ident.estimation.run_variation import (
+    ASSUMED_DELAY,
+    ASSUMED_FRICTION,
+    ASSUMED_OFFSET,
+    KINDS,
+    assumed_variation,
+    run_variation,
+)
 from scara_ident.paper import table5_parameters
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
@@ -84,6 +91,20 @@ def test_where_runs_do_not_differ_nothing_is_found():
 
 def test_of_two_runs_nothing_is_said():
     assert not wls(observed(runs(np.random.default_rng(0), count=2))).variation
+
+
+def test_of_two_runs_friction_an_offset_and_a_delay_of_their_own_are_taken_to_be_noise():
+    seen = observed(runs(np.random.default_rng(0), (0.0,) * 4, count=2))
+    item = assumed_variation(seen, seen.joints, wls(seen).value).joints[0]
+    assert item is not None
+    offset = ASSUMED_OFFSET * np.sqrt(np.mean(item.directions[1] ** 2))
+    assert_allclose(item.std, [ASSUMED_FRICTION, 0.0, offset, ASSUMED_DELAY])
+    # More friction and another offset in the second run say nothing; noise says as much as ever.
+    second = np.arange(item.directions.shape[1]) >= item.bounds[1]
+    told = np.vstack([item.directions[[0, 2]] * second, np.random.default_rng(1).standard_normal((1, len(second)))])
+    left = np.linalg.norm(item.whitened(told), axis=1) / np.linalg.norm(told, axis=1)
+    assert np.all(left[:2] < 0.1)
+    assert left[2] > 0.98
 
 
 def test_units_of_torque_change_nothing():

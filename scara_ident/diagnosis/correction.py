@@ -1,0 +1,66 @@
+"""Effects that are taken out of the recordings, such as a delay, before anything else is said of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.selection_step import SelectionStep, observed
+from scara_ident.estimation.least_squares import value_and_weights
+from scara_ident.motion.prepared import PreparedData
+
+# Each leaves a tenth or less of what the last one left.
+MOST_CORRECTIONS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """An effect that was taken out of the recordings, such as a delay.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    value : ndarray, shape (k,)
+        In all.
+    """
+
+    candidate: Candidate
+    value: Array
+
+
+def corrected(data: PreparedData, candidate: Candidate, value: Array) -> PreparedData:
+    """Return recordings without an effect that is taken out of them."""
+    effect, member = candidate.effect, candidate.member
+    mended = (item.with_effort_of(effect.corrected(item.recording, member, value)) for item in data.recordings)
+    return replace(data, recordings=tuple(mended))
+
+
+def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColumns, Array]:
+    """Take an effect out of the data, and again while some of it is left.
+
+    A first estimate is one of first order, beside parameters that stand for some of it.
+
+    Returns
+    -------
+    CandidateColumns
+        On the rows of the corrected data.
+    ndarray, shape (k,)
+        All that was taken out.
+    """
+    whole, last = np.zeros(len(candidate.effect.columns(step.scene, candidate.member))), np.inf
+    for _ in range(MOST_CORRECTIONS):
+        (own,) = step.judge([candidate])
+        value = own.examination.value
+        size = float(np.linalg.norm(value))
+        if candidate.effect.settled(value) or size >= last:
+            break
+        whole, last = whole + value, size
+        observations = step.observations.with_torque(corrected(step.observations.data, candidate, value))
+        step = replace(step, columns=step.columns.beside(observations))
+        estimate, weights = value_and_weights(observed(step))
+        scene = replace(step.scene, value=estimate[: len(step.scene.model.columns)])
+        step = replace(step, scene=scene, weights=weights)
+    return step.columns, whole
