@@ -133,7 +133,9 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
     gains = ", ".join(
         f"{joint} {number(effect.before[joint])} to {number(effect.after[joint])} {context.unit(joint)}"
         for joint in context.diagnosis.robot.joints
-        if joint in effect.before
+        # Of most joints an effect changes nothing that could be read.
+        if joint == effect.joint
+        or (joint in effect.before and number(effect.before[joint]) != number(effect.after[joint]))
     )
     p_value = chance(effect.p_value)
     words = (

@@ -22,7 +22,7 @@ def variation_blocks(robot: Robot, variation: RunVariation | None, runs: Sequenc
     if not variation:
         return []
     rows: list[list[Cell | str]] = [
-        [name(joint), kind, *_said(std, unit_of_kind(robot, joint, kind))]
+        [name(joint), Cell(kind, "unit"), *_said(std, unit_of_kind(robot, joint, kind))]
         for joint, kinds in variation.sizes(robot).items()
         for kind, std in kinds.items()
     ]
@@ -36,7 +36,7 @@ def variation_blocks(robot: Robot, variation: RunVariation | None, runs: Sequenc
     each: list[list[Cell | str]] = []
     for joint, k, item in shown:
         found = [_said(float(off), unit_of_kind(robot, joint, KINDS[k])) for off in item.of_run[:, k]]
-        each.append([name(joint), KINDS[k], *(value for value, _ in found), found[0][1]])
+        each.append([name(joint), Cell(KINDS[k], "unit"), *(value for value, _ in found), found[0][1]])
     head = ["joint", "what differs", *runs, "unit"]
     words = (
         "Standard deviation between runs, beyond what noise makes of them; it is in the standard deviations of all parameters. "
