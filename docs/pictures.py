@@ -77,7 +77,7 @@ def report(folder: Path) -> None:
             simulate L1 CI --seed 7 {hidden} --output test
             diagnose train --validate test --output out""",
     )
-    photographed(folder / "out" / "report.html", "report", 1420)
+    photographed(folder / "out" / "report.html", "report", 818)
 
 
 def tutorial_effect(folder: Path) -> None:

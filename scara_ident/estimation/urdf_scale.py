@@ -73,11 +73,14 @@ def scale_sentence(scales: Mapping[str, float] | None, robot: Robot) -> str:
     usual = (size > 1.0 / USUAL) & (size < USUAL)
     if np.all(usual):
         spread = " to ".join(dict.fromkeys((f"{size.min():.2g}", f"{size.max():.2g}")))
-        return f"{said}. Torques of the bodies are {spread} times the URDF's."
+        same = "those of the URDF" if spread == "1" else f"{spread} times the URDF's"
+        return f"{said}. Torques of the bodies are {same}."
     asked = "are effort_gain and effort_side right?" if geared else "is effort_gain right?"
     if np.all(size < ALIKE * middle) and np.all(size > middle / ALIKE):
         return f"{said}. All inertial parameters are {middle:.2g} of the URDF's: {asked}"
     odd = ", ".join(
-        f"{scale:.2g} on {joint}" for (joint, scale), fits in zip(scales.items(), usual, strict=True) if not fits
+        f"{scale:.2g} times the URDF's on {joint}"
+        for (joint, scale), fits in zip(scales.items(), usual, strict=True)
+        if not fits
     )
-    return f"{said}. Torques of the bodies are {odd} times the URDF's: {asked}"
+    return f"{said}. Torques of the bodies are {odd}: {asked}"

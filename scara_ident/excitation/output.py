@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.next_steps import capital
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information
 from scara_ident.excitation.criteria import BlockLogDet, Condition
@@ -27,6 +28,8 @@ ROS_RATE = 100.0
 ROS_POINTS = 10.0
 # Samples per period of the highest harmonic below which a table no longer tells the motion.
 LEAST_SAMPLES = 4.0
+# Joints or limits that a sentence names, at the most.
+MOST_NAMES = 6
 # Motion above this frequency makes most arms swing, Hz.
 SWINGING = 5.0
 
@@ -228,18 +231,23 @@ def summary(design: Design) -> list[str]:
     samples = _listed(list(design.samples))
     each = "" if count == 1 or len(set(design.samples)) > 1 else " each"
     return [
-        f"{what} of {lengths} s for {', '.join(design.model.robot.joints)}.",
+        f"{what} of {lengths} s for {_few(design.model.robot.joints, 'joint')}.",
         f"Limits broken: {', '.join(broken)}."
         if broken
         else f"All limits hold, at {design.verified} samples and between them.",
         *(
-            f"{item.question.text}: {item.before:.2g} standard errors apart so far, {item.after:.2g} expected with it."
+            f"{capital(item.question.text)}: {item.before:.2g} standard errors apart so far, {item.after:.2g} expected with it."
             + (f" {item.instead}" if item.instead else "")
             for item in design.tells
         ),
-        f"Held back by {', '.join(held)}." if held else "No limit holds it back: use more harmonics.",
+        f"Held back by {_few(held, 'limit')}." if held else "No limit holds it back: use more harmonics.",
         f"Information: ln det {design.log_det:.2f} over {samples} samples{each}, condition of the regressor {condition:.4g}.",
     ]
+
+
+def _few(names: Sequence[str], noun: str) -> str:
+    """Return names, or how many there are where nobody would read them all."""
+    return ", ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} {noun}s"
 
 
 def _listed(numbers: Sequence[float]) -> str:

@@ -111,7 +111,7 @@ def _shares_said(rms: Mapping[str, Array]) -> str:
         f", {WORDS['effects']} {shares['effects']:.0%}." if "effects" in shares else "; no effects were found to add."
     )
     return (
-        f"Of the PID's tracking error {WORDS['urdf']} leaves {shares['urdf']:.0%}, {WORDS['identified']} "
+        f"Of the PID's tracking error {shares['urdf']:.0%} are left {WORDS['urdf']}, {WORDS['identified']} "
         f"{shares['identified']:.0%}{last}"
     )
 

@@ -44,7 +44,7 @@ def test_the_json_holds_the_rms_of_every_feed_forward_and_only_rollouts_that_wer
 def test_the_words_give_shares_of_the_pids_error() -> None:
     first, *others = sentences(result())
     assert first == (
-        "Of the PID's tracking error with the URDF fed forward leaves 50%, with the identified model 25%, "
+        "Of the PID's tracking error 50% are left with the URDF fed forward, with the identified model 25%, "
         "with the effects found 10%."
     )
     assert "off after 0.2 s by joint1 0.01 rad, joint2 0.02 rad" in others[1]

@@ -215,11 +215,19 @@ class Beside:
 Block = Paragraph | Heading | Listing | Table | Scale | Group | Arm | Gains | Folded | Beside
 
 
+_ESTIMATORS = {
+    "ols": "least squares",
+    "wls": "weighted least squares",
+    "rls": "recursive least squares",
+    "consistent": "weighted least squares of an arm that can exist",
+}
+
+
 def number(value: float | None, digits: int = 3) -> str:
     """Return a value with so many significant digits, zeros at the end included; a dash where there is none."""
     if value is None or not math.isfinite(value):
         return "–"
-    return f"{value:#.{digits}g}".rstrip(".")
+    return "0" if value == 0.0 else f"{value:#.{digits}g}".rstrip(".")
 
 
 def chance(probability: float) -> str:
@@ -240,6 +248,11 @@ def information_words(log_det: float | None, condition: float | None) -> str:
         f"What the motion tells of all parameters together: J_d = ln det HᵀH = {number(log_det, 4)}, the more the better. How "
         f"evenly: the condition J_k = cond HᵀH = {number(condition)}, small where no parameter is hidden behind others."
     )
+
+
+def estimator_words(method: str) -> str:
+    """Return the name of an estimator as a textbook has it; that of an installed package stays as it is."""
+    return _ESTIMATORS.get(method, method)
 
 
 def superscripts(unit: str) -> str:

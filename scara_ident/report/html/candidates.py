@@ -34,7 +34,8 @@ def _candidate(row: Mapping[str, Any], most: float) -> list[Cell | str]:
     helps, voting = row["helps_in"]
     return [
         Cell(kind="why", title=row["label"], note=row["why"]),
-        Cell(f"{row['gain']:.1%}", "unit", bar=row["gain"] / most),
+        # No minus before a gain that rounds to nothing.
+        Cell(f"{row['gain']:z.1%}", "unit", bar=row["gain"] / most),
         chance(row["p_value"]),
         f"{helps} of {voting}",
         Cell(tag=Tag("found", "good") if row["decision"] == "accepted" else Tag("rejected")),

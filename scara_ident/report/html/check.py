@@ -28,6 +28,8 @@ from scara_ident.use.check import CLOSE, Check, limits_of_joint, sentences
 
 # Points of a line, at the most.
 MOST_POINTS = 6000
+# Share of a drive's work below which a part of it is rounding.
+ROUNDING = 1e-9
 
 
 def check_report(path: Path, found: Check) -> None:
@@ -83,8 +85,10 @@ def _limits(found: Check) -> list[Block]:
                 spans + more,
             ]
         )
-    head = ("limit", "reached", "±", "bound", "unit", "at [s]", "used", "beyond it [s]")
-    words = "The value of each that is nearest to its limit, or farthest beyond. Torque is that of the drive, with its rotor, on the side where effort is recorded; ± is two standard deviations of it, by the parameters and the model's error on recordings."
+    head = ["limit", "reached", "±", "bound", "unit", "at [s]", "used", "beyond it [s]"]
+    if not found.broken:
+        head, rows = head[:-1], [row[:-1] for row in rows]
+    words = "The value of each that is nearest to its limit, or farthest beyond. Torque is that of the drive, with its rotor, on the side where effort is recorded; ± is two standard deviations of it, by the parameters and the model's error on recordings. Used: of a position, the share of the way from the middle of the range."
     return [Paragraph(words), Table(head, rows, (1, 2, 3, 5))] if rows else []
 
 
@@ -143,7 +147,7 @@ def _energy(found: Check) -> list[Block]:
             number(energy.given[j]),
             number(energy.returned[j]),
             number(energy.heated[j]),
-            *(number(energy.work[each][j]) for each in names),
+            *(number(_worth(float(energy.work[each][j]), float(energy.given[j]))) for each in names),
         ]
         for j, joint in enumerate(robot.joints)
     ]
@@ -155,6 +159,11 @@ def _energy(found: Check) -> list[Block]:
     plot = Plot("time [s]", (Panel("given less taken back [J]", _balances(found), 180),))
     figure = single("energy-time", "Energy of each drive over time", "", plot)
     return [Paragraph(words), Table(head, rows, tuple(range(1, len(head)))), Group("energy-group", (figure,))]
+
+
+def _worth(work: float, given: float) -> float:
+    """Return a work that is no mere rounding of the work given, or else 0."""
+    return 0.0 if abs(work) < ROUNDING * abs(given) else work
 
 
 def _balances(found: Check) -> list[Layer]:

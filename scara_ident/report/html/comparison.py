@@ -17,6 +17,7 @@ from scara_ident.report.html.blocks import (
     Paragraph,
     Scale,
     Table,
+    estimator_words,
     name,
     number,
     superscripts,
@@ -30,6 +31,12 @@ from scara_ident.report.plot import Figure, Layer, Line, Panel, Plot, single, st
 FULL_RATIO = 10.0
 # Ratio to what the covariance promises from which an error is marked as bias.
 BIASED = 2.0
+# What a trajectory is like, joint by joint: key, words, kind of unit. Without repetitions no runs scatter.
+CHARACTERISTICS = (
+    ("sigma", "scatter of runs", "torque"),
+    ("peak_velocity", "peak velocity", "velocity"),
+    ("peak_acceleration", "peak acc.", "acceleration"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,16 +65,21 @@ def _trajectories(context: ComparisonContext) -> list[Block]:
     """What every trajectory is like."""
     if not context.content.get("characteristics"):
         return []
+    every = context.content["characteristics"].values()
+    columns = [
+        (key, words, kind)
+        for key, words, kind in CHARACTERISTICS
+        if any(value is not None for what in every for value in (what.get(key) or {}).values())
+    ]
     rows: list[list[Cell | str]] = []
     for trajectory in context.trajectories:
         what = context.content["characteristics"][trajectory]
         row: list[Cell | str] = [name(trajectory), number(what.get("log_det"), 4), number(what.get("condition"))]
-        for key in ("sigma", "peak_velocity", "peak_acceleration"):
+        for key, *_ in columns:
             row += [number((what.get(key) or {}).get(joint)) for joint in context.joints]
         rows.append([*row, str(len(what.get("recordings", ())))])
-    columns = (("scatter of runs", "torque"), ("peak velocity", "velocity"), ("peak acc.", "acceleration"))
     head = ["trajectory", "J_d", "J_k"]
-    head += [f"{what}, {joint}{context.unit(joint, kind)}" for what, kind in columns for joint in context.joints]
+    head += [f"{what}, {joint}{context.unit(joint, kind)}" for _, what, kind in columns for joint in context.joints]
     head.append("runs")
     words = "J_d: what the motion tells of all parameters together (ln det); J_k: condition, small where no parameter is hidden behind others."
     return [Paragraph(words), Table(head, rows, range(1, len(head)))]
@@ -139,7 +151,7 @@ def _parameter_cell(value: float | None, std: float | None, middle: float) -> Ce
     if value is None or std is None:
         return Cell("undetermined", "num")
     strength = float(np.clip((value - middle) / (6.0 * std), -1.0, 1.0)) if std else 0.0
-    return Cell(digits(value, std), "num", strength, note=f"± {std:.1g}")
+    return Cell(digits(value, std), "num", strength, note=f"± {number(std, 2)}")
 
 
 def _friction_curves(context: ComparisonContext) -> list[Block]:
@@ -189,7 +201,7 @@ def comparison_report(path: Path, content: Mapping[str, Any]) -> None:
     trajectories = f"{len(content['trajectories'])} trajectories"
     Page(
         f"Comparison of trajectories, {content.get('robot', '')}".rstrip(", "),
-        f"{content.get('model', '')} model by {content.get('method', 'least squares')}; {trajectories}".strip(),
+        f"{content.get('model', '')} model by {estimator_words(content.get('method', 'ols'))}; {trajectories}".strip(),
         content.get("summary") or (f"{trajectories} compared.",),
         parts("comparison", SECTIONS, ComparisonContext(content)),
     ).write(path)

@@ -32,7 +32,7 @@ def contact_report(path: Path, found: ContactFindings) -> None:
         NamedSection("torque", "External torque", _torque),
         NamedSection("thresholds", "Thresholds", _thresholds),
     )
-    subtitle = f"{count(len(found.observed), 'recording')}; {alarm.rate:g} false alarms per hour are stated"
+    subtitle = f"{count(len(found.observed), 'recording')}; thresholds for {alarm.rate:g} false alarm{'' if alarm.rate == 1.0 else 's'} an hour"
     page = Page(f"Contact with {robot.name}", subtitle, sentences(found), parts("contact", sections, found))
     page.write(path)
 

@@ -18,7 +18,6 @@ from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.html.blocks import (
     Block,
     Cell,
-    Folded,
     Gain,
     Gains,
     Heading,
@@ -36,6 +35,7 @@ from scara_ident.report.html.candidates import candidate_blocks
 from scara_ident.report.html.certainty import evidence_blocks, tentative_blocks
 from scara_ident.report.html.chapters import Chapter, chapters
 from scara_ident.report.html.events import events_blocks
+from scara_ident.report.html.gain import gain_blocks
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.parameters import digits
 from scara_ident.report.html.remainder import remainder_group
@@ -48,8 +48,9 @@ from scara_ident.report.traces import FittedContext, Trace, traces
 from scara_ident.report.use import WORDS
 from scara_ident.threads import one_blas_thread
 
-KINDS = (("validation", "held out"), ("training", "training"))
 PICTURED = (("validation", "held-out"), ("training", "training"))
+# Share of the remainder that a dependence explains at least, to be shown: below it reads 0.0 %.
+LEAST_EXPLAINED = 5e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,41 +83,7 @@ class DiagnosisContext(FittedContext):
 
 def _gain(context: DiagnosisContext) -> list[Block]:
     """Errors before and after."""
-    content, joints = context.content, context.diagnosis.robot.joints
-    rows: list[list[Cell | str]] = []
-    for kind, words in KINDS:
-        part = content[kind]
-        for joint in joints if part["before"] else ():
-            before, after = part["before"][joint], part["after"][joint]
-            shares = [_share(part[f"{when}_relative"][joint]) for when in ("before", "after")]
-            row: list[Cell | str] = [words, name(joint), number(before), number(after), _change(before, after)]
-            rows.append([*row, *shares, number(content["noise_floor"].get(joint)), context.unit(joint)])
-    head = ["recordings", "joint", "before", "after", "what is left", "before, of torque", "after, of torque"]
-    head += ["noise floor", "unit"]
-    detail: list[list[Cell | str]] = [
-        [name(recording), words, *(number(row[when][joint]) for joint in joints for when in ("before", "after"))]
-        for kind, words in KINDS
-        for recording, row in content["recordings"][kind].items()
-    ]
-    columns = [f"{joint} {when} [{context.unit(joint)}]" for joint in joints for when in ("before", "after")]
-    return [
-        Paragraph(
-            "Rms residual within the band. Held-out recordings took no part in any choice; the noise floor is what does not repeat."
-        ),
-        Table(head, rows, (2, 3, 5, 6, 7)),
-        Folded("every recording", Table(("recording", "", *columns), detail, range(2, 2 + len(columns)))),
-    ]
-
-
-def _change(before: float | None, after: float | None) -> Cell:
-    if not before or after is None:
-        return Cell()
-    change = round(100.0 * (after / before - 1.0))
-    return Cell(f"{f'{change:+d}' if change else '0'} %", "unit", track=after / before)
-
-
-def _share(value: float | None) -> str:
-    return "–" if value is None else f"{value:.1%}"
+    return gain_blocks(context.content, context.diagnosis.robot)
 
 
 def _story(context: DiagnosisContext) -> list[Block]:
@@ -166,7 +133,9 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
     gains = ", ".join(
         f"{joint} {number(effect.before[joint])} to {number(effect.after[joint])} {context.unit(joint)}"
         for joint in context.diagnosis.robot.joints
-        if joint in effect.before
+        # Of most joints an effect changes nothing that could be read.
+        if joint == effect.joint
+        or (joint in effect.before and number(effect.before[joint]) != number(effect.after[joint]))
     )
     p_value = chance(effect.p_value)
     words = (
@@ -217,8 +186,14 @@ def _variation(context: DiagnosisContext) -> Sequence[Block]:
 
 def _next(context: DiagnosisContext) -> list[Block]:
     """What to record next."""
-    found = [item.sentence() for item in next_steps(context.diagnosis)]
-    return [listing(found) if found else Paragraph("Nothing in these recordings asks for another experiment.")]
+    steps, aliases = next_steps(context.diagnosis), len(context.diagnosis.aliases)
+    # The last ones are what the model absorbs on any data, which has a table of its own.
+    found = [item.sentence() for item in steps[: len(steps) - aliases]]
+    blocks: list[Block] = [
+        listing(found) if found else Paragraph("Nothing in these recordings asks for another experiment.")
+    ]
+    absorbed = f"Another {count(aliases, 'effect')} would need a measurement of another kind: see What cannot be known."
+    return [*blocks, Paragraph(absorbed)] if aliases else blocks
 
 
 def _left(context: DiagnosisContext) -> list[Block]:
@@ -257,7 +232,7 @@ def _depending(context: DiagnosisContext) -> list[Block]:
             Cell(f"{item.explained:.1%}", "num", max(0.0, min(1.0, item.explained))),
             f"{number(item.rms)} {context.unit(item.joint)}",
         ]
-        for item in [item for item in context.diagnosis.dependences if item.explained > 0.0][:6]
+        for item in [item for item in context.diagnosis.dependences if item.explained > LEAST_EXPLAINED][:6]
     ]
     if rows:
         words = "What the remainder depends on: share of its square that means over signals explain on trajectories that they were not taken from."
@@ -364,7 +339,7 @@ def diagnosis_report(path: Path, context: DiagnosisContext) -> None:
         found = parts("diagnosis", SECTIONS, context)
     subtitle = (
         f"{diagnosis.before.model.name} model; {count(len(diagnosis.training_after.data.recordings), 'recording')}, {len(diagnosis.validation_after.data.recordings)} held out; "
-        f"{diagnosis.search.tried} candidates and scan points tried; verdict: {diagnosis.verdict}"
+        f"{diagnosis.search.tried} candidates tried"
     )
     verdict = _verdict(diagnosis, content["summary"])
     warn = diagnosis.verdict in ("unexplained", "undecided")

@@ -83,7 +83,9 @@ def _limits(context: ExcitationContext) -> list[Block]:
         used = Cell("" if share is None else f"{share:.0%}", track=share, tag=tag)
         unit = superscripts(str(each.get("unit", "")))
         rows.append([name(limit), number(each.get("reached")), number(each.get("bound")), unit, used])
-    words = Paragraph("What the motion reaches of each limit, between its samples too.")
+    words = Paragraph(
+        "What the motion reaches of each limit, between its samples too; of a position, the share of the way from the middle of the range."
+    )
     return [words, Table(("limit", "reached", "bound", "unit", "used"), rows, (1, 2))] if rows else []
 
 
@@ -103,7 +105,9 @@ def excitation_report(path: Path, content: Mapping[str, Any], robot: Robot, moti
     """
     context = ExcitationContext(content, robot, motions)
     broken = [limit for limit, each in context.limits if (each.get("share") or 0.0) > 1.0]
-    verdict = list(content.get("summary") or ()) or [
+    # The numbers of its information have a section of their own, which explains them.
+    said = [each for each in content.get("summary") or () if not each.startswith("Information:")]
+    verdict = said or [
         f"A motion of {number(content.get('duration'))} s.",
         f"Broken limits: {', '.join(broken)}." if broken else "All limits hold.",
     ]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.identification.identify import Identification, undetermined
-from scara_ident.report.html.blocks import Block, Heading, Paragraph, count, information_words
+from scara_ident.report.html.blocks import Block, Heading, Paragraph, count, estimator_words, information_words
 from scara_ident.report.html.events import events_blocks
 from scara_ident.report.html.friction import friction_group
 from scara_ident.report.html.page import Page, parts
@@ -153,10 +153,13 @@ def identification_report(path: Path, context: IdentificationContext) -> None:
         found = parts("identification", SECTIONS, context)
     fitted, held_out = identification.training, identification.validation
     subtitle = (
-        f"{identification.model.name} model, {len(identification.model.columns)} parameters, {identification.estimate.method}; "
+        f"{identification.model.name} model, {len(identification.model.columns)} parameters, {estimator_words(identification.estimate.method)}; "
         f"{count(len(fitted.data.recordings), 'recording')}, {fitted.samples} samples fitted, {count(len(held_out.data.recordings), 'recording')} held out"
     )
-    verdict = (_headline(identification), *sentences(identification))
+    # How runs differ has a section of its own.
+    variation = identification.estimate.variation
+    elsewhere = {f"{said}." for said in variation.sentences(identification.model.robot)} if variation else set()
+    verdict = (_headline(identification), *(said for said in sentences(identification) if said not in elsewhere))
     title = f"Identification of {identification.model.robot.name}"
     Page(title, subtitle, verdict, found, bool(undetermined(identification))).write(path)
 

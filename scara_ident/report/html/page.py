@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -10,11 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 
 from scara_ident.errors import ScaraIdentError
 from scara_ident.files import write_text
-from scara_ident.report.html.blocks import Arm, Beside, Block, Folded, Gains, Group
+from scara_ident.report.html.blocks import Arm, Beside, Block, Folded, Gains, Group, superscripts
 from scara_ident.report.html.section import Kind, Section, added_sections
+
+# Sentences below the verdict that are all shown, at the most; of more only the first are.
+MOST_SAID, FIRST_SAID = 6, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +44,7 @@ class Page:
     warn : bool
         Whether the verdict is bad news.
     picture : Gains, optional
-        Beside the verdict.
+        Below the verdict's first sentence.
     """
 
     title: str
@@ -48,6 +53,19 @@ class Page:
     parts: Sequence[Part]
     warn: bool = False
     picture: Gains | None = None
+
+    @property
+    def shown(self) -> Sequence[str]:
+        """What stands below the verdict's first sentence: what comes first of the others, and what asks something."""
+        others = self.verdict[1:]
+        return [
+            said for k, said in enumerate(others) if len(others) <= MOST_SAID or k < FIRST_SAID or said.endswith("?")
+        ]
+
+    @property
+    def folded(self) -> Sequence[str]:
+        """The sentences that are shown on demand."""
+        return [said for said in self.verdict[1:] if said not in self.shown]
 
     def render(self) -> str:
         """Return the whole file's text."""
@@ -100,7 +118,18 @@ def _environment() -> Environment:
     )
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     environment.globals["asset"] = asset
+    environment.filters |= {"typeset": typeset, "breakable": breakable}
     return environment
+
+
+def typeset(text: str) -> str:
+    """Return words as the page sets them: powers raised, a number on one line with its unit, a space before %."""
+    return re.sub(r"(?<=\d) ?%", "\u00a0%", superscripts(text).replace("N m", "N\u00a0m"))
+
+
+def breakable(text: str) -> Markup:
+    """Return a name that paper and phones may break between its words."""
+    return Markup("<wbr>").join(map(escape, re.split(r"(?<=[_.])(?=[^\W\d])", text)))
 
 
 def asset(name: str) -> str:

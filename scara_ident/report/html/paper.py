@@ -25,7 +25,7 @@ def _checks(section: str, report: PaperReport) -> list[Block]:
             number(check.printed, 4),
             number(check.computed, 4),
             "" if check.unit == "1" else superscripts(check.unit),
-            check.condition,
+            Cell(check.condition, "unit"),
             Cell(tag=TAGS[check.agrees]),
             Cell(check.comment, "words"),
         ]

@@ -43,7 +43,9 @@ def parameter_table(estimate: Estimate) -> Table:
             tag = Tag("not told from 0", "bad") if weak else None
             share = Cell(words, "unit", bar=relative, weak=weak, tag=tag)
         unit, meaning = Cell(superscripts(column.unit), "unit"), Cell(superscripts(column.meaning), "words")
-        stated = Cell(number(float(nominal[k]), 4), "num")
+        # Sums of inertias of the URDF that cancel leave rounding.
+        cancelled = abs(nominal[k]) < NO_INERTIA * np.nanmax(np.abs(nominal), initial=0.0)
+        stated = Cell(number(0.0 if cancelled else float(nominal[k]), 4), "num")
         rows.append([name(column.name), digits(value, std), stated, interval, unit, share, meaning])
     return Table(("name", "value", "URDF", "95 % interval", "unit", "std / value", "meaning"), rows, (1, 2, 3))
 

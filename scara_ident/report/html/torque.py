@@ -80,6 +80,7 @@ def torque_plot(robot: Robot, traces: Sequence[Trace], j: int, band: float | Non
         above.append(Line(grid, predicted, "vermillion", "predicted", 1.4, "5 3").thinned(bucket))
         _, residual = banded(trace, trace.residual[j], band)
         used = trace.used[j, :: _every(trace, band)]
+        above += unused_regions(trace, j)
         below += unused_regions(trace, j)
         # What the estimate does not use may be far larger, and must not set the scale.
         idle = Line(grid, np.where(used, np.nan, residual), "grey", "residual, not used", 1.0).thinned(bucket)

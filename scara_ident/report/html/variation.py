@@ -22,7 +22,7 @@ def variation_blocks(robot: Robot, variation: RunVariation | None, runs: Sequenc
     if not variation:
         return []
     rows: list[list[Cell | str]] = [
-        [name(joint), kind, number(std), unit_of_kind(robot, joint, kind)]
+        [name(joint), Cell(kind, "unit"), *_said(std, unit_of_kind(robot, joint, kind))]
         for joint, kinds in variation.sizes(robot).items()
         for kind, std in kinds.items()
     ]
@@ -33,11 +33,11 @@ def variation_blocks(robot: Robot, variation: RunVariation | None, runs: Sequenc
         for k in range(len(KINDS))
         if item.std[k] > 0.0
     ]
-    each: list[list[Cell | str]] = [
-        [name(run), *(number(float(item.of_run[r, k])) for _, k, item in shown)] for r, run in enumerate(runs)
-    ]
-    head = ["recording"]
-    head += [f"{KINDS[k]} of {joint} [{unit_of_kind(robot, joint, KINDS[k])}]" for joint, k, _ in shown]
+    each: list[list[Cell | str]] = []
+    for joint, k, item in shown:
+        found = [_said(float(off), unit_of_kind(robot, joint, KINDS[k])) for off in item.of_run[:, k]]
+        each.append([name(joint), Cell(KINDS[k], "unit"), *(value for value, _ in found), found[0][1]])
+    head = ["joint", "what differs", *runs, "unit"]
     words = (
         "Standard deviation between runs, beyond what noise makes of them; it is in the standard deviations of all parameters. "
         "Friction and torque scale are shares of what the model predicts. Kinds that chance explains are left out."
@@ -45,5 +45,10 @@ def variation_blocks(robot: Robot, variation: RunVariation | None, runs: Sequenc
     return [
         Paragraph(words),
         Table(("joint", "what differs", "std between runs", "unit"), rows, (2,)),
-        Folded("every recording", Table(head, each, range(1, len(head)))),
+        Folded("every recording", Table(head, each, range(2, len(head) - 1))),
     ]
+
+
+def _said(size: float, unit: str) -> tuple[str, str]:
+    """Return a size and its unit; shares are said in percent."""
+    return (number(100.0 * size), "%") if unit == "1" else (number(size), unit)

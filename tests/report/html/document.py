@@ -50,7 +50,8 @@ class Document(HTMLParser):
         if self._script is not None:
             self.scripts[self._script] += data
         elif self.open and self.open[-1] != "style":
-            self.words += data
+            # Where lines may end is for the eye.
+            self.words += data.replace("\N{NO-BREAK SPACE}", " ")
 
 
 def document(path: Path) -> Document:

@@ -17,6 +17,15 @@ EMPTY = """() => [...document.querySelectorAll("[data-figure], [data-arm]")].fil
   return !drawn.some((shape) => { const box = shape.getBBox(); return box.width > 0 || box.height > 0; });
 }).map((figure) => figure.dataset.figure || figure.dataset.arm)"""
 
+# Words of a figure that touch others of it; those aslant stand beside each other.
+TOUCHING = """() => [...document.querySelectorAll(".plot svg")].flatMap((svg) => {
+  const words = [...svg.querySelectorAll("text.tick, text.axis")].filter((text) => !/rotate\\(-60\\)/.test(text.getAttribute("transform")));
+  const boxes = words.map((text) => [text.textContent, text.getBoundingClientRect()]);
+  return boxes.flatMap(([one, a], i) => boxes.slice(i + 1).filter(([, b]) =>
+    Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 3
+  ).map(([other]) => `${one} on ${other}`));
+})"""
+
 
 # Whether colours have contrast takes a minute on long pages: there `benchmarks/accessibility.py` looks.
 LONG = ("identification", "paper")
@@ -36,6 +45,7 @@ def barriers(page, kind: str) -> list[str]:
 def test_every_figure_is_drawn_whatever_is_chosen(pages, opened, kind):
     page = opened(pages[kind])
     assert page.evaluate(EMPTY) == []
+    assert page.evaluate(TOUCHING) == []
     # Half of the kinds on a wide light page, half on a narrow dark one.
     if kind in PAGES[::2]:
         assert barriers(page, kind) == []

@@ -49,5 +49,10 @@ def test_no_candidate_is_lost_and_those_beyond_the_first_unfold(candidates: int)
     assert len(rows(content(candidates))) == candidates + 2
 
 
+def test_a_gain_that_rounds_to_nothing_has_no_minus():
+    (line,) = rows({"effects": [], "candidates": [row("c", -1e-5)]})
+    assert line[1].text == "0.0%"
+
+
 def test_without_anything_tried_the_table_is_empty():
     assert rows({"effects": [], "candidates": []}) == []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scara_ident.report.html.check import check_figures
+from scara_ident.report.html.check import _worth, check_figures
 from tests.report.html.document import data_of, document
 
 
@@ -17,3 +17,9 @@ def test_a_broken_limit_is_shown_with_its_time(checked, checked_page):
     assert [layer["x"] for layer in torque if layer["t"] == "v"] == [checked.limited_by.time]
     assert "It cannot be run: torque of joint1" in checked_page.read_text()
     assert [len(row) for row in check_figures(checked)] == [2, 2]
+    assert "beyond it [s]" in page.words
+
+
+def test_rounding_is_no_work():
+    assert _worth(5e-19, 75.0) == 0.0
+    assert _worth(-0.3, 75.0) == -0.3

@@ -20,6 +20,9 @@ def test_a_diagnosis_tells_the_story_from_effect_to_gain(diagnosed):
     assert {"effect-1-view", "effect-1-own", "effect-1-time", "torque"} <= set(found.figures)
     assert "1. spring on joint1" in found.words
     assert "Explained: the model lacked spring on joint1" in found.words
+    # What the model absorbs on any data stands in its own table, and not among what to do next.
+    assert "or what absorbs it" not in found.words
+    assert "Effects that the model absorbs on any data" in found.words
 
 
 def test_the_residual_before_follows_what_the_effect_adds(diagnosed):

@@ -8,6 +8,7 @@ import pytest
 
 from scara_ident.errors import ScaraIdentError
 from scara_ident.report.html.identification import IdentificationContext, identification_report
+from scara_ident.report.html.page import FIRST_SAID, MOST_SAID, Page, breakable, typeset
 from tests.report.html.document import data_of, document
 from tests.report.simulated import made, run
 
@@ -68,3 +69,20 @@ def test_a_report_that_cannot_be_written_leaves_nothing(tmp_path, result):
 
 def test_ten_recordings_of_25_s_stay_below_10_mb(big):
     assert big.stat().st_size <= 10e6
+
+
+def test_a_number_stays_with_its_unit_and_percent_looks_the_same_everywhere():
+    assert (
+        typeset("5% of 3 N m/rad^2, 7.1 %")
+        == "5\N{NO-BREAK SPACE}% of 3 N\N{NO-BREAK SPACE}m/rad², 7.1\N{NO-BREAK SPACE}%"
+    )
+    assert breakable("<a_b1.lower, 0.5") == "&lt;a_<wbr>b1.<wbr>lower, 0.5"
+
+
+def test_of_a_long_verdict_the_first_sentences_are_shown_and_what_asks_something():
+    said = ["Verdict.", *(f"Sentence {k}." for k in range(MOST_SAID)), "Is the gain right?"]
+    page = Page("", "", said, ())
+    assert page.shown == [*said[1 : 1 + FIRST_SAID], "Is the gain right?"]
+    assert sorted([*page.shown, *page.folded]) == sorted(said[1:])
+    short = Page("", "", said[: MOST_SAID + 1], ())
+    assert (list(short.shown), list(short.folded)) == (said[1 : MOST_SAID + 1], [])

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from scara_ident.report.html import parameters
 from scara_ident.report.html.parameters import cheap_history, convergence_group, parameter_table
 
 
@@ -32,3 +33,10 @@ def test_the_urdfs_value_stands_beside_each_parameter_that_it_has(result):
     assert float(stated["P_d1"]) > 0.0
     # Of friction a URDF of links says nothing.
     assert stated["a01"] == "–"
+
+
+def test_what_cancels_in_the_urdf_is_0_and_no_rounding(result, monkeypatch):
+    values = np.full(len(result.model.columns), np.nan)
+    values[:2] = 16.0, -2e-16
+    monkeypatch.setattr(parameters, "urdf_values", lambda model: values)
+    assert [row[2].text for row in parameter_table(result.estimate).rows[:3]] == ["16.00", "0", "–"]

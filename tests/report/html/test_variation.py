@@ -30,13 +30,13 @@ def test_each_joint_and_kind_that_differs_has_its_row():
     assert isinstance(table, Table)
     sizes = variation.sizes(ROBOT)["joint2"]
     assert [[text(cell) for cell in row] for row in table.rows] == [
-        ["joint2", "friction", number(sizes["friction"]), "1"],
+        ["joint2", "friction", number(100.0 * sizes["friction"]), "%"],
         ["joint2", "offset", number(sizes["offset"]), "N m"],
     ]
     assert isinstance(folded, Folded)
     assert isinstance(folded.inside, Table)
-    assert folded.inside.head == ["recording", "friction of joint2 [1]", "offset of joint2 [N m]"]
-    assert [text(cell) for cell in folded.inside.rows[2]] == ["B_1", number(0.03), number(0.01)]
+    assert folded.inside.head == ["joint", "what differs", "A_1", "A_2", "B_1", "unit"]
+    assert [text(cell) for cell in folded.inside.rows[0]] == ["joint2", "friction", "6.00", "-6.00", "3.00", "%"]
 
 
 def test_where_runs_do_not_differ_nothing_is_drawn():

@@ -5,6 +5,8 @@
 const Plot = (() => {
   const LEFT = 62, RIGHT = 12, TOP = 8, GAP = 12, BOTTOM = 38;
   const NO_VALUE = -32768;
+  // Width of a character of a tick, px.
+  const DIGIT = 6.8;
   let clips = 0;
 
   const escape = (text) => String(text).replace(/[&<>"]/g, (c) => ({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})[c]);
@@ -202,12 +204,43 @@ const Plot = (() => {
     return canvas.toDataURL();
   }
 
+  // Height of a panel, what is shown in it, its range and the ticks of its axis.
+  function verticalAxis(panel, spec, state, x0, x1, width, inner) {
+    const height = panel.height * (width < 480 && !spec.small ? 0.85 : 1);
+    const shown = panel.ready.filter((layer) => !state.hidden.has(layer.name));
+    let range = panel.range ? [...panel.range] : null;
+    if (range && panel.log) range = range.map(Math.log10);
+    if (!range) {
+      const spans = shown.map((layer) => spanY(layer, x0, x1)).filter(Boolean);
+      range = spans.length ? [Math.min(...spans.map((s) => s[0])), Math.max(...spans.map((s) => s[1]))] : [0, 1];
+      if (panel.log) range[0] = Math.max(range[0], range[1] - 6);
+      const pad = 0.06 * (range[1] - range[0]) || 0.05 * Math.abs(range[0]) || 0.5;
+      range = [range[0] - pad, range[1] + pad];
+    }
+    if (spec.equal) {
+      const need = ((x1 - x0) / inner) * height, middle = 0.5 * (range[0] + range[1]);
+      range = [middle - 0.5 * need, middle + 0.5 * need];
+    }
+    const ticks = (panel.log ? logTicks : linearTicks)(...range, height / 26);
+    return {height, shown, range, ticks, words: panel.log ? (v) => number(10 ** v, 3) : tickWords(ticks)};
+  }
+
+  // Linear ticks so far apart that their words do not touch.
+  function apart(low, high, inner, gap) {
+    let ticks = [];
+    for (; gap <= inner; gap *= 1.25) {
+      ticks = linearTicks(low, high, inner / gap);
+      const words = tickWords(ticks), room = ticks.length > 1 ? ((ticks[1][0] - ticks[0][0]) / (high - low)) * inner : inner;
+      if (DIGIT * Math.max(...ticks.map(([v]) => words(v).length)) + 6 <= room) return ticks;
+    }
+    return ticks.length > 2 ? ticks.filter((_, k) => k % 2 === 0) : ticks;
+  }
+
   function draw(host, spec, state, wanted) {
     const width = Math.max(200, Math.round(wanted || host.clientWidth || 640));
     if (spec.kind === "matrix") return drawMatrix(host, spec, width);
-    const small = Boolean(spec.small), left = small ? 60 : LEFT, {names} = spec.x;
+    const small = Boolean(spec.small), {names} = spec.x, least = small ? 60 : LEFT;
     const bottom = names ? Math.min(120, 30 + 5.5 * Math.max(...names.map((name) => name.length))) : small ? 34 : BOTTOM;
-    const inner = width - left - RIGHT;
     const logX = Boolean(spec.x.log);
     if (!spec.prepared) {
       for (const panel of spec.panels) panel.ready = panel.layers.map((layer) => ready(layer, logX, panel.log));
@@ -220,33 +253,19 @@ const Plot = (() => {
       if (full[0] === full[1]) full = [full[0] - 0.5, full[1] + 0.5];
     }
     const [x0, x1] = state.view || full;
-    const sx = (v) => left + ((v - x0) / (x1 - x0)) * inner;
+    const axes = spec.panels.map((panel) => verticalAxis(panel, spec, state, x0, x1, width, width - least - RIGHT));
+    // Room for the widest number beside the words of its axis.
+    const left = spec.equal ? least : Math.max(least, ...axes.map(({ticks, words}) => Math.ceil(29 + DIGIT * Math.max(0, ...ticks.map(([v, label]) => (label ? words(v).length : 0))))));
+    const inner = width - left - RIGHT, sx = (v) => left + ((v - x0) / (x1 - x0)) * inner;
     const geometry = [];
     let y = TOP, body = "";
     // Words longer than their axis stand above it.
     const above = spec.panels.some((panel) => panel.label.length * 6.3 > panel.height);
     for (const panel of spec.panels) {
       if (above) y += 17;
-      const height = panel.height * (width < 480 && !small ? 0.85 : 1);
-      const shown = panel.ready.filter((layer) => !state.hidden.has(layer.name));
-      let range = panel.range ? [...panel.range] : null;
-      if (range && panel.log) range = range.map(Math.log10);
-      if (!range) {
-        const spans = shown.map((layer) => spanY(layer, x0, x1)).filter(Boolean);
-        range = spans.length ? [Math.min(...spans.map((s) => s[0])), Math.max(...spans.map((s) => s[1]))] : [0, 1];
-        if (panel.log) range[0] = Math.max(range[0], range[1] - 6);
-        const pad = 0.06 * (range[1] - range[0]) || 0.05 * Math.abs(range[0]) || 0.5;
-        range = [range[0] - pad, range[1] + pad];
-      }
-      if (spec.equal) {
-        const need = ((x1 - x0) / inner) * height, middle = 0.5 * (range[0] + range[1]);
-        range = [middle - 0.5 * need, middle + 0.5 * need];
-      }
-      const [y0, y1] = range, top = y;
+      const {height, shown, range: [y0, y1], ticks, words} = axes[spec.panels.indexOf(panel)], top = y;
       const sy = (v) => top + height - ((v - y0) / (y1 - y0)) * height;
       const clip = `clip${++clips}`;
-      const ticks = panel.log ? logTicks(y0, y1, height / 26) : linearTicks(y0, y1, height / 26);
-      const words = panel.log ? (v) => number(10 ** v, 3) : tickWords(ticks);
       for (const [v, label] of ticks) {
         const py = sy(v).toFixed(1);
         body += `<line class="grid" x1="${left}" x2="${left + inner}" y1="${py}" y2="${py}"/>`;
@@ -254,7 +273,7 @@ const Plot = (() => {
       }
       // Names stand at whole numbers, as many as fit.
       const every = names && Math.ceil((12 * (x1 - x0)) / inner);
-      const ticksX = names ? names.map((_, i) => [i, i % every === 0]) : (logX ? logTicks : linearTicks)(x0, x1, inner / (small ? 48 : 72));
+      const ticksX = names ? names.map((_, i) => [i, i % every === 0]) : logX ? logTicks(x0, x1, inner / (small ? 48 : 72)) : apart(x0, x1, inner, small ? 48 : 72);
       const xTicks = ticksX.filter(([v]) => v >= x0 && v <= x1);
       const xWords = logX ? (v) => number(10 ** v, 3) : tickWords(xTicks);
       const lowest = panel === spec.panels[spec.panels.length - 1];
@@ -317,7 +336,7 @@ const Plot = (() => {
     if (layer.t === "region") {
       const a = Math.max(g.left, g.sx(layer.x0)), b = Math.min(g.left + g.inner, g.sx(layer.x1));
       const top = layer.share ? g.top + g.height * (1 - layer.share) : g.top;
-      return b > a ? `<rect class="region" ${colour} x="${a.toFixed(1)}" width="${(b - a + 0.3).toFixed(1)}" y="${top}" height="${g.top + g.height - top}" fill-opacity="${layer.o || 0.1}"/>` : "";
+      return b > a ? `<rect class="region" ${colour} x="${a.toFixed(1)}" width="${(b - a).toFixed(1)}" y="${top}" height="${g.top + g.height - top}" fill-opacity="${layer.o || 0.1}"/>` : "";
     }
     if (layer.t === "h") return `<path class="line" ${colour} d="M${g.left} ${g.sy(layer.y).toFixed(1)}H${g.left + g.inner}" stroke-width="1" stroke-dasharray="5 4"/>`;
     if (layer.t === "v") return layer.x < g.x0 || layer.x > g.x1 ? "" : `<path class="line" ${colour} d="M${g.sx(layer.x).toFixed(1)} ${g.top}V${g.top + g.height}" stroke-width="1" stroke-dasharray="3 3"/>`;
@@ -344,8 +363,10 @@ const Plot = (() => {
       }
     });
     const foot = TOP + rows * cell;
+    // Words aslant need more room than words in rows.
+    const everyColumn = Math.ceil(14 / cell);
     spec.columns.forEach((name, k) => {
-      if (k % every) return;
+      if (k % everyColumn) return;
       const px = label + (k + 0.5) * cell;
       body += `<text class="tick" transform="translate(${px.toFixed(1)} ${(foot + 8).toFixed(1)}) rotate(-60)" text-anchor="end" dy=".32em">${escape(name)}</text>`;
     });

@@ -50,7 +50,7 @@
         const item = document.createElement("button");
         const kind = {band: "band", density: "band", region: "band", dots: "dot"}[layer.t] || "stroke";
         item.type = "button";
-        item.innerHTML = `<i class="${kind}${layer.d || layer.t === "h" ? " dashed" : ""}" style="--c:var(--c-${layer.c})"></i>${Plot.escape(name)}`;
+        item.innerHTML = `<i class="${kind}${layer.d || layer.t === "h" ? (parseFloat(layer.d) <= 2 ? " dotted" : " dashed") : ""}" style="--c:var(--c-${layer.c})"></i>${Plot.escape(name)}`;
         item.title = "show or hide";
         item.setAttribute("aria-pressed", "true");
         item.onclick = () => {
