@@ -139,6 +139,8 @@ def _features(state: Sequence[Array], joint: int) -> Array:
     columns += [np.tanh(2.0 * own), own, own**3, own * np.abs(own)]
     columns += [np.sin(2.0 * angle), np.cos(2.0 * angle), sign * np.sin(angle), sign * np.cos(angle)]
     columns += [sign * np.abs(torque), torque, torque**3, sign * np.minimum(sign * torque, 0.0)]
-    result = np.array([*columns, *np.sin(q), *np.cos(q), *turn, *v, *a])
+    # A spring, or a cable, pulls by the angle itself.
+    away = q - np.mean(q, axis=1, keepdims=True)
+    result = np.array([*columns, *away, *np.sin(q), *np.cos(q), *turn, *v, *a])
     size = np.sqrt(np.mean(result**2, axis=1, keepdims=True))
     return np.asarray(result / np.where(size > 0.0, size, 1.0))
