@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from scara_ident.identification.binned_residual import Binned, binned
@@ -40,6 +42,22 @@ def test_an_offset_and_a_drift_of_a_run_are_taken_off_and_a_push_is_not():
     assert size(after[1]) < 0.06
     push = slice(2000 // before[2].size + 1, 2250 // before[2].size - 1)
     assert np.mean(after[2].left[0, push]) > 0.9 * np.mean(before[2].left[0, push])
+
+
+def test_a_runs_own_friction_is_taken_off_where_it_hardly_ever_turns_back():
+    item = made([np.zeros(part.samples) for part in STRETCHES])[0]
+    # Two seconds back among eighteen forth, in which an offset and friction add up to nothing.
+    speed = np.ones(item.taken.shape)
+    speed[:, 250:300] = -1.0
+    q, _, a, load = item.state
+    turned = replace(
+        item,
+        raw=item.raw + np.repeat(1.0 - speed, item.size, axis=1),
+        used=np.ones_like(item.used),
+        state=(q, speed, a, load),
+    )
+    (after,) = without_trends([turned])
+    assert np.max(np.abs(np.mean(after.left[:, 255:295], axis=1))) < 0.1
 
 
 def test_what_comes_with_the_motion_in_all_recordings_is_taken_off_and_what_happens_once_is_not():
