@@ -8,6 +8,7 @@ the motion is exact for a stiff position controller. Its size is the largest rms
 that the model leaves of the same recordings without the push, as recorded, which has runs that differ and what is missing in it.
 
     python benchmarks/events.py --robot ur5 --recordings 100 --seed 1           # pushes
+    python benchmarks/events.py --robot scara03 --recordings 30 --seed 1 --named 10   # is an effect named for one?
     python benchmarks/events.py --robot ur5 --recordings 1800 --seed 2 --quiet   # 10 h without one
 """
 
@@ -22,13 +23,18 @@ from typing import Any, get_args
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.signal import lfilter, welch
+from scipy.stats import norm
 from virtual_conditions import Noise
 from virtual_motions import KINDS, random_motion
 
+from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import robust_fit
+from scara_ident.identification.binned_residual import SLOW
+from scara_ident.identification.event_search import FALSE_EVERY
 from scara_ident.identification.events import Event, find_events
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.model.model import build_model
@@ -49,6 +55,8 @@ RAMP = 0.03
 # Found: it overlaps. Timely: both ends within this, s.
 TIMELY = 0.1
 CLEAR = 3.0
+# Length of the pieces that a spectrum is the mean of, s.
+PIECE = 2.0
 
 
 @dataclass(frozen=True)
@@ -70,6 +78,8 @@ class Set:
     missing: str
     noise: str
     differ: bool
+    sigma: Array
+    keep: float
 
 
 def made_set(robot: Robot, arm: VirtualArm, rng: np.random.Generator, pushed: bool) -> Set:
@@ -119,7 +129,8 @@ def made_set(robot: Robot, arm: VirtualArm, rng: np.random.Generator, pushed: bo
         step = 2.0 * np.pi / 2**bits
         seen = np.round(q / step) * step
         recordings.append(Recording(f"r{k}", f"r{k}", 1, robot.joints, at, seen, torque))
-    return Set(recordings, added, push, missing, kind, differ)
+    keep = float(np.exp(-1.0 / (rate * noise.correlation_time))) if kind == "coloured" else 0.0
+    return Set(recordings, added, push, missing, kind, differ, sigma, keep)
 
 
 def lacking(missing: str, arm: VirtualArm, q: Array, v: Array, torque: Array) -> Array:
@@ -156,18 +167,77 @@ def observed(robot: Robot, recordings: list[Recording]) -> Observations:
     return observe(model, usable_in_bands(model, recordings)[0])
 
 
-def size_of(robot: Robot, made: Set) -> float:
-    """Return how large a push is, over what the model leaves without it."""
+@dataclass(frozen=True)
+class Possible:
+    """What can be known of a push.
+
+    Attributes
+    ----------
+    size : float
+        How large it is, over what the model leaves without it.
+    power : tuple of float
+        Of the best tests: that of the noise's law, and that of the spectrum of what the model leaves.
+    timely : tuple of float
+        With what probability both ends are within `TIMELY` if their errors are no smaller than Cramer and Rao's bound, of each.
+    hidden : bool
+        Whether all joints are slow where it begins or where it ends.
+    """
+
+    size: float
+    power: tuple[float, float]
+    timely: tuple[float, float]
+    hidden: bool
+
+
+def possible(robot: Robot, made: Set) -> Possible:
+    """Return what can be known of a push."""
     assert made.push is not None and made.added is not None
+    push, added = made.push, made.added
     plain = [
-        replace(item, effort=item.effort - made.added) if item.name == made.push.recording else item
-        for item in made.recordings
+        replace(item, effort=item.effort - added) if item.name == push.recording else item for item in made.recordings
     ]
     observations = observed(robot, plain)
-    left = observations.unfiltered_rms(weighted_value(observations.by_joint))
-    (run,) = (item for item in made.recordings if item.name == made.push.recording)
-    inside = (run.time >= made.push.start) & (run.time <= made.push.stop)
-    return float(np.max(np.sqrt(np.mean(made.added[:, inside] ** 2, axis=1)) / left))
+    value = weighted_value(observations.by_joint)
+    (run,) = (item for item in made.recordings if item.name == push.recording)
+    place = next(k for k, item in enumerate(observations.data.recordings) if item.name == push.recording)
+    parts = [k for k, item in enumerate(observations.data.recordings) for _ in item.stretches]
+    stretches = zip(parts, observations.data.stretches, observations.predicted(value), strict=True)
+    part, left = max(
+        ((part, part.torque - predicted) for k, part, predicted in stretches if k == place),
+        key=lambda item: item[1].shape[1],
+    )
+    speed = np.abs(part.motion.v)
+    slow = np.all(speed < SLOW * np.max(speed, axis=1, keepdims=True), axis=0)
+    ends = np.searchsorted(part.stretch.time - run.time[0], (push.start, push.stop))
+    hidden = bool(np.any(slow[np.minimum(ends, len(slow) - 1)]))
+    inside = (run.time >= push.start) & (run.time <= push.stop)
+    size = float(np.max(np.sqrt(np.mean(added[:, inside] ** 2, axis=1)) / observations.unfiltered_rms(value)))
+    rate = 1.0 / float(np.median(np.diff(run.time)))
+    # One false event an interval as long as push and event, which overlap.
+    level = norm.isf(2.0 * (push.stop - push.start) / FALSE_EVERY)
+    slope = np.gradient(added, axis=1) * rate
+    middle = 0.5 * (push.start + push.stop)
+    ramps = [np.where(chosen, slope, 0.0) for chosen in (run.time < middle, run.time >= middle)]
+    power, timely = [], []
+    for deflection in (lambda signal: by_law(made, signal), lambda signal: by_spectrum(left, signal, rate)):
+        power.append(float(norm.cdf(deflection(added) - level)))
+        timely.append(float(np.prod([1.0 - 2.0 * norm.sf(TIMELY * deflection(ramp)) for ramp in ramps])))
+    return Possible(size, (power[0], power[1]), (timely[0], timely[1]), hidden)
+
+
+def by_law(made: Set, signal: Array) -> float:
+    """Return the deflection of the matched filter for a signal (n, N) in the noise alone, as normal."""
+    whitened = lfilter([1.0, -made.keep], [1.0], signal, axis=1) / np.sqrt(1.0 - made.keep**2)
+    return float(np.sqrt(np.sum((whitened / made.sigma[:, None]) ** 2)))
+
+
+def by_spectrum(left: Array, signal: Array, rate: float) -> float:
+    """Return the deflection of the matched filter for a signal (n, N) in stationary noise with the spectrum of a residual."""
+    count = signal.shape[1]
+    at, density = welch(left, rate, nperseg=min(round(PIECE * rate), left.shape[1]), detrend=False, axis=1)
+    frequency, power = np.fft.rfftfreq(count, 1.0 / rate), np.abs(np.fft.rfft(signal, axis=1)) ** 2
+    noise = np.array([np.interp(frequency, at, row) for row in density])
+    return float(np.sqrt(4.0 / (rate * count) * np.sum(power / noise)))
 
 
 def matches(event: Event, push: Push) -> bool:
@@ -190,6 +260,9 @@ def main() -> None:
     parser.add_argument("--recordings", type=int, default=100, help="with a push each; without, in all")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--quiet", action="store_true", help="no pushes: false events an hour")
+    parser.add_argument(
+        "--named", type=int, default=0, help="so many sets, complete but for a clear push, are diagnosed"
+    )
     parser.add_argument("--minutes", type=float, default=np.inf, help="no further set after so long")
     parser.add_argument("--verbose", action="store_true")
     given = parser.parse_args()
@@ -200,6 +273,7 @@ def main() -> None:
     cost: list[float] = []
     false: Counter[str] = Counter()
     rows: list[dict[str, Any]] = []
+    named: list[str] = []
     until = time.monotonic() + 60.0 * given.minutes
     while done < given.recordings and time.monotonic() < until:
         made = made_set(robot, arm, np.random.default_rng([given.seed, k]), not given.quiet)
@@ -222,10 +296,14 @@ def main() -> None:
         if made.push is not None:
             push = made.push
             ends = (min(e.start for e in own) - push.start, max(e.stop for e in own) - push.stop) if own else None
-            size = size_of(robot, made)
+            can = possible(robot, made)
+            size = can.size
             rows.append(
                 {
                     "size": size,
+                    "power": can.power,
+                    "timely": can.timely,
+                    "hidden": can.hidden,
                     "found": bool(own),
                     "ends": ends,
                     "held": _held(own, push),
@@ -239,12 +317,18 @@ def main() -> None:
                 "kinds": {event.kind for event in own},
                 "score": max((event.score for event in own), default=0.0),
             }
+            if size > CLEAR and made.missing == "none" and len(named) < given.named:
+                named.append(", ".join(item.label for item in diagnose(robot, made.recordings).effects))
             if given.verbose or (size > CLEAR and (ends is None or max(map(abs, ends)) > TIMELY)):
                 print(f"set {k}: {push} {rows[-1]}", flush=True)
     print(f"{k} sets, {seconds / 3600.0:.2f} h; {np.median(cost):.3f} s a set to look (median)")
     print(
         f"false events: {sum(false.values())}, {sum(false.values()) / seconds * 36000.0:.2f} in 10 h; by effect missing: {dict(false)}"
     )
+    if named:
+        print(
+            f"sets that lack nothing, with a push: {len(named)}; an effect named in {sum(map(bool, named))}: {set(filter(bool, named))}"
+        )
     clear = [row for row in rows if row["size"] > CLEAR]
     if clear:
         got = [row for row in clear if row["found"]]
@@ -252,6 +336,15 @@ def main() -> None:
         contact = [row for row in got if "contact" in row["kinds"]]
         print(f"pushes above {CLEAR:g} times the noise: {len(clear)} of {len(rows)}; found {len(got)} ({len(got) / len(clear):.0%}), "
               f"both ends within {TIMELY:g} s {len(timely)}, called contact {len(contact)}")  # fmt: skip
+        for k, known in enumerate(("the noise", "the spectrum of what the model leaves")):
+            could = [sum(row[name][k] for row in clear) for name in ("power", "timely")]
+            least = min(row["power"][k] for row in clear)
+            print(f"  the best test that knows push and {known} finds {could[0]:.1f} (the least likely with {least:.0%}), "
+                  f"both ends within {TIMELY:g} s of {could[1]:.1f}")  # fmt: skip
+        seen = [row for row in got if not row["hidden"]]
+        print(
+            f"  no end hidden by friction: {len(seen)}, both ends within {TIMELY:g} s {sum(row in timely for row in seen)}"
+        )
         stated = [held for row in got if row["held"] for held in row["held"]]
         widths = np.quantile([width for row in got for width in row["unsure"]] or [np.nan], (0.5, 0.95))
         print(f"  ends within what is stated of them: {sum(stated)} of {len(stated)}, which is {widths[0]:.2f} s wide (95 %: {widths[1]:.2f} s)")  # fmt: skip

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from scara_ident.estimation.tail import fit_tail
 from scara_ident.use.alarm import stated_level
-from scara_ident.use.tail import fit_tail
 
 Array = NDArray[np.float64]
 RATE, APART, RECORDINGS = 20.0, 10, 12

@@ -17,8 +17,8 @@ SLOWER = (0.03, 0.08, 0.2)
 # Functions of the state taken off at the most, the share of the squared residual that one removes at the least, what harm
 # counts against gain, and standard deviations beyond which a bin's weight falls.
 MOST_FEATURES, LEAST_GAIN, HARM, INFLUENCE = 6, 0.02, 0.5, 10.0
-# A trend is fitted to one of so many bins, of which there are so many for each of its columns.
-THIN, LEAST_BINS = 2, 10
+# A trend is fitted to one of so many bins, of which there are so many for each of its columns, in so many rounds.
+THIN, LEAST_BINS, ROUNDS = 2, 10, 7
 # Seconds of a recording below which its trend is an offset alone.
 LONG_ENOUGH = 10.0
 
@@ -54,19 +54,20 @@ def _robust_trend(rows: Sequence[Array], left: Sequence[Array], known: Sequence[
     size = np.sqrt(np.mean(together**2, axis=1, keepdims=True))
     size = np.where(size > 0.0, size, 1.0)
     together = together / size
-    value = np.zeros(len(together))
     if np.sum(use) < LEAST_BINS * len(together):
         return [np.zeros_like(item) for item in left]
-    for _ in range(6):
+    # Begun by least squares: of a run that hardly ever turns back, that is not what stands out.
+    weight = use
+    for _ in range(ROUNDS):
+        weighted = together * weight
+        normal = weighted @ together.T
+        normal += 1e-6 * np.trace(normal) / len(normal) * np.eye(len(normal)) + 1e-300
+        value = np.linalg.solve(normal, weighted @ target)
         off = target - value @ together
         scale = NORMAL * median(np.abs(off[use > 0.0]))
         if scale == 0.0:
             break
         weight = use * np.maximum(0.0, 1.0 - (off / (4.0 * scale)) ** 2) ** 2
-        weighted = together * weight
-        normal = weighted @ together.T
-        normal += 1e-6 * np.trace(normal) / len(normal) * np.eye(len(normal)) + 1e-300
-        value = np.linalg.solve(normal, weighted @ target)
     return np.split((value / size[:, 0]) @ whole, np.cumsum([len(item) for item in left])[:-1])
 
 
@@ -139,6 +140,8 @@ def _features(state: Sequence[Array], joint: int) -> Array:
     columns += [np.tanh(2.0 * own), own, own**3, own * np.abs(own)]
     columns += [np.sin(2.0 * angle), np.cos(2.0 * angle), sign * np.sin(angle), sign * np.cos(angle)]
     columns += [sign * np.abs(torque), torque, torque**3, sign * np.minimum(sign * torque, 0.0)]
-    result = np.array([*columns, *np.sin(q), *np.cos(q), *turn, *v, *a])
+    # A spring, or a cable, pulls by the angle itself.
+    away = q - np.mean(q, axis=1, keepdims=True)
+    result = np.array([*columns, *away, *np.sin(q), *np.cos(q), *turn, *v, *a])
     size = np.sqrt(np.mean(result**2, axis=1, keepdims=True))
     return np.asarray(result / np.where(size > 0.0, size, 1.0))

@@ -3,8 +3,9 @@
 Of the residual of a robust fit in bins what the motion makes is taken off (see `event_background`). Means over windows of 0.15
 to 2 s are compared with their own scale (the median absolute value over all recordings, and over this one), in
 which colour of the noise and what the model lacks everywhere are included. A stretch stands out where such a mean is beyond
-what the largest of each second lets expect once in ten hours (Gumbel's law; Coles, *An Introduction to Statistical Modeling of
-Extreme Values*, 2001). Where it begins and ends is looked for last (see `event_ends`).
+what the largest of each second lets expect once in ten hours, by all laws that its square may have (see `estimation.tail`):
+the mean of many samples is nearly normal, and the upper tail of its square exponential. Where an event begins and ends is
+looked for last (see `event_ends`).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array, median
+from scara_ident.estimation.tail import HOUR, Tail, tail_of
 from scara_ident.identification.binned_residual import BOUND, FILLED, NORMAL, Binned
 from scara_ident.identification.event_background import without_states, without_trends
 from scara_ident.identification.event_ends import Ends, event_ends
@@ -24,13 +26,15 @@ from scara_ident.identification.event_ends import Ends, event_ends
 WINDOWS = (0.16, 0.32, 0.6, 1.2, 2.0)
 # Windows that a scale is taken from at the least, and seconds that the largest are.
 LEAST_WINDOWS, LEAST_SECONDS = 20, 5
-# At most one false event in so many seconds, and the least mean that counts, in standard deviations of its windows.
+# At most one false event in so many seconds.
 FALSE_EVERY = 36_000.0
-LEAST_SCORE = 6.5
-# What a model lacks makes the largest larger than that law; found by benchmarks/events.py.
-HEAVIER = 1.5
-# One event and the windows beside it are in at most so many seconds.
-EVENT_SECONDS = 5.0
+# The law is of the largest of so many seconds, or of that share of all if that is more, and of no more than half of them.
+TOPS, TOPS_SHARE = 50, 0.1
+# One event and the windows beside it are in so many seconds, all events in that share of all at the most. For each second beyond
+# a law that looks away from so many, some more may be of events; and for each of those the law is of some that are not.
+EVENT_SECONDS, EVENTS_SHARE, BESIDE_EVENTS, TOPS_PER_EVENT = 5, 0.15, 1.5, 3
+# Standard deviation of the tail's shape before anything is seen: what a model lacks makes it heavier than exponential.
+SHAPE = 0.1
 # Least rms of an event in standard deviations of a bin, and the share of it that least squares leave too.
 LEAST_SIZE, LEAST_BEFORE = 2.0, 0.5
 # What lasts longer than this, s, and than this share of its recording is a change of the arm. What does not stand out surely is
@@ -202,16 +206,22 @@ def _by_second(item: Binned, scores: Sequence[tuple[int, Array]]) -> Array:
 
 
 def _limit(tops: Array, joints: int) -> float:
-    """Return the score that the largest of a second exceeds on any joint once in `FALSE_EVERY`, by Gumbel's law."""
-    tops = tops[np.isfinite(tops)]
-    if len(tops) < LEAST_SECONDS:
+    """Return the score that the largest of a second exceeds on any joint once in `FALSE_EVERY`."""
+    square = tops[np.isfinite(tops)] ** 2
+    if len(square) < LEAST_SECONDS:
         return np.inf
-    # One event and the windows beside it are in so many seconds; of few seconds the upper quantile is lower.
-    share = float(np.clip(1.0 - EVENT_SECONDS / len(tops), 0.6, 0.8))
-    middle, upper = np.quantile(tops, (0.5, share))
-    spread = (upper - middle) / (np.log(-np.log(0.5)) - np.log(-np.log(share)))
-    expected = -np.log(-np.log(0.5)) * -spread + middle + spread * np.log(FALSE_EVERY * joints)
-    return max(LEAST_SCORE, HEAVIER * float(expected))
+    most, rate = round(EVENTS_SHARE * len(square)), HOUR / (FALSE_EVERY * joints)
+    surely = _tail(square, most).level(rate)
+    events = min(most, round(BESIDE_EVENTS * np.sum(square > surely)))
+    return float(np.sqrt(_tail(square, events).level(rate)))
+
+
+def _tail(square: Array, events: int) -> Tail:
+    """Return the law of the squares of the largest of each second, of which so many of the largest may be of events."""
+    events = max(EVENT_SECONDS, events)
+    count = min(max(TOPS, TOPS_SHARE * len(square), TOPS_PER_EVENT * events), len(square) / 2)
+    start = float(np.quantile(square, 1.0 - count / len(square)))
+    return tail_of(square, start, len(square), censored=min(events, int(count / 2)), prior=SHAPE)
 
 
 def _bin_noise(stretches: Sequence[Binned]) -> Array:

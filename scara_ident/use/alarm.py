@@ -14,8 +14,8 @@ from scipy.optimize import nnls
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.estimation.tail import CLUSTERS_OVER_RATE, LEAST_CLUSTERS, TOGETHER, Tail, fit_tail
 from scara_ident.use.external_torque import Observed
-from scara_ident.use.tail import CLUSTERS_OVER_RATE, LEAST_CLUSTERS, TOGETHER, Tail, fit_tail
 
 # Groups of recordings left out to see how sure the rate is.
 FOLDS = 5

@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
+from scara_ident.estimation.tail import clusters
 from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.kinematics import tool_frame
@@ -27,7 +28,6 @@ from scara_ident.use.external_torque import (
     ObserverSettings,
     observe_recording,
 )
-from scara_ident.use.tail import clusters
 
 # Share of the samples whose speed is below the usual largest.
 USUAL = 0.99

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from scara_ident.identification.binned_residual import Binned, binned
@@ -42,14 +44,33 @@ def test_an_offset_and_a_drift_of_a_run_are_taken_off_and_a_push_is_not():
     assert np.mean(after[2].left[0, push]) > 0.9 * np.mean(before[2].left[0, push])
 
 
+def test_a_runs_own_friction_is_taken_off_where_it_hardly_ever_turns_back():
+    item = made([np.zeros(part.samples) for part in STRETCHES])[0]
+    # Two seconds back among eighteen forth, in which an offset and friction add up to nothing.
+    speed = np.ones(item.taken.shape)
+    speed[:, 250:300] = -1.0
+    q, _, a, load = item.state
+    turned = replace(
+        item,
+        raw=item.raw + np.repeat(1.0 - speed, item.size, axis=1),
+        used=np.ones_like(item.used),
+        state=(q, speed, a, load),
+    )
+    (after,) = without_trends([turned])
+    assert np.max(np.abs(np.mean(after.left[:, 255:295], axis=1))) < 0.1
+
+
 def test_what_comes_with_the_motion_in_all_recordings_is_taken_off_and_what_happens_once_is_not():
     speed = max(float(np.abs(part.motion.v[0]).max()) for part in STRETCHES)
     falling = [
         0.5 * np.sign(part.motion.v[0]) * np.exp(-np.abs(part.motion.v[0]) / (0.2 * speed)) for part in STRETCHES
     ]
-    before = made(falling)
-    after = without_states(before)
-    assert all(size(new) < 0.5 * size(old) for old, new in zip(before, after, strict=True))
+    # A cable's pull is by the angle itself, which turns far.
+    pulling = [0.2 * part.motion.q[0] for part in STRETCHES]
+    for added in (falling, pulling):
+        before = made(added)
+        after = without_states(before)
+        assert all(size(new) < 0.5 * size(old) for old, new in zip(before, after, strict=True))
     once = [np.zeros(part.samples) for part in STRETCHES]
     once[3][1500:1750] = 0.5
     alone = without_states(made(once))[3]

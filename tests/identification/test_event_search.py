@@ -35,6 +35,15 @@ def white(seed: int = 0) -> list[np.ndarray]:
     return [rng.standard_normal((2, part.samples)) for part in STRETCHES]
 
 
+def coloured(seed: int) -> list[np.ndarray]:
+    """Noise whose correlation falls to 1/e within 0.1 s."""
+    found = white(seed)
+    for row in found:
+        for k in range(1, row.shape[1]):
+            row[:, k] += np.exp(-1.0 / (0.1 * RATE)) * row[:, k - 1]
+    return found
+
+
 @pytest.mark.parametrize("seconds", [0.3, 1.0, 2.0])
 def test_a_push_of_three_times_the_noise_is_found_within_a_tenth_of_a_second(seconds: float):
     left = white()
@@ -51,11 +60,25 @@ def test_heavy_tails_and_noise_that_remembers_are_no_event():
     rng = np.random.default_rng(1)
     heavy = [rng.standard_t(3, (2, part.samples)) for part in STRETCHES]
     assert searched(heavy) == []
-    coloured = white(2)
-    for row in coloured:
-        for k in range(1, row.shape[1]):
-            row[:, k] += np.exp(-1.0 / (0.1 * RATE)) * row[:, k - 1]
-    assert searched(coloured) == []
+    assert searched(coloured(2)) == []
+
+
+def test_a_push_of_three_times_what_a_ripple_leaves_is_found():
+    left = [row + 1.5 * np.sin(50.0 * part.motion.q) for row, part in zip(white(7), STRETCHES, strict=True)]
+    left[2][0, int(7.0 * RATE) : int(8.5 * RATE)] += 3.0 * np.std(left[2][0])
+    (found,) = searched(left)
+    assert found.binned.recording == 2
+    assert found.start * found.binned.width == pytest.approx(7.0, abs=0.1)
+    assert found.stop * found.binned.width == pytest.approx(8.5, abs=0.1)
+
+
+def test_pushes_do_not_hide_one_another():
+    for begins in ((3.0,), (3.0, 8.0)):
+        left = white(6)
+        for k, row in enumerate(left):
+            for begin in begins:
+                row[k % 2, int(begin * RATE) : int((begin + 0.6) * RATE)] += 6.0
+        assert len(searched(left)) == 4 * len(begins)
 
 
 def test_least_squares_is_asked_for_only_where_something_stands_out():

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import RecordingError
+from scara_ident.estimation.tail import clusters
 from scara_ident.use.alarm import calibrate, residual_scale
 from scara_ident.use.external_torque import FEATURES, Observed
-from scara_ident.use.tail import clusters
 
 RATE = 20.0
 

@@ -108,24 +108,45 @@ def fit_tail(times: Sequence[Array], scores: Sequence[Array], seconds: float, ra
     for level in np.quantile(score, 1.0 - np.geomspace(1.0 / len(score), 0.3, LEVELS)):
         found = peaks(time, score, float(level))
         if len(found) > len(top):
-            start, top = float(level), found - level
+            start, top = float(level), found
         if len(found) >= wanted:
             break
-    return Tail(start, *_laws(top), len(top), seconds / HOUR)
+    return tail_of(top, start, seconds)
 
 
-def _laws(above: Array) -> tuple[Array, Array, Array]:
-    """Return widths, shapes and probabilities of the laws that peaks so far above the start may have; without any, one."""
-    count = len(above)
-    if count == 0:
+def tail_of(tops: Array, start: float, seconds: float, *, censored: int = 0, prior: float = PRIOR) -> Tail:
+    """Return what the tail above a start may be, of one value of each cluster.
+
+    Parameters
+    ----------
+    tops : ndarray, shape (N,)
+        Those not above the start do not matter.
+    start, seconds : float
+    censored : int
+        Of so many of the largest it is used only that they are the largest: they may be no part of the law.
+    prior : float
+        Standard deviation of the shape before anything is seen.
+    """
+    above = np.sort(tops[tops > start]) - start
+    return Tail(start, *_laws(above, censored, prior), len(above), seconds / HOUR)
+
+
+def _laws(above: Array, censored: int, prior: float) -> tuple[Array, Array, Array]:
+    """Return widths, shapes and probabilities of the laws that peaks so far above the start, ascending, may have."""
+    count = len(above) - censored
+    if count <= 0:
         return np.ones(1), SHAPES[-1:], np.ones(1)
+    # The largest that is seen stands for those that are not.
+    seen = np.minimum(above, above[count - 1])
     shape, away = (grid.ravel() for grid in np.meshgrid(SHAPES, WIDTHS, indexing="ij"))
-    width = float(np.mean(above)) * (1.0 - shape) * np.exp(away / np.sqrt(count + 1.0))
-    reach = 1.0 + shape[:, None] * above / width[:, None]
+    width = float(np.sum(seen)) / count * (1.0 - shape) * np.exp(away / np.sqrt(count + 1.0))
+    reach = 1.0 + shape[:, None] * seen / width[:, None]
     # A law that ends below a peak is not possible.
     can = np.all(reach > 0.0, axis=1)
-    width, shape, reach = width[can], shape[can], reach[can]
-    log = -count * np.log(width) - (1.0 + 1.0 / shape) * np.sum(np.log(reach), axis=1) - 0.5 * (shape / PRIOR) ** 2
+    width, shape, reach = width[can], shape[can], np.log(reach[can])
+    # Of those not seen the likelihood is the share beyond.
+    log = -count * np.log(width) - np.sum(reach[:, :count], axis=1) - np.sum(reach, axis=1) / shape
+    log -= 0.5 * (shape / prior) ** 2
     weight = np.exp(log - np.max(log))
     kept = weight > LEAST_WEIGHT * np.sum(weight)
     return width[kept], shape[kept], weight[kept] / np.sum(weight[kept])

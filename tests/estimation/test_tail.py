@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.use.tail import Tail, clusters, fit_tail
+from scara_ident.estimation.tail import Tail, clusters, fit_tail, tail_of
 
 RATE = 20.0
 
@@ -64,3 +64,20 @@ def test_clusters_are_parted_by_half_a_second():
     assert clusters(time, score, 1.0) == [(1, 1), (3, 3), (6, 6)]
     assert clusters(time / 2.0, score, 1.0) == [(1, 6)]
     assert clusters(time, score, 3.0) == []
+
+
+def test_what_may_be_no_part_of_the_law_says_only_that_it_is_large():
+    rng = np.random.default_rng(4)
+    levels = []
+    for _ in range(8):
+        score = rng.exponential(size=1000)
+        other = np.where(score >= np.sort(score)[-20], 100.0 * score, score)
+        tails = [tail_of(item, np.log(10.0), 1000.0, censored=20, prior=0.1) for item in (score, other)]
+        # However large they are.
+        assert tails[0].level(1.0) == tails[1].level(1.0)
+        assert tails[0].clusters == np.sum(score > np.log(10.0))
+        assert tail_of(other, np.log(10.0), 1000.0, prior=0.1).level(1.0) > 3.0 * tails[0].level(1.0)
+        levels.append(tails[0].level(1.0))
+    # A second each: once an hour is log(3600). What is not known of the law makes it more.
+    assert np.log(3600.0) < np.median(levels) < 1.2 * np.log(3600.0)
+    assert tail_of(np.ones(9), 1.0, 9.0, censored=2).level(1.0) == 1.0
