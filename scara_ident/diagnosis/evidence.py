@@ -202,7 +202,7 @@ def detection_limits(found: Search, criteria: SelectionCriteria = CRITERIA) -> A
 
 
 def least_found(found: Search, decision: Decision, criteria: SelectionCriteria = CRITERIA) -> Mapping[str, Parameter]:
-    """Return the parameters that an effect of one coefficient would have to have to come in; none for others.
+    """Return the size that an effect of one coefficient would have to have to come in; none for others.
 
     It must be significant, and remove as much of what is left on its joint as is asked. The standard deviation says nothing.
 
@@ -223,8 +223,8 @@ def least_found(found: Search, decision: Decision, criteria: SelectionCriteria =
     if not np.isfinite(size):
         return {}
     told = candidate.effect.parameters(scene, candidate.member, np.array([size]), np.zeros((1, 1)))
-    own = {parameter.name for parameter in candidate.effect.nonlinear}
-    return {name: item for name, item in told.items() if name not in own}
+    # Others, such as where a spring is at rest, stand behind it.
+    return dict([next(iter(told.items()))])
 
 
 def coloured_shares(residuals: Residuals) -> Array:
