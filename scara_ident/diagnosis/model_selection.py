@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.acceptance import Decision, hopeless
 from scara_ident.diagnosis.audit import outdone, unsettled
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import SelectionCriteria
@@ -124,15 +124,19 @@ def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
     """Return the band that would tell effects that are not in the model and may be there, Hz; 0 where there are none."""
     chosen = {item.label(found.scene) for item in found.chosen}
     promising = [
-        item.candidate.effect.band(item.candidate.member)
+        item
         for item in found.decisions
-        if (item.accepted or item.tentative)
-        and item.label not in chosen
+        if item.label not in chosen
+        and item.candidate.effect.band(item.candidate.member) > 0.0
         and item.examination.p_value * found.tried <= 1.0
-        and item.gain >= criteria.least_gain
+        # A grid point loses the rest.
+        and item.gain >= criteria.near_best * criteria.least_gain
+        and hopeless(item.candidate, item.examination, found.scene, criteria) is None
     ]
-    highest = HIGHEST_BAND * min(part.rate for part in found.data.stretches)
-    return min(max(promising, default=0.0), highest)
+    if not promising:
+        return 0.0
+    best = max(promising, key=lambda item: item.gain).candidate
+    return min(best.effect.band(best.member), HIGHEST_BAND * min(part.rate for part in found.data.stretches))
 
 
 def _new(found: Search, before: Search) -> bool:
