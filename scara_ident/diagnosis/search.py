@@ -339,11 +339,8 @@ def _fitted(
         With the step at the estimate that goes with the candidate.
     """
     criteria = step.criteria
-    enough = max(criteria.least_gain_to_fit, criteria.near_best * best)
-    # A fit is dear: only what chance would not bring among so many at a grid point is worth one.
-    sure = [item for item in candidates if item.examination.p_value * step.tried <= 1.0]
-    worth = sorted((item for item in sure if item.gain >= enough), key=lambda item: -item.gain)
-    begins = {item.label: (step.scene, item.candidate) for item in worth[: criteria.most_fitted]}
+    worth = _worth_fitting(candidates, max(criteria.least_gain_to_fit, criteria.near_best * best), step.tried, criteria)
+    begins = {item.label: (step.scene, item.candidate) for item in worth}
     if known is not None:
         # Found in another band: from there it is near.
         scene = replace(step.scene, value=known.scene.value, armatures=known.scene.armatures)
@@ -356,6 +353,24 @@ def _fitted(
         own = replace(step, scene=scene)
         found.append((own, own.judge([chosen[-1]])[0]))
     return found
+
+
+def _worth_fitting(
+    candidates: Sequence[Decision], enough: float, tried: int, criteria: SelectionCriteria
+) -> list[Decision]:
+    """Return those that promise so much gain and what they may stand for, the most promising first."""
+    # A fit is dear: only what chance would not bring among so many at a grid point is worth one.
+    sure = [item for item in candidates if item.gain >= enough and item.examination.p_value * tried <= 1.0]
+    most: dict[str, float] = {}
+    for item in sure:
+        name = item.candidate.effect.name
+        most[name] = max(item.gain, most.get(name, 0.0))
+    # The same of another joint that does nearly as well, however unsure at its grid point.
+    near = [
+        item for item in candidates if item.gain >= criteria.near_best * most.get(item.candidate.effect.name, np.inf)
+    ]
+    worth = [item for item in candidates if item in sure or item in near]
+    return sorted(worth, key=lambda item: -item.gain)[: criteria.most_fitted]
 
 
 def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:

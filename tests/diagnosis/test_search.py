@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.model_selection import rms_of
 from scara_ident.diagnosis.search import (
     SearchTask,
     _backward,
     _sure_once_refined,
+    _worth_fitting,
     columns_at_hand,
     corrected,
     scene_of,
@@ -180,3 +183,17 @@ def test_corrected_torque_is_that_of_the_recording_corrected():
         assert np.array_equal(part.torque, whole.effort)
         assert part.motion.q is not old.motion.q
         assert np.array_equal(part.motion.a, old.motion.a)
+
+
+def test_what_an_effect_may_stand_for_on_another_joint_is_fitted_beside_it():
+    """An elastic second joint was believed where the first was, whose grid point chance might have brought."""
+
+    def decision(name: str, gain: float, p_value: float):
+        effect = SimpleNamespace(effect=SimpleNamespace(name=name))
+        return SimpleNamespace(candidate=effect, gain=gain, examination=SimpleNamespace(p_value=p_value))
+
+    other, first, faint = decision("a", 0.16, 3e-9), decision("a", 0.13, 0.13), decision("a", 0.05, 0.13)
+    beside = decision("b", 0.15, 0.13)
+    assert _worth_fitting([faint, first, beside, other], 0.1, 100, CRITERIA) == [other, first]
+    # Alone it is not worth a fit.
+    assert _worth_fitting([first, beside], 0.1, 100, CRITERIA) == []
