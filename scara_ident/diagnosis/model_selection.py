@@ -106,14 +106,16 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
         left("choosing the band again")
         # What was missing had hidden how far up the motion explains the torque, and other effects with it.
         explains = max(choose_bands(found.search.model, found.search.data).bands) if found.search.chosen else 0.0
-        promised = _promised_band(found.search, criteria)
+        asked = _asked_band(found.search)
+        promised = max(asked, _promised_band(found.search, criteria))
         wider = max(explains, promised)
         if wider < criteria.wider * _band(found):
             break
         more = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands))))
         now, left = next_of(left)
         again = _searched(replace(task, progress=now), more, (), found.search)
-        if promised > explains and not _new(again.search, found.search):
+        told = asked >= criteria.wider * _band(found) and _asked_band(again.search) > 0.0
+        if promised > explains and not told and not _new(again.search, found.search):
             # The motion says less of what is so far up, and there is nothing.
             break
         columns, found = more, again
@@ -136,7 +138,16 @@ def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
     if not promising:
         return 0.0
     best = max(promising, key=lambda item: item.gain).candidate
-    return min(best.effect.band(best.member), HIGHEST_BAND * min(part.rate for part in found.data.stretches))
+    return _within(best.effect.band(best.member), found)
+
+
+def _asked_band(found: Search) -> float:
+    """Return the band that tells the effects in the model from others, Hz; 0 where none asks for one."""
+    return _within(max((item.effect.band(item.member) for item in found.chosen), default=0.0), found)
+
+
+def _within(band: float, found: Search) -> float:
+    return min(band, HIGHEST_BAND * min(part.rate for part in found.data.stretches))
 
 
 def _new(found: Search, before: Search) -> bool:

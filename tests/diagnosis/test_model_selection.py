@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.lack_of_fit import lack_of_fit
-from scara_ident.diagnosis.model_selection import Outcome, _promised_band, _proxies, rms_of, select_model
+from scara_ident.diagnosis.model_selection import Outcome, _asked_band, _promised_band, _proxies, rms_of, select_model
 from scara_ident.diagnosis.search import SearchTask
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.effects import CATALOGUE
@@ -61,6 +61,11 @@ def test_a_joint_that_swings_within_the_band_is_found_there() -> None:
     wider = selected(runs, JointElasticity(), bands=(4.0, 4.0), free=True)
     assert found(wider) == {"joint_elasticity of joint1"}
     assert wider.search.chosen[0].member.nonlinear[0] == pytest.approx(candidate.member.nonlinear[0], rel=0.02)
+    # What is in the model asks for both sides of its resonance too: below it another joint's elasticity does as well.
+    (band, _), swings = wider.search.bands, wider.search.chosen[0].member.nonlinear[0]
+    assert _asked_band(wider.search) == pytest.approx(1.5 * swings)
+    assert band is not None
+    assert CRITERIA.wider * band > 1.5 * swings
 
 
 @pytest.mark.slow
