@@ -350,8 +350,13 @@ def _fitted(
     for scene, candidate in begins.values():
         everything = (*step.chosen, candidate)
         scene, chosen = tune(scene, step.columns, step.weights, everything, criteria.rotor_inertia_std, coarse=True)
-        own = replace(step, scene=scene)
-        found.append((own, own.judge([chosen[-1]])[0]))
+        # Beside the others as they are fitted with it.
+        own = replace(step, scene=scene, chosen=chosen[:-1])
+        (decision,) = own.judge([chosen[-1]])
+        before, left = float(np.sum(step.model.squares)), float(np.sum(decision.examination.left))
+        if decision.accepted and before - left < criteria.least_gain * before / scene.robot.n:
+            decision = replace(decision, accepted=False, why="takes the place of an effect in the model")
+        found.append((own, decision))
     return found
 
 
@@ -361,10 +366,7 @@ def _worth_fitting(
     """Return those that promise so much gain and what they may stand for, the most promising first."""
     # A fit is dear: only what chance would not bring among so many at a grid point is worth one.
     sure = [item for item in candidates if item.gain >= enough and item.examination.p_value * tried <= 1.0]
-    most: dict[str, float] = {}
-    for item in sure:
-        name = item.candidate.effect.name
-        most[name] = max(item.gain, most.get(name, 0.0))
+    most = {item.candidate.effect.name: item.gain for item in sorted(sure, key=lambda item: item.gain)}
     # The same of another joint that does nearly as well, however unsure at its grid point.
     near = [
         item for item in candidates if item.gain >= criteria.near_best * most.get(item.candidate.effect.name, np.inf)

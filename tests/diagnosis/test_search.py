@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -14,6 +15,7 @@ from scara_ident.diagnosis.model_selection import rms_of
 from scara_ident.diagnosis.search import (
     SearchTask,
     _backward,
+    _fitted,
     _sure_once_refined,
     _worth_fitting,
     columns_at_hand,
@@ -197,3 +199,15 @@ def test_what_an_effect_may_stand_for_on_another_joint_is_fitted_beside_it():
     assert _worth_fitting([faint, first, beside, other], 0.1, 100, CRITERIA) == [other, first]
     # Alone it is not worth a fit.
     assert _worth_fitting([first, beside], 0.1, 100, CRITERIA) == []
+
+
+def test_what_takes_the_place_of_an_effect_in_the_model_does_not_come_in(monkeypatch):
+    """An elastic first joint was dropped again for the second, fitted with it so that it explained nothing any more."""
+    held, spoilt = Candidate(Spring(), Member(1)), Candidate(Stribeck(), Member(0, (0.3,)))
+    step = step_beside(with_torque(exact_runs(), 1, spring), [held])
+    (promised,) = replace(step, chosen=()).judge([held])
+    monkeypatch.setattr(sys.modules[search.__module__], "tune", lambda scene, *_, **__: (scene, (spoilt, held)))
+    ((own, decision),) = _fitted(step, [promised], 0.0, None)
+    assert own.chosen == (spoilt,)
+    assert decision.gain > 0.5
+    assert (decision.accepted, decision.why) == (False, "takes the place of an effect in the model")
