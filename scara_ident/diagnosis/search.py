@@ -366,12 +366,9 @@ def _worth_fitting(
     """Return those that promise so much gain and what they may stand for, the most promising first."""
     # A fit is dear: only what chance would not bring among so many at a grid point is worth one.
     sure = [item for item in candidates if item.gain >= enough and item.examination.p_value * tried <= 1.0]
-    most = {item.candidate.effect.name: item.gain for item in sorted(sure, key=lambda item: item.gain)}
-    # The same of another joint that does nearly as well, however unsure at its grid point.
-    near = [
-        item for item in candidates if item.gain >= criteria.near_best * most.get(item.candidate.effect.name, np.inf)
-    ]
-    worth = [item for item in candidates if item in sure or item in near]
+    # The same of another joint, however unsure at its grid point, which loses most of a resonance with little damping.
+    names = {item.candidate.effect.name for item in sure}
+    worth = [item for item in candidates if item.gain >= enough and item.candidate.effect.name in names]
     return sorted(worth, key=lambda item: -item.gain)[: criteria.most_fitted]
 
 
