@@ -39,7 +39,7 @@ Item = dict[str, Any]
 # Columns by what a covered parameter is of; the rest are inertial.
 FRICTION = ("a0", "a1", "a2", "a3")
 # What families call the effects' parameters.
-OTHER_NAMES = {"_lost_share": "loss_coefficient", "crossing_width": "width"}
+OTHER_NAMES = {"_lost_share": "loss_coefficient", "_flown_width": "width"}
 # Effects whose columns share something with the base model, so that its parameters mean something else beside them: the
 # spring's rest is an offset, and a gain is one of all torques of its joint.
 SHARING = {"spring": ("offset",), "torque_gain_mismatch": ("inertial", "friction", "offset")}

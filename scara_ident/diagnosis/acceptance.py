@@ -62,8 +62,7 @@ def decide(
     criteria : SelectionCriteria
     """
     unseen = _unseen(examination, criteria)
-    unphysical = unseen or _unphysical(candidate, examination, scene)
-    small = unphysical or _small(candidate, examination, scene, gain, criteria)
+    small = hopeless(candidate, examination, scene, criteria) or _small(candidate, examination, scene, gain, criteria)
     # The first reason that a person would give.
     why = unseen or _insignificant(examination, tried, criteria) or small or _seldom(examination, criteria)
     if _wrong_sign(candidate, examination):
@@ -90,11 +89,14 @@ def _unseen(examination: Examination, criteria: SelectionCriteria) -> str | None
     return None
 
 
-def _unphysical(candidate: Candidate, examination: Examination, scene: Scene) -> str | None:
+def hopeless(candidate: Candidate, examination: Examination, scene: Scene, criteria: SelectionCriteria) -> str | None:
+    """Say why these recordings cannot show a candidate, or no arm can have it with the coefficients found; else None."""
     std = np.sqrt(np.clip(np.diag(examination.covariance), 0.0, None))
     # Judged beside the parameters that the model has once the candidate is in it.
     after = replace(scene, value=examination.model_value[: len(scene.value)])
-    return candidate.effect.inadmissible(after, candidate.member, examination.value, std)
+    return _unseen(examination, criteria) or candidate.effect.inadmissible(
+        after, candidate.member, examination.value, std
+    )
 
 
 def _small(

@@ -7,15 +7,18 @@ not spread evenly over frequency, can be in more than a small share of it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.cluster_test import needed
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.search import Search
+from scara_ident.effects import Parameter
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.bands import binned_power
 from scara_ident.estimation.noise_bias import noise_torque
@@ -42,8 +45,8 @@ class Evidence:
     why : str
         In words.
     limit : float
-        Share of its square that half of the effects tried on it would have to remove to be significant; NaN where
-        none was tried.
+        Share of its square that half of the effects tried on it would have to remove to come in; NaN where none was
+        tried.
     """
 
     joint: str
@@ -171,7 +174,7 @@ def detection_limits(found: Search, criteria: SelectionCriteria = CRITERIA) -> A
     """Return for each joint the share of its squared residual that half of the effects tried would have to remove.
 
     An effect is significant where its coefficients, squared and over their variance, are beyond a quantile; times what
-    one standard deviation of them removes, that is the least that it must remove.
+    one standard deviation of them removes, that is the least that it must remove, and never less than is asked of its gain.
 
     Returns
     -------
@@ -195,7 +198,33 @@ def detection_limits(found: Search, criteria: SelectionCriteria = CRITERIA) -> A
         quantile = float(fdtri(count, rest, 1.0 - criteria.family_error / found.tried)) * examined.freedom / rest
         noise = float(np.trace(examined.products @ examined.covariance))
         shares[joint].append(min(1.0, quantile * noise / total * robot.n))
-    return np.array([float(np.median(item)) if item else np.nan for item in shares])
+    return np.array([max(float(np.median(item)), criteria.least_gain) if item else np.nan for item in shares])
+
+
+def least_found(found: Search, decision: Decision, criteria: SelectionCriteria = CRITERIA) -> Mapping[str, Parameter]:
+    """Return the size that an effect of one coefficient would have to have to come in; none for others.
+
+    It must be significant, and remove as much of what is left on its joint as is asked. The standard deviation says nothing.
+
+    Parameters
+    ----------
+    found : Search
+    decision : Decision
+        On one of the candidates at the end.
+    criteria : SelectionCriteria, optional
+    """
+    examined, candidate, scene = decision.examination, decision.candidate, found.scene
+    if len(examined.value) != 1 or examined.outside < criteria.least_outside or not examined.products[0, 0] > 0.0:
+        return {}
+    errors = needed(1, examined.freedom, criteria.family_error / found.tried)
+    left = float(np.sum(found.step.model.squares)) / (1 if candidate.member.joint is None else scene.robot.n)
+    share = criteria.least_gain / (1.0 - criteria.least_gain)
+    size = max(errors * np.sqrt(examined.covariance[0, 0]), np.sqrt(share * left / examined.products[0, 0]))
+    if not np.isfinite(size):
+        return {}
+    told = candidate.effect.parameters(scene, candidate.member, np.array([size]), np.zeros((1, 1)))
+    # Others, such as where a spring is at rest, stand behind it.
+    return dict([next(iter(told.items()))])
 
 
 def coloured_shares(residuals: Residuals) -> Array:

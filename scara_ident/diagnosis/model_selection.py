@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.acceptance import Decision, hopeless
 from scara_ident.diagnosis.audit import outdone, unsettled
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import SelectionCriteria
@@ -106,14 +106,16 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
         left("choosing the band again")
         # What was missing had hidden how far up the motion explains the torque, and other effects with it.
         explains = max(choose_bands(found.search.model, found.search.data).bands) if found.search.chosen else 0.0
-        promised = _promised_band(found.search, criteria)
+        asked = _asked_band(found.search)
+        promised = max(asked, _promised_band(found.search, criteria))
         wider = max(explains, promised)
         if wider < criteria.wider * _band(found):
             break
         more = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands))))
         now, left = next_of(left)
         again = _searched(replace(task, progress=now), more, (), found.search)
-        if promised > explains and not _new(again.search, found.search):
+        told = asked >= criteria.wider * _band(found) and _asked_band(again.search) > 0.0
+        if promised > explains and not told and not _new(again.search, found.search):
             # The motion says less of what is so far up, and there is nothing.
             break
         columns, found = more, again
@@ -124,15 +126,28 @@ def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
     """Return the band that would tell effects that are not in the model and may be there, Hz; 0 where there are none."""
     chosen = {item.label(found.scene) for item in found.chosen}
     promising = [
-        item.candidate.effect.band(item.candidate.member)
+        item
         for item in found.decisions
-        if (item.accepted or item.tentative)
-        and item.label not in chosen
+        if item.label not in chosen
+        and item.candidate.effect.band(item.candidate.member) > 0.0
         and item.examination.p_value * found.tried <= 1.0
-        and item.gain >= criteria.least_gain
+        # A grid point loses the rest.
+        and item.gain >= criteria.near_best * criteria.least_gain
+        and hopeless(item.candidate, item.examination, found.scene, criteria) is None
     ]
-    highest = HIGHEST_BAND * min(part.rate for part in found.data.stretches)
-    return min(max(promising, default=0.0), highest)
+    if not promising:
+        return 0.0
+    best = max(promising, key=lambda item: item.gain).candidate
+    return _within(best.effect.band(best.member), found)
+
+
+def _asked_band(found: Search) -> float:
+    """Return the band that tells the effects in the model from others, Hz; 0 where none asks for one."""
+    return _within(max((item.effect.band(item.member) for item in found.chosen), default=0.0), found)
+
+
+def _within(band: float, found: Search) -> float:
+    return min(band, HIGHEST_BAND * min(part.rate for part in found.data.stretches))
 
 
 def _new(found: Search, before: Search) -> bool:

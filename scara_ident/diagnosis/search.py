@@ -329,11 +329,8 @@ def _fitted(
         With the step at the estimate that goes with the candidate.
     """
     criteria = step.criteria
-    enough = max(criteria.least_gain_to_fit, criteria.near_best * best)
-    # A fit is dear: only what chance would not bring among so many at a grid point is worth one.
-    sure = [item for item in candidates if item.examination.p_value * step.tried <= 1.0]
-    worth = sorted((item for item in sure if item.gain >= enough), key=lambda item: -item.gain)
-    begins = {item.label: (step.scene, item.candidate) for item in worth[: criteria.most_fitted]}
+    worth = _worth_fitting(candidates, max(criteria.least_gain_to_fit, criteria.near_best * best), step.tried, criteria)
+    begins = {item.label: (step.scene, item.candidate) for item in worth}
     if known is not None:
         # Found in another band: from there it is near.
         scene = replace(step.scene, value=known.scene.value, armatures=known.scene.armatures)
@@ -343,9 +340,26 @@ def _fitted(
     for scene, candidate in begins.values():
         everything = (*step.chosen, candidate)
         scene, chosen = tune(scene, step.columns, step.weights, everything, criteria.rotor_inertia_std, coarse=True)
-        own = replace(step, scene=scene)
-        found.append((own, own.judge([chosen[-1]])[0]))
+        # Beside the others as they are fitted with it.
+        own = replace(step, scene=scene, chosen=chosen[:-1])
+        (decision,) = own.judge([chosen[-1]])
+        before, left = float(np.sum(step.model.squares)), float(np.sum(decision.examination.left))
+        if decision.accepted and before - left < criteria.least_gain * before / scene.robot.n:
+            decision = replace(decision, accepted=False, why="takes the place of an effect in the model")
+        found.append((own, decision))
     return found
+
+
+def _worth_fitting(
+    candidates: Sequence[Decision], enough: float, tried: int, criteria: SelectionCriteria
+) -> list[Decision]:
+    """Return those that promise so much gain and what they may stand for, the most promising first."""
+    # A fit is dear: only what chance would not bring among so many at a grid point is worth one.
+    sure = [item for item in candidates if item.gain >= enough and item.examination.p_value * tried <= 1.0]
+    # The same of another joint, however unsure at its grid point, which loses most of a resonance with little damping.
+    names = {item.candidate.effect.name for item in sure}
+    worth = [item for item in candidates if item.gain >= enough and item.candidate.effect.name in names]
+    return sorted(worth, key=lambda item: -item.gain)[: criteria.most_fitted]
 
 
 def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:

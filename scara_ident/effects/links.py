@@ -181,6 +181,25 @@ def _traced_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
     return found[0], found[1], found[2]
 
 
+def rigid_columns(signals: Signals) -> Array:
+    """Return the rigid bodies' columns at the recorded motion, which are at hand, shape (n, p, N)."""
+    model, motion = signals.scene.model, signals.motion
+    place = model.place(model.rigid_body)
+    result = np.zeros((len(model.active), place.stop - place.start, motion.samples))
+    for joint, (own, rows) in enumerate(zip(model.active, signals.columns, strict=True)):
+        rigid = (own >= place.start) & (own < place.stop)
+        result[joint, own[rigid] - place.start] = rows[rigid]
+    return result
+
+
+def behind(motion: Motion, joint: int, lag: tuple[Array, Array, Array]) -> Motion:
+    """Return a motion with the link of one joint, which lags its motor, in place of the motor."""
+    q, v, a = motion.q.copy(), motion.v.copy(), motion.a.copy()
+    for part, own in zip((q, v, a), lag, strict=True):
+        part[joint] -= own
+    return Motion(motion.name, motion.trajectory, motion.time, q, v, a, None, motion.rate)
+
+
 def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Array:
     """Change of all torques when the link of one joint lags its motor, to first order in the lag.
 

@@ -20,7 +20,9 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.links import (
+    behind,
     lagging,
+    rigid_columns,
     rigid_slopes,
     rigid_torque,
     usual_link_inertia,
@@ -108,8 +110,8 @@ class TwoMasses:
             left = recorded[j] - signals.predicted[j] - lagging(signals, j, lag)[j]
             lag = self._initial.added(lag, self._initial.state(left, (lag[0], lag[1])))
         for _ in range(0 if _small(lag) else STEPS - 1):
-            behind = self._behind(lag)
-            load = self._load(self._torque(behind)[self.joint], behind.a[self.joint])
+            moved = behind(self.signals.motion, self.joint, lag)
+            load = self._load(self._torque(moved)[self.joint], moved.a[self.joint])
             by_q, by_v, by_a = self._slopes
             lag = self.swing.solve(load + by_q * lag[0] + by_v * lag[1] + by_a * lag[2], lag[0][:2])
         return lag
@@ -140,7 +142,7 @@ class TwoMasses:
         scene, j = self.signals.scene, self.joint
         if _small(self.lag):
             return lagging(self.signals, j, self.lag)
-        result = self._torque(self._behind(self.lag)) - self.signals.rigid
+        result = self._torque(behind(self.signals.motion, self.joint, self.lag)) - self.signals.rigid
         result[j] += scene.robot.row_scale[j] * scene.armature(j) * self.lag[2]
         return np.asarray(result)
 
@@ -152,17 +154,17 @@ class TwoMasses:
         """
         scene, motion, j = self.signals.scene, self.signals.motion, self.joint
         term, scale = scene.model.rigid_body, scene.robot.row_scale[j]
-        behind, (x, first, second) = self._behind(self.lag), self.lag
-        columns = term.regressor(behind)
+        moved, (x, first, second) = behind(motion, j, self.lag), self.lag
+        columns = term.regressor(moved)
         p = columns.shape[1]
         result = np.zeros((scene.robot.n, p + 3, motion.samples))
-        recorded = self._recorded(p)
+        recorded = rigid_columns(self.signals)
         result[:, :p] = columns - recorded
         rotor = np.append(scene.armature_slopes(j), 1.0)[:, None]
         usual = np.append(usual_link_inertia_slopes(scene, j), -1.0)[:, None]
         omega, ratio = 2.0 * np.pi * self.frequency, self.damping_ratio
         right = np.empty((p + 3, motion.samples))
-        right[: p + 1] = -rotor * behind.a[j] - usual * (omega**2 * x + 2.0 * ratio * omega * first)
+        right[: p + 1] = -rotor * moved.a[j] - usual * (omega**2 * x + 2.0 * ratio * omega * first)
         right[:p] += columns[j] / scale
         right[p + 1] = -4.0 * np.pi * self.inertia * (omega * x + ratio * first)
         right[p + 2] = -2.0 * omega * self.inertia * first
@@ -179,24 +181,6 @@ class TwoMasses:
             result[..., :begun] -= np.einsum("kc,cjt->jkt", state, self._initial.torque)
         share = np.append(usual[:, 0] / self.inertia, [2.0 / self.frequency, 0.0])
         return result + share[:, None] * self.change[:, None]
-
-    def _recorded(self, p: int) -> Array:
-        """Return the rigid bodies' columns at the recorded motion, which are at hand, shape (n, p, N)."""
-        model, motion = self.signals.scene.model, self.signals.motion
-        place = model.place(model.rigid_body)
-        result = np.zeros((len(model.active), p, motion.samples))
-        for joint, (own, rows) in enumerate(zip(model.active, self.signals.columns, strict=True)):
-            rigid = (own >= place.start) & (own < place.stop)
-            result[joint, own[rigid] - place.start] = rows[rigid]
-        return result
-
-    def _behind(self, lag: Lag) -> Motion:
-        """Return the motion with the joint's link in place of its motor."""
-        motion = self.signals.motion
-        q, v, a = motion.q.copy(), motion.v.copy(), motion.a.copy()
-        for part, own in zip((q, v, a), lag, strict=True):
-            part[self.joint] -= own
-        return Motion(motion.name, motion.trajectory, motion.time, q, v, a, None, motion.rate)
 
     def _torque(self, motion: Motion) -> Array:
         return rigid_torque(self.signals.scene, motion, motion.q, motion.v, motion.a)

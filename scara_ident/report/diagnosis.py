@@ -10,7 +10,7 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.effect_parameters import RotorInertia
-from scara_ident.diagnosis.evidence import Evidence
+from scara_ident.diagnosis.evidence import Evidence, least_found
 from scara_ident.diagnosis.model_selection import Unexplained, rms_of
 from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.diagnosis.questions import noise_density, suspects_in_model
@@ -150,6 +150,7 @@ def _candidate(decision: Decision, diagnosis: Diagnosis) -> dict[str, Any]:
         "gain": decision.gain,
         "helps_in": [helps, voting],
         "outside_model": decision.examination.outside,
+        "detection_limit": {name: item.value for name, item in least_found(diagnosis.search, decision).items()},
         "nonlinear": {
             parameter.name: value
             for parameter, value in zip(

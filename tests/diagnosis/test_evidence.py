@@ -10,14 +10,22 @@ from scipy.signal import lfilter
 
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import diagnose
-from scara_ident.diagnosis.evidence import Evidence, coloured_shares, evidence, held_out_evidence, unsure_of_others
+from scara_ident.diagnosis.evidence import (
+    Evidence,
+    coloured_shares,
+    evidence,
+    held_out_evidence,
+    least_found,
+    unsure_of_others,
+)
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
+from scara_ident.diagnosis.selection_step import best_of_each
 from scara_ident.estimation import wls
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.motion.prepared import prepare
 from scara_ident.robot.robot import load_robot
-from tests.diagnosis.made import BANDS, exact_runs, observed, virtual_runs
+from tests.diagnosis.made import BANDS, exact_runs, observed, step_beside, virtual_runs, with_torque
 
 
 def left_of(noise: np.ndarray) -> np.ndarray:
@@ -50,6 +58,22 @@ def test_complete_is_earned_by_repetition(nothing_missing):
     assert nothing_missing.verdict == "complete"
     assert [item.by for item in nothing_missing.evidence] == ["repetition"] * 2
     assert all(item.limit < CRITERIA.least_power for item in nothing_missing.evidence)
+
+
+def test_an_effect_comes_in_from_its_detection_limit_on(nothing_missing):
+    search = nothing_missing.search
+    decision = best_of_each(search.decisions)["spring of joint2"]
+    ((name, limit),) = least_found(search, decision).items()
+    assert (name, limit.unit) == ("stiffness", "N m/rad")
+    accepted = []
+    for share in (0.0, 0.6, 1.4):
+        runs = with_torque(virtual_runs(), 1, lambda motion, size=share * limit.value: size * motion.q[1])
+        step = replace(step_beside(runs), tried=search.tried)
+        accepted.append(step.judge([decision.candidate])[0].accepted)
+    assert accepted == [False, False, True]
+    # Of several coefficients no one size is the least.
+    assert least_found(search, best_of_each(search.decisions)["friction_coupling of joint2 by joint1"]) == {}
+    assert all(item.limit >= CRITERIA.least_gain for item in nothing_missing.evidence)
 
 
 def test_one_short_run_cannot_tell():

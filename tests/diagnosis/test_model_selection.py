@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.lack_of_fit import lack_of_fit
-from scara_ident.diagnosis.model_selection import Outcome, _proxies, rms_of, select_model
+from scara_ident.diagnosis.model_selection import Outcome, _asked_band, _promised_band, _proxies, rms_of, select_model
 from scara_ident.diagnosis.search import SearchTask
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.effects import CATALOGUE
@@ -52,9 +52,20 @@ def test_a_joint_that_swings_within_the_band_is_found_there() -> None:
     # Far below the swing it is but promised, and looked for where it swings; a band that was asked for is kept.
     kept = selected(runs, JointElasticity(), bands=(4.0, 4.0), free=False)
     assert (kept.search.bands, found(kept)) == ((4.0, 4.0), set())
+    # The point that gains most says where, not the highest; a grid point may have lost two fifths of what is asked.
+    point = next(item for item in kept.search.decisions if item.candidate.member.joint == 0)
+    sure = replace(point, examination=replace(point.examination, value=np.array([1e-5]), p_value=1e-4, outside=1.0))
+    points = [replace(sure, candidate=sure.candidate.at((f, 0.2)), gain=g) for f, g in ((6.0, 0.048), (15.0, 0.04))]
+    assert _promised_band(replace(kept.search, decisions=tuple(points)), CRITERIA) == 9.0
+    assert _promised_band(replace(kept.search, decisions=(replace(points[0], gain=0.029),)), CRITERIA) == 0.0
     wider = selected(runs, JointElasticity(), bands=(4.0, 4.0), free=True)
     assert found(wider) == {"joint_elasticity of joint1"}
     assert wider.search.chosen[0].member.nonlinear[0] == pytest.approx(candidate.member.nonlinear[0], rel=0.02)
+    # What is in the model asks for both sides of its resonance too: below it another joint's elasticity does as well.
+    (band, _), swings = wider.search.bands, wider.search.chosen[0].member.nonlinear[0]
+    assert _asked_band(wider.search) == pytest.approx(1.5 * swings)
+    assert band is not None
+    assert CRITERIA.wider * band > 1.5 * swings
 
 
 @pytest.mark.slow

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.model_selection import rms_of
 from scara_ident.diagnosis.search import (
     SearchTask,
     _backward,
+    _fitted,
     _sure_once_refined,
+    _worth_fitting,
     columns_at_hand,
     scene_of,
     search,
@@ -167,3 +172,29 @@ def test_the_scene_is_how_far_the_recordings_reach():
     for part in seen.data.stretches:
         for held, made in zip(columns_at_hand(seen)[part.motion], MODEL.joint_columns(part.motion), strict=True):
             assert np.array_equal(held, made)
+
+
+def test_what_an_effect_may_stand_for_on_another_joint_is_fitted_beside_it():
+    """An elastic second joint was believed where the first was, whose grid point chance might have brought."""
+
+    def decision(name: str, gain: float, p_value: float):
+        effect = SimpleNamespace(effect=SimpleNamespace(name=name))
+        return SimpleNamespace(candidate=effect, gain=gain, examination=SimpleNamespace(p_value=p_value))
+
+    other, first, faint = decision("a", 0.16, 3e-9), decision("a", 0.13, 0.13), decision("a", 0.05, 0.13)
+    beside = decision("b", 0.15, 0.13)
+    assert _worth_fitting([faint, first, beside, other], 0.1, 100, CRITERIA) == [other, first]
+    # Alone it is not worth a fit.
+    assert _worth_fitting([first, beside], 0.1, 100, CRITERIA) == []
+
+
+def test_what_takes_the_place_of_an_effect_in_the_model_does_not_come_in(monkeypatch):
+    """An elastic first joint was dropped again for the second, fitted with it so that it explained nothing any more."""
+    held, spoilt = Candidate(Spring(), Member(1)), Candidate(Stribeck(), Member(0, (0.3,)))
+    step = step_beside(with_torque(exact_runs(), 1, spring), [held])
+    (promised,) = replace(step, chosen=()).judge([held])
+    monkeypatch.setattr(sys.modules[search.__module__], "tune", lambda scene, *_, **__: (scene, (spoilt, held)))
+    ((own, decision),) = _fitted(step, [promised], 0.0, None)
+    assert own.chosen == (spoilt,)
+    assert decision.gain > 0.5
+    assert (decision.accepted, decision.why) == (False, "takes the place of an effect in the model")

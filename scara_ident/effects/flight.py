@@ -1,0 +1,210 @@
+"""A link that flies freely in the clearance of its gear, and how its flight follows from the bodies and the width.
+
+While the torque through the gear keeps its sign, motor and link touch on one flank. When it changes its sign the link loses
+contact, and both drift apart with the acceleration that the torque would have given, until the link lands on a flank
+without bouncing (Nordin and Gutman, Automatica 38(10), 2002).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.effects.links import behind, lagging, link_inertia, rigid_columns, shared, usual_link_inertia
+from scara_ident.effects.signals import Signals
+from scara_ident.motion.low_pass import HIGHEST_CUT, differentiate
+from scara_ident.motion.motion import Motion
+
+# The link's lag keeps this many times the band: beyond it its second derivative is noise.
+LAG_BAND = 1.5
+# A link's inertia stays above this share of its usual one, however folded, where the estimate is a poor one.
+LEAST_INERTIA = 0.1
+# Samples of a flight that are looked at first.
+REACH = 64
+
+Lag = tuple[Array, Array, Array]
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A flight: its first sample and the one after its last, and its flank, 1 or -1.
+
+    ``since`` is the share of a sample's period by which the contact was lost before the first sample.
+    """
+
+    first: int
+    stop: int
+    side: float
+    since: float
+
+
+@dataclass(frozen=True, eq=False)
+class FreeLink:
+    """A joint's motor and link on a stretch of motion, with clearance between them.
+
+    Attributes
+    ----------
+    signals : Signals
+    joint : int
+    width : float
+        rad or m at the joint.
+    """
+
+    signals: Signals
+    joint: int
+    width: float
+
+    @cached_property
+    def usual(self) -> float:
+        """Usual inertia of the link, at the joint; not above 0 where misjudged."""
+        return usual_link_inertia(self.signals.scene, self.joint)
+
+    @cached_property
+    def lag(self) -> Lag:
+        """Motor less link as a share of the width, and its first two derivatives, each (N,)."""
+        return self._differentiated(self._flown[0])
+
+    @property
+    def change(self) -> Array:
+        """Torque of all joints per width, recorded side, shape (n, N)."""
+        return lagging(self.signals, self.joint, self.lag)
+
+    def slopes(self) -> Array:
+        """Return the derivatives of width times `change`, the width that multiplies it held, shape (n, p + 2, N).
+
+        They are by the parameters of the rigid bodies, by the armature where these do not tell it, and by the width.
+        """
+        scene, motion, j = self.signals.scene, self.signals.motion, self.joint
+        place, flights = self._flown
+        columns, scale = rigid_columns(self.signals), scene.robot.row_scale[j]
+        p = columns.shape[1]
+        rotor = np.append(scene.armature_slopes(j), 1.0)[:, None]
+        load, inertia = -rotor * motion.a[j], -rotor * np.ones(motion.samples)
+        load[:p] += columns[j] / scale
+        inertia[:p] += self._inertia_columns
+        inertia[:, self._inertia <= LEAST_INERTIA * self.usual] = 0.0
+        drifts = (load - self._drift * inertia) / self._inertia
+        moved = np.zeros((p + 2, motion.samples))
+        for flight in flights:
+            own = slice(flight.first, flight.stop)
+            moved[:-1, own] = _apart(drifts[:, own], flight.since * self._step, self._step, from_none=False)
+            moved[-1, own] = 0.5 * flight.side - place[own]
+        lags = self._differentiated(moved)
+        lag = tuple(self.width * part for part in self.lag)
+        result = np.array([lagging(self.signals, j, (lags[0][k], lags[1][k], lags[2][k])) for k in range(p + 2)])
+        result = result.transpose(1, 0, 2)
+        result[:, :p] += scene.model.rigid_body.regressor(behind(motion, j, (lag[0], lag[1], lag[2]))) - columns
+        result[j, : p + 1] += scale * rotor * lag[2]
+        return np.asarray(result)
+
+    @property
+    def _step(self) -> float:
+        return 1.0 / self.signals.motion.rate
+
+    @cached_property
+    def _inertia(self) -> Array:
+        return np.maximum(link_inertia(self.signals, self.joint), LEAST_INERTIA * self.usual)
+
+    @cached_property
+    def _inertia_columns(self) -> Array:
+        """Inertia that the joint moves with its rotor per parameter of the rigid bodies, shape (p, N)."""
+        scene, motion, j = self.signals.scene, self.signals.motion, self.joint
+
+        def made() -> Array:
+            pushed = motion.a.copy()
+            pushed[j] += 1.0
+            moved = Motion(motion.name, motion.trajectory, motion.time, motion.q, motion.v, pushed, None, motion.rate)
+            change = scene.model.rigid_body.regressor(moved) - rigid_columns(self.signals)
+            return np.asarray(change[j] / scene.robot.row_scale[j])
+
+        return shared(motion, ("inertia", scene.model.rigid_body, j), made)
+
+    @cached_property
+    def _drift(self) -> Array:
+        load = self.signals.load(self.joint) / self.signals.scene.robot.row_scale[self.joint]
+        return np.asarray(load / self._inertia)
+
+    @cached_property
+    def _flown(self) -> tuple[Array, list[Flight]]:
+        return flank(self._drift, self.width, self._step)
+
+    def _differentiated(self, signal: Array) -> Lag:
+        rate, cut = self.signals.motion.rate, LAG_BAND * self.signals.scene.band
+        return differentiate(signal, rate, cut if cut < HIGHEST_CUT * rate else None)
+
+
+def flank(drift: Array, width: float, step: float) -> tuple[Array, list[Flight]]:
+    """Return where in its clearance a link is, and its flights.
+
+    Parameters
+    ----------
+    drift : ndarray, shape (N,)
+        Acceleration of the motor relative to the free link: the torque through a gear without clearance over the
+        link's inertia. Taken as linear from sample to sample.
+    width : float
+        rad or m.
+    step : float
+        s per sample.
+
+    Returns
+    -------
+    tuple of (ndarray of shape (N,), list of Flight)
+        Motor less link as a share of the width: 0.5 while the torque is positive, -0.5 while it is negative, and the
+        free flight between them.
+    """
+    count = len(drift)
+    result, flights = np.empty(count), []
+    now, side = 0, 1.0 if drift[0] >= 0.0 else -1.0
+    # Where the sign changes to positive, and to negative.
+    changes = {
+        1.0: np.flatnonzero((drift[1:] > 0.0) & (drift[:-1] <= 0.0)) + 1,
+        -1.0: np.flatnonzero((drift[1:] < 0.0) & (drift[:-1] >= 0.0)) + 1,
+    }
+    while now < count:
+        leaves, since = now, 0.0
+        if drift[now] * side >= 0.0:
+            following = changes[-side]
+            place = int(np.searchsorted(following, now + 1))
+            leaves = int(following[place]) if place < len(following) else count
+            result[now:leaves] = 0.5 * side
+            if leaves == count:
+                break
+            since = float(drift[leaves] / (drift[leaves] - drift[leaves - 1]))
+        now, lands = _fly(drift, leaves, since, side, width, step, result)
+        flights.append(Flight(leaves, now, side, since))
+        side = lands
+    return result, flights
+
+
+def _fly(
+    drift: Array, first: int, since: float, side: float, width: float, step: float, result: Array
+) -> tuple[int, float]:
+    """Fill the flight that begins at a sample, and return the sample at which it has ended, and on which flank."""
+    reach = REACH
+    while True:
+        stop = min(first + reach, len(drift))
+        way = 0.5 * side + _apart(drift[first:stop], since * step, step, from_none=True) / width
+        # The first sample has hardly left its flank.
+        landed = np.flatnonzero(np.abs(way[1:]) >= 0.5) + 1
+        if len(landed) or stop == len(drift):
+            break
+        reach *= 4
+    end = int(landed[0]) if len(landed) else len(way)
+    result[first : first + end] = np.clip(way[:end], -0.5, 0.5)
+    return first + end, side if not len(landed) else float(np.sign(way[end]))
+
+
+def _apart(drift: Array, since: float, step: float, *, from_none: bool) -> Array:
+    """Return how far an acceleration, shape (..., N), has moved what was at rest ``since`` s before the first sample.
+
+    It is linear from sample to sample; before the first it grew from none, or was as large.
+    """
+    first = drift[..., :1]
+    speed, way = (first * since / 2.0, first * since**2 / 6.0) if from_none else (first * since, first * since**2 / 2.0)
+    speeds = speed + np.cumsum(0.5 * step * (drift[..., 1:] + drift[..., :-1]), axis=-1)
+    before = np.concatenate([speed, speeds[..., :-1]], axis=-1)[..., : drift.shape[-1] - 1]
+    ways = way + np.cumsum(step * before + step**2 * (drift[..., :-1] / 3.0 + drift[..., 1:] / 6.0), axis=-1)
+    return np.asarray(np.concatenate([way, ways], axis=-1))
