@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from importlib.metadata import entry_points
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,7 @@ GROUP = "scara_ident.shapes"
 
 
 @pytest.fixture
-def shapes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Registry[float]:
+def shapes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Registry[float]]:
     monkeypatch.syspath_prepend(tmp_path)
     make_installed(
         tmp_path, "stars", GROUP, {"star": "stars:AREA", "round": "stars:AREA", "twin": "stars:AREA"}, "AREA = 5.0\n"
@@ -28,7 +29,11 @@ def shapes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Registry[float]:
     make_installed(tmp_path, "twins", GROUP, {"twin": "twins:AREA"}, "AREA = 2.0\n")
     make_installed(tmp_path, "broken", GROUP, {"cracked": "broken:AREA"}, "import no_such_library\n")
     make_installed(tmp_path, "hollow", GROUP, {"empty": "hollow:AREA"})
-    return Registry("shape", GROUP, {"round": 3.0, "number": "math:pi"})
+    made: Registry[float] = Registry("shape", GROUP, {"round": 3.0, "number": "math:pi"})
+    # What is installed may have been looked for before, and shall be again by who comes after.
+    made.refresh()
+    yield made
+    made.refresh()
 
 
 def test_the_names_are_the_built_in_ones_and_then_those_of_packages(shapes: Registry[float]):

@@ -141,7 +141,9 @@ def test_a_panda_with_its_gripper_goes_from_a_rosbag2_to_a_report_by_the_command
         write_bag(tmp_path / "logs" / f"run_{run_number}", made, names=(*fingers, *robot.joints))
     page = blocks(ROOT / "docs" / "howto" / "my-logs.md")
     (commands,) = (block.text for block in page if block.language == "sh" and "panda.urdf" in block.text)
-    for command in commands.splitlines():
+    installed, *lines = commands.splitlines()
+    assert installed == 'pip install ".[ros]"'
+    for command in lines:
         program, *words = shlex.split(command)
         assert program == "scara-ident"
         assert run(words) == 0, capsys.readouterr().err
