@@ -60,8 +60,19 @@ def test_what_they_stand_behind_keeps_its_order():
         # With a bar that nothing clears the remainder stays.
         ({"least_gain": 1.01}, "unexplained", []),
         ({"most_effects": 0}, "unexplained", []),
-        # Where so much may be left over, nothing is.
-        ({"least_gain": 1.01, "remainder": 1.01, "remainder_to_noise": 1e3, "least_remainder": 1.0}, "complete", []),
+        # Where so much may be left over, nothing is; but where nothing could have come in, that nothing did says nothing.
+        ({"least_gain": 1.01, "remainder": 1.01, "remainder_to_noise": 1e3, "least_remainder": 1.0}, "undecided", []),
+        (
+            {
+                "least_gain": 1.01,
+                "remainder": 1.01,
+                "remainder_to_noise": 1e3,
+                "least_remainder": 1.0,
+                "least_power": 2.0,
+            },
+            "complete",
+            [],
+        ),
     ],
 )
 def test_a_diagnosis_obeys_the_criteria_that_it_is_given(change: dict, verdict: str, found: list[str]):
