@@ -2,7 +2,9 @@
 
 `identify` against the plain way: zero-phase filter, central differences, a Python loop over Pinocchio's regressor into one
 stacked regressor with friction columns, QR of all rows; and against the same with friction's columns made outside of the
-loop. All run in one process with one BLAS thread, in turn within each repeat, from the same recordings. Loading the robot
+loop. All run in one process with one BLAS thread, in turn within each repeat, from the same recordings; `identify` works in two
+Python threads, as it does for its user, and beyond the plain way chooses bands and base columns, weighs what noise of the
+positions does, tests runs and clocks, and gives a covariance that correlation does not spoil. Loading the robot
 is not timed, nor, for the plain ways alone, choosing base columns. All must predict the torque of another motion alike,
 else their times mean nothing.
 
