@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import cache
 from importlib import import_module
 from typing import Any, Generic, TypeVar, overload
@@ -90,11 +90,9 @@ def one_thread() -> Iterator[None]:
             _LOCAL.beside = before
 
 
-@contextmanager
-def threads_for(samples: int) -> Iterator[None]:
+def threads_for(samples: int) -> AbstractContextManager[None]:
     """Use both threads on arrays of so many samples where they are long, else one: two would wait for each other."""
-    with nullcontext() if samples >= LONG else one_thread():
-        yield
+    return nullcontext() if samples >= LONG else one_thread()
 
 
 def side_by_side(function: Callable[..., T], *items: Iterable[Any]) -> list[T]:

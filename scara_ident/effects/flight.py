@@ -13,15 +13,21 @@ from functools import cached_property
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.links import behind, lagging, link_inertia, rigid_columns, shared, usual_link_inertia
+from scara_ident.effects.links import (
+    LEAST_INERTIA,
+    behind,
+    held_link_inertia,
+    lagging,
+    rigid_columns,
+    shared,
+    usual_link_inertia,
+)
 from scara_ident.effects.signals import Signals
 from scara_ident.motion.low_pass import HIGHEST_CUT, differentiate
 from scara_ident.motion.motion import Motion
 
 # The link's lag keeps this many times the band: beyond it its second derivative is noise.
 LAG_BAND = 1.5
-# A link's inertia stays above this share of its usual one, however folded, where the estimate is a poor one.
-LEAST_INERTIA = 0.1
 # Samples of a flight that are looked at first.
 REACH = 64
 
@@ -106,7 +112,7 @@ class FreeLink:
 
     @cached_property
     def _inertia(self) -> Array:
-        return np.maximum(link_inertia(self.signals, self.joint), LEAST_INERTIA * self.usual)
+        return held_link_inertia(self.signals, self.joint)
 
     @cached_property
     def _inertia_columns(self) -> Array:

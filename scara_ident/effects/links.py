@@ -28,6 +28,8 @@ POSITION_STEP = 1e-5
 SPEED_STEP = 1e-4
 # A joint's inertia in its most folded pose is more than this share of its mean, or the estimate of it is a poor one.
 LEAST_FOLDED = 0.02
+# A link's inertia stays above this share of its usual one, however folded, where the estimate is a poor one.
+LEAST_INERTIA = 0.1
 
 _SHARED: WeakKeyDictionary[Signals | Scene | Motion, dict[Hashable, Array]] = WeakKeyDictionary()
 
@@ -228,6 +230,11 @@ def link_inertia(signals: Signals, joint: int) -> Array:
     scene = signals.scene
     by_a = rigid_slopes(signals, joint)[2][joint]
     return np.asarray(by_a / scene.robot.row_scale[joint] - scene.armature(joint))
+
+
+def held_link_inertia(signals: Signals, joint: int) -> Array:
+    """Return `link_inertia`, held above a share of the usual one, shape (N,)."""
+    return np.maximum(link_inertia(signals, joint), LEAST_INERTIA * usual_link_inertia(signals.scene, joint))
 
 
 def usual_link_inertia(scene: Scene, joint: int) -> float:

@@ -21,6 +21,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.effects.links import (
     behind,
+    held_link_inertia,
     lagging,
     rigid_columns,
     rigid_slopes,
@@ -38,8 +39,6 @@ STEPS = 2
 SMALL_LAG = 5e-3
 # Radians of the free swing per sample up to which the scheme of fourth order is taken; it is stable up to 2.45.
 FINE_STEP = 2.0
-# A link's inertia stays above this share of its usual one, however folded, where the estimate is a poor one.
-LEAST_INERTIA = 0.1
 # Gravity does not take away more than the rest of a gear's stiffness.
 LEAST_SPRING = 0.1
 # A swing at the beginning that is seen with less than this share of the other one's strength is not looked for.
@@ -88,8 +87,8 @@ class TwoMasses:
     def _slopes(self) -> Lag:
         """Derivatives of the torque of the links by position, velocity and acceleration, at the joint, each (N,)."""
         signals, j = self.signals, self.joint
-        by_q, by_v, by_a = (slope[j] / signals.scene.robot.row_scale[j] for slope in rigid_slopes(signals, j))
-        return by_q, by_v, np.maximum(by_a - signals.scene.armature(j), LEAST_INERTIA * self.inertia)
+        by_q, by_v = (slope[j] / signals.scene.robot.row_scale[j] for slope in rigid_slopes(signals, j)[:2])
+        return by_q, by_v, held_link_inertia(signals, j)
 
     @cached_property
     def swing(self) -> Swing:

@@ -189,14 +189,16 @@ class Observations(Frozen):
     def predicted(self, value: Array) -> tuple[Array, ...]:
         """Return the torque that parameters predict on every stretch, shape (n, N) each, not filtered.
 
-        That of the last parameters is kept, for more than one ask for it.
+        That of the last parameters is kept, for more than one ask for it, and cannot be written to.
         """
         known = self.__dict__.get("_predicted")
         if known is None or not np.array_equal(known[0], value):
             columns = [joint.columns for joint in self.joints]
 
             def of_stretch(raw: Raw) -> Array:
-                return np.array([value[own] @ row for own, row in zip(columns, raw, strict=True)])
+                torque = np.array([value[own] @ row for own, row in zip(columns, raw, strict=True)])
+                torque.flags.writeable = False
+                return torque
 
             known = value.copy(), tuple(side_by_side(of_stretch, chain.from_iterable(self.raw)))
             self.__dict__["_predicted"] = known
