@@ -27,7 +27,8 @@ def inspect(
         ),
     ],
     urdf: Annotated[
-        Path | None, typer.Option("--urdf", metavar="URDF", help="The arm, to whose joints columns are matched.")
+        Path | None,
+        typer.Option("--urdf", metavar="URDF", help="The arm, or a name as ur5, to whose joints columns are matched."),
     ] = None,
     robot: Annotated[
         Path | None, typer.Option("--robot", metavar="FILE", help="robot.yaml, to check its mapping on this file.")

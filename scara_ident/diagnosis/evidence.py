@@ -92,8 +92,10 @@ def _of_joint(
     joint: str, fit: LackOfFit | None, coloured: float, limit: float, small: float, criteria: SelectionCriteria
 ) -> Evidence:
     if limit > criteria.least_power:
-        share = "no share" if limit >= 1.0 else f"less than {limit:.0%}"
-        why = f"an effect that removes {share} of the squared residual would not have been significant: record more"
+        effect = (
+            "no effect" if limit >= 1.0 else f"no effect that removes less than {limit:.0%} of the squared residual"
+        )
+        why = f"{effect} would have been significant: record more"
         return Evidence(joint, False, "", why, limit)
     if fit is not None and fit.p_value < criteria.significant and fit.missing > small:
         why = f"{fit.missing:.3g} repeats (p = {fit.p_value:.1e}) beside {fit.noise:.3g} that does not: "

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.inspection.chain import is_still, numbered_joints, with_locked
-from scara_ident.inspection.names import CURRENT, TORQUE, Meaning, meaning
+from scara_ident.inspection.chain import is_still, with_locked
+from scara_ident.inspection.names import CURRENT, LINK_SIDE, TORQUE, Meaning
+from scara_ident.inspection.second_encoder import second_encoder
+from scara_ident.inspection.signals import Signal, groups, of_group
 from scara_ident.inspection.values import Reading, position_readings, slopes, time_unit, velocity_reading
 from scara_ident.recording.one_clock import on_one_clock
 from scara_ident.robot.robot import Robot
@@ -22,32 +24,6 @@ CLOCKS = ("time", "__time", "timestamp", "t")
 
 # Of a format in SI: when the state was measured, and when it was received.
 STATED_CLOCKS = ("time", "receive_time")
-
-
-@dataclass(frozen=True)
-class Signal:
-    """The columns of one quantity, by the index of the URDF's joint.
-
-    Attributes
-    ----------
-    quantity : str
-    columns : dict of int to str
-    template : str
-        The columns with the joint or its number as a placeholder.
-    first_number : int or None
-        Number of the first joint's column where joints are told by number; None where they are told by name.
-    units : dict of int to str
-        Unit of each joint's column; empty where it is not known.
-    side : {"joint", "motor"}
-        Side of the gear that the numbers belong to.
-    """
-
-    quantity: str
-    columns: Mapping[int, str]
-    template: str
-    first_number: int | None
-    units: Mapping[int, str] = field(default_factory=dict)
-    side: str = "joint"
 
 
 @dataclass
@@ -132,6 +108,12 @@ def guess(
         ]
         merged, _ = on_one_clock({name: numbers[name] for name in (result.time, *columns)}, result.time, columns)
         _find_units(result, meanings, merged, robot, stated=stated)
+        behind = second_encoder(result.signals["position"], result.joints, usable, numbers, robot)
+        if behind is not None:
+            result.signals["link_position"] = behind
+            own = ", ".join(robot.joints[k] for k in behind.columns)
+            said = f"link_position: {behind.template} taken for a second encoder behind the gear of {own}; check it"
+            result.notes.append(said)
     return result
 
 
@@ -167,8 +149,8 @@ def _find_signal(
 ) -> Signal | None:  # fmt: skip
     found: list[tuple[tuple[object, ...], Signal, str]] = []
     short: list[str] = []
-    for order, (template, by_name, members) in enumerate(_groups(quantity, meanings, robot.n)):
-        signal, note = _of_group(quantity, template, by_name, members, robot)
+    for order, (template, by_name, members) in enumerate(groups(quantity, meanings, robot.n)):
+        signal, note = of_group(quantity, template, by_name, members, robot)
         if signal is None:
             short.append(note)
             continue
@@ -178,6 +160,7 @@ def _find_signal(
             said.commanded,
             -moving,
             -len(signal.columns),
+            bool(said.words & LINK_SIDE),
             not by_name,
             not said.measured,
             not said.words & TORQUE,
@@ -203,50 +186,6 @@ def _find_signal(
     if first[0]:
         result.notes.append(f"{quantity}: {best.template} is by its name a command, not a measurement")
     return best
-
-
-def _groups(quantity: str, meanings: Mapping[str, Meaning], joints: int) -> list[tuple[str, bool, dict[int, str]]]:
-    """List the columns that may be one signal: their template, whether joints are told by name, and the columns.
-
-    What is told by name is told by number too: where columns count J0, J1 and joints j1, j2, names mislead.
-    """
-    named: dict[str, dict[int, str]] = {}
-    numbered: dict[str, dict[int, str]] = {}
-    for name, said in meanings.items():
-        if said.quantity != quantity or (said.joint is not None and said.joint >= joints):
-            continue
-        if said.joint is not None:
-            named.setdefault(said.template, {})[said.joint] = name
-        blind = said if said.joint is None else meaning(name)
-        # An arm of one joint needs neither name nor number.
-        if blind.number is not None or said.joint is None:
-            numbered.setdefault(blind.template, {})[blind.number or 0] = name
-    return [(template, True, members) for template, members in named.items()] + [
-        (template, False, members) for template, members in numbered.items()
-    ]
-
-
-def _of_group(
-    quantity: str, template: str, by_name: bool, members: Mapping[int, str], robot: Robot
-) -> tuple[Signal | None, str]:
-    """Return the signal of a group, if it has enough channels, and what there is to say of it."""
-    if by_name:
-        return Signal(quantity, dict(sorted(members.items())), template, None), ""
-    numbered = sorted(members)
-    first = numbered[0]
-    joints = None if numbered != list(range(first, first + len(numbered))) else numbered_joints(robot, len(numbered))
-    if joints is None:
-        said = (
-            f"{quantity}: {template} has {len(numbered)} channels for {robot.n} joints: not used without a mapping; name "
-            "the joints that it has, in --joints"
-        )
-        return None, said
-    note = ""
-    if len(numbered) > robot.n:
-        note = f"{quantity}: {template} has {len(numbered)} channels; the first {robot.n} taken, in the joints' order"
-    elif robot.n > 1:
-        note = f"{quantity}: {template} matched to the joints by order; check it"
-    return Signal(quantity, {k: members[first + place] for place, k in enumerate(joints)}, template, first), note
 
 
 def _find_units(

@@ -22,6 +22,7 @@ from scara_ident.inspection.unnamed import meanings_by_place
 from scara_ident.recording.files import column_names, is_bag_folder, read_columns
 from scara_ident.recording.recording import Recording, read_recording
 from scara_ident.robot.description import check_description
+from scara_ident.robot.examples import is_name, urdf_of
 from scara_ident.robot.robot import Robot, build_robot, load_robot
 from scara_ident.robot.signal_map import SIGNALS, contract_channels
 
@@ -107,7 +108,7 @@ def inspect_file(
     path : path
         A recording of any kind that can be read, or the folder of a rosbag2 recording.
     urdf : path, optional
-        The arm; without it columns are told by their names alone.
+        The arm, or the name of a robot of example-robot-data; without it columns are told by their names alone.
     robot : path, optional
         A robot description, whose mapping is then used instead of a guess.
     joints : str, optional
@@ -135,14 +136,15 @@ def inspect_file(
         raise UsageError(f"{path}: is a folder; give one recording of it")
     if robot is not None:
         return _by_description(path, load_robot(robot))
-    arm = None if urdf is None else arm_of(Path(urdf), joints)
+    source = None if urdf is None else Path(urdf)
+    arm = None if source is None else arm_of(urdf_of(source), joints)
     topics = _topics(path)
     topic = _likely_topic(path, topics, arm)
     names = column_names(path, topic)
     numbers = _numbers(path, names, topic)
     every = () if arm is None else (*arm.joints, *(name for name, _ in arm.locked))
     meanings = {name: meaning(name, every) for name in names}
-    if arm is None:
+    if arm is None or source is None:
         columns = tuple(_column(name, numbers.get(name), *_by_name(name), False) for name in names)
         return Inspection(path, topics, topic, columns, {})
     by_place = {}
@@ -156,7 +158,8 @@ def inspect_file(
     if len(topics) > 1 and topic is not None:
         described = {"topic": topic, **described}
         found.notes.append(f"topic: {topic} taken of {', '.join(topics)}")
-    text = description_text(found, arm, described, _relative(arm.urdf, Path(folder)), path)
+    where = source if is_name(source) else _relative(arm.urdf, Path(folder))
+    text = description_text(found, arm, described, where, path)
     recording, refusal = (None, None) if not found.complete else _audited(path, text, arm)
     scale = None if recording is None else _scale(recording, arm, text)
     if scale is not None:

@@ -38,6 +38,8 @@ OTHER = frozenset(
     ["error", "err", "std", "min", "max", "limit", "limits", "tcp", "tool", "cartesian", "pose", "gripper", "imu",
      "fehler", "werkzeug", "greifer", "erreur", "outil", "pince"]
 )  # fmt: skip
+# Of an encoder behind the gear, where there is another one before it.
+LINK_SIDE = frozenset(("link", "load", "output", "secondary", "second", "se", "abtrieb", "abtriebsseitig"))
 GENERIC = frozenset(("joint", "link", "axis", "motor", "gelenk", "achse", "axe", "articulation", "moteur"))
 CURRENT = frozenset(("current", "currents", "curr", "i", "strom", "courant", "courants"))
 TORQUE = frozenset(

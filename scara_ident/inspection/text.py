@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from scara_ident.inspection.guess import Guess, Signal
+from scara_ident.inspection.guess import Guess
+from scara_ident.inspection.signals import Signal
 from scara_ident.robot.robot import Robot
 from scara_ident.robot.rotors import GUESS_FACTOR
-from scara_ident.robot.signal_map import fill
+from scara_ident.robot.signal_map import PARTIAL, fill
 from scara_ident.robot.units import DRIVE, table_of
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
@@ -152,32 +153,32 @@ def _recording(described: Mapping[str, Any]) -> list[str]:
 
 
 def _signal(signal: Signal, guess: Guess, robot: Robot) -> dict[str, Any]:
-    joints = [robot.joints[k] for k in guess.joints]
-    if not all(k in signal.columns for k in guess.joints):
+    own = [k for k in guess.joints if k in signal.columns]
+    if len(own) < len(guess.joints) and signal.quantity not in PARTIAL:
         return {}
-    columns = [signal.columns[k] for k in guess.joints]
+    joints, columns = [robot.joints[k] for k in own], [signal.columns[k] for k in own]
     result: dict[str, Any] = {}
     if columns != [f"{joint}.{signal.quantity}" for joint in joints]:
-        result |= _places(signal, joints, columns)
+        result |= _places(signal, joints, columns, len(guess.joints))
     # The default of a robot description is the SI unit.
     usual = {
         k: next(iter(table_of(signal.quantity, linear=bool(robot.prismatic[k]) and signal.side == "joint")))
-        for k in guess.joints
+        for k in own
     }
-    units = {robot.joints[k]: signal.units[k] for k in guess.joints if signal.units.get(k, usual[k]) != usual[k]}
+    units = {robot.joints[k]: signal.units[k] for k in own if signal.units.get(k, usual[k]) != usual[k]}
     if units or (result and signal.units):
-        every = {robot.joints[k]: signal.units.get(k, usual[k]) for k in guess.joints}
+        every = {robot.joints[k]: signal.units.get(k, usual[k]) for k in own}
         result["unit"] = next(iter(every.values())) if len(set(every.values())) == 1 else every
     if signal.side == "motor":
         result["side"] = "motor"
     return result
 
 
-def _places(signal: Signal, joints: list[str], columns: list[str]) -> dict[str, Any]:
+def _places(signal: Signal, joints: list[str], columns: list[str], every: int) -> dict[str, Any]:
     pattern = signal.template
     if signal.first_number == 0:
         pattern = pattern.replace("{number}", "{index}")
-    if [fill(pattern, joint, index) for index, joint in enumerate(joints)] == columns:
+    if len(joints) == every and [fill(pattern, joint, index) for index, joint in enumerate(joints)] == columns:
         return {"column": pattern}
     return {"columns": dict(zip(joints, columns, strict=True))}
 

@@ -42,7 +42,8 @@ def refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str], chan
     guess = f"is it {lower[near[0]]!r}? " if near else ""
     kind = f"{ending} columns" if "." in name and not mapped else "columns"
     shown = ", ".join(have[:8]) + (", ..." if len(have) > 8 else "") if have else "none"
-    remedy = "rename the column, or correct the joints in the robot description"
+    remedy = "rename the column, or correct the joints in the robot description; one for these columns "
+    remedy += f"writes: scara-ident inspect {path.name} --urdf URDF"
     if mapped:
         remedy = f"correct recording: {mapped} in the robot description"
     elif len(missing) == len(wanted) and path.exists():

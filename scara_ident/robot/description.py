@@ -20,6 +20,7 @@ from pydantic import (
 
 from scara_ident.errors import RobotError
 from scara_ident.files import path_fault, real_path
+from scara_ident.robot.examples import example_urdf, is_name
 
 # Sizes that a factor of a drive or a channel may have.
 SMALLEST, LARGEST_FACTOR = 1e-12, 1e12
@@ -173,7 +174,7 @@ def read_description(path: Path) -> RobotDescription:
     Parameters
     ----------
     path : Path
-        The YAML file; its ``urdf`` is relative to it.
+        The YAML file; its ``urdf`` is relative to it, or the name of a robot of example-robot-data.
 
     Raises
     ------
@@ -220,7 +221,10 @@ def read_description(path: Path) -> RobotDescription:
     except RecursionError:
         raise RobotError(f"{path}: nested too deeply; a robot.yaml has a few levels") from None
     description = check_description(content, path)
-    return description.model_copy(update={"urdf": real_path(path.parent / description.urdf)})
+    beside = path.parent / description.urdf
+    # What lies beside the file comes before a robot of that name.
+    urdf = beside if beside.exists() or not is_name(description.urdf) else example_urdf(description.urdf.name)
+    return description.model_copy(update={"urdf": real_path(urdf)})
 
 
 def _size(node: Any, known: dict[int, float]) -> float:

@@ -16,6 +16,17 @@ def is_name(source: Path) -> bool:
     return len(source.parts) == 1 and not source.suffix and not source.exists()
 
 
+def urdf_of(source: Path) -> Path:
+    """Return a file as it is, and the URDF of a robot of example-robot-data for its name.
+
+    Raises
+    ------
+    RobotError
+        As `example_urdf`.
+    """
+    return example_urdf(source.name) if is_name(source) else source
+
+
 def example_urdf(name: str) -> Path:
     """Return the URDF of a robot of example-robot-data.
 

@@ -19,7 +19,7 @@ from scara_ident.errors import RobotError
 from scara_ident.files import path_fault, real_path
 from scara_ident.manners import Frozen
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
-from scara_ident.robot.examples import example_urdf, is_name
+from scara_ident.robot.examples import urdf_of
 from scara_ident.robot.mimic import Follower, coupled_ends, followers, lock_followers, refuse_coupled
 from scara_ident.robot.rotors import RotorGuess, guess_rotors
 from scara_ident.robot.signal_map import Channels, build_channels, check_rated_torque
@@ -172,8 +172,7 @@ def load_robot(path: Path | str | None = None) -> Robot:
     source = Path(path)
     if (fault := path_fault(source)) is not None:
         raise RobotError(fault)
-    if is_name(source):
-        source = example_urdf(source.name)
+    source = urdf_of(source)
     if source.suffix.lower() == ".xacro":
         raise RobotError(f"{source}: is xacro's; {XACRO}")
     if source.suffix.lower() in (".urdf", ".xml"):

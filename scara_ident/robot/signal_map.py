@@ -16,6 +16,8 @@ from scara_ident.robot.description import MotionDescription, RecordingDescriptio
 from scara_ident.robot.units import COUNT, Unit, find_unit, table_of
 
 SIGNALS = ("position", "velocity", "acceleration", "effort", "temperature", "link_position")
+# Which some joints may have and others not.
+PARTIAL = ("link_position",)
 # What a pattern may hold: the joint's name, its place in the robot description from 0, and from 1.
 PLACEHOLDERS = ("{joint}", "{index}", "{number}")
 # A rated torque is within this factor of the URDF's limit; below this share of it, it is that of one per cent.
@@ -161,9 +163,10 @@ class _Signal:
                 self._refuse_unknown(key, value)
         if described.columns is not None:
             for joint in joints:
-                if joint not in described.columns:
+                if joint not in described.columns and self.name not in PARTIAL:
                     self.refuse(f"columns.{joint}", "missing; every identified joint needs its column")
-            return [described.columns[joint] for joint in joints]
+            # A joint that may lack the signal lacks the column of that name.
+            return [described.columns.get(joint, f"{joint}.{self.name}") for joint in joints]
         pattern = described.column or f"{{joint}}.{self.name}"
         if len(joints) > 1 and not any(mark in pattern for mark in PLACEHOLDERS):
             self.refuse(

@@ -56,6 +56,14 @@ def test_files_and_folders_come_before_names(tmp_path: Path, monkeypatch: pytest
         load_robot("ur5")
 
 
+def test_a_robot_description_may_name_one_unless_a_file_of_that_name_lies_beside_it(tmp_path: Path):
+    (tmp_path / "robot.yaml").write_text("urdf: ur5\n")
+    assert load_robot(tmp_path / "robot.yaml").urdf == load_robot("ur5").urdf.resolve()
+    (tmp_path / "ur5").write_text("no URDF")
+    with pytest.raises(RobotError, match=f"{tmp_path}/ur5"):
+        load_robot(tmp_path / "robot.yaml")
+
+
 def test_without_the_package_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch):
     def lost(name: str) -> None:
         raise PackageNotFoundError(name)

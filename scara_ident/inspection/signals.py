@@ -1,0 +1,80 @@
+"""Columns that belong together: one quantity of the joints of an arm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from scara_ident.inspection.chain import numbered_joints
+from scara_ident.inspection.names import Meaning, meaning
+from scara_ident.robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class Signal:
+    """The columns of one quantity, by the index of the URDF's joint.
+
+    Attributes
+    ----------
+    quantity : str
+    columns : dict of int to str
+    template : str
+        The columns with the joint or its number as a placeholder.
+    first_number : int or None
+        Number of the first joint's column where joints are told by number; None where they are told by name.
+    units : dict of int to str
+        Unit of each joint's column; empty where it is not known.
+    side : {"joint", "motor"}
+        Side of the gear that the numbers belong to.
+    """
+
+    quantity: str
+    columns: Mapping[int, str]
+    template: str
+    first_number: int | None
+    units: Mapping[int, str] = field(default_factory=dict)
+    side: str = "joint"
+
+
+def groups(quantity: str, meanings: Mapping[str, Meaning], joints: int) -> list[tuple[str, bool, dict[int, str]]]:
+    """List the columns that may be one signal: their template, whether joints are told by name, and the columns.
+
+    What is told by name is told by number too: where columns count J0, J1 and joints j1, j2, names mislead.
+    """
+    named: dict[str, dict[int, str]] = {}
+    numbered: dict[str, dict[int, str]] = {}
+    for name, said in meanings.items():
+        if said.quantity != quantity or (said.joint is not None and said.joint >= joints):
+            continue
+        if said.joint is not None:
+            named.setdefault(said.template, {})[said.joint] = name
+        blind = said if said.joint is None else meaning(name)
+        # An arm of one joint needs neither name nor number.
+        if blind.number is not None or said.joint is None:
+            numbered.setdefault(blind.template, {})[blind.number or 0] = name
+    return [(template, True, members) for template, members in named.items()] + [
+        (template, False, members) for template, members in numbered.items()
+    ]
+
+
+def of_group(
+    quantity: str, template: str, by_name: bool, members: Mapping[int, str], robot: Robot
+) -> tuple[Signal | None, str]:
+    """Return the signal of a group, if it has enough channels, and what there is to say of it."""
+    if by_name:
+        return Signal(quantity, dict(sorted(members.items())), template, None), ""
+    numbered = sorted(members)
+    first = numbered[0]
+    joints = None if numbered != list(range(first, first + len(numbered))) else numbered_joints(robot, len(numbered))
+    if joints is None:
+        said = (
+            f"{quantity}: {template} has {len(numbered)} channels for {robot.n} joints: not used without a mapping; name "
+            "the joints that it has, in --joints"
+        )
+        return None, said
+    note = ""
+    if len(numbered) > robot.n:
+        note = f"{quantity}: {template} has {len(numbered)} channels; the first {robot.n} taken, in the joints' order"
+    elif robot.n > 1:
+        note = f"{quantity}: {template} matched to the joints by order; check it"
+    return Signal(quantity, {k: members[first + place] for place, k in enumerate(joints)}, template, first), note

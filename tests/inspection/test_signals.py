@@ -1,0 +1,29 @@
+"""Columns of one quantity are grouped by their names, or by their numbers."""
+
+from __future__ import annotations
+
+from scara_ident.inspection.names import meaning
+from scara_ident.inspection.signals import groups, of_group
+from scara_ident.robot.robot import load_robot
+
+ROBOT = load_robot()
+
+
+def test_named_columns_are_told_by_number_too_and_unnamed_ones_by_number_only():
+    names = ["joint1.position", "joint2.position", "enc[0]", "enc[1]", "joint1.effort"]
+    found = groups("position", {name: meaning(name, ROBOT.joints) for name in names}, ROBOT.n)
+    assert found == [
+        ("{joint}.position", True, {0: "joint1.position", 1: "joint2.position"}),
+        ("joint{number}.position", False, {1: "joint1.position", 2: "joint2.position"}),
+        ("enc[{number}]", False, {0: "enc[0]", 1: "enc[1]"}),
+    ]
+    signal, note = of_group("position", *found[2], ROBOT)
+    assert signal is not None
+    assert (signal.columns, signal.first_number) == ({0: "enc[0]", 1: "enc[1]"}, 0)
+    assert "matched to the joints by order" in note
+
+
+def test_a_group_with_fewer_channels_than_joints_is_no_signal():
+    signal, note = of_group("position", "enc[{number}]", False, {0: "enc[0]"}, ROBOT)
+    assert signal is None
+    assert "1 channels for 2 joints" in note
