@@ -221,7 +221,7 @@ class GravityCounterbalance(Sinusoid):
     """
 
     name = "gravity_counterbalance"
-    summary = "a spring or weight that balances the joint"
+    summary = "a spring or weight that balances the joint, or a ripple once per its turn"
     coefficients = (
         Coefficient("balance_sin", "{torque}", "torque of a counterbalance of {joint} per sine of its position"),
         Coefficient("balance_cos", "{torque}", "torque of a counterbalance of {joint} per cosine of its position"),

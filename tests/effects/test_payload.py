@@ -12,6 +12,7 @@ import pytest
 from scara_ident.effects import Member
 from scara_ident.effects.links import point_mass, tool_of
 from scara_ident.effects.payload import FreePayloadChange, GravityCounterbalance, PayloadChange, PayloadOfRecordings
+from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.model.base_parameters import BODY_PARAMETERS
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import Robot, load_robot
@@ -163,3 +164,7 @@ def test_a_counterbalance_is_tried_where_gravity_acts(tmp_path: Path):
     assert found["torque"].std == pytest.approx(0.1)
     assert found["phase"].std == pytest.approx(0.1 / 3.0)
     assert column[1].T @ value == pytest.approx(3.0 * np.sin(item.q[1] + 0.4))
+    # So that its words name the other as well.
+    ripple = columns(TorqueRipple(), scene, item, Member(1, (1.0 / float(scene.robot.reduction[1]),)))
+    np.testing.assert_allclose(column, ripple, atol=1e-9)
+    assert "a ripple once per its turn" in effect.description(scene, Member(1))
