@@ -84,6 +84,8 @@ class Question:
         Rms of the remainder, or size of the parameter.
     experiment : str
         What to do where no motion of the arm answers it.
+    sigma : float
+        Standard errors between the answers that a diagnosis says, for where its recordings are not at hand.
     """
 
     kind: Kind
@@ -94,6 +96,7 @@ class Question:
     parameter: str | None = None
     size: float = np.nan
     experiment: str = ""
+    sigma: float = 0.0
 
     def entry(self) -> dict[str, Any]:
         """Return it as plain values; see `question_of`."""
@@ -126,6 +129,7 @@ def question_of(entry: Mapping[str, Any]) -> Question:
         entry["parameter"],
         np.nan if entry["size"] is None else float(entry["size"]),
         str(entry["experiment"]),
+        float(entry.get("sigma_before") or 0.0),
     )
 
 
