@@ -171,7 +171,7 @@ class Inquiry:
         if not parts:
             return said
         view = self._view(parts[0] if len(parts) == 1 else merge(parts))
-        return np.hypot(said, [view.sigma(item) for item in asked])
+        return np.asarray(np.hypot(said, [view.sigma(item) for item in asked]))
 
     @cached_property
     def just_seen(self) -> dict[str, Array]:

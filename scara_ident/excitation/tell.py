@@ -361,7 +361,7 @@ def _changed(task: Task, x: Array, size: float, beside: Sequence[Array], random:
     elif kind == 1:
         y[0, chosen] *= np.exp(size * random.normal(size=(int(np.sum(chosen)), 1)))
     elif kind == 3:
-        y[0] = _spliced(basis, x[0], beside[random.integers(len(beside))][0], random.uniform(0.0, 2.0 * np.pi))
+        y[0] = _spliced(basis, x[0], beside[int(random.integers(len(beside)))][0], random.uniform(0.0, 2.0 * np.pi))
     else:
         reach = size * (task.limits.upper - task.limits.lower) * random.normal(size=n)
         y[0] = np.where(chosen[:, None], _placed(basis, x[0], _mean(basis, x[0]) + reach), x[0])
