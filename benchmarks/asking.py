@@ -62,8 +62,9 @@ FACTORS, REACHES, SPEEDS = (0.15, 1.5), (0.1, 0.3), (0.4, 1.0)
 FIRST, ASKED, SAMPLED = 8.0, 15.0, 500.0
 EFFORT, PLAIN = Effort(starts=1, rounds=2, processes=1), Effort(starts=2, rounds=0, processes=1)
 WAYS = ("tell", "random", "logdet")
-# A tight cell: to either side of the place of the first motion, rad, and the speed in it, rad/s.
-ROOM, REDUCED = 0.5, 1.0
+# A tight cell: to either side of the place of the first motion, rad, the speed in it, rad/s, and sizes of effects that can
+# show there at all.
+ROOM, REDUCED, LARGER = 0.5, 1.0, (0.5, 3.0)
 # Of a bump: standard deviation over the joint's range, and height over the standard deviation of the effort.
 # The first motion passes all of a bump, or it could be anything: reach, rad.
 WIDTHS, SIZES, PASSING = (0.09, 0.14), (0.2, 0.6), (0.8, 1.2)
@@ -164,13 +165,13 @@ def in_cell(robot: Robot, motion: ReferenceMotion) -> Robot:
     return replace(robot, lower=lower, upper=upper, velocity_limit=speed)
 
 
-def one_set(robot: str, number: int, seed: int, tight: bool = False) -> dict[str, Any]:
+def one_set(robot: str, number: int, seed: int, tight: bool = False, quick: bool = False) -> dict[str, Any]:
     """Return what one set tells."""
     rng = np.random.default_rng([seed, number])
     arm = virtual_arm(_robot(robot))
     pair = PAIRS[number % len(PAIRS)]
     name = pair[(number // len(PAIRS)) % 2]
-    truth = _random_effect(name, float(np.exp(rng.uniform(*np.log(FACTORS)))), arm, rng)
+    truth = _random_effect(name, float(np.exp(rng.uniform(*np.log(LARGER if tight else FACTORS)))), arm, rng)
     motion = poor_motion(arm, rng)
     begun = [record(arm, motion, truth, number, run) for run in (1, 2)]
     first = diagnose(arm.robot, begun)
@@ -206,7 +207,7 @@ def one_set(robot: str, number: int, seed: int, tight: bool = False) -> dict[str
             if told is not None:
                 result["kind"], result["promised"] = told.question.kind, [told.before, told.after]
                 result["seen"] = seen(found, first, told.question)
-    if not any(result[way] for way in WAYS):
+    if not quick and not any(result[way] for way in WAYS):
         # Each as a trajectory of its own.
         runs = [replace(run, name=f"{way}_1") for way, run in more.items()]
         result |= best(first, diagnose(arm.robot, [*begun, *runs]), arm, limits, begun, truth, number)
@@ -373,12 +374,11 @@ def main() -> None:
     words.add_argument("--seed", type=int, default=1)
     words.add_argument("--bump", action="store_true", help="torques that no catalogue lists, instead of pairs")
     words.add_argument("--tight", action="store_true", help="the asked motion keeps to a cell at a reduced speed")
+    words.add_argument("--quick", action="store_true", help="without what a motion for the effect alone would tell")
     words.add_argument("--show", action="store_true")
     given = words.parse_args()
     lines = given.output.read_text(encoding="utf-8").splitlines() if given.output.is_file() else []
-    what, run, tell = (
-        ("bump", one_bump, show_bumps) if given.bump else ("set", partial(one_set, tight=given.tight), show)
-    )
+    what, run, tell = ("bump", one_bump, show_bumps) if given.bump else ("set", sets, show)
     rows = [row for row in map(json.loads, lines) if what in row]
     done = {(row["robot"], row["seed"], row[what]) for row in rows}
     for number in range(0 if given.show else given.sets):

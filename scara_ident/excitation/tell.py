@@ -24,6 +24,7 @@ from scara_ident.diagnosis.questions import MOST_NAMED, Question
 from scara_ident.effects import Signals
 from scara_ident.estimation.information import merge
 from scara_ident.excitation.curves import Basis
+from scara_ident.excitation.interior_point import Minimum
 from scara_ident.excitation.limits import InfeasibleLimits
 from scara_ident.excitation.problem import Problem, Task, row_names
 from scara_ident.excitation.search import (
@@ -186,7 +187,7 @@ def search_to_tell(
     Parameters
     ----------
     task : Task
-        Of one trajectory; its criterion is that of the motion where the first search begins.
+        Of one trajectory; its criterion is that of the motions where the first search begins.
     inquiry : Inquiry
     effort : Effort
         Searches from ``starts`` sets of random motions, each with as many changes as ``1 + rounds`` say.
@@ -199,18 +200,18 @@ def search_to_tell(
         If no random motion is within the limits.
     """
     problem = within_grid(task, COARSE, np.full(len(row_names(task.limits, len(task.posture))), BOUND))
-    paces = [
-        within_grid(
-            replace(task, limits=replace(task.limits, velocity=share * task.limits.velocity)), COARSE, problem.bounds
-        )
-        for share in PACES
-    ]
     turning = any(item.candidate.effect.seeded_by == "order" for item in inquiry.suspects)
     judge = _Judge(inquiry, task, TURNING_RATE if turning else RATE)
 
+    def paced(share: float) -> Minimum | None:
+        slower = replace(task, limits=replace(task.limits, velocity=share * task.limits.velocity))
+        return from_random(within_grid(slower, COARSE, problem.bounds), effort.seed, 0)
+
+    beside = [item.x for item in map_in_order(paced, PACES, effort.processes) if item is not None]
+
     def work(index: int) -> tuple[float, Array] | None:
-        beside = [found.x for found in (from_random(at, effort.seed, index) for at in paces) if found is not None]
-        return _best(problem, judge, np.random.default_rng([effort.seed, index]), effort.rounds, beside)
+        random, begun = np.random.default_rng([effort.seed, index]), beside if index == 0 else []
+        return _best(problem, judge, random, effort.rounds, beside, begun)
 
     found: list[tuple[float, Array]] = []
     costs: list[float] = []
@@ -288,15 +289,14 @@ def motion_of(basis: Basis, posture: Array, coefficients: Array, rate: float) ->
 
 
 def _best(
-    problem: Problem, judge: _Judge, random: np.random.Generator, rounds: int, beside: Sequence[Array]
+    problem: Problem, judge: _Judge, random: np.random.Generator, rounds: int, beside: list[Array], begun: list[Array]
 ) -> tuple[float, Array] | None:
     """Return cost and coefficients of the best of some motions and random ones, changed as long as that helps."""
-    drawn = (_inside(problem, x) for x in (*beside, *(random_motion(problem.task, random) for _ in range(DRAWN))))
+    drawn = (_inside(problem, x) for x in (*begun, *(random_motion(problem.task, random) for _ in range(DRAWN))))
     ranked = sorted(((judge.cost(x), k, x) for k, x in enumerate(drawn) if x is not None), key=lambda item: item[:2])
     if not ranked:
         return None
-    cost, _, best = ranked[0]
-    size = FIRST
+    (cost, _, best), size = ranked[0], FIRST
     for _ in range(CHANGED * (1 + rounds)):
         x = _inside(problem, _changed(problem.task, best, size, beside, random))
         if x is not None and (now := judge.cost(x)) < cost:
@@ -372,9 +372,8 @@ def _spliced(basis: Basis, x: Array, other: Array, phase: float) -> Array:
     """Return coefficients of a motion that goes as one does for half of the time, and as another for the other half."""
     angle = 2.0 * np.pi * np.arange(8 * basis.size) / (8 * basis.size)
     share = 0.5 + 0.5 * np.clip(2.0 * np.cos(angle - phase), -1.0, 1.0)
-    velocity = share * (x @ _rows(basis, 8 * basis.size)[1].T)
-    velocity += (1.0 - share) * (other @ _rows(basis, 8 * basis.size)[1].T)
-    return _placed(basis, velocity @ _inverse(basis, 1).T, _mean(basis, x))
+    one, two = (each @ _rows(basis, 8 * basis.size)[1].T for each in (x, other))
+    return _placed(basis, (share * one + (1.0 - share) * two) @ _inverse(basis, 1).T, _mean(basis, x))
 
 
 def _inside(problem: Problem, x: Array) -> Array | None:
