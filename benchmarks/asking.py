@@ -378,6 +378,7 @@ def main() -> None:
     words.add_argument("--show", action="store_true")
     given = words.parse_args()
     lines = given.output.read_text(encoding="utf-8").splitlines() if given.output.is_file() else []
+    sets = partial(one_set, tight=given.tight, quick=given.quick)
     what, run, tell = ("bump", one_bump, show_bumps) if given.bump else ("set", sets, show)
     rows = [row for row in map(json.loads, lines) if what in row]
     done = {(row["robot"], row["seed"], row[what]) for row in rows}
