@@ -188,7 +188,8 @@ def _hotelling(value: Array, covariance: Array, freedom: Array, rank: NDArray[np
 
 def _whitening(whole: Array) -> tuple[Array, Array, NDArray[np.intp]]:
     """Return A with ``A' W A = 1`` where W says something, its inverse there, and in how many directions that is."""
-    size = np.sqrt(np.diagonal(whole, axis1=1, axis2=2))
+    # Of a column within the model rounding may leave less than nothing.
+    size = np.sqrt(np.maximum(np.diagonal(whole, axis1=1, axis2=2), 0.0))
     size = np.where(size == 0.0, 1.0, size)
     values, vectors = np.linalg.eigh(whole / (size[:, :, None] * size[:, None, :]))
     kept = values > _RANK * np.maximum(values[:, -1:], np.finfo(float).tiny)
