@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable, Iterator
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from scara_ident.threads import forget_threads, one_blas_thread
+from scara_ident.threads import forget_threads, one_blas_thread, one_thread, works_alone
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -40,7 +41,7 @@ def map_in_order(
     """
     wanted = list(items)
     count = min(available_cores() if processes is None else processes, len(wanted))
-    if count <= 1 or "fork" not in multiprocessing.get_all_start_methods():
+    if count <= 1 or not _may_fork():
         with one_blas_thread():
             yield from map(work, wanted)
         return
@@ -59,7 +60,7 @@ def beside(work: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
     work : callable
         Its result is sent to the caller, as is its error.
     """
-    if "fork" not in multiprocessing.get_all_start_methods():
+    if not _may_fork():
         yield work
         return
 
@@ -69,6 +70,39 @@ def beside(work: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
 
     with _forked(1, alone) as pool:
         yield pool.submit(_apply, None).result
+
+
+def halved(work: Callable[[Item], Result], items: Sequence[Item], sizes: Sequence[float]) -> list[Result]:
+    """Apply a function to items, about half of them in another process, and return the results in their order.
+
+    For work of many short steps, for which two threads only wait for each other. It is all done here where only one core may
+    be used, or the caller is one of several that work side by side.
+
+    Parameters
+    ----------
+    work : callable
+        What it keeps of the other half is lost with that process.
+    items : sequence
+    sizes : sequence of float
+        How long each takes, relative to each other.
+    """
+    own, other = set[int](), set[int]()
+    for place in sorted(range(len(items)), key=lambda place: -sizes[place]):
+        least = min((own, other), key=lambda half: sum(sizes[k] for k in half))
+        least.add(place)
+    # Locks that other threads of a caller's program hold would never be released in a fork.
+    in_main = threading.current_thread() is threading.main_thread()
+    if not other or works_alone() or available_cores() == 1 or not in_main or not _may_fork():
+        return [work(item) for item in items]
+    with one_thread(), beside(lambda: [work(items[place]) for place in sorted(other)]) as told:
+        found = {place: work(items[place]) for place in sorted(own)}
+        found |= zip(sorted(other), told(), strict=True)
+    return [found[place] for place in range(len(items))]
+
+
+def _may_fork() -> bool:
+    """Whether the system can fork, and this is not the worker of a pool that must have no processes of its own."""
+    return "fork" in multiprocessing.get_all_start_methods() and not multiprocessing.current_process().daemon
 
 
 @contextmanager

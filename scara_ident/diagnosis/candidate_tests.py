@@ -92,9 +92,7 @@ def examine(
     return _in_groups(model, candidates, lambda group: _examinations(model, products_of(model, group), criteria))
 
 
-def coefficients(
-    model: FittedModel, candidate: Rows, criteria: SelectionCriteria = CRITERIA
-) -> tuple[Array, Array]:
+def coefficients(model: FittedModel, candidate: Rows, criteria: SelectionCriteria = CRITERIA) -> tuple[Array, Array]:
     """Return `Examination.value` and `Examination.products` of a candidate, without the work of a test."""
     columns = {joint: model.weights[joint] * rows for joint, rows in candidate.items()}
     sums = sum(rows @ model.basis[joint].T for joint, rows in columns.items())
