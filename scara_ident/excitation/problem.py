@@ -147,8 +147,9 @@ class Problem:
         if not self._kept(values):
             return Point(x, motion, np.inf, values)
         found = self._limited(x, motion, values)
-        cost = self._cost(found.regressor)[0] if self._kept(found.values) else np.inf
-        return replace(found, cost=cost)
+        if found.regressor is None or not self._kept(found.values):
+            return found
+        return replace(found, cost=self._cost(found.regressor)[0])
 
     def inside(self, x: Array) -> bool:
         """Tell whether all limits are kept, whatever the cost."""

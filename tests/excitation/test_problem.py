@@ -40,20 +40,6 @@ def test_gradient_and_slopes_are_those_of_differences(name):
         np.testing.assert_allclose(pushed[distances], change[distances], atol=2.0 * TOLERANCE / REACH)
 
 
-@pytest.mark.parametrize("name", ["two, with a prior", "six joints"])
-def test_pull_and_curvature_belong_to_push(name):
-    problem = PROBLEMS[name]
-    x = inside(problem)
-    slopes = problem.slopes(problem.at(x))
-    rng = np.random.default_rng(6)
-    u = rng.standard_normal(slopes.values.shape)
-    dx = rng.standard_normal((len(x), x[0].size))
-    pushed = slopes.push(dx)
-    assert np.sum(slopes.pull(u) * dx) == pytest.approx(np.sum(u * pushed), rel=1e-10)
-    bent = np.einsum("kx,kxy,ky->", dx, slopes.curvature(u**2), dx)
-    assert bent == pytest.approx(np.sum(u**2 * pushed**2), rel=1e-10)
-
-
 def test_motions_of_two_lengths_count_by_their_samples():
     model = rigid_model(load_robot())
     problem = small_problem(model, lengths=((8.0, 6), (4.0, 5)))
