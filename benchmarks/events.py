@@ -306,7 +306,12 @@ def main() -> None:
         made = made_set(robot, arm, [given.seed, k], not given.quiet, given.troubled)
         k += 1
         done += len(made.recordings) if given.quiet else 1
-        conditions = (f"missing: {made.missing}", made.noise, f"trouble: {made.trouble}", "runs differ" if made.differ else "alike")
+        conditions = (
+            f"missing: {made.missing}",
+            made.noise,
+            f"trouble: {made.trouble}",
+            "runs differ" if made.differ else "alike",
+        )
         lasting = sum(item.time[-1] for item in made.recordings)
         seconds.update(dict.fromkeys(("in all", *conditions), lasting))
         try:

@@ -95,7 +95,7 @@ def without_states(stretches: Sequence[Binned]) -> list[Binned]:
     left = np.concatenate([item.bounded(LOOSE) for item in stretches], axis=1)
     state = [np.concatenate([item.state[k] for item in stretches], axis=1) for k in range(4)]
     taken = np.zeros_like(left)
-    for j in np.flatnonzero(np.any(known, axis=1)):
+    for j in np.flatnonzero(np.any(known, axis=1)).tolist():
         taken[j] = _of_others(_features(state, j), left[j], known[j], starts, firsts)
     return [item.without(part) for item, part in zip(stretches, np.split(taken, ends[:-1], axis=1), strict=True)]
 
