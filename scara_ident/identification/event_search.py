@@ -42,9 +42,9 @@ LEAST_SIZE, LEAST_BEFORE = 2.0, 0.5
 # an arm starts and stops is no event.
 LONGEST, LONGEST_SHARE = 3.0, 0.15
 SEEN, BESIDE = 0.3, 1.0
-# Where speed, acceleration and torque are farther from the next so many of other times than they are in this share of all, only
-# what stands out by so much is an event. At the most so many bins are compared with.
-USUAL, SURE, NEXT, COMPARED = 0.9, 3.3, 5, 2000
+# Where speed, acceleration or torque are above this share of all, or all three farther from the next so many of other times than
+# they are in that share of all, only what stands out by so much is an event. At the most so many bins are compared with.
+USUAL, USUAL_TOGETHER, SURE, NEXT, COMPARED = 0.97, 0.95, 3.3, 5, 2000
 # Events are rare: a residual that stands out in more of the time than this is the model's doing.
 RARE = 0.2
 # A joint helps to find the ends of an event if it stands out by this share of what would make it one.
@@ -152,13 +152,18 @@ def _local(segment: Segment) -> bool:
 
 
 def _novel(segment: Segment, stretches: Sequence[Binned], shown: NDArray[np.bool_]) -> bool:
-    """Whether most of it is in states that the arm is hardly ever in at other times: the model is not known there."""
+    """Whether most of it is in states that the arm is hardly ever in: the model is not known there."""
     item, inside = segment.binned, slice(segment.start, segment.stop)
     power = item.known[:, inside] * item.left[:, inside] ** 2
 
     def usual(j: int) -> bool:
+        most = [
+            np.quantile(np.concatenate([np.abs(other.state[k][j]) for other in stretches]), USUAL) for k in (1, 2, 3)
+        ]
+        beyond = [np.abs(item.state[k][j, inside]) > value for k, value in zip((1, 2, 3), most, strict=True)]
         own, often = _alone(segment, stretches, j)
-        return bool(np.sum(power[j, own > np.quantile(often, USUAL, method="higher")]) <= 0.5 * np.sum(power[j]))
+        beyond.append(own > np.quantile(often, USUAL_TOGETHER, method="higher"))
+        return all(np.sum(power[j, there]) <= 0.5 * np.sum(power[j]) for there in beyond)
 
     return not any(segment.score[j] >= SURE or usual(int(j)) for j in np.flatnonzero(shown))
 
