@@ -9,7 +9,10 @@ which the recordings show, by the scatter of blocks of time. Where no motion nam
 of the size that all recordings together show: how many times as large as the diagnosis needs it is then expected
 (``best``), and whether it is named after it (``best_right``). A set where neither comes about is not to be settled.
 
-    python benchmarks/asking.py OUTPUT.jsonl --robot scara03 --sets 24 --seed 1
+With ``--tight`` all three motions keep to a cell about the place of the first, at a reduced speed, of which most of what
+any motion tells is cut off.
+
+    python benchmarks/asking.py OUTPUT.jsonl --robot scara03 --sets 24 --seed 1 [--tight]
     python benchmarks/asking.py OUTPUT.jsonl --show
     python benchmarks/asking.py OUTPUT.jsonl --bump --sets 12
 """
@@ -21,7 +24,7 @@ import json
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import permutations
 from pathlib import Path
 from typing import Any
@@ -31,7 +34,7 @@ from virtual_motions import RATE, random_motion, ranges
 from virtual_sets import _random_effect
 
 from scara_ident.diagnosis import Diagnosis, diagnose
-from scara_ident.diagnosis.answerability import Inquiry, inquire, knowing, known_rows
+from scara_ident.diagnosis.answerability import inquire, knowing, known_rows
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.fitted_model import FittedModel
@@ -39,11 +42,9 @@ from scara_ident.diagnosis.questions import Question, Suspect, noise_density, su
 from scara_ident.diagnosis.selection_step import fitted_model
 from scara_ident.diagnosis.shape import KNOTS
 from scara_ident.errors import ScaraIdentError
-from scara_ident.excitation import Design, Effort, design_excitation, limits_of
+from scara_ident.excitation import Design, Effort, Limits, design_excitation, limits_of
 from scara_ident.excitation.tell import sure_of
-from scara_ident.excitation.tell import told as tells
 from scara_ident.model.model import build_model
-from scara_ident.motion.motion import Motion
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation import Effect, ReferenceMotion, VirtualArm, simulate, virtual_arm
@@ -59,8 +60,11 @@ PAIRS = (
 # Sizes of effects against the usual, reach of the first motion, rad, its largest speed, rad/s, and lengths, s.
 FACTORS, REACHES, SPEEDS = (0.15, 1.5), (0.1, 0.3), (0.4, 1.0)
 FIRST, ASKED, SAMPLED = 8.0, 15.0, 500.0
-EFFORT, PLAIN = Effort(starts=2, rounds=2, processes=1), Effort(starts=2, rounds=0, processes=1)
+EFFORT, PLAIN = Effort(starts=1, rounds=2, processes=1), Effort(starts=2, rounds=0, processes=1)
 WAYS = ("tell", "random", "logdet")
+# A tight cell: to either side of the place of the first motion, rad, the speed in it, rad/s, and sizes of effects that can
+# show there at all.
+ROOM, REDUCED, LARGER = 0.5, 1.0, (0.5, 3.0)
 # Of a bump: standard deviation over the joint's range, and height over the standard deviation of the effort.
 # The first motion passes all of a bump, or it could be anything: reach, rad.
 WIDTHS, SIZES, PASSING = (0.09, 0.14), (0.2, 0.6), (0.8, 1.2)
@@ -147,22 +151,32 @@ def _robot(name: str) -> Robot:
 
 @cache
 def _plain(robot: Robot) -> ReferenceMotion:
-    """Return the motion of the largest log determinant, the same for every set of a robot."""
+    """Return the motion of the largest log determinant, the same for every set of a robot with the same limits."""
     limits = limits_of(robot, clearance=None, share=1.0)
     return as_reference(design_excitation(build_model(robot), duration=ASKED, limits=limits, effort=PLAIN))
 
 
-def one_set(robot: str, number: int, seed: int) -> dict[str, Any]:
+def in_cell(robot: Robot, motion: ReferenceMotion) -> Robot:
+    """Return a robot with the limits of a tight cell about a motion."""
+    low, high = ranges(robot)
+    place = 0.5 * (motion.position.min(axis=1) + motion.position.max(axis=1))
+    speed = np.minimum(robot.velocity_limit, REDUCED)
+    lower, upper = np.maximum(low, place - ROOM), np.minimum(high, place + ROOM)
+    return replace(robot, lower=lower, upper=upper, velocity_limit=speed)
+
+
+def one_set(robot: str, number: int, seed: int, tight: bool = False, quick: bool = False) -> dict[str, Any]:
     """Return what one set tells."""
     rng = np.random.default_rng([seed, number])
     arm = virtual_arm(_robot(robot))
     pair = PAIRS[number % len(PAIRS)]
     name = pair[(number // len(PAIRS)) % 2]
-    truth = _random_effect(name, float(np.exp(rng.uniform(*np.log(FACTORS)))), arm, rng)
+    truth = _random_effect(name, float(np.exp(rng.uniform(*np.log(LARGER if tight else FACTORS)))), arm, rng)
     motion = poor_motion(arm, rng)
     begun = [record(arm, motion, truth, number, run) for run in (1, 2)]
     first = diagnose(arm.robot, begun)
-    result: dict[str, Any] = {"robot": robot, "seed": seed, "set": number, "pair": list(pair), "truth": name}
+    result: dict[str, Any] = {"robot": robot, "seed": seed, "set": number, "tight": tight, "pair": list(pair)}
+    result["truth"] = name
     result |= {"joint": truth.joint, "before": right(first, truth), "verdict": first.verdict, "found": _found(first)}
     if result["before"]:
         return result
@@ -172,13 +186,14 @@ def one_set(robot: str, number: int, seed: int) -> dict[str, Any]:
     result["asked"] = [item.text for item in asked]
     start = time.perf_counter()
     # All of the limits for each, as the random motion has them.
-    limits = limits_of(arm.robot, clearance=None, share=1.0)
+    within = in_cell(arm.robot, motion) if tight else arm.robot
+    limits = limits_of(within, clearance=None, share=1.0)
     design = design_excitation(model, duration=ASKED, tell=inquiry, limits=limits, effort=EFFORT)
     result["design_seconds"] = time.perf_counter() - start
     motions = {
         "tell": lambda: as_reference(design),
-        "random": lambda: random_motion("more", arm, "fourier", ASKED, rng),
-        "logdet": lambda: _plain(arm.robot),
+        "random": lambda: random_motion("more", replace(arm, robot=within), "fourier", ASKED, rng),
+        "logdet": lambda: _plain(within),
     }
     result["unshown"] = [label for item in design.tells for label in item.unshown]
     more = {}
@@ -188,28 +203,25 @@ def one_set(robot: str, number: int, seed: int) -> dict[str, Any]:
         result[way] = right(found, truth)
         result[f"found_{way}"], result[f"why_{way}"] = _found(found), _why(found, truth)
         if way == "tell":
-            later = replace(inquiry, noise=noise_density(found), bands=found.search.bands)
-            later = knowing(later, first.search.step.columns)
-            moved = [design.motion()]
-            result["own"] = own(first, inquiry, moved, truth)
-            result["noise"] = [each.noise.tolist() for each in (inquiry, later)]
-            result["bands"] = [list(each.bands) for each in (inquiry, later)]
-            result["seen_noise"] = [
-                [each.before, each.after] for each in tells(later, moved) if each.question.suspects
-            ][:1]
             told = next((item for item in design.tells if item.question.suspects), None)
             if told is not None:
                 result["kind"], result["promised"] = told.question.kind, [told.before, told.after]
                 result["seen"] = seen(found, first, told.question)
-    if not any(result[way] for way in WAYS):
+    if not quick and not any(result[way] for way in WAYS):
         # Each as a trajectory of its own.
         runs = [replace(run, name=f"{way}_1") for way, run in more.items()]
-        result |= best(first, diagnose(arm.robot, [*begun, *runs]), arm, begun, truth, number)
+        result |= best(first, diagnose(arm.robot, [*begun, *runs]), arm, limits, begun, truth, number)
     return result
 
 
 def best(
-    first: Diagnosis, whole: Diagnosis, arm: VirtualArm, begun: Sequence[Recording], truth: Effect, number: int
+    first: Diagnosis,
+    whole: Diagnosis,
+    arm: VirtualArm,
+    limits: Limits,
+    begun: Sequence[Recording],
+    truth: Effect,
+    number: int,
 ) -> dict[str, Any]:
     """Return what a motion designed for the effect that is there alone tells of it, its size taken from all recordings."""
     scene = whole.search.scene
@@ -229,21 +241,10 @@ def best(
     question = Question("below_limit", suspects[0].label, (suspects[0],))
     inquiry = replace(inquire(first, [question]), noise=noise_density(whole), bands=whole.search.bands)
     inquiry = knowing(inquiry, first.search.step.columns)
-    limits = limits_of(arm.robot, clearance=None, share=1.0)
     design = design_excitation(first.before.model, duration=ASKED, tell=inquiry, limits=limits, effort=EFFORT)
     (times,) = sure_of(inquiry, [design.motion()]).values()
     found = diagnose(arm.robot, [*begun, record(arm, as_reference(design), truth, number, 3)])
     return {"best": times, "best_right": right(found, truth), "best_why": _why(found, truth)}
-
-
-def own(first: Diagnosis, inquiry: Inquiry, motions: Sequence[Motion], truth: Effect) -> list[float] | None:
-    """Return how far the effect that is there is from none, before and after; None where it is in no question."""
-    for item in inquiry.suspects:
-        place = truth.joint is None or item.candidate.joint(inquiry.scene) in (None, truth.joint)
-        if item.value and item.candidate.effect.name == truth.name and place:
-            (found,) = tells(inquire(first, [Question("below_limit", item.label, (item,))]), motions)
-            return [found.before, found.after]
-    return None
 
 
 def one_bump(robot: str, number: int, seed: int) -> dict[str, Any]:
@@ -372,10 +373,13 @@ def main() -> None:
     words.add_argument("--sets", type=int, default=24)
     words.add_argument("--seed", type=int, default=1)
     words.add_argument("--bump", action="store_true", help="torques that no catalogue lists, instead of pairs")
+    words.add_argument("--tight", action="store_true", help="the asked motion keeps to a cell at a reduced speed")
+    words.add_argument("--quick", action="store_true", help="without what a motion for the effect alone would tell")
     words.add_argument("--show", action="store_true")
     given = words.parse_args()
     lines = given.output.read_text(encoding="utf-8").splitlines() if given.output.is_file() else []
-    what, run, tell = ("bump", one_bump, show_bumps) if given.bump else ("set", one_set, show)
+    sets = partial(one_set, tight=given.tight, quick=given.quick)
+    what, run, tell = ("bump", one_bump, show_bumps) if given.bump else ("set", sets, show)
     rows = [row for row in map(json.loads, lines) if what in row]
     done = {(row["robot"], row["seed"], row[what]) for row in rows}
     for number in range(0 if given.show else given.sets):

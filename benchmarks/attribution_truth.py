@@ -10,6 +10,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -21,17 +22,19 @@ from virtual_sets import VirtualSet, simulate_set
 from scara_ident.arrays import Array
 from scara_ident.diagnosis import Diagnosis, diagnose
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.correction import taken_out
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.search import scene_of
-from scara_ident.diagnosis.selection_step import model_with
+from scara_ident.diagnosis.selection_step import SelectionStep, model_with, observed_at_every_sample
 from scara_ident.effects import CATALOGUE, Member
-from scara_ident.effects.measurement import shifted
+from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.least_squares import wls
 from scara_ident.estimation.observations import observe
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.prepared import PreparedData, prepare
+from scara_ident.motion.prepared import prepare
+from scara_ident.recording.recording import Recording
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.simulation import Effect
 
@@ -163,7 +166,8 @@ def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, dict[str,
     """Fit the true model, at its true nonlinear parameters, to the same recordings in the same bands.
 
     It knows by how much the training recordings are late on average, what each run has of its own it does not. With
-    "fitted" the true structure is all that is known, and its nonlinear parameters are fitted with the others.
+    "fitted" the true structure is all that is known, and its nonlinear parameters are fitted with the others, how late the
+    recordings are among them if they are.
 
     Returns
     -------
@@ -191,7 +195,8 @@ def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, dict[str,
         return None
     chosen, model, value, errors = best
     validation = _errors(joints, joint_errors(value, observe(model, held_out)))
-    own, known = _all_fitted(result, chosen, training) if chosen else (model, value)
+    own, known, fitted_late = _all_fitted(result, chosen, made.training, late=late != 0.0)
+    held_out = prepare([shifted(item, fitted_late) for item in made.held_out], bands)
     return {
         "training": errors,
         "validation": validation,
@@ -199,20 +204,23 @@ def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, dict[str,
     }
 
 
-def _all_fitted(result: Diagnosis, chosen: Sequence[Candidate], training: PreparedData) -> tuple[TorqueModel, Array]:
-    """Fit effects with their nonlinear parameters, and return the model with its parameters."""
-    base = result.search.base
-    observations = observe(base, training)
+def _all_fitted(
+    result: Diagnosis, chosen: Sequence[Candidate], recordings: Sequence[Recording], *, late: bool
+) -> tuple[TorqueModel, Array, float]:
+    """Fit effects with their nonlinear parameters, and return the model, its parameters and how late recordings are."""
+    base, criteria = result.search.base, result.search.step.criteria
+    observations = observe(base, prepare(recordings, result.search.bands))
     start = wls(observations)
-    scene, found = tune(
-        scene_of(base, start.value, observations),
-        CandidateColumns(observations),
-        start.weights,
-        chosen,
-        result.search.step.criteria.rotor_inertia_std,
-    )
-    model = model_with(scene, found)
-    return model, wls(observe(model, training)).value
+    columns, delay = CandidateColumns(observations), 0.0
+    scene, found = scene_of(base, start.value, observations), tuple(chosen)
+    for _ in range(1 + late):
+        scene, found = tune(scene, columns, start.weights, found, criteria.rotor_inertia_std)
+        step = SelectionStep(scene, columns, found, start.weights, 1, criteria)
+        if late:
+            columns, more = taken_out(step, Candidate(TimeDelay(), Member(None)))
+            delay += float(more[0])
+    final = replace(step, columns=columns)
+    return model_with(scene, found), wls(observed_at_every_sample(final)).value, delay
 
 
 def _errors(joints: Sequence[str], errors: Sequence[Any]) -> dict[str, float]:

@@ -10,6 +10,10 @@ that the model leaves of the same recordings without the push, as recorded, whic
     python benchmarks/events.py --robot ur5 --recordings 100 --seed 1           # pushes
     python benchmarks/events.py --robot scara03 --recordings 30 --seed 1 --named 10   # is an effect named for one?
     python benchmarks/events.py --robot ur5 --recordings 1800 --seed 2 --quiet   # 10 h without one
+    python benchmarks/events.py --robot ur5 --recordings 1800 --seed 2 --quiet --troubled
+
+With `--troubled` an arm has one of `TROUBLES` besides: a coarse encoder, friction that falls while it warms up over all
+recordings, or a torque that vibrates in bursts.
 """
 
 from __future__ import annotations
@@ -24,7 +28,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.signal import lfilter, welch
-from scipy.stats import norm
+from scipy.stats import chi2, norm
 from virtual_conditions import Noise
 from virtual_motions import KINDS, random_motion
 
@@ -48,6 +52,12 @@ from scara_ident.simulation.spatial import configuration
 Array = NDArray[np.float64]
 RATES = (125.0, 250.0)
 NOISES: tuple[Noise, ...] = get_args(Noise)
+TROUBLES = ("encoder", "warm-up", "vibration")
+# Steps of a coarse encoder in a turn of the joint, as powers of 2; by what share friction is larger when cold, and how long that
+# lasts, s; frequency of vibrations, Hz, their size over the noise, and how long a burst is, s.
+COARSE = (11, 15)
+COLD, WARMING = (0.1, 0.4), (10.0, 100.0)
+SHAKING, SHAKEN, BURST = (5.0, 40.0), (0.5, 3.0), 0.5
 MISSING = ("none", "none", "none", "none", "none", "stribeck", "loss", "ripple", "spring", "all")
 FORCE, LASTING = (5.0, 30.0), (0.3, 2.0)
 # Rise and fall of a push, s.
@@ -80,16 +90,23 @@ class Set:
     differ: bool
     sigma: Array
     keep: float
+    trouble: str
 
 
-def made_set(robot: Robot, arm: VirtualArm, rng: np.random.Generator, pushed: bool) -> Set:
+def made_set(robot: Robot, arm: VirtualArm, seed: list[int], pushed: bool, troubled: bool) -> Set:
     """Draw recordings, and a push in one of them."""
+    # Apart from the rest, which is then the same without trouble.
+    rng, own = np.random.default_rng(seed), np.random.default_rng([*seed, 1])
+    trouble = str(own.choice(TROUBLES)) if troubled else "none"
+    cold, warming, shaken = own.uniform(*COLD), own.uniform(*WARMING), own.uniform(*SHAKEN)
+    omega = 2.0 * np.pi * own.uniform(*SHAKING)
     count, rate = int(rng.integers(3, 7)), float(rng.choice(RATES))
     missing, kind = str(rng.choice(MISSING)), NOISES[int(rng.choice(len(NOISES)))]
     differ, repeated = bool(rng.random() < 0.5), bool(rng.random() < 0.33)
     level = float(np.exp(rng.uniform(np.log(0.005), np.log(0.05))))
     noise = TorqueNoise(kind, float(np.exp(rng.uniform(np.log(0.005), np.log(0.1)))))
     bits = int(rng.integers(16, 22))
+    bits = int(own.integers(*COARSE)) if trouble == "encoder" else bits
     scale = np.abs(robot.row_scale)[:, None]
     place = int(rng.integers(count))
     motions = [
@@ -97,7 +114,7 @@ def made_set(robot: Robot, arm: VirtualArm, rng: np.random.Generator, pushed: bo
         for k in range((count + 1) // 2 if repeated else count)
     ]
     recordings, push, added = [], None, None
-    reference = None
+    reference, began = None, 0.0
     for k in range(count):
         motion = motions[k // 2 if repeated else k]
         at = np.arange(0.0, motion.time[-1], 1.0 / rate)
@@ -126,11 +143,19 @@ def made_set(robot: Robot, arm: VirtualArm, rng: np.random.Generator, pushed: bo
             torque, added = torque + more, more
             push = Push(f"r{k}", start, start + length)
         torque = torque + sigma[:, None] * noise.draw(rng, (robot.n, len(at)), rate)
+        if trouble == "warm-up":
+            a0, a1, a2, a3 = (run.friction[:, i, None] for i in range(4))
+            friction = a0 * np.sign(v) + a1 * v + a2 * np.sign(v) * v**2 + a3 * v**3
+            torque = torque + cold * np.exp(-(began + at) / warming) * friction
+        if trouble == "vibration":
+            bursts = TorqueNoise("coloured", BURST).draw(own, (robot.n, len(at)), rate)
+            torque = torque + shaken * sigma[:, None] * np.abs(bursts) * np.sin(omega * at)
+        began += at[-1]
         step = 2.0 * np.pi / 2**bits
         seen = np.round(q / step) * step
         recordings.append(Recording(f"r{k}", f"r{k}", 1, robot.joints, at, seen, torque))
     keep = float(np.exp(-1.0 / (rate * noise.correlation_time))) if kind == "coloured" else 0.0
-    return Set(recordings, added, push, missing, kind, differ, sigma, keep)
+    return Set(recordings, added, push, missing, kind, differ, sigma, keep, trouble)
 
 
 def lacking(missing: str, arm: VirtualArm, q: Array, v: Array, torque: Array) -> Array:
@@ -260,6 +285,7 @@ def main() -> None:
     parser.add_argument("--recordings", type=int, default=100, help="with a push each; without, in all")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--quiet", action="store_true", help="no pushes: false events an hour")
+    parser.add_argument("--troubled", action="store_true", help="each arm has one of the troubles")
     parser.add_argument(
         "--named", type=int, default=0, help="so many sets, complete but for a clear push, are diagnosed"
     )
@@ -269,17 +295,25 @@ def main() -> None:
     assert set(get_args(TorqueNoise.__annotations__["kind"]) or ("white", "coloured", "heavy"))
     robot = load_robot(None if given.robot == "scara03" else given.robot)
     arm = virtual_arm(robot)
-    seconds, done, k = 0.0, 0, 0
+    seconds: Counter[str] = Counter()
+    done, k = 0, 0
     cost: list[float] = []
     false: Counter[str] = Counter()
     rows: list[dict[str, Any]] = []
     named: list[str] = []
     until = time.monotonic() + 60.0 * given.minutes
     while done < given.recordings and time.monotonic() < until:
-        made = made_set(robot, arm, np.random.default_rng([given.seed, k]), not given.quiet)
+        made = made_set(robot, arm, [given.seed, k], not given.quiet, given.troubled)
         k += 1
         done += len(made.recordings) if given.quiet else 1
-        seconds += sum(item.time[-1] for item in made.recordings)
+        conditions = (
+            f"missing: {made.missing}",
+            made.noise,
+            f"trouble: {made.trouble}",
+            "runs differ" if made.differ else "alike",
+        )
+        lasting = sum(item.time[-1] for item in made.recordings)
+        seconds.update(dict.fromkeys(("in all", *conditions), lasting))
         try:
             observations = observed(robot, made.recordings)
             begin = time.perf_counter()
@@ -291,8 +325,8 @@ def main() -> None:
         own = [event for event in found if made.push and matches(event, made.push)]
         for event in found:
             if event not in own:
-                false[made.missing] += 1
-                print(f"false, set {k} ({made.missing}, {made.noise}, runs differ: {made.differ}): {event}", flush=True)
+                false.update(("in all", *conditions))
+                print(f"false, set {k} ({', '.join(conditions)}): {event}", flush=True)
         if made.push is not None:
             push = made.push
             ends = (min(e.start for e in own) - push.start, max(e.stop for e in own) - push.stop) if own else None
@@ -321,10 +355,13 @@ def main() -> None:
                 named.append(", ".join(item.label for item in diagnose(robot, made.recordings).effects))
             if given.verbose or (size > CLEAR and (ends is None or max(map(abs, ends)) > TIMELY)):
                 print(f"set {k}: {push} {rows[-1]}", flush=True)
-    print(f"{k} sets, {seconds / 3600.0:.2f} h; {np.median(cost):.3f} s a set to look (median)")
-    print(
-        f"false events: {sum(false.values())}, {sum(false.values()) / seconds * 36000.0:.2f} in 10 h; by effect missing: {dict(false)}"
-    )
+    print(f"{k} sets; {np.median(cost):.3f} s a set to look (median); false events, by what is there:")
+    for what, lasting in sorted(seconds.items()):
+        count, hours = false[what], lasting / 3600.0
+        least, most = (10.0 / hours * chi2.ppf((0.025, 0.975), (2.0 * count, 2.0 * count + 2.0)) / 2.0).tolist()
+        print(
+            f"  {what}: {count} in {hours:.2f} h, {10.0 * count / hours:.2f} in 10 h (95 %: {np.nan_to_num(least):.2f} to {most:.2f})"
+        )
     if named:
         print(
             f"sets that lack nothing, with a push: {len(named)}; an effect named in {sum(map(bool, named))}: {set(filter(bool, named))}"

@@ -2,7 +2,7 @@
 
 Random arms in closed loop with random motions (see `rigid_runs`). In some of 4 to 7 recordings the last link carries a box
 of 2 to 15 % of the arm's mass, within 0.1 m of the tool in any direction and turned anyhow; its torque is Pinocchio's.
-Names say nothing. In every fifth set no recording has a payload. One of the recordings held out is loaded; its state is for
+Names say nothing. In every fifth set no recording has a payload. One of the one or two held out is loaded; its state is for
 the diagnosis to find. The true model knows which recordings are loaded, and no more.
 
     python benchmarks/payloads.py --robot ur5 --sets 40 --seed 1
@@ -125,22 +125,24 @@ def one_set(robot: str, seed: int, empty: bool, varied: bool) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as place:
         runs = rigid_runs(robot, seed, Path(place) / "set", asked)
     item = {"seed": seed, "noise": runs.conditions.noise}
-    return item | _diagnosed(runs, float(np.sum(runs.arm.bodies[:, 0])), rng, empty)
+    return item | _diagnosed(runs, count, float(np.sum(runs.arm.bodies[:, 0])), rng, empty)
 
 
 def measured_set(runs: MeasuredRuns, seed: int, empty: bool) -> dict[str, Any]:
     """Add a payload to measured recordings and diagnose them."""
     mass = sum(body.mass for body in list(runs.robot.model.inertias)[1:])
-    return {"seed": seed, "noise": np.nan} | _diagnosed(runs, mass, np.random.default_rng([seed, 9]), empty)
+    count = len(runs.recordings) - 1
+    return {"seed": seed, "noise": np.nan} | _diagnosed(runs, count, mass, np.random.default_rng([seed, 9]), empty)
 
 
 def _diagnosed(
-    runs: RigidRuns | MeasuredRuns, arm_mass: float, rng: np.random.Generator, empty: bool
+    runs: RigidRuns | MeasuredRuns, count: int, arm_mass: float, rng: np.random.Generator, empty: bool
 ) -> dict[str, Any]:
-    count = len(runs.recordings) - 1
+    """Load the last recording, which is held out, and some of the first ``count``, which are trained on; diagnose."""
+    last = len(runs.recordings) - 1
     payload = random_payload(runs.robot, arm_mass, rng)
     places = rng.permutation(count)[: int(rng.integers(1, count))]
-    loaded = frozenset() if empty else frozenset([*places.tolist(), count])
+    loaded = frozenset() if empty else frozenset([*places.tolist(), last])
 
     def added(k: int, motion: Any) -> Array:
         signals = (
@@ -171,7 +173,7 @@ def _diagnosed(
         item["mass_std"] = values["mass"].std / payload.mass
         item["moment_std"] = float(np.linalg.norm([values[n].std for n in ("mx", "my", "mz")]) / np.linalg.norm(first))
     if not empty:
-        item["ratio"], item["ratio_before"] = _to_true_model(found, training, {names[k] for k in loaded}, names[count])
+        item["ratio"], item["ratio_before"] = _to_true_model(found, training, {names[k] for k in loaded}, names[last])
     return item
 
 

@@ -1,4 +1,4 @@
-"""The type of all arrays of real numbers, whose shapes docstrings give, and their median."""
+"""The type of all arrays of real numbers, whose shapes docstrings give, their median, and where flags are set."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,3 +16,9 @@ def median(values: Array) -> float:
     if np.isnan(np.max(parts[middle:])):
         return np.nan
     return float(parts[middle] if len(values) % 2 else 0.5 * (np.max(parts[:middle]) + parts[middle]))
+
+
+def runs_of(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return where flags, (M,), are set one after the other: the first place, and the one after the last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

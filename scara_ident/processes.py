@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any, TypeVar
 
-from scara_ident.threads import forget_threads, one_blas_thread
+from scara_ident.threads import forget_threads, one_blas_thread, one_thread, works_alone
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _work: Callable[[Any], Any] | None = None
+# Threads begin without it.
+_OWN: ContextVar[bool] = ContextVar("own process", default=False)
 
 
 def available_cores() -> int:
@@ -40,7 +43,7 @@ def map_in_order(
     """
     wanted = list(items)
     count = min(available_cores() if processes is None else processes, len(wanted))
-    if count <= 1 or "fork" not in multiprocessing.get_all_start_methods():
+    if count <= 1 or not _may_fork():
         with one_blas_thread():
             yield from map(work, wanted)
         return
@@ -59,7 +62,7 @@ def beside(work: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
     work : callable
         Its result is sent to the caller, as is its error.
     """
-    if "fork" not in multiprocessing.get_all_start_methods():
+    if not _may_fork():
         yield work
         return
 
@@ -69,6 +72,50 @@ def beside(work: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
 
     with _forked(1, alone) as pool:
         yield pool.submit(_apply, None).result
+
+
+@contextmanager
+def own_process() -> Iterator[None]:
+    """Let `halved` use another process: nobody else's threads run in this one, whose locks a fork would never see released.
+
+    A command says so of its own; in a program or a notebook of others nothing is forked unasked.
+    """
+    token = _OWN.set(True)
+    try:
+        yield
+    finally:
+        _OWN.reset(token)
+
+
+def halved(work: Callable[[Item], Result], items: Sequence[Item], sizes: Sequence[float]) -> list[Result]:
+    """Apply a function to items, about half of them in another process, and return the results in their order.
+
+    For work of many short steps, for which two threads only wait for each other. It is all done here where only one core may
+    be used, the caller is one of several that work side by side, or is not known to be alone in its process, see `own_process`.
+
+    Parameters
+    ----------
+    work : callable
+        What it keeps of the other half is lost with that process.
+    items : sequence
+    sizes : sequence of float
+        How long each takes, relative to each other.
+    """
+    own, other = set[int](), set[int]()
+    for place in sorted(range(len(items)), key=lambda place: -sizes[place]):
+        least = min((own, other), key=lambda half: sum(sizes[k] for k in half))
+        least.add(place)
+    if not other or works_alone() or available_cores() == 1 or not _OWN.get() or not _may_fork():
+        return [work(item) for item in items]
+    with one_thread(), beside(lambda: [work(items[place]) for place in sorted(other)]) as told:
+        found = {place: work(items[place]) for place in sorted(own)}
+        found |= zip(sorted(other), told(), strict=True)
+    return [found[place] for place in range(len(items))]
+
+
+def _may_fork() -> bool:
+    """Whether the system can fork, and this is not the worker of a pool that must have no processes of its own."""
+    return "fork" in multiprocessing.get_all_start_methods() and not multiprocessing.current_process().daemon
 
 
 @contextmanager

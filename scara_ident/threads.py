@@ -90,6 +90,11 @@ def one_thread() -> Iterator[None]:
             _LOCAL.beside = before
 
 
+def works_alone() -> bool:
+    """Whether what is done now is to be done one thing after the other, since others work beside it."""
+    return bool(getattr(_LOCAL, "beside", False))
+
+
 def threads_for(samples: int) -> AbstractContextManager[None]:
     """Use both threads on arrays of so many samples where they are long, else one: two would wait for each other."""
     return nullcontext() if samples >= LONG else one_thread()
@@ -101,7 +106,7 @@ def side_by_side(function: Callable[..., T], *items: Iterable[Any]) -> list[T]:
     What such a function wants side by side itself is done one after the other: both threads are at work.
     """
     work = list(zip(*items, strict=False))
-    if len(work) < 2 or getattr(_LOCAL, "beside", False):
+    if len(work) < 2 or works_alone():
         with one_blas_thread():
             return [function(*arguments) for arguments in work]
     results: list[Any] = [None] * len(work)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+from threading import Thread
 
 import pytest
 
 from scara_ident import processes
-from scara_ident.processes import available_cores, beside, map_in_order
-from scara_ident.threads import side_by_side
+from scara_ident.processes import available_cores, beside, halved, map_in_order, own_process
+from scara_ident.threads import one_thread, side_by_side
 
 
 @pytest.mark.parametrize("processes", [1, 2, 3])
@@ -68,3 +70,47 @@ def test_without_fork_what_is_done_beside_is_done_here(monkeypatch: pytest.Monke
 def test_an_error_of_what_is_done_beside_reaches_who_waits():
     with pytest.raises(ZeroDivisionError), beside(lambda: 1 // 0) as result:
         result()
+
+
+def where(item: int) -> tuple[int, int]:
+    return item, os.getpid()
+
+
+def test_half_of_the_work_is_done_in_another_process_in_the_order_of_the_items(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(processes, "available_cores", lambda: 2)
+    with own_process():
+        found = halved(where, range(5), [1.0, 4.0, 1.0, 1.0, 1.0])
+    assert [item for item, _ in found] == list(range(5))
+    alone = [item for item, process in found if process == found[1][1]]
+    assert alone == [1]
+    assert os.getpid() in {process for _, process in found}
+    with own_process(), pytest.raises(ZeroDivisionError):
+        halved(lambda x: 1 // (3 - x), range(5), [1.0] * 5)
+
+
+@pytest.mark.parametrize("why", ["one core", "beside others", "a thread", "a worker", "one item", "another's program"])
+def test_it_is_all_done_here_where_no_other_process_is_wanted(why: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(processes, "available_cores", lambda: 1 if why == "one core" else 2)
+    items = range(1 if why == "one item" else 4)
+    found: list[tuple[int, int]] = []
+
+    def work() -> None:
+        found.extend(halved(where, items, [1.0] * len(items)))
+
+    if why == "another's program":
+        work()
+    elif why == "beside others":
+        with own_process(), one_thread():
+            work()
+    elif why == "a thread":
+        with own_process():
+            thread = Thread(target=work)
+            thread.start()
+            thread.join()
+    else:
+        if why == "a worker":
+            # As multiprocessing marks the processes of a pool, which may start none.
+            monkeypatch.setitem(multiprocessing.current_process()._config, "daemon", True)
+        with own_process():
+            work()
+    assert found == [(item, os.getpid()) for item in items]

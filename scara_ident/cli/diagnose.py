@@ -78,21 +78,20 @@ def diagnose(
             catalogue=None if effects is None else effects_named(*_parted(effects)),
             progress=work.part(READING_SHARE, 1.0),
         )
-        worth = None
-        if output is not None and result.effects:
-            work("what the effects cost", 1.0)
-            # The compiled arm takes a hundred megabytes, which go with its process; what draws is loaded meanwhile.
-            with beside(lambda: worth_dict(identified_model(result))) as told:
-                import_module("matplotlib.figure")
-                worth = told()
-    if output is None:
-        content = diagnosis_dict(result)
-    else:
-        from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
+        if output is not None:
+            from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
 
-        # What it holds is made once, for what is printed and for all files.
-        context = DiagnosisContext(result, worth)
-        content = context.content
+            # What it holds is made once, for what is printed and for all files.
+            context = DiagnosisContext(result)
+            if result.effects:
+                work("what the effects cost", 1.0)
+                # The compiled arm takes a hundred megabytes, which go with its process; what draws is made ready meanwhile.
+                with beside(lambda: worth_dict(identified_model(result))) as told:
+                    import_module("matplotlib.figure")
+                    context = DiagnosisContext(result, told)
+                    context.make_pictured()
+                    _ = context.worth
+    content = diagnosis_dict(result) if output is None else context.content
     console = result_console(content, json)
     if verbose:
         show_recordings(console, (*training, *held_out))

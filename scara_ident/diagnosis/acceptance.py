@@ -64,7 +64,7 @@ def decide(
     unseen = _unseen(examination, criteria)
     small = hopeless(candidate, examination, scene, criteria) or _small(candidate, examination, scene, gain, criteria)
     # The first reason that a person would give.
-    why = unseen or _insignificant(examination, tried, criteria) or small or _seldom(examination, criteria)
+    why = unseen or _insignificant(examination, tried, criteria) or small or _seldom(candidate, examination, criteria)
     if _wrong_sign(candidate, examination):
         # The best that a real one can be is absent: nothing is removed, and nothing speaks for it.
         examination, gain = replace(examination, p_value=1.0), min(gain, 0.0)
@@ -120,8 +120,9 @@ def _insignificant(examination: Examination, tried: int, criteria: SelectionCrit
     return None
 
 
-def _seldom(examination: Examination, criteria: SelectionCriteria) -> str | None:
+def _seldom(candidate: Candidate, examination: Examination, criteria: SelectionCriteria) -> str | None:
     helps, voting = examination.votes
-    if voting and helps < criteria.least_votes * voting:
+    # What is taken out of the recordings is the mean of them, whatever they differ by: left in, others would stand for it.
+    if voting and not candidate.corrects_data and helps < criteria.least_votes * voting:
         return f"helps in only {helps} of {voting} trajectories that it was not fitted to"
     return None

@@ -153,7 +153,10 @@ class Inquiry:
         return _sides(item.candidate) if self.freed(item) else []
 
     def sigmas(self, rows: Information | None = None, some: Sequence[Question] | None = None) -> Array:
-        """Return standard errors between the answers to each question, from what is known and further rows; 0 if none.
+        """Return standard errors between the answers to each question, from what is known and further rows.
+
+        Where no recordings are at hand, what the diagnosis said stands for them: no fit to all rows leaves less than fits
+        to each, so that the squares add up to the least that all tell.
 
         Parameters
         ----------
@@ -164,10 +167,11 @@ class Inquiry:
         """
         asked = self.questions if some is None else some
         parts = [part for part in (self.known, rows) if part is not None]
+        said = np.array([item.sigma if self.known is None else 0.0 for item in asked])
         if not parts:
-            return np.zeros(len(asked))
+            return said
         view = self._view(parts[0] if len(parts) == 1 else merge(parts))
-        return np.array([view.sigma(item) for item in asked])
+        return np.asarray(np.hypot(said, [view.sigma(item) for item in asked]))
 
     @cached_property
     def just_seen(self) -> dict[str, Array]:

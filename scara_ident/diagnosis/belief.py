@@ -22,7 +22,7 @@ from scara_ident.diagnosis.candidates import Rows, with_columns
 from scara_ident.diagnosis.cluster_test import freedom_of, needed
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel, products_of
-from scara_ident.diagnosis.questions import all_suspects
+from scara_ident.diagnosis.questions import Suspect, all_suspects
 from scara_ident.estimation.information import Information, triangular
 from scara_ident.estimation.joint_rows import JointRows
 
@@ -118,6 +118,8 @@ def known_blocks(inquiry: Inquiry) -> Blocks | None:
 def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
     """Return how many times as large as the diagnosis needs it is each effect that may be below the limit, by label.
 
+    That it is let in, and that none of the others asked for is taken for it.
+
     Parameters
     ----------
     inquiry : Inquiry
@@ -145,7 +147,49 @@ def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
             inquiry.tried,
         )
         found |= dict(zip((item.label for item in some), times.tolist(), strict=True))
-    return found
+    apart = times_apart(inquiry, [item for item in asked if item.label in found], blocks.information())
+    return {label: min(times, apart.get(label, np.inf)) for label, times in found.items()}
+
+
+def times_apart(
+    inquiry: Inquiry, asked: Sequence[Suspect], rows: Information, criteria: SelectionCriteria = CRITERIA
+) -> dict[str, float]:
+    """Return how many times as large as the diagnosis needs it each effect is, to be told from the nearest other.
+
+    Parameters
+    ----------
+    inquiry : Inquiry
+    asked : sequence of Suspect
+        Those in the model are left out.
+    rows : Information
+        Of all columns of the inquiry, rows of unit noise.
+    criteria : SelectionCriteria
+    """
+    others = [item for item in asked if item.label not in inquiry.labels_in_model]
+    names = [item.label for item in inquiry.suspects]
+    places = {item.label: inquiry.places[names.index(item.label)] for item in others}
+    # Below what the model has the factor holds what that leaves.
+    start = max((wide.stop for _, wide in inquiry.places[: len(inquiry.in_model)]), default=0)
+    left = rows.factor[len(inquiry.scene.model.columns) + start :, len(inquiry.scene.model.columns) : -1]
+    torque = np.hstack([left[:, places[item.label][0]] @ inquiry.just_seen[item.label] for item in others] or [left])
+    whole = np.sum(torque**2, axis=0)
+    owner = np.repeat(np.arange(len(others)), [inquiry.just_seen[item.label].shape[1] for item in others])
+    nearest = np.full(len(others), np.inf)
+    for k, item in enumerate(others):
+        rival = left[:, places[item.label][1]]
+        basis, singular, _ = np.linalg.svd(
+            rival / np.maximum(np.linalg.norm(rival, axis=0), 1e-300), full_matrices=False
+        )
+        basis = basis[:, singular > np.sqrt(_RANK)]
+        apart = np.clip(whole - np.sum((basis.T @ torque) ** 2, axis=0), 0.0, None)
+        # Of more squares than a rival may leave none is taken for another.
+        far = np.divide(apart, (1.0 - criteria.least_share) * whole, out=np.zeros(len(whole)), where=whole > 0.0)
+        squares = np.maximum(apart / (2.0 * criteria.alike) ** 2, far)
+        inverse = np.divide(1.0, squares, out=np.full(len(whole), np.inf), where=squares > 0.0)
+        mean = np.bincount(owner, inverse, len(others)) / np.bincount(owner, minlength=len(others))
+        mean[k] = 0.0
+        nearest = np.minimum(nearest, np.divide(1.0, np.sqrt(mean), out=np.full(len(others), np.inf), where=mean > 0.0))
+    return dict(zip((item.label for item in others), nearest.tolist(), strict=True))
 
 
 def times_believed(

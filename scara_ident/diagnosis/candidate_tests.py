@@ -88,10 +88,20 @@ def examine(
         Columns of each on the rows of every joint that it acts on.
     criteria : SelectionCriteria, optional
     """
-    if len(candidates):
-        # Made once, and not in two threads.
-        _ = model.released
+    model.ready_for(sum(len(next(iter(rows.values()))) for rows in candidates))
     return _in_groups(model, candidates, lambda group: _examinations(model, products_of(model, group), criteria))
+
+
+def coefficients(model: FittedModel, candidate: Rows, criteria: SelectionCriteria = CRITERIA) -> tuple[Array, Array]:
+    """Return `Examination.value` and `Examination.products` of a candidate, without the work of a test."""
+    columns = {joint: model.weights[joint] * rows for joint, rows in candidate.items()}
+    sums = sum(rows @ model.basis[joint].T for joint, rows in columns.items())
+    squares = sum(rows @ rows.T for rows in columns.values())
+    aim = sum(rows @ model.residual[joint] for joint, rows in columns.items())
+    products = squares - sums @ sums.T
+    absorbed = np.diag(products) < criteria.absorbed * np.diag(squares)
+    products = np.where(absorbed[:, None] | absorbed, 0.0, products)
+    return _normal(products, np.where(absorbed, 0.0, aim)), products
 
 
 def held_out_gains(

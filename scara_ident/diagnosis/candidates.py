@@ -15,6 +15,7 @@ from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.position_noise import noisier, unresolved_joints
 from scara_ident.motion.prepared import PreparedStretch
+from scara_ident.processes import halved
 
 # Columns of a candidate, shape (k, N) on the N rows of each joint that it acts on.
 Rows = dict[int, Array]
@@ -23,6 +24,8 @@ Key = tuple[Effect, Member, Hashable]
 
 # Columns that pass the low-pass together: enough for two threads, and little memory.
 AT_ONCE = 32
+# Candidates whose columns take longer to make than another process to begin.
+WORTH_A_PROCESS = 50
 
 
 @dataclass(frozen=True)
@@ -136,8 +139,14 @@ class CandidateColumns:
         if not wanted:
             return
         stretches = self.observations.data.stretches
-        # One after the other: effects are made of many short steps, for which two threads only wait for each other.
-        made = [_on_stretch(self._signals_of(scene, part), wanted, part, keep=keep) for part in stretches]
+
+        def on_stretch(part: PreparedStretch) -> tuple[list[Rows], list[Rows]]:
+            return _on_stretch(self._signals_of(scene, part), wanted, part, keep=keep)
+
+        if len(wanted) < WORTH_A_PROCESS:
+            made = list(map(on_stretch, stretches))
+        else:
+            made = halved(on_stretch, stretches, [part.samples for part in stretches])
         for k, candidate in enumerate(wanted):
             key = _key(scene, candidate)
             parts = [rows[k] for rows, _ in made]

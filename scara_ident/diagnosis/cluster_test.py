@@ -67,7 +67,7 @@ def cluster_test(
     """
     into, back, rank = _whitening(whole)
     left = model.basis_scores - np.einsum("gbkr,gk->gbr", products.cross, value)
-    reach = _each_block(products.cross, model.released)
+    reach = model.reaching(products.cross)
     score = np.einsum("gki,gbk->gbi", into, scores + np.einsum("gbkr,gbr->gbk", reach, left))
     release, own, links, strength = _without_blocks(into, reach, products.cross, columns)
     # What leaving a block out changes, and what that follows from where residuals are white.
@@ -89,7 +89,7 @@ def cluster_test(
 def freedom_of(model: FittedModel, products: Products) -> Array:
     """Return `ClusterTest.freedom`, which no torque takes part in, shape (g,)."""
     into, _, _ = _whitening(np.sum(products.columns, axis=1))
-    reach = _each_block(products.cross, model.released)
+    reach = model.reaching(products.cross)
     _, own, links, strength = _without_blocks(into, reach, products.cross, products.columns)
     _, freedom = _if_white(_Neighbours.of(model), own, links)
     return np.where(np.all(strength > _LEAST_REDUNDANCY, axis=(1, 2)), _least(freedom), 0.0)
@@ -188,7 +188,8 @@ def _hotelling(value: Array, covariance: Array, freedom: Array, rank: NDArray[np
 
 def _whitening(whole: Array) -> tuple[Array, Array, NDArray[np.intp]]:
     """Return A with ``A' W A = 1`` where W says something, its inverse there, and in how many directions that is."""
-    size = np.sqrt(np.diagonal(whole, axis1=1, axis2=2))
+    # Of a column within the model rounding may leave less than nothing.
+    size = np.sqrt(np.maximum(np.diagonal(whole, axis1=1, axis2=2), 0.0))
     size = np.where(size == 0.0, 1.0, size)
     values, vectors = np.linalg.eigh(whole / (size[:, :, None] * size[:, None, :]))
     kept = values > _RANK * np.maximum(values[:, -1:], np.finfo(float).tiny)
@@ -196,13 +197,6 @@ def _whitening(whole: Array) -> tuple[Array, Array, NDArray[np.intp]]:
     into = np.where(kept[:, None], vectors / root[:, None] / size[:, :, None], 0.0)
     back = np.where(kept[:, None], vectors * root[:, None] * size[:, :, None], 0.0)
     return into, back.transpose(0, 2, 1), np.sum(kept, axis=1, dtype=np.intp)
-
-
-def _each_block(signals: Array, matrices: Array) -> Array:
-    """Multiply signals (g, blocks, k, r) by a matrix (blocks, r, r) each, all candidates of a block at once."""
-    g, blocks, k, r = signals.shape
-    found = signals.transpose(1, 0, 2, 3).reshape(blocks, g * k, r) @ matrices
-    return np.asarray(found.reshape(blocks, g, k, r).transpose(1, 0, 2, 3))
 
 
 def _both_sides(into: Array, products: Array) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.candidate_tests import coefficients
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.selection_step import SelectionStep, observed
 from scara_ident.estimation.least_squares import value_and_weights
@@ -52,8 +53,8 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
     """
     whole, last = np.zeros(len(candidate.effect.columns(step.scene, candidate.member))), np.inf
     for _ in range(MOST_CORRECTIONS):
-        (own,) = step.judge([candidate])
-        value = own.examination.value
+        (own,) = step.columns.rows(step.scene, [candidate])
+        value, _ = coefficients(step.model, own, step.criteria)
         size = float(np.linalg.norm(value))
         if candidate.effect.settled(value) or size >= last:
             break

@@ -24,6 +24,8 @@ from scara_ident.threads import THREADS, side_by_side
 LEAST_REDUNDANCY = 1e-9
 # A block whose products have a smaller norm leaves a tenth of every direction to the others.
 WELL_SHARED = 0.9
+# Up to so many signals for each direction they are solved for in less time than the inverse is made.
+FEW = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,19 +131,36 @@ class FittedModel:
     @cached_property
     def released(self) -> Array:
         """Inverse of what each block leaves to the others of the orthonormal columns, shape (blocks, r, r)."""
-        result = np.empty_like(self.basis_products)
+        return self._released(np.broadcast_to(np.eye(self.basis_products.shape[-1]), self.basis_products.shape))
 
-        def invert(some: slice) -> None:
-            products = self.basis_products[some]
+    def ready_for(self, count: int) -> None:
+        """Make what so many signals in all will need, once, and not in two threads."""
+        if count >= FEW * self.root.shape[1]:
+            _ = self.released
+
+    def reaching(self, signals: Array) -> Array:
+        """Return signals of blocks, shape (g, blocks, k, r), times `released`, which is not made for a few of them."""
+        g, blocks, k, r = signals.shape
+        rows = signals.transpose(1, 0, 2, 3).reshape(blocks, g * k, r)
+        few = g * k < FEW * r and "released" not in self.__dict__
+        found = self._released(rows.transpose(0, 2, 1)).transpose(0, 2, 1) if few else rows @ self.released
+        return np.asarray(found.reshape(blocks, g, k, r).transpose(1, 0, 2, 3))
+
+    def _released(self, columns: Array) -> Array:
+        """Return `released` times columns, shape (blocks, r, m)."""
+        result = np.empty(columns.shape)
+
+        def solve(some: slice) -> None:
+            products, own = self.basis_products[some], columns[some]
             left = np.eye(products.shape[-1]) - products
-            # Where something is left of every direction the plain inverse is as good, in a fifth of the time.
+            # Where something is left of every direction the plain solution is as good, in a fifth of the time.
             strong = np.linalg.norm(products, axis=(1, 2)) < WELL_SHARED
-            result[some][strong] = np.linalg.inv(left[strong])
+            result[some][strong] = np.linalg.solve(left[strong], own[strong])
             held, directions = np.linalg.eigh(left[~strong])
-            kept = np.maximum(held, LEAST_REDUNDANCY)
-            result[some][~strong] = (directions / kept[:, None]) @ directions.transpose(0, 2, 1)
+            turned = directions.transpose(0, 2, 1) @ own[~strong]
+            result[some][~strong] = directions @ (turned / np.maximum(held, LEAST_REDUNDANCY)[:, :, None])
 
-        side_by_side(invert, [slice(k, None, THREADS) for k in range(THREADS)])
+        side_by_side(solve, [slice(k, None, THREADS) for k in range(THREADS)])
         return result
 
     @cached_property

@@ -63,16 +63,15 @@ def line_candidates(
         if not any(np.any(piece) for piece in pieces):
             continue
         rate, band = rates[0], residuals.data.bands[j]
-        white = whitened(pieces, rate, highest=band)
+        highest = HIGHEST_FREQUENCY_SHARE * rate
+        above_band = [min(ABOVE_BAND * band, highest)] if band is not None and band < highest else []
+        white, *wider = whitened(pieces, rate, band, *above_band)
         order = _strongest_order(white, turns, criteria)
         strongest = [] if order is None else [SpectralLine("order", order)]
-        highest = HIGHEST_FREQUENCY_SHARE * rate
         within = _strongest_frequency(white, rate, (0.0, band or highest), criteria, band)
         strongest += [] if within is None else [SpectralLine("frequency", within)]
-        if band is not None and band < highest:
-            reach = min(ABOVE_BAND * band, highest)
-            wide = whitened(pieces, rate, highest=reach)
-            above = _strongest_frequency(wide, rate, (band, reach), criteria, reach)
+        for reach, wide in zip(above_band, wider, strict=True):
+            above = _strongest_frequency(wide, rate, (band or 0.0, reach), criteria, reach)
             strongest += [] if above is None else [SpectralLine("frequency", above)]
         found += [
             Candidate(effect, member)

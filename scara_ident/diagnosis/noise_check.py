@@ -6,7 +6,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
-from scara_ident.diagnosis.candidate_tests import Examination, examine
+from scara_ident.diagnosis.candidate_tests import Examination, coefficients
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.selection_step import SelectionStep
 
@@ -28,9 +28,8 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     unresolved = step.columns.unresolved_for(decision.candidate.member.joint)
     if unresolved is not None:
         return unresolved
-    own = step.noisier.columns.rows(step.noisier.scene, [decision.candidate])
-    (again,) = examine(step.noisier.model, own, criteria)
-    left = without_noise(found, again)
+    (own,) = step.noisier.columns.rows(step.noisier.scene, [decision.candidate])
+    left = without_noise(found, *coefficients(step.noisier.model, own, criteria))
     share = float(left @ found.products @ left) / float(found.value @ found.products @ found.value)
     if share >= 1.0:
         # What is no smaller without the noise was not made by it.
@@ -41,7 +40,7 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     return f"the noise of the positions makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
 
 
-def without_noise(found: Examination, again: Examination) -> Array:
-    """Return coefficients without the share of the positions' noise, from two examinations, the second with it twice."""
-    share = again.products @ again.value - found.products @ found.value
+def without_noise(found: Examination, value: Array, products: Array) -> Array:
+    """Return coefficients without the share of the positions' noise, from those with it twice and their products."""
+    share = products @ value - found.products @ found.value
     return np.asarray(found.value - np.linalg.pinv(found.products, rcond=1e-9, hermitian=True) @ share)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any, Literal
 
@@ -23,6 +23,8 @@ from scara_ident.errors import ScaraIdentError
 Kind = Literal["rivals", "unexplained", "below_limit", "parameter"]
 # Rivals of one effect, and candidates that these recordings would hardly have shown: of each family, in all, and by name.
 MOST_RIVALS, MOST_OF_FAMILY, MOST_BELOW, MOST_NAMED = 4, 2, 24, 3
+# Of one suspect against another, at most.
+MOST_ODDS = 100.0
 # What tells a remainder that no signal of the motion is known to make.
 HALF_THE_SPEED = (
     "repeat one trajectory at half the speed; how the remainder scales tells friction from inertia and from delays"
@@ -42,11 +44,14 @@ class Suspect:
         Effect and joint.
     value : tuple of float
         Its coefficients.
+    odds : float
+        How much likelier the recordings make it than one that they say nothing of, see `odds_of`.
     """
 
     candidate: Candidate
     label: str
     value: tuple[float, ...]
+    odds: float = 1.0
 
     def entry(self) -> dict[str, Any]:
         """Return it as plain values; see `suspect_of`."""
@@ -59,6 +64,7 @@ class Suspect:
             "partner": member.partner,
             "nonlinear": list(member.nonlinear),
             "value": list(self.value),
+            "odds": self.odds,
         }
 
 
@@ -84,6 +90,8 @@ class Question:
         Rms of the remainder, or size of the parameter.
     experiment : str
         What to do where no motion of the arm answers it.
+    sigma : float
+        Standard errors between the answers that a diagnosis says, for where its recordings are not at hand.
     """
 
     kind: Kind
@@ -94,6 +102,7 @@ class Question:
     parameter: str | None = None
     size: float = np.nan
     experiment: str = ""
+    sigma: float = 0.0
 
     def entry(self) -> dict[str, Any]:
         """Return it as plain values; see `question_of`."""
@@ -126,6 +135,7 @@ def question_of(entry: Mapping[str, Any]) -> Question:
         entry["parameter"],
         np.nan if entry["size"] is None else float(entry["size"]),
         str(entry["experiment"]),
+        float(entry.get("sigma_before") or 0.0),
     )
 
 
@@ -142,7 +152,8 @@ def suspect_of(entry: Mapping[str, Any]) -> Suspect:
         raise ScaraIdentError(f"effect {entry['effect']}: not as the diagnosis had it; diagnose again")
     nonlinear, value = (tuple(float(x) for x in entry[key]) for key in ("nonlinear", "value"))
     member = Member(entry["place"], nonlinear, entry["partner"])
-    return Suspect(Candidate(families[entry["variant"]], member), str(entry["label"]), value)
+    candidate = Candidate(families[entry["variant"]], member)
+    return Suspect(candidate, str(entry["label"]), value, float(entry.get("odds", 1.0)))
 
 
 def _variant(effect: Effect) -> int:
@@ -222,17 +233,17 @@ def _worth_a_look(diagnosis: Diagnosis) -> Iterator[Question]:
 
 
 def _below_limit(diagnosis: Diagnosis, asked: set[str]) -> Iterator[Question]:
-    """Ask for what these recordings would have shown least of, of a size that they would just have shown."""
+    """Ask for what is likeliest and for what would have shown least, each of a size that would just have shown."""
     seen: dict[str, int] = {}
     suspects = []
-    for decision in sorted(_others(diagnosis), key=lambda item: item.examination.outside):
+    for decision in sorted(_others(diagnosis), key=lambda item: (-_odds(item), item.examination.outside)):
         name = decision.candidate.effect.name
         limit, errors = _limit(decision.examination, diagnosis), _errors(decision.examination)
         if decision.label in asked or not np.isfinite(limit) or errors == 0.0 or seen.get(name, 0) >= MOST_OF_FAMILY:
             continue
         seen[name] = seen.get(name, 0) + 1
         value = limit / errors * decision.examination.value
-        suspects.append(Suspect(decision.candidate, decision.label, tuple(float(x) for x in value)))
+        suspects.append(Suspect(decision.candidate, decision.label, tuple(float(x) for x in value), _odds(decision)))
     if suspects:
         chosen = tuple(suspects[:MOST_BELOW])
         more = f" and {len(chosen) - MOST_NAMED} more" if len(chosen) > MOST_NAMED else ""
@@ -261,7 +272,7 @@ def _others(diagnosis: Diagnosis) -> list[Decision]:
     search = diagnosis.search
     known = {item.label(search.scene) for item in search.chosen}
     best = best_of_each(search.decisions).values()
-    return [
+    found = [
         item
         for item in best
         if item.label not in known
@@ -269,8 +280,15 @@ def _others(diagnosis: Diagnosis) -> list[Decision]:
         and not item.candidate.corrects_data
         and _moves(item.candidate)
         and bool(np.isfinite(item.examination.covariance).all())
-        and possible(item, diagnosis)
     ]
+    either = [item if possible(item, diagnosis) else _mirrored(item) for item in found]
+    return [item for item in either if possible(item, diagnosis)]
+
+
+def _mirrored(decision: Decision) -> Decision:
+    """Return an effect of the other sign, which what is found of nothing has as often; it speaks for no effect."""
+    found = decision.examination
+    return replace(decision, examination=replace(found, value=-found.value, p_value=1.0))
 
 
 def possible(decision: Decision, diagnosis: Diagnosis) -> bool:
@@ -286,7 +304,22 @@ def _moves(candidate: Candidate) -> bool:
 
 
 def _as_found(decision: Decision) -> Suspect:
-    return Suspect(decision.candidate, decision.label, tuple(float(x) for x in decision.examination.value))
+    value = tuple(float(x) for x in decision.examination.value)
+    return Suspect(decision.candidate, decision.label, value, _odds(decision))
+
+
+def _odds(decision: Decision) -> float:
+    return odds_of(decision.examination.p_value)
+
+
+def odds_of(p_value: float) -> float:
+    """Return the most that a p-value speaks for an effect and against none, ``-1 / (e p ln p)``.
+
+    Sellke, Bayarri and Berger, "Calibration of p values for testing precise null hypotheses", The American Statistician
+    55(1), 2001; where it says nothing 1, and at most `MOST_ODDS`, so that none is forgotten for what may be another's.
+    """
+    p = min(float(p_value), np.exp(-1.0))
+    return MOST_ODDS if p <= 0.0 else float(min(MOST_ODDS, -1.0 / (np.e * p * np.log(p))))
 
 
 def _errors(found: Examination) -> float:

@@ -139,8 +139,8 @@ def frequency_spectrum(
 
 
 def whitened(
-    residuals: Sequence[Array], rate: float, *, smoothing: float = 1.0, highest: float | None = None
-) -> list[Array]:
+    residuals: Sequence[Array], rate: float, *highest: float | None, smoothing: float = 1.0
+) -> list[list[Array]]:
     """Divide residuals by the smooth part of their common amplitude spectrum, without phase.
 
     Noise that grows with frequency otherwise hides a line in the motor's angle, which passes many frequencies. The
@@ -151,32 +151,41 @@ def whitened(
     residuals : sequence of ndarray, each of shape (N_r,)
     rate : float
         Samples per second.
+    *highest : float or None
+        Hz above which nothing is kept, such as the residual's own low-pass; None keeps all.
     smoothing : float
         Hz on either side over which the spectrum's median is taken, which a line does not move.
-    highest : float, optional
-        Hz above which nothing is kept: the residual's own low-pass.
 
     Returns
     -------
-    list of ndarray
-        Shapes as given.
+    list of list of ndarray
+        For each highest frequency the residuals, of shapes as given.
     """
     from scipy.fft import next_fast_len
-    from scipy.ndimage import median_filter, uniform_filter1d
 
     length = next_fast_len(max(len(residual) for residual in residuals))
     spectra = [np.fft.rfft(np.asarray(residual) - np.mean(residual), length) for residual in residuals]
-    power = np.sum([np.abs(spectrum) ** 2 for spectrum in spectra], axis=0) / sum(map(len, residuals))
+    frequency = np.fft.rfftfreq(length, 1.0 / rate)
+    kept = [len(frequency) if most is None else int(np.searchsorted(frequency, most, "right")) for most in highest]
     reach = max(1, round(smoothing * length / rate))
-    middle = median_filter(power, 2 * reach + 1, mode="nearest") / np.log(2.0)
-    smooth = uniform_filter1d(middle, 2 * reach + 1, mode="nearest")
+    # What a median and a mean of these reach above the highest frequency.
+    within = slice(max(kept) + 2 * reach)
+    power = np.sum([np.abs(spectrum[within]) ** 2 for spectrum in spectra], axis=0) / sum(map(len, residuals))
+    middle = np.median(around(power, reach), axis=1) / np.log(2.0)
+    smooth = np.mean(around(middle, reach), axis=1)
     gain = np.divide(1.0, np.sqrt(smooth), out=np.zeros_like(smooth), where=smooth > 0.0)
-    if highest is not None:
-        gain[np.fft.rfftfreq(length, 1.0 / rate) > highest] = 0.0
     return [
-        np.fft.irfft(spectrum * gain, length)[: len(residual)]
-        for spectrum, residual in zip(spectra, residuals, strict=True)
+        [
+            np.fft.irfft(spectrum[:count] * gain[:count], length)[: len(residual)]
+            for spectrum, residual in zip(spectra, residuals, strict=True)
+        ]
+        for count in kept
     ]
+
+
+def around(values: Array, reach: int) -> Array:
+    """Return values with as many neighbours on either side, those at the ends repeated, shape (K, 2 reach + 1)."""
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1)
 
 
 def order_width(motor_angle: Array) -> float:
@@ -223,14 +232,13 @@ def lines(
     list of Line
         The most significant first. A strong line has lesser ones beside it that go when it is fitted; one at a time.
     """
-    from scipy.ndimage import maximum_filter1d
     from scipy.special import fdtrc
 
     spacing = float(np.median(np.diff(positions)))
     floor = noise_floor(positions, power, width, degrees=degrees, neighbours=neighbours)
     reach = max(1, round(width / spacing))
     ratio = np.divide(power, floor, out=np.zeros_like(power), where=floor > 0.0)
-    top = np.flatnonzero((power == maximum_filter1d(power, 2 * reach + 1)) & (power > 0.0))
+    top = np.flatnonzero((power == np.max(around(power, reach), axis=1)) & (power > 0.0))
     trials = 1.0 + TRIALS_PER_WIDTH * (positions[-1] - positions[0]) / width
     # A median says as much as a mean of half as many.
     freedom = degrees * max(neighbours - GUARD, 1.0)

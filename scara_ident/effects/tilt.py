@@ -250,7 +250,7 @@ def _too_steep(tilt: Array, std: Array) -> str | None:
 
 def _combined(value: Array, covariance: Array, blend: Array) -> tuple[Array, Array]:
     """Fit tilt and one factor on the nominal first moments to all coefficients, by Gauss and Newton."""
-    from scipy.stats import chi2
+    from scipy.special import chdtrc, chdtri
 
     size = np.sqrt(np.clip(np.diag(covariance), np.finfo(float).tiny, None))
     weight = np.linalg.pinv(covariance / np.outer(size, size), rcond=1e-9, hermitian=True) / np.outer(size, size)
@@ -269,7 +269,7 @@ def _combined(value: Array, covariance: Array, blend: Array) -> tuple[Array, Arr
     error = value - np.concatenate([tilt, factor * blend @ tilt])
     disagreement = float(error @ weight @ error)
     free = len(value) - 3
-    accepted = chi2.ppf(chi2.cdf(AGREEMENT_STDS**2, 1), free) if free > 0 else np.inf
+    accepted = float(chdtri(free, chdtrc(1, AGREEMENT_STDS**2))) if free > 0 else np.inf
     believed = 1.0 / MOMENT_FACTOR <= factor <= MOMENT_FACTOR
     if not np.isfinite(disagreement) or disagreement > accepted or not believed:
         return value[:2], covariance[:2, :2]

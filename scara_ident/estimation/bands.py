@@ -88,13 +88,16 @@ def choose_bands(model: TorqueModel, data: PreparedData) -> BandChoice:
     _ = data.labels  # from the recordings as they are, before they are thinned
     edges = _edges([part.stretch for part in data.stretches])
     highest = HIGHEST_BAND * min(part.rate for part in data.stretches)
-    moving = _moving(data)
+    slow_rate = FIRST_BAND * FIRST_WIDENING / HIGHEST_BAND
+    slow = _thinned(data.at((FIRST_BAND,) * len(data.bands)), slow_rate)
+    moving = _moving(slow)
     floor = np.minimum(narrowest_bands(model, len(data.stretches), moving), highest)
     bands = np.minimum(np.maximum(floor, FIRST_BAND), highest)
     rate = float(np.max(bands)) * FIRST_WIDENING / HIGHEST_BAND
     fit = None
     while True:
-        level = _sample(_thinned(data, rate))
+        # In the bands of the first fit where none begins wider, so that what is at rest is not looked for again.
+        level = _sample(slow if rate == slow_rate else _thinned(data, rate))
         allowed = HIGHEST_BAND * min(part.rate for part in level.stretches)
         with threads_for(max(part.samples for part in level.stretches)):
             bands, fit = _widened(_Spectra(model, level, edges), bands, floor, allowed, fit)
@@ -237,9 +240,8 @@ def narrowest_bands(model: TorqueModel, stretches: int, moving: Array) -> Array:
     return np.asarray(np.clip(alone, together, MOST_ALONE * together))
 
 
-def _moving(data: PreparedData) -> Array:
+def _moving(slow: PreparedData) -> Array:
     """Return the time in which each joint moves, s, shape (n,)."""
-    slow = _thinned(data.at((FIRST_BAND,) * len(data.bands)), FIRST_BAND * FIRST_WIDENING / HIGHEST_BAND)
     with threads_for(max(part.samples for part in slow.stretches)):
         times = side_by_side(lambda part: np.count_nonzero(~part.rest, axis=1) / part.rate, slow.stretches)
     return np.asarray(np.sum(times, axis=0))

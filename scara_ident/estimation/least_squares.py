@@ -15,7 +15,7 @@ from scara_ident.estimation.noise_bias import noise_bias
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import run_variation
 from scara_ident.estimation.working_range import told_directions
-from scara_ident.threads import one_blas_thread
+from scara_ident.threads import one_blas_thread, side_by_side
 
 
 def ols(observations: Observations) -> Estimate:
@@ -85,8 +85,13 @@ def least_squares(
         within = told.within(information)
         value, undetermined = told.kept @ within.solve().value, told.undetermined
         inverse = told.kept @ within.inverse() @ told.kept.T
-    spread = block_covariance(inverse, value, observations.joints, observations.owner, weights)
-    variation = run_variation(observations, observations.joints, value)
+    variation, spread = side_by_side(
+        lambda work: work(),
+        [
+            lambda: run_variation(observations, observations.joints, value),
+            lambda: block_covariance(inverse, value, observations.joints, observations.owner, weights),
+        ],
+    )
     covariance = spread.matrix + variation.covariance(inverse, observations.joints, weights)
     bias = None
     if told is not None:

@@ -28,8 +28,9 @@ Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 # Distances are told apart up to so much more than the margin, m.
 REACH = 0.05
-# Of Coal's search for nearest points, m.
+# Of Coal's search for nearest points, m; and where it begins.
 TOLERANCE = 1e-8
+GUESS, HINT = np.array([1.0, 0.0, 0.0]), np.zeros(2, dtype=np.int32)
 # Random postures at which pairs are looked at.
 POSTURES = 100
 # A pair is likely to come near if its least distance there is so much of the range of its distances, or less.
@@ -80,11 +81,12 @@ class Clearance(Frozen):
         return shapes
 
     @cached_property
-    def _data(self) -> tuple[pin.Data, pin.GeometryData]:
+    def _data(self) -> tuple[pin.Data, pin.GeometryData, list[coal.DistanceRequest], list[coal.DistanceResult]]:
         measured = self.shapes.createData()
-        for request in measured.distanceRequests:
+        requests = list(measured.distanceRequests)
+        for request in requests:
             request.gjk_tolerance = TOLERANCE
-        return self.robot.model.createData(), measured
+        return self.robot.model.createData(), measured, requests, list(measured.distanceResults)
 
     @cached_property
     def _spheres(self) -> tuple[Array, Array]:
@@ -92,6 +94,12 @@ class Clearance(Frozen):
         shapes = self.shapes.geometryObjects
         centres = np.array([shape.placement.act(shape.geometry.aabb_center) for shape in shapes])
         return centres, np.array([shape.geometry.aabb_radius for shape in shapes])
+
+    @cached_property
+    def _sides(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """First and second shape of every pair, each of shape (P,)."""
+        first, second = np.array([pair[:2] for pair in self.pairs], dtype=np.intp).reshape(-1, 2).T
+        return first, second
 
     @cached_property
     def _moved_by(self) -> NDArray[np.bool_]:
@@ -104,23 +112,32 @@ class Clearance(Frozen):
                 joint = model.parents[joint]
         return moved
 
-    def _rates(self, q: Array) -> Array:
-        """Return how much the distance of each pair changes at most per rad or m of each joint, shape (P, n)."""
+    @cached_property
+    def _levers(self) -> tuple[Array, Array]:
+        """How far at most a shape moves per rad or m of each joint, (S, n), and more per m that others slide, (S, n, n)."""
         joints, robot = joints_of(self.robot), self.robot
         centres, radii = self._spheres
-        rates = np.zeros(self._moved_by.shape)
+        fixed, slid = np.zeros(self._moved_by.shape), np.zeros((*self._moved_by.shape, robot.n))
         for shape, found in enumerate(self.shapes.geometryObjects):
-            joint = found.parentJoint
+            joint, beyond = found.parentJoint, np.zeros(robot.n)
             # Obstacles do not move; a floor has no size.
             extent = float(np.linalg.norm(centres[shape]) + radii[shape]) if joint > 0 else 0.0
             while joint > 0:
                 own, each = place_of(robot, joint), joints[joint - 1]
-                rates[shape, own] = 1.0 if each.prismatic else extent
-                extent += float(np.linalg.norm(each.offset)) + (np.abs(q[own]).max() if each.prismatic else 0.0)
+                fixed[shape, own] = 1.0 if each.prismatic else extent
+                slid[shape, own] = 0.0 if each.prismatic else beyond
+                extent += float(np.linalg.norm(each.offset))
+                beyond[own] = float(each.prismatic)
                 joint = each.parent
-        first, second = (np.array([pair[side] for pair in self.pairs], dtype=int) for side in (0, 1))
+        return fixed, slid
+
+    def _rates(self, q: Array) -> Array:
+        """Return how much the distance of each pair changes at most per rad or m of each joint, shape (P, n)."""
+        fixed, slid = self._levers
+        rates = fixed + slid @ np.abs(q).max(axis=1, initial=0.0)
+        first, second = self._sides
         # What moves both alike changes nothing.
-        return np.asarray(np.where(self._moved_by[first] != self._moved_by[second], rates[first] + rates[second], 0.0))
+        return np.where(self._moved_by[first] != self._moved_by[second], rates[first] + rates[second], 0.0)
 
     def nearest(self, q: Array, reach: float = np.inf, *, likely: bool = False) -> Nearest:
         """Measure the smallest distance of each group.
@@ -135,36 +152,35 @@ class Clearance(Frozen):
             Whether to look at likely pairs alone.
         """
         groups = self.groups
+        distance = np.full((len(groups), q.shape[1]), reach)
+        nearest = np.full(distance.shape, -1, dtype=np.intp)
         bounds = self._bounds(joint_frames(self.robot, q))
-        if likely:
-            bounds[~np.array(self.likely, dtype=bool)] = np.inf
-        number = [groups.index(group) for *_, group in self.pairs]
-        found = Nearest.none(len(groups), q.shape[1], reach)
-        model, shapes, (data, measured) = self.robot.model, self.shapes, self._data
-        results, postures = list(measured.distanceResults), self._configurations(q)
-        # How much each pair may have changed on the way to every posture, and what it was where it was last measured.
-        way = np.cumsum(self._rates(q) @ np.abs(np.diff(q, axis=1, prepend=q[:, :1])), axis=1).T.copy()
-        last, bounds = np.full(len(self.pairs), -np.inf), bounds.T.copy()
-        for k in np.flatnonzero(np.any(bounds < reach, axis=1)).tolist():
-            least = np.maximum(bounds[k], last - way[k])
-            near = np.flatnonzero(least < reach)
-            if not len(near):
-                continue
-            pin.updateGeometryPlacements(model, data, shapes, measured, postures[k])
-            best, nearest = [reach] * len(groups), [-1] * len(groups)
-            for pair in near[np.argsort(least[near])].tolist():
-                group = number[pair]
-                if least[pair] >= best[group]:
-                    continue
-                pin.computeDistance(shapes, measured, pair)
-                distance = results[pair].min_distance
-                last[pair] = distance + way[k, pair]
-                if distance < best[group]:
-                    best[group], nearest[group] = distance, pair
-            for group, pair in enumerate(nearest):
-                if pair >= 0:
-                    found.take(group, k, pair, results[pair])
-        return found
+        # How much the distance of each pair may have changed on the way to every posture.
+        way = np.cumsum(self._rates(q) @ np.abs(np.diff(q, axis=1, prepend=q[:, :1])), axis=1)
+        near = np.flatnonzero(np.any(bounds < reach, axis=1) & (self.likely if likely else True))
+        postures, measure = self._configurations(q), self._measure
+        # Pairs that are near on the whole come first: beside them most others need not be measured.
+        for pair in near[np.argsort(bounds[near].mean(axis=1), kind="stable")].tolist():
+            group = groups.index(self.pairs[pair][2])
+            least, found = distance[group], nearest[group]
+            places = np.flatnonzero(bounds[pair] < least)
+            last = -np.inf
+            for k, gone, most in zip(places.tolist(), way[pair, places].tolist(), least[places].tolist(), strict=True):
+                if last - gone < most:
+                    value = measure(pair, postures[k]).min_distance
+                    last = value + gone
+                    if value < most:
+                        least[k], found[k] = value, pair
+        return Nearest(distance, nearest)
+
+    def _measure(self, pair: int, posture: Array) -> coal.DistanceResult:
+        """Measure a pair at a posture as Pinocchio has it; what is returned holds until the next measurement."""
+        data, measured, requests, results = self._data
+        # Coal begins where it last ended, so that digits would depend on what was measured before.
+        requests[pair].cached_gjk_guess, requests[pair].cached_support_func_guess = GUESS, HINT
+        pin.updateGeometryPlacements(self.robot.model, data, self.shapes, measured, posture)
+        pin.computeDistance(self.shapes, measured, pair)
+        return results[pair]
 
     def _configurations(self, q: Array) -> list[Array]:
         """Return Pinocchio's configuration of every posture (n, N)."""
@@ -178,47 +194,52 @@ class Clearance(Frozen):
         frames = joint_frames(self.robot, q)
         slope = np.zeros((len(found.distance), *q.shape))
         group, place = np.nonzero(found.pair >= 0)
-        pairs = np.array([pair[:2] for pair in self.pairs], dtype=int)[found.pair[group, place]]
+        chosen, postures = found.pair[group, place], self._configurations(q[:, place])
+        # Nearest points on the first and on the second shape, and the direction from one to the other.
+        where = np.empty((3, 3, len(chosen)))
+        for k, (pair, posture) in enumerate(zip(chosen.tolist(), postures, strict=True)):
+            result = self._measure(pair, posture)
+            where[:, :, k] = result.getNearestPoint1(), result.getNearestPoint2(), result.normal
         axes, origins = frames.axis[:, :, place], frames.origin[:, :, place]
-        normal, slides = found.normal[group, place].T, frames.prismatic[:, None, None]
-        for side, sign in ((0, -1.0), (1, 1.0)):
-            arm = np.cross(axes, found.points[side, group, place].T - origins, axis=1)
-            moved = self._moved_by[pairs[:, side]].T
-            slope[group, :, place] += sign * (moved * np.einsum("jcN,cN->jN", np.where(slides, axes, arm), normal)).T
+        slides = frames.prismatic[:, None, None]
+        for side, sign, point in zip(self._sides, (-1.0, 1.0), where[:2], strict=True):
+            arm = np.cross(axes, point - origins, axis=1)
+            moved = self._moved_by[side[chosen]].T
+            slope[group, :, place] += sign * (moved * np.einsum("jcN,cN->jN", np.where(slides, axes, arm), where[2])).T
         return slope
 
-    def rows(self, q: Array, *, likely: bool = False, slopes: bool = False) -> tuple[Array, Array]:
-        """Return rows of limits, 1 at the margin and 0 where there is room, shape (G, N), with derivatives if asked for."""
-        found = self.nearest(q, self.margin + REACH, likely=likely)
-        rows = 1.0 - (found.distance - self.margin) / REACH
-        return rows, -self.slopes(q, found) / REACH if slopes else np.zeros(0)
+    @property
+    def reach(self) -> float:
+        """Distance from which on there is room enough, m."""
+        return self.margin + REACH
+
+    def rows(self, found: Nearest) -> Array:
+        """Return distances within reach as rows of limits, 1 at the margin and 0 where there is room, shape (G, N)."""
+        return 1.0 - (found.distance - self.margin) / REACH
 
     def _bounds(self, frames: JointFrames) -> Array:
         """Return a lower bound of the distance of every pair, shape (P, N)."""
         centres, radii = self._spheres
         joints = np.array([shape.parentJoint for shape in self.shapes.geometryObjects])
         places = frames.centres(joints, centres)
-        robots = len(joints) - len(self.boxes) - int(np.isfinite(self.floor))
-        found = np.empty((len(self.pairs), places.shape[2]))
-        for row, (first, second, group) in enumerate(self.pairs):
-            if group == "floor":
-                found[row] = places[first, 2] - self.floor
-            elif second >= robots:
-                centre, edges = (np.array(part)[:, None] for part in self.boxes[int(group.removeprefix("box")) - 1])
-                found[row] = np.linalg.norm(np.maximum(np.abs(places[first] - centre) - 0.5 * edges, 0.0), axis=0)
-            else:
-                found[row] = np.linalg.norm(places[first] - places[second], axis=0) - radii[second]
-            found[row] -= radii[first]
-        return found
+        first, second = self._sides
+        groups = np.array([group for *_, group in self.pairs])
+        own = groups == "self"
+        found = np.empty((len(groups), places.shape[2]))
+        found[own] = np.linalg.norm(places[first[own]] - places[second[own]], axis=1) - radii[second[own], None]
+        found[groups == "floor"] = places[first[groups == "floor"], 2] - self.floor
+        for number, box in enumerate(self.boxes, 1):
+            centre, edges = (np.array(part)[:, None] for part in box)
+            beside = groups == f"box{number}"
+            out = np.maximum(np.abs(places[first[beside]] - centre) - 0.5 * edges, 0.0)
+            found[beside] = np.linalg.norm(out, axis=1)
+        return found - radii[first, None]
 
     def all_distances(self, q: Array) -> Array:
         """Return the distance of every pair at postures (n, N), shape (P, N), m."""
-        model, shapes, (data, measured) = self.robot.model, self.shapes, self._data
-        found = np.empty((len(self.pairs), q.shape[1]))
-        for k, posture in enumerate(self._configurations(q)):
-            pin.computeDistances(model, data, shapes, measured, posture)
-            found[:, k] = [each.min_distance for each in measured.distanceResults]
-        return found
+        pairs, measure = range(len(self.pairs)), self._measure
+        each = [[measure(pair, posture).min_distance for pair in pairs] for posture in self._configurations(q)]
+        return np.array(each).reshape(q.shape[1], len(pairs)).T
 
     def nearest_of(self, posture: Array) -> str:
         """Say which pair is nearest at a posture (n,)."""
@@ -244,37 +265,18 @@ class Clearance(Frozen):
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """Smallest distances of groups at postures, and where they are.
+    """Smallest distances of groups at postures, and of which pairs they are.
 
     Attributes
     ----------
     distance : ndarray, shape (G, N)
         m; negative where shapes overlap, and what was asked as reach where none is nearer.
     pair : ndarray of int, shape (G, N)
-        -1 where none is nearer than the reach.
-    points : ndarray, shape (2, G, N, 3)
-        On the first and the second shape, in the base frame, m.
-    normal : ndarray, shape (G, N, 3)
-        From the first to the second.
+        Which it is of all pairs; -1 where none is nearer than the reach.
     """
 
     distance: Array
     pair: NDArray[np.intp]
-    points: Array
-    normal: Array
-
-    @staticmethod
-    def none(groups: int, samples: int, reach: float) -> Nearest:
-        """Return what is known before anything is measured."""
-        pair = np.full((groups, samples), -1, dtype=np.intp)
-        return Nearest(np.full(pair.shape, reach), pair, np.zeros((2, *pair.shape, 3)), np.zeros((*pair.shape, 3)))
-
-    def take(self, group: int, k: int, pair: int, measured: coal.DistanceResult) -> None:
-        """Keep a measurement."""
-        self.distance[group, k], self.pair[group, k] = measured.min_distance, pair
-        self.points[0, group, k] = measured.getNearestPoint1()
-        self.points[1, group, k] = measured.getNearestPoint2()
-        self.normal[group, k] = measured.normal
 
 
 def clearance_of(

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from scara_ident.arrays import Array
-from scara_ident.excitation.problem import Problem, Slopes
+from scara_ident.excitation.problem import Point, Problem
+from scara_ident.excitation.slopes import Slopes
 
 # Share of the way to the nearest limit that a step may go.
 NEARLY = 0.95
@@ -83,8 +84,8 @@ def shrunk_inside(problem: Problem, x: Array, room: float = 0.03, factor: float 
         Of each try.
     """
     for _ in range(400):
-        cost, values = problem.values(x)
-        if np.isfinite(cost) and np.min(_slack(problem, values)) > room:
+        point = problem.at(x)
+        if np.isfinite(point.cost) and np.min(_slack(problem, point.values)) > room:
             return x
         x = factor * x
     return None
@@ -108,31 +109,29 @@ def minimise(problem: Problem, x: Array, schedule: Schedule | None = None) -> Mi
     while True:
         share = float(np.clip(np.log(plan.first / gap) / span, 0.0, 1.0)) if span > 0.0 else 1.0
         stage = problem.sharpened(plan.sharpness + (1.0 - plan.sharpness) * share)
-        cost, values = stage.values(x)
-        slack = _slack(stage, values)
+        point = stage.at(x)
+        slack = _slack(stage, point.values)
         mu = gap / slack.size
         if multipliers is None:
             multipliers = mu / slack
         stage_steps = 0
         while steps < plan.steps:
-            slopes = stage.slopes(x)
-            direction = _Direction(stage, slopes, slack, multipliers, mu)
-            found = direction.search(x, cost, damping)
+            found = _Direction(stage, stage.slopes(point), point, slack, multipliers, mu).search(damping)
             steps, stage_steps = steps + 1, stage_steps + 1
             if found is None:
                 break
-            x, cost, slack, multipliers, damping = found.x, found.cost, found.slack, found.multipliers, found.damping
+            point, slack, multipliers, damping = found.point, found.slack, found.multipliers, found.damping
             if found.decrease < plan.tolerance:
                 break
+        x = point.x
         if gap <= plan.last or steps >= plan.steps:
-            return Minimum(x, problem.sharpened(1.0).values(x)[0], steps)
+            return Minimum(x, problem.sharpened(1.0).at(x).cost, steps)
         gap = max(plan.last, plan.factor * gap)
 
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    x: Array
-    cost: float
+    point: Point
     slack: Array
     multipliers: Array
     damping: float
@@ -143,18 +142,19 @@ class _Step:
 class _Direction:
     problem: Problem
     slopes: Slopes
+    point: Point
     slack: Array
     multipliers: Array
     mu: float
 
-    def search(self, x: Array, cost: float, damping: float) -> _Step | None:
+    def search(self, damping: float) -> _Step | None:
         """Take a Newton step that lowers the barrier function; None where none does."""
-        slack, mu = self.slack, self.mu
+        x, slack, mu = self.point.x, self.slack, self.mu
         two = self.problem.two_sided
         stiffness = self.multipliers / slack
         force = -(self.slopes.gradient + self.slopes.pull(_fold(mu / slack, two, -1.0)))
         matrix = self.slopes.curvature(_fold(stiffness, two, 1.0))
-        merit = cost - mu * np.sum(np.log(slack))
+        merit = self.point.cost - mu * np.sum(np.log(slack))
         diagonal = np.arange(matrix.shape[1])
         scale = np.mean(matrix[:, diagonal, diagonal])
         while damping <= MOST_DAMPING:
@@ -170,16 +170,15 @@ class _Direction:
             length = min(1.0, NEARLY * float(np.min(slack[near] / closing[near]))) if near.any() else 1.0
             slope = float(np.sum(force * dx))
             for halving in range(HALVINGS):
-                moved = x + length * dx.reshape(x.shape)
-                there, values = self.problem.values(moved)
-                room = _slack(self.problem, values) if np.isfinite(there) else np.zeros(1)
-                if np.min(room) > 0.0 and there - mu * np.sum(np.log(room)) <= merit - SUFFICIENT * length * slope:
+                there = self.problem.at(x + length * dx.reshape(x.shape))
+                room = _slack(self.problem, there.values) if np.isfinite(there.cost) else np.zeros(1)
+                if np.min(room) > 0.0 and there.cost - mu * np.sum(np.log(room)) <= merit - SUFFICIENT * length * slope:
                     wanted = self.multipliers + length * (mu / slack - self.multipliers + stiffness * closing)
                     usual = mu / room
                     wanted = np.where(wanted > 0.0, wanted, usual)
                     held = np.clip(wanted, usual / MULTIPLIER_RANGE, usual * MULTIPLIER_RANGE)
                     eased: float = damping * (0.3 if halving == 0 else 2.0)
-                    return _Step(moved, there, room, held, max(eased, LEAST_DAMPING), slope)
+                    return _Step(there, room, held, max(eased, LEAST_DAMPING), slope)
                 length *= 0.5
             damping *= 10.0
         return None

@@ -347,8 +347,8 @@ def _at_rest(model: TorqueModel, limits: Limits, nominal: Array, q: Array) -> tu
         height = tool_motion(limits.tool, q, still, still).position[2]
         shares.append(limits.floor - height)
     if limits.clearance is not None and limits.clearance.pairs:
-        near = limits.clearance.rows(q)[0]
-        shares += list(near - 1.0)
+        near = limits.clearance.nearest(q, limits.clearance.reach)
+        shares += list(limits.clearance.rows(near) - 1.0)
     stacked = np.array(shares)
 
     def broken(index: int) -> str:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.excitation.clearance import REACH, Nearest
 from scara_ident.excitation.criteria import Criterion
 from scara_ident.excitation.curves import Basis
 from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.sensitivity import SmoothModel
+from scara_ident.excitation.slopes import Slopes
 from scara_ident.excitation.tool import ToolMotion, tool_motion
 from scara_ident.motion.motion import Motion
 
@@ -66,69 +69,30 @@ class Task:
 
 
 @dataclass(frozen=True, eq=False)
-class Slopes:
-    """Cost and limits of a motion with their derivatives by the coefficients.
-
-    A limit is a row ``y`` over all samples that must stay within ``+-bound`` or, if it has one side, below it.
+class Point:
+    """A motion with what was evaluated of it.
 
     Attributes
     ----------
+    x : ndarray, shape (k, n, m)
+    motion : Motion
     cost : float
-    gradient : ndarray, shape (k, n m)
+        Infinite where limits are broken.
     values : ndarray, shape (R, k M)
-        All rows.
-    own : tuple of (int, int, float)
-        For the first rows, which depend on one joint: derivative (0 position, 1 velocity, ...), joint, scale.
-    shared : ndarray, shape (R', k, M, n m)
-        Derivative of the rows after them.
-    rows : ndarray, shape (4, k, M, m)
-        The bases.
+        Rows of limits; only the first ones where these are broken.
+    regressor : ndarray, shape (n, p, k M), or None
+    tool : ToolMotion or None
+    near : Nearest or None
+        Distances, where they are measured.
     """
 
+    x: Array
+    motion: Motion
     cost: float
-    gradient: Array
     values: Array
-    own: tuple[tuple[int, int, float], ...]
-    shared: Array
-    rows: Array
-
-    def pull(self, u: Array) -> Array:
-        """Return the transposed derivative of all rows times u (R, k M), shape (k, n m)."""
-        k, _, width = self.shared.shape[1:]
-        m = self.rows.shape[3]
-        u = u.reshape(len(u), k, -1)
-        result = (
-            np.einsum("rkM,rkMx->kx", u[len(self.own) :], self.shared) if len(self.shared) else np.zeros((k, width))
-        )
-        for row, (kind, joint, scale) in enumerate(self.own):
-            result[:, joint * m : (joint + 1) * m] += scale * np.einsum("kM,kMm->km", u[row], self.rows[kind])
-        return np.asarray(result)
-
-    def push(self, x: Array) -> Array:
-        """Return the derivative of all rows times x (k, n m), shape (R, k M)."""
-        m = self.rows.shape[3]
-        own = [
-            scale * np.einsum("km,kMm->kM", x[:, j * m : (j + 1) * m], self.rows[kind]) for kind, j, scale in self.own
-        ]
-        shared = np.einsum("rkMx,kx->rkM", self.shared, x)
-        return np.concatenate([np.array(own), shared]).reshape(len(self.values), -1)
-
-    def curvature(self, d: Array) -> Array:
-        """Return the squares of all derivatives weighted with d (R, k M), summed over samples, shape (k, n m, n m)."""
-        k, _, width = self.shared.shape[1:]
-        m = self.rows.shape[3]
-        d = d.reshape(len(d), k, -1)
-        result = np.zeros((k, width, width))
-        for part in range(k):
-            for row, (kind, joint, scale) in enumerate(self.own):
-                place = slice(joint * m, (joint + 1) * m)
-                basis = self.rows[kind, part]
-                half = basis * (abs(scale) * np.sqrt(d[row, part]))[:, None]
-                result[part, place, place] += half.T @ half
-            for row, slope in enumerate(self.shared[:, part]):
-                half = slope * np.sqrt(d[len(self.own) + row, part])[:, None]
-                result[part] += half.T @ half
-        return result
+    regressor: Array | None = None
+    tool: ToolMotion | None = None
+    near: Nearest | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +125,7 @@ class Problem:
         smooth = replace(task.smooth, width=width * task.limits.velocity)
         return replace(self, task=replace(task, smooth=smooth, criterion=task.criterion.sharpened(share)))
 
-    @property
+    @cached_property
     def two_sided(self) -> NDArray[np.bool_]:
         """Which rows are bounded from both sides, shape (R,)."""
         names = row_names(self.task.limits, len(self.task.posture))
@@ -176,27 +140,22 @@ class Problem:
     def _derivative(self, x: Array, order: int) -> Array:
         return np.asarray(np.einsum("knm,kMm->nkM", x, self.rows[order]).reshape(x.shape[1], -1))
 
-    def values(self, x: Array) -> tuple[float, Array]:
-        """Return cost and rows of limits (R, k M) of coefficients; infinite cost, and some rows, where limits are broken."""
+    def at(self, x: Array) -> Point:
+        """Evaluate coefficients; where first rows break their bounds, those after them and the cost are left out."""
         motion = self.motion(x)
         values = self._own(x, motion)
         if not self._kept(values):
-            return np.inf, values
-        regressor = self.task.smooth.regressor(motion)
-        values = self._limited(values, motion, regressor)
-        if self._kept(values):
-            # Last, as they take longest.
-            values = np.concatenate([values, self._distances(motion)[0]])
-        return self._cost(regressor)[0] if self._kept(values) else np.inf, values
+            return Point(x, motion, np.inf, values)
+        found = self._limited(x, motion, values)
+        if found.regressor is None or not self._kept(found.values):
+            return found
+        return replace(found, cost=self._cost(found.regressor)[0])
 
     def inside(self, x: Array) -> bool:
         """Tell whether all limits are kept, whatever the cost."""
         motion = self.motion(x)
         values = self._own(x, motion)
-        if not self._kept(values):
-            return False
-        values = self._limited(values, motion, self.task.smooth.regressor(motion))
-        return self._kept(values) and self._kept(np.concatenate([values, self._distances(motion)[0]]))
+        return self._kept(values) and self._kept(self._limited(x, motion, values).values)
 
     def _kept(self, values: Array) -> bool:
         """Whether the first rows are within their bounds."""
@@ -206,15 +165,13 @@ class Problem:
     def limited(self, x: Array) -> Array:
         """Return all rows of limits (R, k M), broken or not."""
         motion = self.motion(x)
-        values = self._limited(self._own(x, motion), motion, self.task.smooth.regressor(motion))
-        return np.concatenate([values, self._distances(motion)[0]])
+        return self._limited(x, motion, self._own(x, motion), broken=True).values
 
-    def slopes(self, x: Array) -> Slopes:
-        """Return cost and limits with their derivatives."""
-        task, motion = self.task, self.motion(x)
-        k, n = x.shape[:2]
-        regressor = task.smooth.regressor(motion)
-        torques = self._torques(regressor)
+    def slopes(self, point: Point) -> Slopes:
+        """Return cost and limits with their derivatives at a point within all limits."""
+        task, motion, regressor = self.task, point.motion, point.regressor
+        assert regressor is not None
+        k, n = point.x.shape[:2]
         cost, gradient = self._cost(regressor)
         counted = self._counted(regressor)
         weights = np.zeros_like(regressor)
@@ -225,16 +182,16 @@ class Problem:
         by_motion, torque = task.smooth.derivatives(motion, weights, task.nominal)
         limited = np.isfinite(task.limits.torque)
         dense = [torque[limited] / task.limits.torque[limited, None, None, None]]
-        tool_rows = self._tool_rows(self._tool(motion), True)
-        dense += [slope[None] for _, slope in tool_rows]
-        near, nearing = self._distances(motion, True)
-        dense.append(np.stack([nearing, *2 * [np.zeros_like(nearing)]], axis=1))
+        if point.tool is not None:
+            dense += [slope[None] for _, slope in tool_rows(task.limits, point.tool, True)]
+        if point.near is not None:
+            dense.append(self._nearing(motion, point.near))
         by_kind = by_motion.reshape(3, n, k, -1)
         return Slopes(
             cost=cost,
             gradient=np.einsum("dnkM,dkMm->knm", by_kind, self.rows[:3]).reshape(k, -1),
-            values=np.concatenate([self._own(x, motion), torques, *(row[None] for row, _ in tool_rows), near]),
-            own=self._own_rows(),
+            values=point.values,
+            own=self._own_rows,
             shared=self._chained(np.concatenate(dense), k),
             rows=self.rows,
         )
@@ -244,6 +201,7 @@ class Problem:
         """Samples of the criterion that one sample of the grid stands for, shape (k,)."""
         return np.asarray(np.array(self.task.samples) * self.stride / self.rows.shape[2])
 
+    @cached_property
     def _own_rows(self) -> tuple[tuple[int, int, float], ...]:
         limits = self.task.limits
         bounds = (0.5 * (limits.upper - limits.lower), limits.velocity, limits.acceleration, limits.jerk)
@@ -255,39 +213,39 @@ class Problem:
         centre = self.task.limits.centre[:, None]
         jerk = self._derivative(x, 3) if np.isfinite(self.task.limits.jerk).any() else motion.a
         signals = (motion.q - centre, motion.v, motion.a, jerk)
-        return np.array([scale * signals[kind][j] for kind, j, scale in self._own_rows()])
+        return np.array([scale * signals[kind][j] for kind, j, scale in self._own_rows])
 
-    def _limited(self, own: Array, motion: Motion, regressor: Array) -> Array:
-        rows = [row[None] for row, _ in self._tool_rows(self._tool(motion), False)]
-        return np.concatenate([own, self._torques(regressor), *rows])
-
-    def _distances(self, motion: Motion, slopes: bool = False) -> tuple[Array, Array]:
-        """Return rows of distances, shape (G, k M), with their derivatives by positions (G, n, k M) if asked for."""
-        clearance, k = self.task.limits.clearance, self.task.trajectories
-        groups = 0 if clearance is None else len(clearance.groups)
-        rows = np.zeros((groups, motion.samples))
-        slope = np.zeros((groups, *motion.q.shape)) if slopes else np.zeros(0)
-        if clearance is not None and groups:
-            places = np.arange(motion.samples).reshape(k, -1)[:, :: self.sparse].ravel()
-            rows[:, places], nearing = clearance.rows(motion.q[:, places], likely=self.sparse > 1, slopes=slopes)
-            if slopes:
-                slope[..., places] = nearing
-        return rows, slope
-
-    def _torques(self, regressor: Array) -> Array:
-        limit = self.task.limits.torque
+    def _limited(self, x: Array, motion: Motion, own: Array, broken: bool = False) -> Point:
+        """Add all other rows; distances, which take longest, only where the rest is kept, or broken rows are wanted too."""
+        limits, regressor = self.task.limits, self.task.smooth.regressor(motion)
         torque = np.einsum("jpN,p->jN", regressor, self.task.nominal)
-        limited = np.isfinite(limit)
-        return np.asarray(torque[limited] / limit[limited, None])
+        limited = np.isfinite(limits.torque)
+        values = [own, torque[limited] / limits.torque[limited, None]]
+        tool, near = None, None
+        if limits.tool is not None and limits.watches_tool:
+            tool = tool_motion(limits.tool, motion.q, motion.v, motion.a)
+            values += [row[None] for row, _ in tool_rows(limits, tool, False)]
+        rows = np.concatenate(values)
+        clearance = limits.clearance
+        if clearance is not None and clearance.groups and (broken or self._kept(rows)):
+            places = self._measured(motion)
+            near = clearance.nearest(motion.q[:, places], clearance.reach, likely=self.sparse > 1)
+            distances = np.zeros((len(clearance.groups), motion.samples))
+            distances[:, places] = clearance.rows(near)
+            rows = np.concatenate([rows, distances])
+        return Point(x, motion, np.inf, rows, regressor, tool, near)
 
-    def _tool(self, motion: Motion) -> ToolMotion | None:
-        limits = self.task.limits
-        if limits.tool is None or not limits.watches_tool:
-            return None
-        return tool_motion(limits.tool, motion.q, motion.v, motion.a)
+    def _measured(self, motion: Motion) -> NDArray[np.intp]:
+        """Return the samples at which distances are measured."""
+        return np.arange(motion.samples).reshape(self.task.trajectories, -1)[:, :: self.sparse].ravel()
 
-    def _tool_rows(self, tool: ToolMotion | None, slopes: bool) -> list[tuple[Array, Array]]:
-        return [] if tool is None else tool_rows(self.task.limits, tool, slopes)
+    def _nearing(self, motion: Motion, near: Nearest) -> Array:
+        """Return derivatives of the rows of distances by the motion, shape (G, 3, n, k M)."""
+        clearance, places = self.task.limits.clearance, self._measured(motion)
+        assert clearance is not None
+        slope = np.zeros((len(near.distance), 3, *motion.q.shape))
+        slope[:, 0][..., places] = -clearance.slopes(motion.q[:, places], near) / REACH
+        return slope
 
     def _counted(self, regressor: Array) -> Array:
         k = self.task.trajectories
@@ -337,18 +295,22 @@ def tool_rows(limits: Limits, tool: ToolMotion, slopes: bool) -> list[tuple[Arra
     none: Array = np.zeros(0)
     if np.isfinite(limits.tool_acceleration):
         unit = tool.acceleration / limits.tool_acceleration**2
-        parts = (tool.jacobian_acceleration, 2.0 * tool.jacobian_rate, tool.jacobian)
-        slope = 2.0 * np.einsum("dncN,cN->dnN", np.array(parts), unit) if slopes else none
+        slope = none
+        if slopes:
+            turned = 2.0 * np.einsum("dncN,cN->dnN", tool.jacobians, unit)
+            slope = np.array([turned[2], 2.0 * turned[1], turned[0]])
         found.append((np.sum(unit * tool.acceleration, axis=0), slope))
     if np.isfinite(limits.tool_speed):
         unit = tool.velocity / limits.tool_speed**2
-        parts = (tool.jacobian_rate, tool.jacobian, np.zeros_like(tool.jacobian))
-        slope = 2.0 * np.einsum("dncN,cN->dnN", np.array(parts), unit) if slopes else none
+        slope = none
+        if slopes:
+            turned = 2.0 * np.einsum("dncN,cN->dnN", tool.jacobians[:2], unit)
+            slope = np.array([turned[1], turned[0], np.zeros_like(turned[0])])
         found.append((np.sum(unit * tool.velocity, axis=0), slope))
     if np.isfinite(limits.floor):
         slope = none
         if slopes:
-            slope = np.zeros((3, *tool.jacobian[:, 0].shape))
-            slope[0] = -tool.jacobian[:, 2]
+            slope = np.zeros((3, *tool.jacobians[0, :, 0].shape))
+            slope[0] = -tool.jacobians[0, :, 2]
         found.append((1.0 + limits.floor - tool.position[2], slope))
     return found

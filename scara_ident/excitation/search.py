@@ -114,7 +114,7 @@ def search(task: Task, effort: Effort, progress: Callable[[Progress], None] | No
     elite: list[Minimum] = []
 
     def work(item: tuple[int, Array | None]) -> Minimum | None:
-        return _from(problem, effort.seed, *item)
+        return from_random(problem, effort.seed, *item)
 
     for generation in range(1 + effort.rounds):
         first = generation * effort.starts
@@ -144,8 +144,8 @@ def within_grid(task: Task, density: int, bounds: Array, stride: int = 1) -> Pro
     return Problem(task, grid(task.bases, stride * counted), stride, bounds, SPARSE[density])
 
 
-def _from(problem: Problem, seed: int, index: int, parent: Array | None) -> Minimum | None:
-    """Search from a random motion, or from a change of a parent."""
+def from_random(problem: Problem, seed: int, index: int, parent: Array | None = None) -> Minimum | None:
+    """Search from a random motion, or from a change of a parent; None where that cannot be brought within the limits."""
     random = np.random.default_rng([seed, index])
     drawn = _random_motion(problem.task, random)
     if parent is not None:

@@ -2,8 +2,9 @@
 
 Effects remember, turn with the sign of a speed and pass the bands of the diagnosis, so that their columns have no useful
 derivative by a motion's coefficients. The search draws motions, takes each as large as its limits allow or smaller, and
-changes the best of them; a motion is judged by what the diagnosis would see and believe of it: its columns within the
-bands, over the noise, block of time by block, beside what is known.
+changes the best of them, beside motions at some speeds that tell most of the model's parameters, which a gradient finds. A
+motion is judged by what the diagnosis would see and believe of it: its columns within the bands, over the noise, block of
+time by block, beside what is known.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from scara_ident.diagnosis.questions import MOST_NAMED, Question
 from scara_ident.effects import Signals
 from scara_ident.estimation.information import merge
 from scara_ident.excitation.curves import Basis
+from scara_ident.excitation.interior_point import Minimum
 from scara_ident.excitation.limits import InfeasibleLimits
 from scara_ident.excitation.problem import Problem, Task, row_names
 from scara_ident.excitation.search import (
@@ -32,6 +34,7 @@ from scara_ident.excitation.search import (
     Effort,
     Found,
     Progress,
+    from_random,
     verified_inside,
     within_grid,
 )
@@ -47,14 +50,18 @@ RATE, TURNING_RATE, FINE_RATE = 200.0, 500.0, 1000.0
 DRAWN, CHANGED = 48, 60
 # Speeds of a drawn motion as shares of the limits, evenly in their logarithm; how often a joint stands still.
 SLOWEST, STILL = 0.03, 0.15
-# Sizes of a change, as shares of the motion; by how much a joint's motion grows or shrinks, in its logarithm.
-CHANGE, GROWTH = (0.05, 0.6), 0.4
-# What a motion that breaks a limit shrinks by, and how often at most.
-SHRINKING, TRIES = 0.85, 40
+# Shares of the limits of speeds at which motions that tell most of the parameters are searched.
+PACES = (1.0, 0.3, 0.1)
+# Size of the first change, of 1 for another motion; it grows by this where a change helps and else shrinks by its fourth
+# root, so that one in five helps (Rechenberg 1973), and is at least so large.
+FIRST, GROWN, LEAST = 0.3, 1.5, 0.01
+# What a motion that breaks a limit shrinks by at first, twice as much each time up to the most, and how often.
+SHRINKING, MOST_SHRINKING, TRIES = 0.01, 0.2, 40
 # Weights of kinds of questions against that of what may be below the limit: what was found comes first.
-WEIGHTS = {"rivals": 2.0, "unexplained": 2.0, "below_limit": 1.0, "parameter": 0.5}
-# Standard errors at which an answer is sure enough: beyond, other questions count as much.
-SURE = 5.0
+WEIGHTS = {"rivals": 2.0, "unexplained": 2.0, "below_limit": 1.0, "parameter": 0.2}
+# Standard errors at which an answer is sure enough, and how many times what is needed is worth having: noise and size are
+# foreseen to a factor or two.
+SURE, ENOUGH = 5.0, 5.0
 
 
 @dataclass(frozen=True)
@@ -180,7 +187,7 @@ def search_to_tell(
     Parameters
     ----------
     task : Task
-        Of one trajectory; its criterion takes no part.
+        Of one trajectory; its criterion is that of the motions where the first search begins.
     inquiry : Inquiry
     effort : Effort
         Searches from ``starts`` sets of random motions, each with as many changes as ``1 + rounds`` say.
@@ -196,8 +203,15 @@ def search_to_tell(
     turning = any(item.candidate.effect.seeded_by == "order" for item in inquiry.suspects)
     judge = _Judge(inquiry, task, TURNING_RATE if turning else RATE)
 
+    def paced(share: float) -> Minimum | None:
+        slower = replace(task, limits=replace(task.limits, velocity=share * task.limits.velocity))
+        return from_random(within_grid(slower, COARSE, problem.bounds), effort.seed, 0)
+
+    beside = [item.x for item in map_in_order(paced, PACES, effort.processes) if item is not None]
+
     def work(index: int) -> tuple[float, Array] | None:
-        return _best(problem, judge, np.random.default_rng([effort.seed, index]), effort.rounds)
+        random, begun = np.random.default_rng([effort.seed, index]), beside if index == 0 else []
+        return _best(problem, judge, random, effort.rounds, beside, begun)
 
     found: list[tuple[float, Array]] = []
     costs: list[float] = []
@@ -222,7 +236,7 @@ class _Judge:
     rate: float
 
     def cost(self, x: Array) -> float:
-        """Return minus the weighted sum of the logarithms of what questions gain."""
+        """Return minus the weighted sum of the logarithms of what questions gain, up to what is enough."""
         (basis,) = self.task.bases
         new = rows_in_blocks(self.each, motion_of(basis, self.task.posture, x[0], self.rate))
         sure = believed(self.each, new if self.known is None else self.known.with_more(new))
@@ -232,7 +246,7 @@ class _Judge:
         rest = [item.kind != "below_limit" for item in self.each.questions]
         if any(rest):
             sizes[rest] = self.each.sigmas(new.information(), [*compress(self.each.questions, rest)]) / SURE
-        return -float(self.weights @ np.log1p(sizes**2))
+        return -float(self.weights @ np.log((1.0 + sizes**2) / (1.0 + (sizes / ENOUGH) ** 2)))
 
     @cached_property
     def known(self) -> Blocks | None:
@@ -252,11 +266,11 @@ class _Judge:
 
     @cached_property
     def weights(self) -> Array:
-        """Questions of one kind share its weight, so that many effects worth a look do not outweigh all others."""
-        kinds = [(item.kind, len(item.suspects) > 1) for item in self.inquiry.questions]
-        shares = [WEIGHTS[kind] / kinds.count((kind, more)) for kind, more in kinds]
-        counts = [len(_alone(item)) for item in self.inquiry.questions]
-        return np.repeat(np.array(shares) / counts, counts)
+        """Questions of one kind share its weight, those of what may be below the limit by the odds of each."""
+        kinds = [item.kind for item in self.each.questions]
+        odds = np.array([item.suspects[0].odds if item.kind == "below_limit" else 1.0 for item in self.each.questions])
+        total = {kind: sum(odds[k] for k, other in enumerate(kinds) if other == kind) for kind in kinds}
+        return np.array([WEIGHTS[kind] * share / total[kind] for kind, share in zip(kinds, odds, strict=True)])
 
 
 def _alone(question: Question) -> list[Question]:
@@ -274,17 +288,21 @@ def motion_of(basis: Basis, posture: Array, coefficients: Array, rate: float) ->
     return Motion("asked", "asked", time, q + posture[:, None], v, a, None, rate)
 
 
-def _best(problem: Problem, judge: _Judge, random: np.random.Generator, rounds: int) -> tuple[float, Array] | None:
-    """Return cost and coefficients of the best of some random motions, changed as long as that helps."""
-    drawn = (_inside(problem, random_motion(problem.task, random)) for _ in range(DRAWN))
+def _best(
+    problem: Problem, judge: _Judge, random: np.random.Generator, rounds: int, beside: list[Array], begun: list[Array]
+) -> tuple[float, Array] | None:
+    """Return cost and coefficients of the best of some motions and random ones, changed as long as that helps."""
+    drawn = (_inside(problem, x) for x in (*begun, *(random_motion(problem.task, random) for _ in range(DRAWN))))
     ranked = sorted(((judge.cost(x), k, x) for k, x in enumerate(drawn) if x is not None), key=lambda item: item[:2])
     if not ranked:
         return None
-    cost, _, best = ranked[0]
+    (cost, _, best), size = ranked[0], FIRST
     for _ in range(CHANGED * (1 + rounds)):
-        x = _inside(problem, _changed(problem.task, best, random))
+        x = _inside(problem, _changed(problem.task, best, size, beside, random))
         if x is not None and (now := judge.cost(x)) < cost:
-            cost, best = now, x
+            cost, best, size = now, x, min(1.0, GROWN * size)
+        else:
+            size = max(LEAST, GROWN**-0.25 * size)
     return cost, best
 
 
@@ -331,24 +349,31 @@ def _inverse(basis: Basis, derivative: int) -> Array:
     return np.linalg.pinv(_rows(basis, 8 * basis.size)[derivative], rcond=1e-9)
 
 
-def _changed(task: Task, x: Array, random: np.random.Generator) -> Array:
-    """Return a change of a motion: something added to some joints, a joint larger, smaller or elsewhere."""
+def _changed(task: Task, x: Array, size: float, beside: Sequence[Array], random: np.random.Generator) -> Array:
+    """Return a motion with some joints' changed, enlarged or moved, or with another in a half of its time."""
     n = x.shape[1]
     chosen = random.uniform(size=n) < max(0.4, 1.0 / n)
     chosen[random.integers(n)] = True
-    kind = random.integers(3)
-    y = x.copy()
+    kind = random.integers(4 if beside else 3)
+    (basis,), y = task.bases, x.copy()
     if kind == 0:
-        other = random_motion(task, random)
-        size = random.uniform(*CHANGE)
-        y[0, chosen] = (1.0 - 0.5 * size) * x[0, chosen] + size * other[0, chosen]
+        y[0, chosen] = (1.0 - 0.5 * size) * x[0, chosen] + size * random_motion(task, random)[0, chosen]
     elif kind == 1:
-        y[0, chosen] *= np.exp(GROWTH * random.normal(size=(int(np.sum(chosen)), 1)))
+        y[0, chosen] *= np.exp(size * random.normal(size=(int(np.sum(chosen)), 1)))
+    elif kind == 3:
+        y[0] = _spliced(basis, x[0], beside[int(random.integers(len(beside)))][0], random.uniform(0.0, 2.0 * np.pi))
     else:
-        (basis,) = task.bases
-        reach = 0.3 * (task.limits.upper - task.limits.lower) * random.normal(size=n)
+        reach = size * (task.limits.upper - task.limits.lower) * random.normal(size=n)
         y[0] = np.where(chosen[:, None], _placed(basis, x[0], _mean(basis, x[0]) + reach), x[0])
     return y
+
+
+def _spliced(basis: Basis, x: Array, other: Array, phase: float) -> Array:
+    """Return coefficients of a motion that goes as one does for half of the time, and as another for the other half."""
+    angle = 2.0 * np.pi * np.arange(8 * basis.size) / (8 * basis.size)
+    share = 0.5 + 0.5 * np.clip(2.0 * np.cos(angle - phase), -1.0, 1.0)
+    one, two = (each @ _rows(basis, 8 * basis.size)[1].T for each in (x, other))
+    return _placed(basis, (share * one + (1.0 - share) * two) @ _inverse(basis, 1).T, _mean(basis, x))
 
 
 def _inside(problem: Problem, x: Array) -> Array | None:
@@ -366,8 +391,8 @@ def _inside(problem: Problem, x: Array) -> Array | None:
     mean = np.mean(q, axis=1)
     moved = middle + size * (mean - 0.5 * (low + high)) - posture
     x = _placed(basis, size[:, None] * x[0], moved)[None]
-    for _ in range(TRIES):
+    for k in range(TRIES):
         if problem.inside(x):
             return x
-        x = SHRINKING * x
+        x = (1.0 - min(MOST_SHRINKING, SHRINKING * 2.0**k)) * x
     return None

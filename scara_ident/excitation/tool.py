@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -42,18 +43,36 @@ class ToolMotion:
     ----------
     position, velocity, acceleration : ndarray, shape (3, N)
         m, m/s, m/s^2; acceleration without gravity.
-    jacobian, jacobian_rate, jacobian_acceleration : ndarray, shape (n, 3, N)
-        What a unit rate of each joint gives to the point, and its first two derivatives in time. For a point that
-        depends on q(t) alone, the derivative of its acceleration by q_j is the second derivative in time of its
-        derivative by q_j, and that by q_j' is twice the first.
+    parts : tuple of (int, bool, tuple of ndarray)
+        Of each joint that moves it: its place in ``robot.joints``, whether it slides, and its axis with two derivatives
+        in time or, of one that turns, that and the way from the joint to the point with two derivatives, each (3, N).
+    joints : int
+        Number n of joints of the robot.
     """
 
     position: Array
     velocity: Array
     acceleration: Array
-    jacobian: Array
-    jacobian_rate: Array
-    jacobian_acceleration: Array
+    parts: tuple[tuple[int, bool, tuple[Array, ...]], ...]
+    joints: int
+
+    @cached_property
+    def jacobians(self) -> Array:
+        """What a unit rate of each joint gives to the point, and its first two derivatives in time, shape (3, n, 3, N).
+
+        For a point that depends on q(t) alone, the derivative of its acceleration by q_j is the second derivative in
+        time of its derivative by q_j, and that by q_j' is twice the first.
+        """
+        found = np.zeros((3, self.joints, *self.position.shape))
+        for place, slides, (axis, rate, change, *arms) in self.parts:
+            if slides:
+                found[:, place] = axis, rate, change
+                continue
+            r, dr, ddr = arms
+            found[0, place] = _cross(axis, r)
+            found[1, place] = _cross(rate, r) + _cross(axis, dr)
+            found[2, place] = _cross(change, r) + 2.0 * _cross(rate, dr) + _cross(axis, ddr)
+        return found
 
 
 def tool_of(robot: Robot, frame: str | None = None) -> Tool:
@@ -121,20 +140,18 @@ def tool_motion(tool: Tool, q: Array, v: Array, a: Array) -> ToolMotion:
     swing = _cross(spin, arm)
     position, velocity = origin + arm, speed + swing
     acceleration = push + _cross(twist, arm) + _cross(spin, swing)
-    jacobians = np.zeros((3, tool.joints, 3, samples))
-    for (place, joint), (axis, rate, change), (centre, moved, pushed) in zip(tool.chain, axes, centres, strict=True):
-        if joint.prismatic:
-            jacobians[:, place] = axis, rate, change
-            continue
-        r, dr, ddr = position - centre, velocity - moved, acceleration - pushed
-        jacobians[0, place] = _cross(axis, r)
-        jacobians[1, place] = _cross(rate, r) + _cross(axis, dr)
-        jacobians[2, place] = _cross(change, r) + 2.0 * _cross(rate, dr) + _cross(axis, ddr)
-    return ToolMotion(position, velocity, acceleration, *jacobians)
+    parts = []
+    for (place, joint), axis, (centre, moved, pushed) in zip(tool.chain, axes, centres, strict=True):
+        arms = () if joint.prismatic else (position - centre, velocity - moved, acceleration - pushed)
+        parts.append((place, joint.prismatic, (*axis, *arms)))
+    return ToolMotion(position, velocity, acceleration, tuple(parts), tool.joints)
 
 
 def _cross(x: Array, y: Array) -> Array:
-    return np.stack([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]])
+    found = np.empty_like(y)
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.subtract(x[i] * y[j], x[j] * y[i], out=found[k])
+    return found
 
 
 def rotation(axis: Array, angle: Array) -> Array:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array, median
+from scara_ident.arrays import Array, median, runs_of
 from scara_ident.motion.prepared import PreparedStretch, standstill
 
 # Length of a bin, s.
@@ -123,12 +123,6 @@ class Binned:
         """Return the mean over windows of so many bins, shape (n, M - length + 1); NaN where too little is used."""
         total, used = (item[:, length:] - item[:, :-length] for item in self.sums)
         return np.where(used >= FILLED * length, total / np.maximum(used, FILLED), np.nan)
-
-
-def runs_of(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return where flags, (M,), are set one after the other: the first place, and the one after the last."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    return [(int(begin), int(end)) for begin, end in edges.reshape(-1, 2)]
 
 
 def bounded_noise(parts: Sequence[PreparedStretch], left: Sequence[Array], owner: Sequence[int]) -> dict[int, Array]:

@@ -118,7 +118,8 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
         left, score = _held_out(held)
         best: tuple[ChannelFault, Observations] | None = None
         for signal, chosen, exchanged in suspects:
-            other = observe(model, _read_as(held.data, signal, chosen, exchanged))
+            read = _read_as(held.data, signal, chosen, exchanged)
+            other = held.with_torque(read) if signal == "effort" else observe(model, read)
             then, mended = _held_out(other)
             if mended >= (MENDED * score if best is None else best[0].mended) or not _better(left, then):
                 continue
@@ -181,6 +182,8 @@ def _read_as(data: PreparedData, signal: Signal, joints: Sequence[int], exchange
     def read(part: PreparedStretch) -> PreparedStretch:
         position = turned(part.stretch.position, "position" in signal)
         torque = turned(part.torque, "effort" in signal)
+        if "position" not in signal:
+            return replace(part, stretch=replace(part.stretch, torque=torque, _thinned={}))
         return PreparedStretch(
             replace(part.stretch, position=position, torque=torque, _filtered={}, _thinned={}), part.bands
         )
@@ -232,7 +235,7 @@ def _held_out(observations: Observations) -> tuple[Array, float]:
 
 def _better(left: Array, other: Array) -> bool:
     """Whether other residuals are smaller block by block, by a t test of the logarithms of their ratios."""
-    from scipy.stats import t as t_distribution
+    from scipy.special import stdtrit
 
     both = np.isfinite(left) & np.isfinite(other)
     ratios = np.where(both, np.log(np.maximum(other, ROUNDING)) - np.log(np.maximum(left, ROUNDING)), 0.0)
@@ -241,7 +244,7 @@ def _better(left: Array, other: Array) -> bool:
     if len(mean) < 2:
         return False
     spread = float(np.std(mean, ddof=1)) / np.sqrt(len(mean))
-    return bool(np.mean(mean) + t_distribution.ppf(1.0 - LEVEL, len(mean) - 1) * spread < 0.0)
+    return bool(np.mean(mean) + float(stdtrit(len(mean) - 1, 1.0 - LEVEL)) * spread < 0.0)
 
 
 def _pushing(value: Array, observations: Observations) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array, median
-from scara_ident.identification.binned_residual import FILLED, NORMAL, Binned
+from scara_ident.identification.binned_residual import FILLED, NORMAL, STILL, Binned
 
 # Standard deviations at which a sample is bounded where it is asked what other recordings have at the same state.
 LOOSE = 40.0
@@ -21,6 +21,9 @@ MOST_FEATURES, LEAST_GAIN, HARM, INFLUENCE = 6, 0.02, 0.5, 10.0
 THIN, LEAST_BINS, ROUNDS = 2, 10, 7
 # Seconds of a recording below which its trend is an offset alone.
 LONG_ENOUGH = 10.0
+# What depends on the state is told by what is seen in other parts of about so long, s, than an event's own: hardly any event
+# reaches beyond one of them and those beside it.
+PART = 3.0
 
 
 def without_trends(stretches: Sequence[Binned]) -> list[Binned]:
@@ -35,7 +38,7 @@ def without_trends(stretches: Sequence[Binned]) -> list[Binned]:
             for i in own:
                 v, load = stretches[i].state[1][j], stretches[i].state[3][j]
                 time = np.arange(len(v)) * stretches[i].width / max(seconds, 1.0)
-                sign = np.tanh(10.0 * v / speed)
+                sign = _turning(v, speed)
                 columns = [np.ones_like(v), sign, load, time, time * sign]
                 rows.append(np.array(columns[: 5 if seconds >= LONG_ENOUGH else 1]))
                 left.append(stretches[i].left[j])
@@ -72,69 +75,86 @@ def _robust_trend(rows: Sequence[Array], left: Sequence[Array], known: Sequence[
 
 
 def without_states(stretches: Sequence[Binned]) -> list[Binned]:
-    """Take off what other recordings, or other parts of the only one, have at the same state of motion.
+    """Take off what a residual has at the same state of motion at other times, in other recordings and in this one.
 
-    Only where that makes a recording's residual smaller; what happens once is in no other recording, and stays.
+    Only where that makes a recording's residual smaller; what happens once is seen at no other time, and stays.
     """
-    n = len(stretches[0].left)
-    groups = _groups(stretches)
-    count = 1 + max(int(group.max(initial=0)) for group in groups)
-    if count < 2:
+    lengths = [item.left.shape[1] for item in stretches]
+    parts = [max(1, round(count * item.width / PART)) for item, count in zip(stretches, lengths, strict=True)]
+    # Where each part begins.
+    ends = np.cumsum(lengths)
+    starts = np.concatenate(
+        [end - count + np.arange(own) * count // own for end, count, own in zip(ends, lengths, parts, strict=True)]
+    )
+    if len(starts) <= 3:
         return list(stretches)
-    together = np.concatenate(groups)
+    # Recordings follow one another.
+    owners = np.repeat([item.recording for item in stretches], parts)
+    firsts = np.flatnonzero(np.append(True, np.diff(owners)))
     known = np.concatenate([item.known for item in stretches], axis=1) > FILLED
     left = np.concatenate([item.bounded(LOOSE) for item in stretches], axis=1)
     state = [np.concatenate([item.state[k] for item in stretches], axis=1) for k in range(4)]
     taken = np.zeros_like(left)
-    for j in range(n):
-        columns = _features(state, j)
-        if not np.any(known[j]):
-            continue
-        taken[j] = _of_others(columns, left[j], known[j], together, count)
-    parts = np.split(taken, np.cumsum([item.taken.shape[1] for item in stretches])[:-1], axis=1)
-    return [item.without(part) for item, part in zip(stretches, parts, strict=True)]
+    for j in np.flatnonzero(np.any(known, axis=1)).tolist():
+        taken[j] = _of_others(_features(state, j), left[j], known[j], starts, firsts)
+    return [item.without(part) for item, part in zip(stretches, np.split(taken, ends[:-1], axis=1), strict=True)]
 
 
-def _groups(stretches: Sequence[Binned]) -> list[NDArray[np.intp]]:
-    """Return for each bin the group that is explained by the others: its recording, or a quarter of the only one."""
-    owners = list(dict.fromkeys(item.recording for item in stretches))
-    if len(owners) > 1:
-        return [np.full(item.left.shape[1], owners.index(item.recording)) for item in stretches]
-    total = sum(item.left.shape[1] for item in stretches)
-    places = np.minimum(np.arange(total) * 4 // max(1, total), 3)
-    return np.split(places, np.cumsum([item.left.shape[1] for item in stretches])[:-1])
+def _of_others(
+    columns: Array, left: Array, known: NDArray[np.bool_], starts: NDArray[np.intp], firsts: NDArray[np.intp]
+) -> Array:
+    """Return what functions of the state explain of each part by what they do in all but it and those beside it, shape (M,).
 
-
-def _of_others(columns: Array, left: Array, known: NDArray[np.bool_], group: NDArray[np.intp], count: int) -> Array:
-    """Return what functions of the state, one after the other, explain of each group by what they do in all others."""
-    taken = np.zeros_like(left)
+    Parts begin at ``starts``, recordings with the parts ``firsts``. One function is added after the other, and all are fitted
+    together.
+    """
+    taken, chosen = np.zeros_like(left), list[int]()
+    counts = np.diff(np.append(starts, len(left)))
+    lengths = np.diff(np.append(starts[firsts], len(left)))
     for _ in range(MOST_FEATURES):
         off = left - taken
         scale = NORMAL * median(np.abs(off[known]))
         use = known * np.minimum(1.0, INFLUENCE * scale / np.maximum(np.abs(off), 1e-300))
         weighted = columns * use
-        scores, squares = (np.zeros((count, len(columns))) for _ in range(2))
-        for k in range(count):
-            own = group == k
-            scores[k], squares[k] = weighted[:, own] @ off[own], np.sum(weighted[:, own] * columns[:, own], axis=1)
-        others = np.sum(squares, axis=0) - squares
-        value = (np.sum(scores, axis=0) - scores) / np.where(others > 0.0, others, np.inf)
-        gains = 2.0 * value * scores - value**2 * squares
+        scores, squares = (np.add.reduceat(weighted * more, starts, axis=1) for more in (off, columns))
+        away = _not_near(squares)
+        value = _not_near(scores) / np.where(away > 0.0, away, np.inf)
+        gains = np.add.reduceat(2.0 * value * scores - value**2 * squares, firsts, axis=1)
         # Where it does harm to one recording it is not that recording's doing.
         gains[gains < 0.0] *= HARM
-        best = int(np.argmax(np.sum(gains, axis=0)))
-        if np.sum(gains[:, best]) < LEAST_GAIN * np.sum(use * off**2):
+        best = int(np.argmax(np.sum(gains, axis=1)))
+        if best in chosen or np.sum(gains[best]) < LEAST_GAIN * np.sum(use * off**2):
             break
-        helps = np.where(gains[:, best] > 0.0, value[:, best], 0.0)
-        taken += helps[group] * columns[best]
+        chosen.append(best)
+        own = columns[chosen]
+        normal = _not_near(np.add.reduceat(own[:, None] * (own * use), starts, axis=2))
+        right = _not_near(np.add.reduceat(own * use * left, starts, axis=1))
+        normal += 1e-6 * np.trace(normal) * np.eye(len(own))[:, :, None] + 1e-300
+        values = np.linalg.solve(normal.transpose(2, 0, 1), right.T[:, :, None])[:, :, 0].T
+        fitted = np.sum(np.repeat(values, counts, axis=1) * own, axis=0)
+        helps = np.add.reduceat(use * (off**2 - (left - fitted) ** 2), starts[firsts]) > 0.0
+        taken = np.where(np.repeat(helps, lengths), fitted, taken)
     return taken
+
+
+def _not_near(sums: Array) -> Array:
+    """Return for each part, of sums (..., parts), the sum of all parts but it and those beside it."""
+    near = sums.copy()
+    near[..., 1:] += sums[..., :-1]
+    near[..., :-1] += sums[..., 1:]
+    return np.asarray(np.sum(sums, axis=-1, keepdims=True) - near)
+
+
+def _turning(velocity: Array, most: Array | float) -> Array:
+    """Return the sign of a speed that reaches so much, which is whole wherever anything is said of a joint."""
+    return np.tanh(velocity / (STILL * np.asarray(most)))
 
 
 def _features(state: Sequence[Array], joint: int) -> Array:
     """Return functions of the state that a joint's residual may depend on, of unit size, shape (k, M)."""
     q, v, a, load = state
     speed = np.maximum(np.max(np.abs(v), axis=1, keepdims=True), 1e-9)
-    turn, own = np.tanh(10.0 * v / speed), v[joint] / speed[joint]
+    turn, own = _turning(v, speed), v[joint] / speed[joint]
     sign, angle, torque = turn[joint], q[joint], load[joint]
     columns = [sign * np.exp(-np.abs(own) / slow) for slow in SLOWER]
     columns += [np.tanh(2.0 * own), own, own**3, own * np.abs(own)]

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array
-from scara_ident.identification.binned_residual import runs_of
+from scara_ident.arrays import Array, runs_of
 
 # How far an event may reach to either side of what stands out most, s.
 REACH = 5.0

@@ -42,8 +42,9 @@ LEAST_SIZE, LEAST_BEFORE = 2.0, 0.5
 # an arm starts and stops is no event.
 LONGEST, LONGEST_SHARE = 3.0, 0.15
 SEEN, BESIDE = 0.3, 1.0
-# Where speed, acceleration or torque are above this share of all, only what stands out by so much is an event.
-USUAL, SURE = 0.97, 3.3
+# Where speed, acceleration or torque are above this share of all, or all three farther from the next so many of other times than
+# they are in that share of all, only what stands out by so much is an event. At the most so many bins are compared with.
+USUAL, USUAL_TOGETHER, SURE, NEXT, COMPARED = 0.97, 0.95, 3.3, 5, 2000
 # Events are rare: a residual that stands out in more of the time than this is the model's doing.
 RARE = 0.2
 # A joint helps to find the ends of an event if it stands out by this share of what would make it one.
@@ -151,14 +152,45 @@ def _local(segment: Segment) -> bool:
 
 
 def _novel(segment: Segment, stretches: Sequence[Binned], shown: NDArray[np.bool_]) -> bool:
-    """Whether the arm is then faster, or loaded more, than nearly ever: the model is not known there."""
+    """Whether most of it is in states that the arm is hardly ever in: the model is not known there."""
     item, inside = segment.binned, slice(segment.start, segment.stop)
-    for j in np.flatnonzero(shown & (segment.score < SURE)):
-        for k in (1, 2, 3):
-            usual = np.concatenate([np.abs(other.state[k][j]) for other in stretches])
-            if np.median(np.abs(item.state[k][j, inside])) > np.quantile(usual, USUAL):
-                shown = shown & (np.arange(len(shown)) != j)
-    return not np.any(shown)
+    power = item.known[:, inside] * item.left[:, inside] ** 2
+
+    def usual(j: int) -> bool:
+        most = [
+            np.quantile(np.concatenate([np.abs(other.state[k][j]) for other in stretches]), USUAL) for k in (1, 2, 3)
+        ]
+        beyond = [np.abs(item.state[k][j, inside]) > value for k, value in zip((1, 2, 3), most, strict=True)]
+        own, often = _alone(segment, stretches, j)
+        beyond.append(own > np.quantile(often, USUAL_TOGETHER, method="higher"))
+        return all(np.sum(power[j, there]) <= 0.5 * np.sum(power[j]) for there in beyond)
+
+    return not any(segment.score[j] >= SURE or usual(int(j)) for j in np.flatnonzero(shown))
+
+
+def _alone(segment: Segment, stretches: Sequence[Binned], joint: int) -> tuple[Array, Array]:
+    """Return how far a joint's states are from those next to them at other times: in each bin of a segment, and in all."""
+    thin = -(-sum(item.left.shape[1] for item in stretches) // COMPARED)
+    used = [np.flatnonzero(item.known[joint] > FILLED)[::thin] for item in stretches]
+    place = [item is segment.binned for item in stretches].index(True)
+
+    def states(k: int, bins: NDArray[np.intp]) -> Array:
+        # Stretch and time tell what is another time.
+        time = bins * stretches[k].width / LONGEST
+        return np.array([np.full(len(bins), k), time, *(row[joint, bins] for row in stretches[k].state[1:])])
+
+    among = np.concatenate([states(k, bins) for k, bins in enumerate(used)], axis=1)
+    scale = np.maximum(np.std(among[2:], axis=1), 1e-300)
+
+    def distance(own: Array) -> Array:
+        apart = np.zeros((own.shape[1], among.shape[1]))
+        for row, other, size in zip(own[2:], among[2:], scale, strict=True):
+            apart += ((row[:, None] - other) / size) ** 2
+        apart[(own[0][:, None] == among[0]) & (np.abs(own[1][:, None] - among[1]) < 1.0)] = np.inf
+        least = min(NEXT, among.shape[1]) - 1
+        return np.asarray(np.partition(apart, least, axis=1)[:, least])
+
+    return distance(states(place, np.arange(segment.start, segment.stop))), distance(among)
 
 
 def _scores(stretches: Sequence[Binned]) -> list[list[tuple[int, Array]]]:

@@ -14,7 +14,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array, median
+from scara_ident.arrays import Array, median, runs_of
 from scara_ident.manners import Frozen
 from scara_ident.motion.low_pass import HIGHEST_CUT, ROWS_AT_ONCE, low_pass, low_pass_every
 from scara_ident.motion.motion import Motion, Stretch, motion_of, stretches, torque_of, with_effort_of
@@ -348,10 +348,9 @@ def fading(rest: NDArray[np.bool_], rate: float, bands: Sequence[float | None]) 
     """
     result = np.ones(rest.shape)
     for j, band in enumerate(bands):
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], rest[j].astype(np.int8), [0]])))
         ramp = _widening(FADE_PERIODS, rate, band)
         rise = np.sin(0.5 * np.pi * np.arange(1, ramp + 1) / (ramp + 1)) ** 2
-        for start, stop in edges.reshape(-1, 2):
+        for start, stop in runs_of(rest[j]):
             before, after = result[j, max(0, start - ramp) : start], result[j, stop : stop + ramp]
             before *= rise[: len(before)][::-1]
             after *= rise[: len(after)]
@@ -388,9 +387,8 @@ def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | N
 
 def _runs_longer_than(mask: NDArray[np.bool_], length: int, widen: int) -> NDArray[np.bool_]:
     """Keep the runs of True that are longer than ``length`` and widen them by ``widen`` on both sides."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     result = np.zeros_like(mask)
-    for start, stop in edges.reshape(-1, 2):
+    for start, stop in runs_of(mask):
         if stop - start > length:
             result[max(0, start - widen) : stop + widen] = True
     return result

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.effects.spectra import around
 from scara_ident.report.traces import Trace
 from scara_ident.robot.robot import Robot
 
@@ -121,11 +122,10 @@ def orders(robot: Robot, traces: Sequence[Trace], j: int, residuals: Sequence[Ar
 
 def _bound(power: Array, parts: int) -> Array:
     """Bound on noise whose power is a mean of ``parts`` exponential ones, from the median of its neighbours."""
-    from scipy.ndimage import median_filter
     from scipy.special import gammaincinv
 
     half, rare = gammaincinv(parts, 0.5), gammaincinv(parts, 1.0 - FALSE_ALARM / len(power))
-    return np.asarray(median_filter(power, size=min(MEDIAN_BINS, len(power)), mode="nearest") * rare / half)
+    return np.asarray(np.median(around(power, min(MEDIAN_BINS, len(power)) // 2), axis=1) * rare / half)
 
 
 @dataclass(frozen=True, eq=False)

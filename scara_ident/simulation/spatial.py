@@ -7,6 +7,8 @@ Recursions: Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 6
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -193,6 +195,8 @@ def dynamics(
             composite[k, 9] += izz + along - 2.0 * hz * pz - m * pz * pz
 
 
+# Each model is itself alone, and its geometry is never changed: read joint by joint it takes longer than the rest of a draft.
+@lru_cache(maxsize=8)
 def turned_frames(model: pin.Model) -> tuple[NDArray[np.int64], NDArray[np.bool_], Array, Array, Array]:
     """Describe a model with every joint axis along z.
 

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
@@ -147,6 +146,8 @@ def residual_scale(runs: Sequence[Observed]) -> tuple[Array, Array]:
     The largest absolute value in each `TOGETHER` is fitted by the features' means with coefficients that are not negative.
     Peaks and not the mean, since a joint at rest has nearly the same residual all the time, and one that moves has not.
     """
+    from scipy.optimize import nnls
+
     parts = [_in_windows(run) for run in runs]
     size = np.concatenate([part[0] for part in parts], axis=1)
     features = np.concatenate([part[1] for part in parts], axis=2)

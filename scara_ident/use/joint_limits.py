@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, runs_of
 from scara_ident.errors import UsageError
 from scara_ident.robot.robot import Robot
 from scara_ident.use.energy import Drive
@@ -173,14 +172,8 @@ def margins(robot: Robot, limits: JointLimits, drives: Sequence[Drive]) -> tuple
             if side != 0.0:
                 share = float(max(0.0, 1.0 - left[k] / half)) if np.isfinite(half) else None
             allowed = TOLERANCE * (abs(bound) if side == 0.0 else half if np.isfinite(half) else 0.0)
-            beyond = tuple((float(time[i]), float(time[m])) for i, m in _runs(left < -allowed))
+            beyond = tuple((float(time[i]), float(time[m - 1])) for i, m in runs_of(left < -allowed))
             found.append(
                 Margin(joint, kind, float(bound), float(signal[k]), float(time[k]), float(left[k]), share, unit, beyond)
             )
     return tuple(found)
-
-
-def _runs(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Give first and last sample of every stretch of True."""
-    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    yield from ((int(start), int(stop) - 1) for start, stop in edges)

@@ -17,6 +17,7 @@ from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.first_run import compiled_first
 from scara_ident.simulation.reference import ReferenceMotion
+from scara_ident.threads import side_by_side
 from scara_ident.use.identified_arm import arm_with, arms_of, by_name, simulated
 from scara_ident.use.mujoco_arm import Free, mujoco_arm
 from scara_ident.use.rollout import HORIZONS, rollout_errors, virtual_free
@@ -120,13 +121,27 @@ def use(
     pairs = tuple((effect.resolve(whole), item) for effect, item in pairs)
     effects = tuple(effect for effect, _ in pairs)
     wanted = at_ticks(trial_motion(whole, seed) if motion is None else motion)
-    feeds = fed_forward(model, wanted, bare, whole, effects)
-    runs, drawn = [], []
-    for k in range(arms):
+    drawn = [
+        (_drawn(model, whole, random), tuple(_drawn_effect(*pair, whole, random) for pair in pairs))
+        for _ in range(arms)
+    ]
+    feeds = fed_forward(model, wanted, bare, whole, ())
+    runs: list[tuple[Tracked, ...]] = []
+
+    def follow_first() -> None:
+        runs.append(tracked(*drawn[0], wanted, {"pid": None, **feeds}, seed))
+
+    def learn() -> None:
+        learned["effects"] = needed_torque(whole, effects, wanted, foreseen_torque(model, wanted))
+
+    # What effects ask for is learned in one run after the other, so that the first arm moves beside.
+    learned: dict[str, Array] = {}
+    side_by_side(lambda work: work(), [learn, follow_first] if effects else [follow_first])
+    runs[0] += tracked(*drawn[0], wanted, learned, seed)
+    feeds |= learned
+    for k in range(1, arms):
         progress("following the motion", 0.2 + 0.5 * k / arms)
-        arm, own = _drawn(model, whole, random), tuple(_drawn_effect(*pair, whole, random) for pair in pairs)
-        drawn.append((arm, own))
-        runs.append(tracked(arm, own, wanted, {"pid": None, **feeds}, seed + k))
+        runs.append(tracked(*drawn[k], wanted, {"pid": None, **feeds}, seed + k))
     rollouts: dict[str, Array] = {}
     not_mujoco = ""
     if recordings:

@@ -88,6 +88,13 @@ def test_a_joints_own_delay_of_less_than_a_sample_is_not_an_effect():
         assert decision.accepted is accepted, decision.why
 
 
+def test_a_mean_delay_is_taken_out_whichever_of_the_runs_it_helps_in():
+    item = replace(GOOD, value=np.array([0.003]), covariance=np.array([[1e-8]]), fold_gains=(0.5, -0.1, 0.2))
+    assert decided(Candidate(TimeDelay(), Member(None)), item, 100).accepted
+    own = replace(item, value=np.array([4.0 / SCENE.rate]))
+    assert "helps in only 2 of 3" in decided(Candidate(TimeDelay(), Member(0)), own, 100).why
+
+
 @pytest.mark.parametrize(("gain", "removes"), [(0.04, "4.0%"), (-0.5, "0.0%")])
 def test_too_small_a_gain_is_below_the_detection_limit(gain: float, removes: str):
     assert decided(SPRING, GOOD, 100, gain).why.startswith(f"below the detection limit: removes {removes}")

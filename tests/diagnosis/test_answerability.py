@@ -15,7 +15,7 @@ from scara_ident.diagnosis.shape import KNOTS
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation.information import Information
 from scara_ident.robot.robot import load_robot
-from tests.diagnosis.asked import open_diagnosis, small_runs
+from tests.diagnosis.asked import PAIR, open_diagnosis, small_runs
 
 
 def left_of(spanning: np.ndarray, column: np.ndarray) -> float:
@@ -113,7 +113,12 @@ def test_a_file_and_the_recordings_give_the_same_inquiry():
     sigma = dict(zip((item.text for item in again.questions), again.sigmas(), strict=True))
     first = next(item for item in content["next"] if item["question"] == texts[0])
     assert sigma[texts[0]] == pytest.approx(first["sigma_before"], rel=1e-6)
-    assert np.array_equal(inquiry_of(content, load_robot()).sigmas(), np.zeros(len(texts)))
+    # Without the recordings what the file says of them counts, and of more rows the least that both tell together.
+    alone = inquiry_of(content, load_robot())
+    said = {item["question"]: item["sigma_before"] for item in content["next"] if item.get("kind")}
+    assert alone.sigmas() == pytest.approx([said[text] for text in texts]) and said[PAIR] > 0.0
+    both = alone.sigmas(again.known)
+    assert both[texts.index(PAIR)] == pytest.approx(np.sqrt(2.0) * said[PAIR], rel=1e-6)
     with pytest.raises(ScaraIdentError, match="but the robot is scara03"):
         inquiry_of({**content, "robot": "ur5"}, load_robot())
     with pytest.raises(ScaraIdentError, match="no questions in it"):

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.belief import Blocks, times_believed
+from scara_ident.diagnosis.answerability import inquire
+from scara_ident.diagnosis.belief import Blocks, times_apart, times_believed
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.gain import gains
+from scara_ident.diagnosis.questions import Question, questions
+from scara_ident.estimation.information import Information
+from tests.diagnosis.asked import open_diagnosis
 
 ROWS, BLOCKS, PARAMETERS, TRIED = 12, 40, 4, 100
 
@@ -82,3 +88,27 @@ def test_blocks_taken_together_hold_the_same_rows_and_more_are_of_other_trajecto
     products = many.fitted(range(PARAMETERS), CRITERIA.parts), fewer.fitted(range(PARAMETERS), CRITERIA.parts)
     assert products[0].joints[0].table == pytest.approx(products[1].joints[0].table)
     assert np.sum(products[1].basis_products, axis=0) == pytest.approx(np.eye(PARAMETERS), abs=1e-9)
+
+
+def test_what_another_effect_does_nearly_as_well_is_not_told_from_it():
+    found = open_diagnosis()
+    suspects = questions(found)[0].suspects
+    asked = [Question("below_limit", item.label, (item,)) for item in suspects]
+    inquiry = replace(inquire(found, asked), in_model=(), known=None)
+    p, width = len(inquiry.scene.model.columns), [len(item.value) for item in suspects]
+    rows = np.random.default_rng(8).normal(size=(90, p + sum(width)))
+    model, spring, tilt = np.split(rows, [p, p + width[0]], axis=1)
+
+    def apart(rows: np.ndarray) -> float:
+        return times_apart(inquiry, suspects, Information.empty(rows.shape[1]).absorb(rows, np.zeros(90)))[
+            "spring of joint1"
+        ]
+
+    # One that the tilt's first column does but for a little, and one as far from it as columns of noise are.
+    near = 40.0 * tilt[:, :1] + 30.0 * spring
+    torque = near @ np.array(suspects[0].value)
+    left = [np.sum((torque - a @ np.linalg.lstsq(a, torque)[0]) ** 2) for a in (model, np.hstack([model, tilt]))]
+    assert left[1] < 0.5 * left[0]
+    expected = max(left[1] / (2.0 * CRITERIA.alike) ** 2, left[1] / ((1.0 - CRITERIA.least_share) * left[0]))
+    assert apart(np.hstack([model, near, tilt])) == pytest.approx(np.sqrt(expected), rel=1e-9)
+    assert apart(np.hstack([model, 40.0 * tilt[:, :1], tilt])) == pytest.approx(0.0, abs=1e-6)

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 from scipy.stats import f
 
-from scara_ident.diagnosis.candidate_tests import Examination, examine, held_out_gains
+from scara_ident.diagnosis.candidate_tests import Examination, coefficients, examine, held_out_gains
 from scara_ident.diagnosis.candidates import Rows
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitted_model import FittedModel
@@ -69,6 +69,15 @@ def test_value_gain_and_contribution_are_those_of_the_joint_fit():
         after = np.sum((torque - columns[:, [0, 1, 2, *group]] @ joined) ** 2)
         assert result.gain == pytest.approx(1.0 - after / before, rel=1e-6)
         assert result.contribution == pytest.approx(before - after, rel=1e-6)
+
+
+@pytest.mark.parametrize("place", range(7))
+def test_coefficients_alone_are_those_of_an_examination(place: int):
+    model, candidates = uneven_blocks(1)
+    (wanted,) = examine(model, [candidates[place]])
+    value, products = coefficients(model, candidates[place])
+    assert_allclose(value, wanted.value, rtol=1e-9, atol=1e-12 * np.max(np.abs(wanted.value)))
+    assert_allclose(products, wanted.products, rtol=1e-9, atol=1e-12 * np.max(np.abs(wanted.products)))
 
 
 def test_the_standard_deviation_is_the_scatter_of_repeated_estimates():

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, with_columns
+from scara_ident import processes
+from scara_ident.diagnosis.candidates import WORTH_A_PROCESS, Candidate, CandidateColumns, with_columns
 from scara_ident.diagnosis.search import scene_of as scene_on
 from scara_ident.effects import CATALOGUE, Member
 from scara_ident.effects.friction import FrictionCoupling, Stribeck
@@ -127,3 +128,19 @@ def test_without_candidates_the_rows_are_those_of_the_model():
     for one, other in zip(with_columns(seen, []), seen.joints, strict=True):
         assert_array_equal(one.table, other.table)
     assert CandidateColumns(seen).rows(scene_on(seen.model, wls(seen).value, seen), []) == []
+
+
+def test_columns_made_in_two_processes_are_the_same_to_the_last_bit(
+    gapped: Observations, monkeypatch: pytest.MonkeyPatch
+):
+    scene = scene_on(gapped.model, wls(gapped).value, gapped)
+    many = [Candidate(effect, member) for effect in CATALOGUE for member in effect.members(scene)]
+    assert len(many) >= WORTH_A_PROCESS
+    found = {}
+    for cores in (1, 2):
+        monkeypatch.setattr(processes, "available_cores", lambda cores=cores: cores)
+        found[cores] = CandidateColumns(gapped).rows(scene, many)
+    for one, other in zip(found[1], found[2], strict=True):
+        assert one.keys() == other.keys()
+        for joint in one:
+            assert_array_equal(one[joint], other[joint])

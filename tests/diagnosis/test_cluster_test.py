@@ -131,3 +131,7 @@ def test_as_many_standard_errors_as_are_needed_have_the_chance_asked_for(count: 
     value = np.zeros(count)
     value[0] = needed(count, freedom, 1e-4)
     assert significance(value, np.eye(count), freedom, np.eye(count)) == pytest.approx(1e-4, rel=0.01)
+
+
+def test_a_column_of_which_rounding_leaves_less_than_nothing_is_not_tested():
+    assert significance(np.ones(1), np.eye(1), 9.0, np.array([[-1e-25]])) == 1.0

@@ -78,3 +78,19 @@ def test_a_block_without_a_row_of_a_joint_adds_nothing():
     answer = basis_of(model) @ found.sums[0].T
     wanted = by_block(answer[:, 0] ** 2, place, len(model.owner))[empty]
     assert_allclose(found.columns[0, empty, 0, 0], wanted, rtol=1e-9, atol=1e-12 * found.sizes[0, 0])
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_few_signals_are_solved_for_as_many_are_multiplied_by_the_inverse(shared: bool):
+    model, _ = uneven_blocks(1)
+    blocks, r = len(model.owner), model.root.shape[1]
+    if shared:
+        # What a block leaves to the others then has no small direction.
+        model.__dict__["basis_products"] = 0.5 * model.basis_products / np.max(model.basis_products)
+    signals = np.random.default_rng(3).standard_normal((1, blocks, 1, r))
+    few = model.reaching(signals)
+    assert "released" not in model.__dict__
+    model.ready_for(r)
+    wanted = np.einsum("gbkr,brs->gbks", signals, model.released)
+    assert_allclose(few, wanted, rtol=0, atol=1e-12 * np.max(np.abs(wanted)))
+    assert_allclose(model.reaching(signals), wanted, rtol=0, atol=1e-12 * np.max(np.abs(wanted)))

@@ -34,7 +34,7 @@ def test_what_the_noise_makes_is_taken_off_and_what_the_arm_does_is_left(true: f
     twice = examined(smooth + noise + again, other + 3.0 * (noise + again), torque)
     assert abs(once.value[0] - true) > 0.05
     assert once.p_value < 1e-12
-    left = without_noise(once, twice)
+    left = without_noise(once, twice.value, twice.products)
     assert abs(left[0]) == pytest.approx(true, abs=0.07)
     p_value = significance(left, once.covariance, once.freedom, once.products)
     assert (p_value < 1e-6) if true else (p_value > 1e-3)

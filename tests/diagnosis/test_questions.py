@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis import Unexplained
-from scara_ident.diagnosis.questions import noise_density, question_of, questions, suspects_in_model
+from scara_ident.diagnosis.questions import (
+    MOST_ODDS,
+    noise_density,
+    odds_of,
+    question_of,
+    questions,
+    suspects_in_model,
+)
 from scara_ident.errors import UsageError
 from scara_ident.files import plain
 from tests.diagnosis.asked import PAIR, open_diagnosis
@@ -43,6 +50,19 @@ def test_an_effect_of_a_file_that_is_not_installed_is_said():
     entry["suspects"][0]["effect"] = "gremlin"
     with pytest.raises(UsageError, match="gremlin"):
         question_of(entry)
+
+
+def test_a_p_value_speaks_for_an_effect_as_much_as_it_can():
+    # Table 1 of Sellke, Bayarri and Berger 2001: odds of none of .870, .407 and .125.
+    assert [1.0 / odds_of(p) for p in (0.2, 0.05, 0.01)] == pytest.approx([0.870, 0.407, 0.125], abs=6e-3)
+    assert odds_of(0.9) == pytest.approx(1.0) and odds_of(0.0) == odds_of(1e-30) == MOST_ODDS
+    # What cannot be there as it was found may be there with the other sign, and nothing speaks for it.
+    found = open_diagnosis()
+    (decision,) = [item for item in found.search.decisions if item.label == "spring of joint2"][:1]
+    pushing = replace(decision, examination=replace(decision.examination, value=np.array([-1.0]), p_value=1e-3))
+    asked = questions(replace(found, search=replace(found.search, decisions=(pushing,))))
+    (spring,) = [item for question in asked for item in question.suspects if item.label == "spring of joint2"]
+    assert spring.value[0] > 0.0 and spring.odds == pytest.approx(1.0)
 
 
 def test_the_noise_is_that_of_the_recordings():

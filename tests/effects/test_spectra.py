@@ -73,7 +73,7 @@ def test_the_order_is_found_between_the_points_and_under_coloured_noise():
     residual = coloured(rng, len(angle)) + 0.15 * np.sin(2.037 * angle + 1.0)
     width = order_width(angle)
     orders = np.arange(0.5, 14.0, width / 4.0)
-    first = lines(orders, order_spectrum(whitened([residual], RATE)[0], angle, orders), width)[0]
+    first = lines(orders, order_spectrum(whitened([residual], RATE, None)[0][0], angle, orders), width)[0]
     assert first.position == pytest.approx(2.037, abs=0.1 * width)
     assert first.p_value < 1e-6
 
@@ -81,14 +81,14 @@ def test_the_order_is_found_between_the_points_and_under_coloured_noise():
 def test_whitening_makes_noise_white_and_leaves_phase_alone():
     rng = np.random.default_rng(3)
     parts = [coloured(rng, 16000), coloured(rng, 12000)]
-    white = whitened(parts, RATE)
+    white = whitened(parts, RATE, None)[0]
     low, high = (frequency_spectrum(white, RATE, np.arange(a, a + 40.0, 0.05)).mean() for a in (2.0, 400.0))
     assert low == pytest.approx(high, rel=0.15)
     pulse = np.zeros(4001)
     pulse[2000] = 1.0
-    answer = whitened([pulse], RATE)[0]
+    answer = whitened([pulse], RATE, None)[0][0]
     assert answer == pytest.approx(answer[::-1], abs=1e-9 * np.abs(answer).max())
-    kept = whitened(parts, RATE, highest=100.0)
+    kept = whitened(parts, RATE, 100.0)[0]
     assert frequency_spectrum(kept, RATE, np.array([200.0, 300.0])).max() < 1e-3 * low
 
 
@@ -102,7 +102,7 @@ def test_noise_alone_seldom_has_a_line():
     draws = 30
     for _ in range(draws):
         parts = [coloured(rng, len(angle)) for _ in range(2)]
-        white = whitened(parts, RATE)
+        white = whitened(parts, RATE, None)[0]
         found = order_spectrum(np.concatenate(white), np.concatenate([angle, angle]), orders)
         false[0] += bool(lines(orders, found, width, significance=0.01))
         power = frequency_spectrum(parts, RATE, frequencies)
@@ -116,7 +116,7 @@ def test_noise_alone_seldom_has_a_line():
 def test_a_spectrum_of_what_has_nothing_above_a_frequency_needs_fewer_samples():
     time, random = np.arange(20_000) / RATE, np.random.default_rng(5)
     parts = [random.standard_normal(len(time)) + 0.2 * np.sin(2 * np.pi * 11.3 * time) for _ in range(2)]
-    low = whitened(parts, RATE, highest=20.0)
+    low = whitened(parts, RATE, 20.0)[0]
     frequencies = np.arange(1.0, 20.0, 0.03)
     whole = frequency_spectrum(low, RATE, frequencies)
     # A piece that is cut off leaks a little of itself to all frequencies.

@@ -11,7 +11,7 @@ from scara_ident.excitation.clearance import REACH, clearance_of
 from scara_ident.excitation.verification import Reached
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
-from tests.arms import Link, write_urdf
+from tests.arms import Link, example_urdf, write_urdf
 
 ENDS = np.full(3, -2.0), np.full(3, 2.0)
 BALL = '<sphere radius="0.05"/>'
@@ -70,8 +70,9 @@ def test_a_box_over_the_floor(tmp_path):
     np.testing.assert_allclose(near.distance, [lowest + 1.3], atol=1e-9)
     np.testing.assert_allclose(clearance.slopes(q, near), slopes_by_difference(clearance, q), atol=1e-6)
     # Rows are 1 at the margin, and 0 where there is room.
+    near = clearance.nearest(q, clearance.reach)
     np.testing.assert_allclose(
-        clearance.rows(q)[0], [np.clip(1.0 - (lowest + 1.3 - 0.02) / REACH, 0.0, None)], atol=1e-7
+        clearance.rows(near), [np.clip(1.0 - (lowest + 1.3 - 0.02) / REACH, 0.0, None)], atol=1e-7
     )
 
 
@@ -91,6 +92,16 @@ def test_what_is_passed_over_along_a_motion_changes_nothing(tmp_path):
         found = clearance.nearest(q, reach).distance
         np.testing.assert_allclose(found[least > 0.0], np.minimum(least, reach)[least > 0.0], atol=1e-9)
     assert np.mean(least < 0.06) > 0.05
+
+
+def test_distances_do_not_depend_on_what_was_measured_before():
+    robot = load_robot(example_urdf("ur5_robot.urdf"))
+    clearance = clearance_of(robot, np.full(6, -3.0), np.full(6, 3.0), margin=0.02, floor=0.0)
+    q = np.random.default_rng(0).uniform(-3.0, 3.0, (6, 40))
+    forward, backward = clearance.all_distances(q), clearance.all_distances(q[:, ::-1])[:, ::-1]
+    np.testing.assert_array_equal(forward, backward)
+    near = [clearance.nearest(each, 0.1) for each in (q, q[:, ::-1])]
+    np.testing.assert_array_equal(near[0].distance, near[1].distance[:, ::-1])
 
 
 def test_a_ball_beside_boxes(tmp_path):

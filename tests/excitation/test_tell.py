@@ -75,6 +75,18 @@ def test_what_was_promised_is_seen_and_the_effect_is_told(asked):
     assert (effect.effect, effect.joint, effect.confounded_with) == ("spring", "joint1", ())
 
 
+def test_the_motion_tells_as_much_as_that_of_the_largest_log_determinant_of_what_this_is_about():
+    found = open_diagnosis()
+    model = found.before.model
+    # So small that none is ever sure enough.
+    each = [Question("parameter", name, parameter=name, size=1e-4) for name in model.names]
+    inquiry, whole = inquire(found, each), limits_of(model.robot, share=1.0)
+    plain = design_excitation(model, duration=6.0, harmonics=6, limits=whole, effort=EFFORT)
+    design = design_excitation(model, duration=6.0, harmonics=6, tell=inquiry, limits=whole, effort=EFFORT)
+    of = [[item.after for item in told(inquiry, [own.motion(rate=200.0)])] for own in (design, plain)]
+    assert np.mean(np.log(of[0])) > np.mean(np.log(of[1])) - 0.05
+
+
 def test_goals_that_exclude_each_other_are_said(asked):
     model = asked[0].scene.model
     with pytest.raises(UsageError, match="without a criterion of its own"):

@@ -51,11 +51,11 @@ def test_the_derivatives_of_the_tools_motion_are_those_of_differences(name):
         by_q, by_v = tool_motion(tool, q + d, v, a), tool_motion(tool, q, v + d, a)
         less_q, less_v = tool_motion(tool, q - d, v, a), tool_motion(tool, q, v - d, a)
         slope = (by_q.position - less_q.position) / (2 * h)
-        np.testing.assert_allclose(motion.jacobian[joint], slope, atol=1e-8)
+        np.testing.assert_allclose(motion.jacobians[0, joint], slope, atol=1e-8)
         slope = (by_q.acceleration - less_q.acceleration) / (2 * h)
-        np.testing.assert_allclose(motion.jacobian_acceleration[joint], slope, atol=2e-7)
+        np.testing.assert_allclose(motion.jacobians[2, joint], slope, atol=2e-7)
         slope = (by_v.acceleration - less_v.acceleration) / (2 * h)
-        np.testing.assert_allclose(2.0 * motion.jacobian_rate[joint], slope, atol=2e-8)
+        np.testing.assert_allclose(2.0 * motion.jacobians[1, joint], slope, atol=2e-8)
 
 
 def test_the_tool_of_the_scara_is_the_gripper_of_the_paper():

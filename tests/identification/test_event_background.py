@@ -1,4 +1,4 @@
-"""What is no event: a trend of a run, and what other recordings have at the same state of motion."""
+"""What is no event: a trend of a run, and what is left at the same state of motion at other times."""
 
 from __future__ import annotations
 
@@ -75,3 +75,29 @@ def test_what_comes_with_the_motion_in_all_recordings_is_taken_off_and_what_happ
     once[3][1500:1750] = 0.5
     alone = without_states(made(once))[3]
     assert np.mean(alone.left[0, 152:173]) > 0.4
+
+
+def test_what_friction_lacks_is_taken_off_as_soon_as_a_joint_turns_back():
+    added = [0.5 * np.sign(part.motion.v[0]) * np.sin(part.motion.q[0]) for part in STRETCHES]
+    for old, new in zip(made(added), without_states(made(added)), strict=True):
+        speed = np.abs(old.state[1][0])
+        slow = (old.known[0] > 0.9) & (speed < 0.1 * np.max(speed))
+        # The mean of ten samples of 0.1 is left; a sign that grows over a tenth of the speed leaves 0.05 and more.
+        left, before = (np.sqrt(np.mean(item.left[0, slow] ** 2)) for item in (new, old))
+        assert left < 0.04 < 0.1 < before
+
+
+def test_a_state_that_one_recording_has_again_and_again_is_no_event_and_what_happens_once_in_it_is():
+    # Only the last ever moves.
+    speed = np.max(np.abs(STRETCHES[3].motion.v[0]))
+    added = [
+        0.5 * (part.motion.v[0] / speed) ** 3 if k == 3 else np.zeros(part.samples) for k, part in enumerate(STRETCHES)
+    ]
+    added[3][1500:1750] += 0.5
+    items = made(added)
+    still = [replace(item, state=tuple(np.zeros_like(row) for row in item.state)) for item in items[:3]]
+    left = without_states([*still, items[3]])[3].left[0]
+    usual = (items[3].known[0] > 0.9) & (np.abs(np.arange(len(left)) - 162) > 20)
+    assert np.sqrt(np.mean(items[3].left[0, usual] ** 2)) > 0.1
+    assert np.sqrt(np.mean(left[usual] ** 2)) < 0.05
+    assert np.mean(left[152:173]) > 0.4

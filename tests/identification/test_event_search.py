@@ -97,3 +97,18 @@ def test_a_change_that_lasts_is_no_event():
     left = white(4)
     left[1][0, int(8.0 * RATE) :] += 3.0
     assert searched(left) == []
+
+
+def test_what_stands_out_in_a_state_that_the_arm_is_in_once_is_no_event_unless_it_is_large():
+    for size, found in ((1.5, 0), (6.0, 1)):
+        left = white(8)
+        left[2][0, int(7.0 * RATE) : int(8.0 * RATE)] += size
+        parts = [with_more(part, row) for part, row in zip(STRETCHES, left, strict=True)]
+        noise = bounded_noise(parts, left, range(len(parts)))
+        usual = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
+        assert len(standing_out(usual, lambda own=usual: own)) == 1
+        # The torque is as large as usual, and at no other time against such a speed.
+        *motion, torque = usual[2].state
+        against = np.where((np.arange(torque.shape[1]) >= 175) & (np.arange(torque.shape[1]) < 200), -torque, torque)
+        once = [*usual[:2], replace(usual[2], state=(*motion, against)), usual[3]]
+        assert len(standing_out(once, lambda own=once: own)) == found

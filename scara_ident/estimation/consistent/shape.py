@@ -106,7 +106,7 @@ def lubricated_p_value(polynomial: BrakingPolynomial, observations: Observations
     plain : Estimate
         By weighted least squares, of the same observations.
     """
-    from scipy.stats import f as f_distribution
+    from scipy.special import fdtrc
 
     columns, powers = list(polynomial.columns), np.array(polynomial.powers)
     # Torque at the velocity limit, so that the parameters have one unit.
@@ -129,7 +129,7 @@ def lubricated_p_value(polynomial: BrakingPolynomial, observations: Observations
         if freedom <= 0.0:
             return 1.0
         if size:
-            p_value += 0.5 * float(f_distribution.sf(statistic * freedom / ((blocks - 1.0) * size), size, freedom))
+            p_value += 0.5 * float(fdtrc(size, freedom, statistic * freedom / ((blocks - 1.0) * size)))
     return p_value
 
 

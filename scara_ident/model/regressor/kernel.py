@@ -6,14 +6,14 @@ Pinocchio on random states whenever it is built: Pinocchio stays the truth.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, runs_of
 from scara_ident.errors import RegressorMismatch
 from scara_ident.manners import Frozen
 from scara_ident.model.regressor.program import Program
@@ -87,7 +87,7 @@ class RegressorKernel(Frozen):
         if out is None:
             out = np.zeros(shape, dtype=states.dtype)
         else:
-            zeros = list(_runs(~self.pattern.ravel()))
+            zeros = [slice(*run) for run in runs_of(~self.pattern.ravel())]
         rows = _flat(out, shape)
         program = self._program
         buffers = np.empty((program.buffers, min(_CHUNK, samples)), dtype=states.dtype)
@@ -247,13 +247,6 @@ def _configurations(model: pin.Model, q: Array) -> Array:
         else:
             result[joint.idx_q] = q[joint.idx_v]
     return result
-
-
-def _runs(mask: NDArray[np.bool_]) -> Iterator[slice]:
-    """Give the stretches of True."""
-    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
-    for start, stop in edges.reshape(-1, 2).tolist():
-        yield slice(start, stop)
 
 
 def _flat(out: Array, shape: tuple[int, int, int]) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -58,7 +58,17 @@ class DiagnosisContext(FittedContext):
     """What the sections of a diagnosis draw from."""
 
     diagnosis: Diagnosis
-    worth: Mapping[str, Any] | None = None
+    told: Callable[[], Mapping[str, Any] | None] = lambda: None
+
+    @cached_property
+    def worth(self) -> Mapping[str, Any] | None:
+        """What the effects found cost, waited for when it is first asked for."""
+        return self.told()
+
+    @one_blas_thread()
+    def make_pictured(self) -> None:
+        """Make what pictures are of, for which nothing is waited for."""
+        _ = self.chapters, self.groups
 
     @cached_property
     def content(self) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, runs_of
 from scara_ident.estimation import JointError
 from scara_ident.report.html.blocks import Cell, Group, Selector, Table, name, number
 from scara_ident.report.plot import Drawing, Figure, Grid, Layer, Line, Panel, Plot, Region
@@ -92,12 +92,11 @@ def torque_plot(robot: Robot, traces: Sequence[Trace], j: int, band: float | Non
 
 def unused_regions(trace: Trace, j: int) -> list[Layer]:
     """Return strips over the times that the estimate of a joint leaves out, but for moments that could not be seen."""
-    left_out = np.concatenate([[False], ~trace.used[j], [False]])
-    edges = np.flatnonzero(np.diff(left_out.astype(np.int8))).reshape(-1, 2)
     seen = max(1, trace.motion.samples // LEAST_SEEN)
     return [
         Region((float(trace.time[start]), float(trace.time[stop - 1])), "grey", "not used: ends, standstill", 0.25)
-        for start, stop in edges[edges[:, 1] - edges[:, 0] > seen].tolist()
+        for start, stop in runs_of(~trace.used[j])
+        if stop - start > seen
     ]
 
 
