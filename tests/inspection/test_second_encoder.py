@@ -26,7 +26,7 @@ def columns(other: str, *, follow: tuple[bool, bool] = (True, True)) -> dict[str
 
 def inspected(tmp_path, made):
     write_columns(tmp_path / "run_1.parquet", made)
-    return inspect_file(tmp_path / "run_1.parquet", urdf=embedded_urdf())
+    return inspect_file(tmp_path / "run_1.parquet", urdf=embedded_urdf(), folder=tmp_path)
 
 
 def test_a_position_named_the_links_that_follows_the_motors_is_a_second_encoder(tmp_path):
