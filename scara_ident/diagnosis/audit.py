@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import Examination
@@ -93,6 +95,9 @@ def uncertain(own: Coefficients, examination: Examination, essential: slice, lea
     from scipy.special import erfc
 
     value, covariance = own.value[essential], own.covariance[essential, essential]
+    if not np.array_equal(examination.tested, examination.value):
+        # The freedom is that of weighted blocks, which are less sure.
+        covariance = covariance + examination.covariance[essential, essential]
     p_value = significance(value, covariance, examination.freedom, examination.products[essential, essential])
     if p_value <= float(erfc(least / 2.0**0.5)):
         return None

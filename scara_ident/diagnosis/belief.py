@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.answerability import Inquiry
 from scara_ident.diagnosis.candidates import Rows, with_columns
-from scara_ident.diagnosis.cluster_test import freedom_of, needed
+from scara_ident.diagnosis.cluster_test import least_sizes
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel, products_of
 from scara_ident.diagnosis.questions import Suspect, all_suspects
@@ -224,16 +224,15 @@ def times_believed(
         found = products_of(model, [candidates[place] for place in group])
         whole = np.sum(found.columns, axis=1)
         outside = np.max(np.diagonal(whole, axis1=1, axis2=2) / np.maximum(found.sizes, np.finfo(float).tiny), axis=1)
-        freedom = freedom_of(model, found)
+        sizes = least_sizes(model, found, criteria.family_error / tried)
         folds = np.array([np.sum(found.columns[:, model.fold == f], axis=1) for f in range(model.folds)])
         costs = _costs(folds, whole - folds)
         for g, place in enumerate(group):
             if outside[g] < criteria.least_outside:
                 continue
-            errors = needed(k, float(freedom[g]), criteria.family_error / tried)
             own = joints[place]
             count = sum(rows.independent for j, rows in enumerate(model.joints) if own is None or j == own)
-            each = (folds[:, g], costs[:, g], errors, count, criteria)
+            each = (folds[:, g], costs[:, g], float(sizes[g]), count, criteria)
             squares = [_needed_square(axis, whole[g], *each) for axis in axes[place].T]
             result[place] = 1.0 / np.sqrt(np.mean(squares))
     return result

@@ -31,8 +31,10 @@ class Examination:
     ----------
     value : ndarray, shape (k,)
         Coefficients when it is added to the model.
+    tested : ndarray, shape (k,)
+        The same, with blocks weighted where few of them hold most of its columns, see `ClusterTest.value`.
     covariance : ndarray, shape (k, k)
-        Of the coefficients, from block scores.
+        Of the coefficients tested, from block scores.
     p_value : float
         That all coefficients are zero, see `cluster_test`.
     outside : float
@@ -57,6 +59,7 @@ class Examination:
     """
 
     value: Array
+    tested: Array
     covariance: Array
     p_value: float
     outside: float
@@ -186,6 +189,7 @@ def _examinations(model: FittedModel, found: Products, criteria: SelectionCriter
             results.append(
                 Examination(
                     nothing,
+                    nothing,
                     unknown,
                     1.0,
                     float(outside[g]),
@@ -203,6 +207,7 @@ def _examinations(model: FittedModel, found: Products, criteria: SelectionCriter
         results.append(
             Examination(
                 value[g],
+                test.value[g],
                 test.covariance[g],
                 float(test.p_value[g]),
                 float(outside[g]),

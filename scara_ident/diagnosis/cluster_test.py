@@ -10,19 +10,26 @@ two, however many blocks there are (Bell and McCaffrey 2002; Pustejovsky and Tip
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.balance import BENDS, Weighted, power, shares_of, weighted
 from scara_ident.diagnosis.fitted_model import FittedModel, Products
 
 # Share of a direction that the other blocks must hold, or it cannot be tested without this one.
 _LEAST_REDUNDANCY = 1e-6
 # Fewer degrees of freedom than this after those of several coefficients, and one direction alone is asked too.
 FEW = 10.0
+# Blocks are weighted where one holds more than this share of a direction: more than all others together.
+MOST = 0.5
+# Weights of blocks are chosen for a probability such as one candidate of some two hundred must have.
+ASKED = 1e-5
+# With fewer degrees of freedom no size is significant: it would take millions of standard errors.
+LEAST_FREEDOM = 0.1
 # Directions of a few columns below this share of the largest are not tested.
 _RANK = 1e-9
 
@@ -35,13 +42,16 @@ class ClusterTest:
     ----------
     p_value : ndarray, shape (g,)
         That all coefficients of a candidate are zero.
+    value : ndarray, shape (g, k)
+        The coefficients that were tested: those of least squares, or by weighted blocks (see `balance`).
     covariance : ndarray, shape (g, k, k)
-        Of the coefficients.
+        Of these.
     freedom : ndarray, shape (g,)
         Degrees of freedom of the covariance.
     """
 
     p_value: Array
+    value: Array
     covariance: Array
     freedom: Array
 
@@ -74,7 +84,9 @@ def cluster_test(
     change = np.einsum("gbij,gbj->gbi", release, score)
     neighbours = _Neighbours.of(model)
     pairs = neighbours.pairs(change)
-    expected, freedom = _if_white(neighbours, own, links)
+    # In a block nothing is left of its products with itself: `own` is what it has less these.
+    negative = np.full(links.shape[-1], -1.0)
+    expected, freedom = _if_white(neighbours, own + links @ links.transpose(0, 1, 3, 2), links, negative)
     scale = _inverse_root(expected)
     unbiased = scale @ np.einsum("gpi,gpj->gij", pairs, pairs) @ scale
     whitened = np.einsum("gij,gj->gi", back, value)
@@ -83,16 +95,100 @@ def cluster_test(
     together = _hotelling(whitened, unbiased, least, rank)
     few = (rank > 1) & (least - rank + 1.0 < FEW)
     p_value = np.where(few, _either(together, whitened, unbiased, freedom, rank), together)
-    return ClusterTest(np.where(known, p_value, 1.0), into @ unbiased @ into.transpose(0, 2, 1), least)
+    result = ClusterTest(np.where(known, p_value, 1.0), value, into @ unbiased @ into.transpose(0, 2, 1), least)
+    return _balanced(model, replace(products, columns=columns, scores=scores), result, (into, back, rank), known)
 
 
-def freedom_of(model: FittedModel, products: Products) -> Array:
-    """Return `ClusterTest.freedom`, which no torque takes part in, shape (g,)."""
-    into, _, _ = _whitening(np.sum(products.columns, axis=1))
+def _balanced(
+    model: FittedModel,
+    products: Products,
+    result: ClusterTest,
+    whitening: tuple[Array, Array, NDArray[np.intp]],
+    known: NDArray[np.bool_],
+) -> ClusterTest:
+    """Return a test, of little freedom made by weighted blocks where effects can then be smaller and still significant."""
+    into, back, rank = whitening
+    places, weights, _ = _weights(model, products, (into, rank), np.where(known, result.freedom, 0.0), ASKED)
+    if not len(places):
+        return result
+    into, few = into[places], _whitened(products, into, places)
+    found = weighted(model, few, weights)
+    expected, freedom = _of_weighted(_Neighbours.of(model), found)
+    # As if nothing of the candidate were in the model.
+    start = np.einsum("gij,gj->gi", back[places], result.value[places])
+    scores = np.einsum("gki,gbk->gbi", into, products.scores[places]) + np.einsum("gbij,gj->gbi", few.columns, start)
+    scores = weights[..., None] * (scores - np.einsum("gkr,br->gbk", found.spanned, model.basis_scores))
+    inverse = np.linalg.pinv(np.sum(found.own, axis=1))
+    value = np.einsum("gij,gj->gi", inverse, np.sum(scores, axis=1))
+    scores -= np.einsum("gbij,gj->gbi", found.own, value)
+    left = model.basis_scores - np.einsum("gbkr,gk->gbr", few.cross, value)
+    change = np.einsum("gbij,gbj->gbi", found.release, scores + np.einsum("gbkr,gbr->gbk", found.reach, left))
+    pairs = _Neighbours.of(model).pairs(change)
+    scale = into @ power(found.spread, 0.5) @ _inverse_root(expected) @ power(found.spread, -0.5)
+    covariance = scale @ np.einsum("gpi,gpj->gij", pairs, pairs) @ scale.transpose(0, 2, 1)
+    tested, least = np.einsum("gki,gi->gk", into, value), _least(freedom)
+    whole = np.sum(products.columns[places], axis=1)
+    p_value = [significance(*each) for each in zip(tested, covariance, least, whole, strict=True)]
+    # What all rows say must not be the opposite.
+    agrees = np.einsum("gi,gij,gj->g", tested, whole, result.value[places]) > 0.0
+    new = ClusterTest(np.where(agrees, p_value, 1.0), tested, covariance, least)
+    both = {name: np.array(held) for name, held in vars(result).items()}
+    for name, held in vars(new).items():
+        both[name][places] = held
+    return ClusterTest(**both)
+
+
+def _weights(
+    model: FittedModel, products: Products, whitening: tuple[Array, NDArray[np.intp]], freedom: Array, chance: float
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """Return which candidates need less by weighted blocks, their weights, and what all need, see `least_sizes`."""
+    into, rank = whitening
+    sizes = np.array([needed(k, v, chance) if k else np.inf for k, v in zip(rank, freedom, strict=True)])
+    places = np.flatnonzero((freedom < FEW) & (rank > 0))
+    few = _whitened(products, into, places)
+    if len(places):
+        places = places[np.max(shares_of(model, few, np.ones(few.columns.shape[:2])), axis=1) > MOST]
+        few = _whitened(products, into, places)
+    weights, bent = np.ones(few.columns.shape[:2]), np.zeros(len(places), dtype=bool)
+    each = weights
+    neighbours = _Neighbours.of(model)
+    for bend in BENDS if len(places) else ():
+        # What the model leaves of the columns follows from the weights, and these from that.
+        each = 1.0 / (1.0 + shares_of(model, few, each) / bend)
+        found = weighted(model, few, each)
+        least = _least(_of_weighted(neighbours, found)[1])
+        spread = np.sqrt(np.trace(found.spread, axis1=1, axis2=2) / rank[places])
+        size = spread * [needed(k, v, chance) for k, v in zip(rank[places], least, strict=True)]
+        better = (found.strength > _LEAST_REDUNDANCY) & (size < sizes[places])
+        sizes[places[better]], weights[better], bent[better] = size[better], each[better], True
+    return places[bent], weights[bent], sizes
+
+
+def _whitened(products: Products, into: Array, places: NDArray[np.intp]) -> Products:
+    """Return the products of some candidates in units in which those of all blocks are the identity."""
+    into = into[places]
+    cross = into.transpose(0, 2, 1)[:, None] @ products.cross[places]
+    return replace(products, columns=_both_sides(into, products.columns[places]), cross=cross)
+
+
+def _of_weighted(neighbours: _Neighbours, found: Weighted) -> tuple[Array, Array]:
+    """Return `_if_white` of weighted blocks, in units in which their coefficients' covariance is the identity."""
+    turn = power(found.spread, -0.5)[:, None]
+    return _if_white(neighbours, turn @ found.alone @ turn, turn @ found.links, found.signs)
+
+
+def least_sizes(model: FittedModel, products: Products, chance: float) -> Array:
+    """Return the standard errors of least squares at which candidates become significant, shape (g,); no torque takes part.
+
+    Where residuals are white of variance one; the test by weighted blocks takes more of its own, and fewer of these.
+    """
+    into, _, rank = _whitening(np.sum(products.columns, axis=1))
     reach = model.reaching(products.cross)
     _, own, links, strength = _without_blocks(into, reach, products.cross, products.columns)
-    _, freedom = _if_white(_Neighbours.of(model), own, links)
-    return np.where(np.all(strength > _LEAST_REDUNDANCY, axis=(1, 2)), _least(freedom), 0.0)
+    alone = own + links @ links.transpose(0, 1, 3, 2)
+    _, freedom = _if_white(_Neighbours.of(model), alone, links, np.full(links.shape[-1], -1.0))
+    least = np.where(np.all(strength > _LEAST_REDUNDANCY, axis=(1, 2)), _least(freedom), 0.0)
+    return _weights(model, products, (into, rank), least, chance)[2]
 
 
 def needed(count: int, freedom: float, chance: float) -> float:
@@ -114,10 +210,12 @@ def needed(count: int, freedom: float, chance: float) -> float:
     """
     from scipy.special import fdtri
 
+    if freedom < LEAST_FREEDOM:
+        return np.inf
     rest = freedom - count + 1.0
     few = count > 1 and rest < FEW
     share = 0.5 * chance if few else chance
-    together = np.sqrt(fdtri(count, rest, 1.0 - share) * freedom * count / rest) if rest > 0.0 else np.inf
+    together = np.sqrt(fdtri(count, rest, 1.0 - share) * freedom * count / rest) if rest > LEAST_FREEDOM else np.inf
     alone = np.sqrt(fdtri(1.0, freedom, 1.0 - share / count)) if few and freedom > 0.0 else np.inf
     return float(min(together, alone))
 
@@ -252,34 +350,32 @@ class _Neighbours:
         return found
 
 
-def _if_white(neighbours: _Neighbours, own: Array, links: Array) -> tuple[Array, Array]:
+def _if_white(neighbours: _Neighbours, alone: Array, links: Array, signs: Array) -> tuple[Array, Array]:
     """Return what the scatter is expected to be where residuals are white of variance one, and its freedom.
 
-    The changes of blocks b and c have the covariance ``-links_b links_c'``, and that of a block with itself is
-    ``own_b``. Satterthwaite: the freedom of a direction is the squared trace of the covariance of all over its squared
-    norm; infinite where a candidate has no column in it.
+    The changes of blocks b and c have the covariance ``links_b diag(signs) links_c'``, and that of a block with itself has
+    ``alone_b`` in addition. Satterthwaite: the freedom of a direction is the squared trace of the covariance of all over
+    its squared norm; infinite where a candidate has no column in it.
 
     Parameters
     ----------
     neighbours : _Neighbours
-    own : ndarray, shape (g, blocks, k, k)
+    alone : ndarray, shape (g, blocks, k, k)
     links : ndarray, shape (g, blocks, k, m)
+    signs : ndarray, shape (m,)
     """
-    alone = own + links @ links.transpose(0, 1, 3, 2)
     paired = neighbours.pairs(links)
     # A pair holds half of the square of either block.
-    expected = np.sum(alone, axis=1) - np.einsum("gpim,gpjm->gij", paired, paired)
+    expected = np.sum(alone, axis=1) + np.einsum("gpim,m,gpjm->gij", paired, signs, paired)
     size = np.diagonal(alone, axis1=2, axis2=3)
     diagonal = np.sqrt(0.5) * neighbours.pairs(size)
     norm = np.sum(diagonal**2, axis=1) + 0.5 * np.sum(size**2, axis=1)
-    norm -= 2.0 * np.einsum("gbi,gbim,gbim->gi", size, *(neighbours.back(paired),) * 2)
+    norm += 2.0 * np.einsum("gbi,gbim,m,gbim->gi", size, neighbours.back(paired), signs, neighbours.back(paired))
     across = paired.transpose(0, 2, 1, 3)
-    narrow = (
-        across @ across.transpose(0, 1, 3, 2)
-        if across.shape[2] < across.shape[3]
-        else across.transpose(0, 1, 3, 2) @ across
-    )
-    norm += np.sum(narrow**2, axis=(2, 3))
+    if across.shape[2] < across.shape[3]:
+        norm += np.sum((across @ (signs * across).transpose(0, 1, 3, 2)) ** 2, axis=(2, 3))
+    else:
+        norm += np.einsum("m,gkmn,n->gk", signs, (across.transpose(0, 1, 3, 2) @ across) ** 2, signs)
     trace = np.diagonal(expected, axis1=1, axis2=2)
     shown = (trace > 0.0) & (norm > 0.0)
     freedom = np.where(shown, trace**2 / np.where(shown, norm, 1.0), np.inf)

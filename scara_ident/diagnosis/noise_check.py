@@ -34,7 +34,7 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     if share >= 1.0:
         # What is no smaller without the noise was not made by it.
         return None
-    p_value = significance(left, found.covariance, found.freedom, found.products)
+    p_value = significance(found.tested - found.value + left, found.covariance, found.freedom, found.products)
     if p_value * step.tried <= criteria.family_error and decision.gain * share >= criteria.least_gain:
         return None
     return f"the noise of the positions makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"

@@ -326,7 +326,7 @@ def _errors(found: Examination) -> float:
     """Return by how many standard errors coefficients differ from none."""
     if not np.all(np.isfinite(found.covariance)):
         return 0.0
-    wald = found.value @ np.linalg.pinv(found.covariance, rcond=1e-9, hermitian=True) @ found.value
+    wald = found.tested @ np.linalg.pinv(found.covariance, rcond=1e-9, hermitian=True) @ found.tested
     return float(np.sqrt(max(float(wald), 0.0)))
 
 

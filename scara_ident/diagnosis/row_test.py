@@ -46,7 +46,7 @@ def examine_rows(model: FittedModel, candidate: Rows, found: Examination) -> Exa
     together = min(1.0, 2.0 * min(p_value, found.p_value))
     if p_value >= found.p_value:
         return replace(found, p_value=together)
-    return replace(found, p_value=together, covariance=covariance, freedom=freedom)
+    return replace(found, p_value=together, tested=found.value, covariance=covariance, freedom=freedom)
 
 
 def _by_rows(model: FittedModel, candidate: Rows, found: Examination) -> tuple[Array, float]:

@@ -23,6 +23,7 @@ SCENE = scene_of(load_robot())
 SPRING = Candidate(Spring(), Member(0))
 GOOD = Examination(
     value=np.array([0.05, 0.0]),
+    tested=np.array([0.05, 0.0]),
     covariance=np.diag([1e-6, 1e-6]),
     p_value=1e-12,
     outside=0.5,

@@ -267,6 +267,7 @@ def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
     torque = rows[:, -1] - rows[:, model.parameters : -1] @ value
     return Examination(
         value,
+        value,
         covariance,
         p_value,
         outside,
