@@ -221,9 +221,9 @@ def read_description(path: Path) -> RobotDescription:
     except RecursionError:
         raise RobotError(f"{path}: nested too deeply; a robot.yaml has a few levels") from None
     description = check_description(content, path)
-    beside = path.parent / description.urdf
     # What lies beside the file comes before a robot of that name.
-    urdf = beside if beside.exists() or not is_name(description.urdf) else example_urdf(description.urdf.name)
+    named = is_name(description.urdf, path.parent)
+    urdf = example_urdf(description.urdf.name) if named else path.parent / description.urdf
     return description.model_copy(update={"urdf": real_path(urdf)})
 
 

@@ -11,9 +11,9 @@ from scara_ident.errors import RobotError
 PACKAGE = "example-robot-data"
 
 
-def is_name(source: Path) -> bool:
-    """Tell whether a word is a robot's name: no file or folder, one word without a suffix."""
-    return len(source.parts) == 1 and not source.suffix and not source.exists()
+def is_name(source: Path, folder: Path = Path()) -> bool:
+    """Tell whether a word is a robot's name: one word without a suffix, and no file in the folder it is read from."""
+    return len(source.parts) == 1 and not source.suffix and not (folder / source).exists()
 
 
 def urdf_of(source: Path) -> Path:

@@ -56,9 +56,15 @@ def test_files_and_folders_come_before_names(tmp_path: Path, monkeypatch: pytest
         load_robot("ur5")
 
 
-def test_a_robot_description_may_name_one_unless_a_file_of_that_name_lies_beside_it(tmp_path: Path):
+def test_a_robot_description_may_name_one_unless_a_file_of_that_name_lies_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     (tmp_path / "robot.yaml").write_text("urdf: ur5\n")
     assert load_robot(tmp_path / "robot.yaml").urdf == load_robot("ur5").urdf.resolve()
+    elsewhere = tmp_path / "elsewhere"
+    (elsewhere / "ur5").mkdir(parents=True)
+    monkeypatch.chdir(elsewhere)
+    assert load_robot(tmp_path / "robot.yaml").urdf.name == "ur5_robot.urdf"
     (tmp_path / "ur5").write_text("no URDF")
     with pytest.raises(RobotError, match=f"{tmp_path}/ur5"):
         load_robot(tmp_path / "robot.yaml")
