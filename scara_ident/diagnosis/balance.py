@@ -74,7 +74,7 @@ def weighted(model: FittedModel, found: Products, weights: Array) -> Weighted:
     each = weights[..., None, None]
     columns, cross, basis = found.columns, found.cross, model.basis_products
     spanned = _spanned(model, found, weights)
-    across = each * (cross - _by_blocks(spanned, basis))
+    across = each * (cross - spanned @ basis)
     own = each * (columns - spanned @ _t(cross))
     bent = each * (own - across @ _t(spanned))
     whole = np.sum(own, axis=1)
@@ -87,7 +87,7 @@ def weighted(model: FittedModel, found: Products, weights: Array) -> Weighted:
     strength = np.min(np.linalg.eigvalsh(0.5 * root @ (left + _t(left)) @ root), axis=(1, 2))
     good = strength[:, None, None, None] > 0.0
     release = np.linalg.inv(np.where(good, left, np.eye(left.shape[-1])))
-    seen = across + _by_blocks(reach, basis)
+    seen = across + reach @ basis
     alone = bent + across @ _t(reach) + reach @ _t(seen)
     square, inverse = np.sum(bent, axis=1), np.linalg.pinv(whole, hermitian=True)
     first = (bent + reach @ _t(across)) @ power(square, -0.5)[:, None]
@@ -118,22 +118,13 @@ def _spanned(model: FittedModel, found: Products, weights: Array) -> Array:
 def shares_of(model: FittedModel, found: Products, weights: Array) -> Array:
     """Return the share of each block of the square of what the weighted model leaves of the columns, shape (g, blocks)."""
     spanned = _spanned(model, found, weights)
-    left = (
-        found.columns
-        - found.cross @ _t(spanned)
-        - spanned @ _t(found.cross - _by_blocks(spanned, model.basis_products))
-    )
+    left = found.columns - found.cross @ _t(spanned) - spanned @ _t(found.cross - spanned @ model.basis_products)
     whole = power(np.sum(left, axis=1), -0.5)[:, None]
     return np.asarray(np.max(np.linalg.eigvalsh(whole @ left @ whole), axis=2))
 
 
 def _t(matrices: Array) -> Array:
     return np.asarray(np.swapaxes(matrices, -1, -2))
-
-
-def _by_blocks(signals: Array, matrices: Array) -> Array:
-    """Multiply signals (g, blocks or 1, k, r) by a matrix (blocks, r, r) each."""
-    return np.asarray(signals @ matrices)
 
 
 def power(matrices: Array, power: float) -> Array:
