@@ -66,11 +66,12 @@ def _confounders_of(
     scene, criteria = step.scene, replace(step.criteria, family_error=step.criteria.significant)
     step = replace(step, criteria=criteria)
     own = step.judge([found])[0]
+    twins = [Candidate(*twin) for twin in found.effect.same_columns(scene, found.member)]
     # Of all joints together: candidates of different joints are compared. Those that remove too little, most of them, need
     # no test.
     saved = own.examination.held_out
     least = criteria.near_confounder * saved
-    enough = pool
+    enough = list(dict.fromkeys([*pool, *twins]))
     # By the columns at hand first: most come nowhere near, and need no others.
     for columns, asked in ((first, LEAST_AT_FIRST * least), (scene, least)):
         found_gains = held_out_gains(step.model, step.columns.rows(columns, enough), criteria)

@@ -237,6 +237,10 @@ class Effect(ABC):
         """Return the members that a line of a joint's residual suggests."""
         return (Member(joint, (line.position,)),) if line.kind == self.seeded_by else ()
 
+    def same_columns(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
+        """Return members of other families that have a member's columns on this robot, and that no scan need try."""
+        return ()
+
     def band(self, member: Member) -> float:
         """Return the band, Hz, that holds where a member shows most; 0 where every band does."""
         return 0.0

@@ -13,6 +13,7 @@ from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.links import point_mass, shared, tool_of
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
+from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.recording_groups import groups_by_torque
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid
@@ -238,6 +239,11 @@ class GravityCounterbalance(Sinusoid):
         """Return sine and cosine of the position."""
         q = signals.motion.q[member.place]
         return [np.sin(q), np.cos(q)]
+
+    def same_columns(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
+        """Return the ripple once per turn of a motor without a gear, or whose gear the description does not state."""
+        direct = abs(float(scene.robot.reduction[member.place])) == 1.0
+        return ((TorqueRipple(), Member(member.joint, (1.0,))),) if direct else ()
 
 
 def _instants(scene: Scene, count: int) -> tuple[Member, ...]:

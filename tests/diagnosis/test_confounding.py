@@ -66,3 +66,23 @@ def test_an_effect_of_another_kind_is_no_rival():
 def test_two_effects_at_once_are_not_rivals_of_each_other():
     both = groups(1.9, lambda motion: spring(motion) + 0.03 * np.abs(motion.v[0]))
     assert both == {"spring of joint1": {}, "asymmetric_friction of joint1": {}}
+
+
+class Twin(Pendulum):
+    """Another cause of the same columns, which the search does not try."""
+
+    name = "twin"
+
+
+class WithTwin(Pendulum):
+    """A pendulum that knows of it."""
+
+    def same_columns(self, scene, member):
+        return ((Twin(), member),)
+
+
+def test_another_cause_of_the_same_columns_is_named_though_it_is_not_tried():
+    runs = with_torque(exact_runs(size=1.9), 0, lambda motion: STIFFNESS * np.sin(motion.q[0] - MIDDLE))
+    result = searched(runs, WithTwin())
+    ((twin,),) = confounders(result.step, result.decisions, result.first)
+    assert (twin.label, twin.gain) == ("twin of joint1", twin.found_gain)

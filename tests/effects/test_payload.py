@@ -168,3 +168,14 @@ def test_a_counterbalance_is_tried_where_gravity_acts(tmp_path: Path):
     ripple = columns(TorqueRipple(), scene, item, Member(1, (1.0 / float(scene.robot.reduction[1]),)))
     np.testing.assert_allclose(column, ripple, atol=1e-9)
     assert "a ripple once per its turn" in effect.description(scene, Member(1))
+
+
+def test_a_counterbalance_without_a_gear_has_a_ripple_of_its_columns(tmp_path: Path):
+    scene = scene_of(load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R)))
+    ((ripple, member),) = GravityCounterbalance().same_columns(scene, Member(1))
+    item = moving(scene.robot, 1.0)
+    np.testing.assert_allclose(
+        columns(ripple, scene, item, member), columns(GravityCounterbalance(), scene, item, Member(1)), atol=1e-12
+    )
+    geared = scene_of(replace(scene.robot, reduction=np.array([100.0, -100.0])))
+    assert GravityCounterbalance().same_columns(geared, Member(1)) == ()
