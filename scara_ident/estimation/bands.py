@@ -100,7 +100,10 @@ def choose_bands(model: TorqueModel, data: PreparedData) -> BandChoice:
         level = _sample(slow if rate == slow_rate else _thinned(data, rate))
         allowed = HIGHEST_BAND * min(part.rate for part in level.stretches)
         with threads_for(max(part.samples for part in level.stretches)):
-            bands, fit = _widened(_Spectra(model, level, edges), bands, floor, allowed, fit)
+            # What fewer samples show is not taken back: of more, fewer recordings are looked at, behind a filter so wide that
+            # noise turns the sign of friction.
+            least = floor if fit is None else np.maximum(floor, bands)
+            bands, fit = _widened(_Spectra(model, level, edges), bands, least, allowed, fit)
         if allowed >= highest or np.max(bands) < NEAR_HIGHEST * allowed:
             return _told(model, bands, fit, edges, floor, moving)
         rate *= NEXT_RATE
