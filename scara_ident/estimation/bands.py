@@ -157,7 +157,16 @@ class _Spectra:
     def __init__(self, model: TorqueModel, data: PreparedData, edges: Array) -> None:
         self.model, self.data, self.edges = model, data, edges
         self.parts = [part.stretch for part in data.stretches]
-        self.torque = np.sum([binned_power(torque_of(part), part.rate, edges) for part in self.parts], axis=0)
+        # At rest friction is anything: what no fit sees does not count here.
+        first = data.at((FIRST_BAND,) * model.robot.n)
+        self.fades = side_by_side(lambda part: part.fade, first.stretches)
+
+        def recorded(part: Stretch, fade: Array) -> Array:
+            torque = torque_of(part)
+            mean = np.sum(fade * torque, axis=1) / np.maximum(np.sum(fade, axis=1), 1.0)
+            return binned_power(fade * (torque - mean[:, None]), part.rate, edges)
+
+        self.torque = np.sum(side_by_side(recorded, self.parts, self.fades), axis=0)
 
         def wide(part: Stretch) -> tuple[Array, ...]:
             return model.joint_columns(motion_of(part, [WIDE_FILTER * part.rate] * model.robot.n))
@@ -174,11 +183,11 @@ class _Spectra:
     def judged(self, bands: Array, value: Array) -> _Fit:
         """Say how far up parameters that were fitted in some bands explain each joint's torque."""
 
-        def left(part: Stretch, columns: tuple[Array, ...]) -> Array:
+        def left(part: Stretch, columns: tuple[Array, ...], fade: Array) -> Array:
             predicted = [value[own] @ rows for own, rows in zip(self.model.active, columns, strict=True)]
-            return binned_power(torque_of(part) - np.array(predicted), part.rate, self.edges)
+            return binned_power(fade * (torque_of(part) - np.array(predicted)), part.rate, self.edges)
 
-        error = np.sum(side_by_side(left, self.parts, self.columns), axis=0)
+        error = np.sum(side_by_side(left, self.parts, self.columns, self.fades), axis=0)
         gain = np.cumsum(self.torque * (1.0 - EXPLAINED) - error, axis=1)
         best = np.argmax(gain, axis=1)
         some = gain[np.arange(len(best)), best] > 0.0
