@@ -19,12 +19,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, runs_of
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import informations, kept_rows
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Stretch, motion_of, torque_of
-from scara_ident.motion.prepared import END_PERIODS, PreparedData, PreparedStretch
+from scara_ident.motion.prepared import END_PERIODS, PreparedData, PreparedStretch, fading
 from scara_ident.motion.thinning import thinned
 from scara_ident.threads import side_by_side, threads_for
 
@@ -157,9 +157,7 @@ class _Spectra:
     def __init__(self, model: TorqueModel, data: PreparedData, edges: Array) -> None:
         self.model, self.data, self.edges = model, data, edges
         self.parts = [part.stretch for part in data.stretches]
-        # At rest friction is anything: what no fit sees does not count here.
-        first = data.at((FIRST_BAND,) * model.robot.n)
-        self.fades = side_by_side(lambda part: part.fade, first.stretches)
+        self.fades = side_by_side(_moving_weight, data.at((FIRST_BAND,) * model.robot.n).stretches)
 
         def recorded(part: Stretch, fade: Array) -> Array:
             torque = torque_of(part)
@@ -193,6 +191,18 @@ class _Spectra:
         some = gain[np.arange(len(best)), best] > 0.0
         whole = np.maximum(np.cumsum(self.torque, axis=1), np.finfo(float).tiny)
         return _Fit(bands, value, np.where(some, self.edges[best + 1], 0.0), 1.0 - np.cumsum(error, axis=1) / whole)
+
+
+def _moving_weight(part: PreparedStretch) -> Array:
+    """Return the weight of every sample, shape (n, N), 0 in a standstill: friction is anything there, and no fit sees it.
+
+    A reversal is shorter than a period of the band, and counts: noise turns the sign of friction there, which ends a band.
+    """
+    rest = part.rest.copy()
+    for row in rest:
+        for start, stop in runs_of(row):
+            row[start:stop] = stop - start >= part.rate / FIRST_BAND
+    return fading(rest, part.rate, part.bands)
 
 
 def _told(model: TorqueModel, bands: Array, fit: _Fit, edges: Array, floor: Array, moving: Array) -> BandChoice:
