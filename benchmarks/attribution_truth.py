@@ -33,7 +33,7 @@ from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.least_squares import wls
 from scara_ident.estimation.observations import observe
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.prepared import prepare
+from scara_ident.motion.prepared import PreparedData, prepare
 from scara_ident.recording.recording import Recording
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.simulation import Effect
@@ -119,6 +119,7 @@ def _compared(result: Diagnosis, made: VirtualSet, was: Item) -> Item:
     told = diagnosis_dict(result)
     oracle = true_model_error(result, made)
     after, reference = told["validation"]["after"], oracle and oracle["validation"]
+    without = oracle.pop("without") if oracle else []
     return {
         "found": [_found(effect) for effect in told["effects"]],
         "tentative": [
@@ -136,7 +137,9 @@ def _compared(result: Diagnosis, made: VirtualSet, was: Item) -> Item:
         "true_model": oracle,
         "to_true_model": worst_ratio(after, reference),
         "fitted_to_true_model": worst_ratio(oracle["fitted"], reference) if oracle else None,
+        "late": _late(made),
         "strength": strength(told["training"]["before"], oracle and oracle["training"]),
+        "strengths": [strength(errors, oracle["training"]) for errors in without],
         "coverage": coverage(told["parameters"], true_parameters(made, was), [effect.name for effect in made.effects]),
     }
 
@@ -162,7 +165,13 @@ def _of(effect: Any, name: str) -> Any:
     return effect.get(name) if isinstance(effect, dict) else getattr(effect, name, None)
 
 
-def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, dict[str, float]] | None:
+def _late(made: VirtualSet) -> float:
+    """Return by how much the training recordings are late on average, by an effect and by what runs differ by, s."""
+    delays = [effect.as_dict()["parameters"]["delay"] for effect in made.effects if effect.name == "time_delay"]
+    return sum(delays) + float(np.mean([state.delay for state in made.states[: len(made.training)]]))
+
+
+def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, Any] | None:
     """Fit the true model, at its true nonlinear parameters, to the same recordings in the same bands.
 
     It knows by how much the training recordings are late on average, what each run has of its own it does not. With
@@ -172,13 +181,12 @@ def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, dict[str,
     Returns
     -------
     dict or None
-        Rms of each joint in training and validation, and in validation with all fitted; None where the catalogue has no
-        family for an effect.
+        Rms of each joint in training and validation, in validation with all fitted, and in training without each of the
+        effects in turn; None where the catalogue has no family for an effect.
     """
     scene, bands = result.search.scene, result.search.bands
     joints = made.robot.joints
-    delays = [effect.as_dict()["parameters"]["delay"] for effect in made.effects if effect.name == "time_delay"]
-    late = sum(delays) + float(np.mean([state.delay for state in made.states[: len(made.training)]]))
+    late = _late(made)
     others = [_candidates(effect, made) for effect in made.effects if effect.name != "time_delay"]
     training, held_out = (
         prepare([shifted(item, late) for item in items], bands) for items in (made.training, made.held_out)
@@ -201,7 +209,25 @@ def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, dict[str,
         "training": errors,
         "validation": validation,
         "fitted": _errors(joints, joint_errors(known, observe(own, held_out))),
+        "without": _without_each(result, made, chosen, training),
     }
+
+
+def _without_each(
+    result: Diagnosis, made: VirtualSet, chosen: Sequence[Candidate], training: PreparedData
+) -> list[dict[str, float]]:
+    """Return the rms of each joint in training of the true model without each of its effects, in their order."""
+    found, left = [], list(chosen)
+    for effect in made.effects:
+        kept, data = list(chosen), training
+        if effect.name == "time_delay":
+            late = _late(made) - effect.as_dict()["parameters"]["delay"]
+            data = prepare([shifted(item, late) for item in made.training], training.bands)
+        else:
+            kept.remove(left.pop(0))
+        fitted = observe(model_with(result.search.scene, kept), data)
+        found.append(_errors(made.robot.joints, joint_errors(wls(fitted).value, fitted)))
+    return found
 
 
 def _all_fitted(

@@ -2,8 +2,8 @@
 
 Blocks of time are few, and a column that lives in some of them leaves `cluster_test` hardly any freedom: a cubic term of
 the torque that removes nine tenths of the residual may then pass for chance. What is left beside such a candidate is
-near the noise, so that it shows how far the noise remembers; the rows themselves are then counted, with the
-heteroscedastic and autocorrelation-consistent covariance of Newey and West (1987) over that memory, and Satterthwaite's
+near the noise, so that it shows how far the noise remembers; if that is less than a block, the rows themselves are counted,
+with the heteroscedastic and autocorrelation-consistent covariance of Newey and West (1987) over that memory, and Satterthwaite's
 degrees of freedom. With two tests the smaller probability counts twice (Bonferroni).
 """
 
@@ -23,6 +23,9 @@ from scara_ident.diagnosis.fitted_model import FittedModel
 FORGOTTEN = 0.1
 # Longest memory that is looked for, as a share of a joint's rows.
 LONGEST = 0.25
+# Of a block, within which what is left on a candidate's joints must be forgotten for rows to be counted: their level was
+# shown for noise that is. What is remembered longer is no noise, but something that is still missing.
+NOISE_WITHIN = 0.5
 
 
 def examine_rows(model: FittedModel, candidate: Rows, found: Examination) -> Examination:
@@ -54,7 +57,7 @@ def _by_rows(model: FittedModel, candidate: Rows, found: Examination) -> tuple[A
     weighted = {joint: model.weights[joint] * columns for joint, columns in candidate.items()}
     sums = np.sum([columns @ model.basis[joint].T for joint, columns in weighted.items()], axis=0)
     scatter = np.zeros_like(found.products)
-    trace = norm = 0.0
+    trace = norm = own = remembered = 0.0
     rows = sum(len(residual) for residual in model.residual)
     for joint, (basis, residual) in enumerate(zip(model.basis, model.residual, strict=True)):
         outside = weighted.get(joint, 0.0) - sums @ basis
@@ -68,13 +71,16 @@ def _by_rows(model: FittedModel, candidate: Rows, found: Examination) -> tuple[A
         scatter += scores @ scores.T
         trace += float(np.sum(squares))
         norm += 0.5 * max(2.0, kurtosis - 1.0) * float(squares @ squares)
+        if joint in weighted:
+            own += float(np.sum(squares))
+            remembered += float(np.sum(squares)) * 0.5 * lags * len(model.fold) / len(left)
         for lag in range(1, lags + 1):
             weight = 1.0 - lag / (lags + 1.0)
             across = weight * scores[:, lag:] @ scores[:, :-lag].T
             scatter += across + across.T
             norm += 2.0 * weight**2 * float(squares[lag:] @ squares[:-lag])
     spare = rows - model.root.shape[1] - len(found.value)
-    if spare <= 0 or norm == 0.0:
+    if spare <= 0 or norm == 0.0 or remembered > NOISE_WITHIN * own:
         return np.full_like(scatter, np.inf), 1.0
     inverse = np.linalg.pinv(found.products, rcond=1e-9, hermitian=True)
     return rows / spare * inverse @ scatter @ inverse, min(trace**2 / norm, float(spare))

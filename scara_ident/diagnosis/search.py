@@ -356,9 +356,9 @@ def _worth_fitting(
     """Return those that promise so much gain and what they may stand for, the most promising first."""
     # A fit is dear: only what chance would not bring among so many at a grid point is worth one.
     sure = [item for item in candidates if item.gain >= enough and item.examination.p_value * tried <= 1.0]
-    # The same of another joint, however unsure at its grid point, which loses most of a resonance with little damping.
+    # The same of another joint, however unsure or small at its grid point, which loses most of a resonance with little damping.
     names = {item.candidate.effect.name for item in sure}
-    worth = [item for item in candidates if item.gain >= enough and item.candidate.effect.name in names]
+    worth = [item for item in candidates if item.candidate.effect.name in names]
     return sorted(worth, key=lambda item: -item.gain)[: criteria.most_fitted]
 
 

@@ -19,12 +19,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, runs_of
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import informations, kept_rows
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Stretch, motion_of, torque_of
-from scara_ident.motion.prepared import END_PERIODS, PreparedData, PreparedStretch
+from scara_ident.motion.prepared import END_PERIODS, PreparedData, PreparedStretch, fading
 from scara_ident.motion.thinning import thinned
 from scara_ident.threads import side_by_side, threads_for
 
@@ -100,7 +100,10 @@ def choose_bands(model: TorqueModel, data: PreparedData) -> BandChoice:
         level = _sample(slow if rate == slow_rate else _thinned(data, rate))
         allowed = HIGHEST_BAND * min(part.rate for part in level.stretches)
         with threads_for(max(part.samples for part in level.stretches)):
-            bands, fit = _widened(_Spectra(model, level, edges), bands, floor, allowed, fit)
+            # What fewer samples show is not taken back: of more, fewer recordings are looked at, behind a filter so wide that
+            # noise turns the sign of friction.
+            least = floor if fit is None else np.maximum(floor, bands)
+            bands, fit = _widened(_Spectra(model, level, edges), bands, least, allowed, fit)
         if allowed >= highest or np.max(bands) < NEAR_HIGHEST * allowed:
             return _told(model, bands, fit, edges, floor, moving)
         rate *= NEXT_RATE
@@ -154,7 +157,14 @@ class _Spectra:
     def __init__(self, model: TorqueModel, data: PreparedData, edges: Array) -> None:
         self.model, self.data, self.edges = model, data, edges
         self.parts = [part.stretch for part in data.stretches]
-        self.torque = np.sum([binned_power(torque_of(part), part.rate, edges) for part in self.parts], axis=0)
+        self.fades = side_by_side(_moving_weight, data.at((FIRST_BAND,) * model.robot.n).stretches)
+
+        def recorded(part: Stretch, fade: Array) -> Array:
+            torque = torque_of(part)
+            mean = np.sum(fade * torque, axis=1) / np.maximum(np.sum(fade, axis=1), 1.0)
+            return binned_power(fade * (torque - mean[:, None]), part.rate, edges)
+
+        self.torque = np.sum(side_by_side(recorded, self.parts, self.fades), axis=0)
 
         def wide(part: Stretch) -> tuple[Array, ...]:
             return model.joint_columns(motion_of(part, [WIDE_FILTER * part.rate] * model.robot.n))
@@ -171,16 +181,28 @@ class _Spectra:
     def judged(self, bands: Array, value: Array) -> _Fit:
         """Say how far up parameters that were fitted in some bands explain each joint's torque."""
 
-        def left(part: Stretch, columns: tuple[Array, ...]) -> Array:
+        def left(part: Stretch, columns: tuple[Array, ...], fade: Array) -> Array:
             predicted = [value[own] @ rows for own, rows in zip(self.model.active, columns, strict=True)]
-            return binned_power(torque_of(part) - np.array(predicted), part.rate, self.edges)
+            return binned_power(fade * (torque_of(part) - np.array(predicted)), part.rate, self.edges)
 
-        error = np.sum(side_by_side(left, self.parts, self.columns), axis=0)
+        error = np.sum(side_by_side(left, self.parts, self.columns, self.fades), axis=0)
         gain = np.cumsum(self.torque * (1.0 - EXPLAINED) - error, axis=1)
         best = np.argmax(gain, axis=1)
         some = gain[np.arange(len(best)), best] > 0.0
         whole = np.maximum(np.cumsum(self.torque, axis=1), np.finfo(float).tiny)
         return _Fit(bands, value, np.where(some, self.edges[best + 1], 0.0), 1.0 - np.cumsum(error, axis=1) / whole)
+
+
+def _moving_weight(part: PreparedStretch) -> Array:
+    """Return the weight of every sample, shape (n, N), 0 in a standstill: friction is anything there, and no fit sees it.
+
+    A reversal is shorter than a period of the band, and counts: noise turns the sign of friction there, which ends a band.
+    """
+    rest = part.rest.copy()
+    for row in rest:
+        for start, stop in runs_of(row):
+            row[start:stop] = stop - start >= part.rate / FIRST_BAND
+    return fading(rest, part.rate, part.bands)
 
 
 def _told(model: TorqueModel, bands: Array, fit: _Fit, edges: Array, floor: Array, moving: Array) -> BandChoice:

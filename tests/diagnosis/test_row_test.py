@@ -54,6 +54,19 @@ def test_of_noise_hardly_any_is_significant(memory: float):
     assert np.mean(np.array(found) < 0.001) <= 0.005
 
 
+def test_rows_are_not_counted_beside_what_is_remembered_over_most_of_a_block():
+    rng = np.random.default_rng(5)
+    blocks = 12
+    length = blocks * ROWS
+    tried, missing = few_places(rng, length), slow(rng, 1, length, 8.0)[0]
+    model = model_of(slow(rng, 4, length, 8.0), missing + 20.0 * tried[0] / np.std(tried), blocks)
+    (item,) = examine(model, [{0: tried}])
+    assert item.gain > 0.9
+    again = examine_rows(model, {0: tried}, item)
+    assert again.p_value == pytest.approx(min(1.0, 2.0 * item.p_value))
+    assert again.freedom == item.freedom
+
+
 def test_of_white_noise_the_covariance_is_that_of_least_squares():
     rng = np.random.default_rng(3)
     blocks = 300

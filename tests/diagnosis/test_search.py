@@ -184,6 +184,8 @@ def test_what_an_effect_may_stand_for_on_another_joint_is_fitted_beside_it():
     other, first, faint = decision("a", 0.16, 3e-9), decision("a", 0.13, 0.13), decision("a", 0.05, 0.13)
     beside = decision("b", 0.15, 0.13)
     assert _worth_fitting([faint, first, beside, other], 0.1, 100, CRITERIA) == [other, first]
+    # It may gain next to nothing there, and most once it is fitted.
+    assert _worth_fitting([faint, beside, other], 0.1, 100, CRITERIA) == [other, faint]
     # Alone it is not worth a fit.
     assert _worth_fitting([first, beside], 0.1, 100, CRITERIA) == []
 

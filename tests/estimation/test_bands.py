@@ -262,3 +262,38 @@ def test_the_rate_of_the_samples_does_not_move_the_band(model: TorqueModel):
     one, other = (choose_bands(model, prepare([item])).bands for item in (whole, half))
     # Bins are a third of an octave.
     assert np.all(np.abs(np.log2(np.array(one) / other)) < 0.7)
+
+
+def moves(model: TorqueModel, rate: float, size: tuple[float, float], noise: float, rests: float) -> Recording:
+    """From point to point in a second each, with rests between at which friction holds with any share of Coulomb's."""
+    rng = np.random.default_rng(6)
+    time = np.arange(round(SECONDS * rate)) / rate
+    period, q, v, a = 1.0 + rests, *(np.zeros((2, len(time))) for _ in range(3))
+    turn = np.minimum(np.mod(time, period), 1.0)
+    # Neither friction's sign nor its viscous part tells what it is at rest.
+    held = (np.mod(time, period) >= 1.0) * np.array([[0.4], [0.2]])
+    for j in range(2):
+        points = np.array(size)[j] * rng.uniform(-1.0, 1.0, int(SECONDS / period) + 2)
+        place = (time / period).astype(int)
+        begin, way = points[place], np.diff(points)[place]
+        q[j] = begin + way * (10.0 * turn**3 - 15.0 * turn**4 + 6.0 * turn**5)
+        v[j] = way * (30.0 * turn**2 - 60.0 * turn**3 + 30.0 * turn**4)
+        a[j] = way * (60.0 * turn - 180.0 * turn**2 + 120.0 * turn**3)
+        held[j] *= rng.uniform(-1.0, 1.0, len(points))[place]
+    torque = recorded_torque(model.robot, q, v, a, FRICTION) + held
+    torque += 0.005 * np.std(torque, axis=1, keepdims=True) * rng.standard_normal(torque.shape)
+    return recording(model.robot, "moves_1", time, q + noise * rng.standard_normal(q.shape), torque)
+
+
+def test_what_friction_holds_at_rest_does_not_narrow_the_band(model: TorqueModel):
+    found = choose_bands(model, prepare([moves(model, 100.0, (0.8, 0.8), 1e-5, 1.0)]))
+    assert min(found.bands) > 10.0
+    assert min(found.explained) > 0.99
+
+
+def test_a_calm_recording_does_not_narrow_the_band_of_a_lively_one(model: TorqueModel):
+    """At 1 kHz only the first is looked at; at the low rate, where the choice begins, both were."""
+    calm, lively = moves(model, 1000.0, (0.05, 0.05), 3e-4, 0.0), moves(model, 1000.0, (0.8, 0.8), 3e-4, 0.0)
+    lively = replace(lively, name="others_1", trajectory="others")
+    one, other = (choose_bands(model, prepare(items)).bands for items in ((calm, lively), (lively, calm)))
+    np.testing.assert_allclose(one, other, rtol=0.3)
