@@ -264,7 +264,11 @@ def _choose(
 ) -> tuple[Decision | None, dict[str, Decision], Scene]:
     """Refine the best families; return the best acceptable member that is sound, those better that are not, and its scene."""
     criteria = step.criteria
-    best = list(best_of_each(decisions).values())
+    # Families of one name each: which of them is better is seen once they are refined.
+    by_family: dict[Effect, list[Decision]] = {}
+    for item in decisions:
+        by_family.setdefault(item.candidate.effect, []).append(item)
+    best = [item for family in by_family.values() for item in best_of_each(family).values()]
     first = [item for item in best if item.candidate.effect.fitted_first]
     accepted = [item for item in best if item.accepted and not item.candidate.effect.fitted_first]
     found = _fitted(step, first, max((item.gain for item in accepted), default=0.0), known)

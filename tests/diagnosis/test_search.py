@@ -22,7 +22,7 @@ from scara_ident.diagnosis.search import (
     scene_of,
     search,
 )
-from scara_ident.effects import Member
+from scara_ident.effects import Coefficient, Effect, Member, NonlinearParameter
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
@@ -104,6 +104,44 @@ def test_what_is_sure_only_beside_its_grid_point_is_refined_before_it_is_refused
     assert found.accepted and found.candidate.member.nonlinear[0] == pytest.approx(0.43, rel=0.1)
     # Where something else removes much more it is not its turn.
     assert _sure_once_refined(strict, [refused], 2.0) == []
+
+
+class Bump(Effect):
+    """A torque at one place of the first joint, which is tried at a few only."""
+
+    name = "bump"
+    summary = "bump"
+    coefficients = (Coefficient("height", "N m", "height of a bump"),)
+    nonlinear = (NonlinearParameter("place", "rad", -1.0, 4.0, False),)
+
+    def members(self, scene):
+        return tuple(Member(0, (place,)) for place in (0.5, 1.0, 1.5, 2.0))
+
+    def signal_columns(self, signals, member):
+        return [np.exp(-(((signals.motion.q[0] - member.nonlinear[0]) / 0.3) ** 2))]
+
+
+class BumpAndSlope(Bump):
+    """Another shape of the same cause, which comes nearer between two places."""
+
+    coefficients = (*Bump.coefficients, Coefficient("slope", "N m", "slope of a bump"))
+
+    def signal_columns(self, signals, member):
+        off = (signals.motion.q[0] - member.nonlinear[0]) / 0.45
+        return [np.exp(-(off**2)), off * np.exp(-(off**2))]
+
+
+def test_of_families_of_one_name_the_one_is_taken_that_is_better_once_refined():
+    runs = with_torque(exact_runs(), 0, lambda motion: 0.2 * np.exp(-(((motion.q[0] - 1.15) / 0.3) ** 2)))
+    step = step_beside(runs)
+    first, second = (
+        max(step.judge([Candidate(family, item) for item in family.members(step.scene)]), key=lambda item: item.gain)
+        for family in (Bump(), BumpAndSlope())
+    )
+    assert first.gain < second.gain
+    (chosen,) = searched(runs, Bump(), BumpAndSlope()).chosen
+    assert chosen.effect == Bump()
+    assert chosen.member.nonlinear[0] == pytest.approx(1.15, abs=0.01)
 
 
 def test_a_delay_is_corrected_in_the_data():
