@@ -281,6 +281,10 @@ def _choose(
         enough = criteria.near_best * open_[0][1].examination.held_out
         leaders = [pair for pair in open_ if pair[1].examination.held_out >= enough][: criteria.most_refined]
         refined = step.refine([item for own, item in leaders if own is step])
+        sure = [item.candidate for item in refined if item.accepted]
+        refined += step.judge(
+            [replace(item, effect=full) for item in sure if (full := item.effect.in_full()) is not None]
+        )
         pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in leaders if pair[0] is not step]
         for own, decision in sorted(pairs, key=lambda pair: -pair[1].examination.held_out):
             why = _insignificant(own, decision.candidate) or noise_objection(own, decision)

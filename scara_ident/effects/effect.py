@@ -241,6 +241,10 @@ class Effect(ABC):
         """Return members of other families that have a member's columns on this robot, and that no scan need try."""
         return ()
 
+    def in_full(self) -> Effect | None:
+        """Return a family with more columns that may take its place once a member is to be believed; None without one."""
+        return None
+
     def band(self, member: Member) -> float:
         """Return the band, Hz, that holds where a member shows most; 0 where every band does."""
         return 0.0

@@ -62,12 +62,21 @@ class PayloadChange(Effect):
         return _too_heavy(scene, float(value[0]), float(std[0]))
 
 
+@dataclass(frozen=True)
 class FreePayloadChange(PayloadChange):
     """A body that the last link carries from some time in the run on, mounted anyhow.
 
     Its mass, first moments and inertia are columns as far as the torque shows them; what it shows of the mass beside
     other combinations decides whether a mass is reported.
+
+    Attributes
+    ----------
+    whole : bool
+        Whether all that the torque shows are columns, not only the few that tell most. What has so many imitates much: only
+        where the few are to be believed is the whole body tried in their place.
     """
+
+    whole: bool = False
 
     summary = "a payload of unknown mounting taken up or put down in the run"
 
@@ -80,23 +89,27 @@ class FreePayloadChange(PayloadChange):
         meaning = "{} of a payload in the frame of the last joint"
         return tuple(
             Column(f"payload_{name}", None, BODY_UNITS[k], meaning.format(name))
-            for k in _shown(scene.robot)
+            for k in self._told(scene.robot)
             for name in [BODY_PARAMETERS[k]]
         )
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque per standard parameter of the payload from then on."""
         robot = signals.scene.robot
-        columns = shared(
-            signals.motion,
-            "free payload",
-            lambda: tool_of(robot).columns(robot, signals.motion)[:, list(_shown(robot))],
-        )
+        columns = _body(signals)[:, list(self._told(robot))]
         return np.moveaxis(columns * _after(signals, member.nonlinear[0]), 1, 0)
+
+    def in_full(self) -> Effect | None:
+        """Return the family with all columns."""
+        return None if self.whole else replace(self, whole=True)
+
+    def essential(self, scene: Scene, member: Member) -> slice:
+        """Return the mass where the torque tells it, if all of the body is tried: see `PayloadOfRecordings.essential`."""
+        return slice(0, 1) if self.whole and self._told(scene.robot)[0] == 0 else slice(None)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where mass and inertia differ in sign, or an arm would carry more than it weighs."""
-        shown = _shown(scene.robot)
+        shown = self._told(scene.robot)
         # Masses and moments of inertia of one body are all positive, or all negative if it was taken away.
         signs = {
             float(np.sign(value[place]))
@@ -110,8 +123,12 @@ class FreePayloadChange(PayloadChange):
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return what the columns say, the mass under its own name."""
         found = super().parameters(scene, member, value, covariance).values()
-        names = ("mass" if k == 0 else BODY_PARAMETERS[k] for k in _shown(scene.robot))
+        names = ("mass" if k == 0 else BODY_PARAMETERS[k] for k in self._told(scene.robot))
         return dict(zip(names, found, strict=True))
+
+    def _told(self, robot: Robot) -> tuple[int, ...]:
+        """Return the standard parameters that are estimated."""
+        return _shown(robot, BODY_COLUMNS, BODY_COLUMN_SHARE) if self.whole else _shown(robot)
 
 
 @dataclass(frozen=True)
@@ -176,11 +193,7 @@ class PayloadOfRecordings(Effect):
             return np.zeros((len(shown), *signals.motion.q.shape))
         if self.at_tool:
             return [_at_tool(signals)]
-
-        def body() -> Array:
-            return tool_of(robot).columns(robot, signals.motion)[:, shown]
-
-        return np.moveaxis(shared(signals.motion, "payload body", body), 1, 0)
+        return np.moveaxis(_body(signals)[:, shown], 1, 0)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where the mass is negative, or more than the arm weighs."""
@@ -264,6 +277,12 @@ def _at_tool(signals: Signals) -> Array:
         return np.asarray(np.einsum("jkn,k->jn", tool.columns(robot, signals.motion), point_mass(tool.point)))
 
     return shared(signals.motion, "payload", make)
+
+
+def _body(signals: Signals) -> Array:
+    """Return the torque per standard parameter of a body on the last link, shape (n, 10, N)."""
+    robot = signals.scene.robot
+    return shared(signals.motion, "payload body", lambda: tool_of(robot).columns(robot, signals.motion))
 
 
 def _too_heavy(scene: Scene, mass: float, std: float) -> str | None:

@@ -77,6 +77,20 @@ def test_a_payload_mounted_anyhow_has_the_columns_that_its_torque_shows():
     assert found["mx"].unit == "kg m"
 
 
+def test_where_the_few_are_believed_all_columns_are_tried():
+    scene = scene_of(load_robot("ur5"))
+    few = FreePayloadChange()
+    full = few.in_full()
+    assert full is not None and full.in_full() is None
+    member = Member(None, (0.0,))
+    names, more = ([column.name for column in item.columns(scene, member)] for item in (few, full))
+    assert set(names) < set(more) and len(more) == 10
+    assert [column.name for column in full.columns(scene, member)[full.essential(scene, member)]] == ["payload_m"]
+    item = moving(scene.robot, 1.0)
+    place = [more.index(name) for name in names]
+    np.testing.assert_array_equal(columns(full, scene, item, member)[:, place], columns(few, scene, item, member))
+
+
 def made(robot: Robot, seed: int, name: str, mass: float, since: float = 0.0):
     rng = np.random.default_rng(seed)
     time = np.arange(6000) / 500.0

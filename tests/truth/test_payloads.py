@@ -59,3 +59,24 @@ def test_a_payload_is_found_by_torque_and_told_in_recordings_held_out():
         if after.name == "run_5":
             worst = before.by_joint[-1].rms(found.before.value)
             assert worst > 4.0 * best.by_joint[-1].rms(true)
+
+
+@pytest.mark.slow
+def test_of_a_body_taken_up_in_the_run_all_is_told_that_shows():
+    """Before, its inertia was no column, and what that left was `unexplained`."""
+    robot = load_robot("ur5")
+    carried = payload_torque(robot, PAYLOAD)
+
+    def taken_up(t, *state):
+        return carried(t, *state) * (t >= 5.0)
+
+    runs = [
+        formula_run(robot, f"run_{k}", [22, k], seconds=12.0, rate=100.0, bits=18, added=taken_up) for k in range(4)
+    ]
+    found = diagnose(robot, runs[:3], validation=runs[3:], catalogue=effects_named("payload_change"))
+    (effect,) = found.effects
+    assert effect.parameters["mass"].value == pytest.approx(PAYLOAD.mass, rel=0.01)
+    inertia = PAYLOAD.matrix()[3:, 3:]
+    seen = [effect.parameters[name].value for name in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")]
+    true = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+    assert np.max(np.abs(np.subtract(seen, true))) < 0.1 * np.max(true)
