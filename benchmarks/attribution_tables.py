@@ -82,10 +82,10 @@ def wrong(item: Item) -> list[str]:
 
 def detection_limit(items: Sequence[Item]) -> float:
     """Return the strength that splits found from missed with the fewest misjudged; NaN where none has one."""
-    known = [item for item in items if item.get("strength") is not None]
+    known = [item for item in items if _sizes(item)[0] is not None]
     if not known:
         return np.nan
-    sizes = np.array([item["strength"] for item in known])
+    sizes = np.array([_sizes(item)[0] for item in known])
     found = np.array([all(hits(item)) for item in known])
     cuts = np.concatenate([[0.0], np.sort(sizes)])
     errors = [np.sum(found[sizes <= cut]) + np.sum(~found[sizes > cut]) for cut in cuts]
@@ -125,17 +125,21 @@ def report(items: Sequence[Item]) -> None:
 
 def above_limit(item: Item, limits: dict[str, float]) -> bool:
     """Return whether every effect of a set is stronger than what its kind can be seen at, by single ones."""
-    if item["kind"] in SEVERAL:
-        names, sizes = [each["effect"] for each in item["true"]], item.get("strengths", [])
-    else:
-        names, sizes = [item["kind"]], [item.get("strength")]
-    return len(sizes) == len(names) and all(
+    names, sizes = [each["effect"] for each in item["true"]], _sizes(item)
+    return 0 < len(names) == len(sizes) and all(
         size is not None and size > limits.get(name, np.inf) for name, size in zip(names, sizes, strict=True)
     )
 
 
+def _sizes(item: Item) -> list[float | None]:
+    """Return the strength of each effect beside the others; of one alone, what the base model lacks where that is unknown."""
+    return item.get("strengths") or [item.get("strength")]
+
+
 def _by_effect(by_kind: dict[str, list[Item]], limits: dict[str, float]) -> None:
-    print("\nstrength: rms of what the effect adds over that of what the true model leaves")
+    print(
+        "\nstrength: rms of what the effect adds to the true model without it, over that of what the true model leaves"
+    )
     print(f"{'effect':28} sets right miss wrong tentative  limit  parameters, |error| in std: median, over 2")
     for kind, items in sorted(by_kind.items()):
         errors = [error for item in items if right(item) for error in effect_errors(item)]

@@ -62,9 +62,10 @@ def confounders(step: SelectionStep, decisions: Sequence[Decision], first: Scene
 def _confounders_of(
     step: SelectionStep, found: Candidate, pool: Sequence[Candidate], first: Scene
 ) -> tuple[Confounder, ...]:
-    # A rival is asked for once, not in every round of a search.
+    # A rival is asked for once, not in every round of a search, and need not be believed itself: how many others were tried
+    # says nothing of whether these two can be told apart.
     scene, criteria = step.scene, replace(step.criteria, family_error=step.criteria.significant)
-    step = replace(step, criteria=criteria)
+    step = replace(step, criteria=criteria, tried=1)
     own = step.judge([found])[0]
     twins = [Candidate(*twin) for twin in found.effect.same_columns(scene, found.member)]
     # Of all joints together: candidates of different joints are compared. Those that remove too little, most of them, need

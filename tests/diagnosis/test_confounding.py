@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,6 +51,14 @@ def test_a_spring_and_a_pendulum_are_one_on_a_small_range():
         ((name, others),) = groups(0.3, added).items()
         assert {name, *others} == {"spring of joint1", "pendulum of joint1"}
         assert all(abs(share - 1.0) < 0.05 for share in others.values())
+
+
+def test_a_rival_is_named_however_many_others_were_tried():
+    result = searched(with_torque(exact_runs(size=0.3), 0, spring), Spring(), Pendulum())
+    # So many that neither would be believed.
+    step = replace(result.step, tried=10**250)
+    ((rival,),) = confounders(step, result.decisions, result.first)
+    assert {result.chosen[0].label(result.scene), rival.label} == {"spring of joint1", "pendulum of joint1"}
 
 
 def test_on_a_large_range_each_stands_alone():
