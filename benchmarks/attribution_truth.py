@@ -168,7 +168,7 @@ def _of(effect: Any, name: str) -> Any:
 def _late(made: VirtualSet) -> float:
     """Return by how much the training recordings are late on average, by an effect and by what runs differ by, s."""
     delays = [effect.as_dict()["parameters"]["delay"] for effect in made.effects if effect.name == "time_delay"]
-    return sum(delays) + float(np.mean([state.delay for state in made.states[: len(made.training)]]))
+    return float(sum(delays) + np.mean([state.delay for state in made.states[: len(made.training)]]))
 
 
 def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, Any] | None:

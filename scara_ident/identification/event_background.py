@@ -19,11 +19,19 @@ SLOWER = (0.03, 0.08, 0.2)
 MOST_FEATURES, LEAST_GAIN, HARM, INFLUENCE = 6, 0.02, 0.5, 10.0
 # A trend is fitted to one of so many bins, of which there are so many for each of its columns, in so many rounds.
 THIN, LEAST_BINS, ROUNDS = 2, 10, 7
+# Starts of that fit, and standard deviations at which Tukey's loss gives up when it chooses among what they end in: half of all may
+# be off (Rousseeuw and Yohai 1984).
+STARTS, HALF = 12, 1.548
 # Seconds of a recording below which its trend is an offset alone.
 LONG_ENOUGH = 10.0
 # What depends on the state is told by what is seen in other parts of about so long, s, than an event's own: hardly any event
 # reaches beyond one of them and those beside it.
 PART = 3.0
+
+
+def without_background(stretches: Sequence[Binned]) -> list[Binned]:
+    """Take off what the motion makes, and what a run has all along."""
+    return without_trends(without_states(stretches))
 
 
 def without_trends(stretches: Sequence[Binned]) -> list[Binned]:
@@ -59,19 +67,44 @@ def _robust_trend(rows: Sequence[Array], left: Sequence[Array], known: Sequence[
     together = together / size
     if np.sum(use) < LEAST_BINS * len(together):
         return [np.zeros_like(item) for item in left]
-    # Begun by least squares: of a run that hardly ever turns back, that is not what stands out.
-    weight = use
+    # Begun by least squares of all, which holds what is so in a run's single turn back, and of all but each of some stretches,
+    # so that what happens in one of them alone is seen not to be a trend: of all that these end in, what leaves least.
+    weight = use * np.concatenate([np.ones((1, len(use))), _but_one(len(use))])
     for _ in range(ROUNDS):
-        weighted = together * weight
-        normal = weighted @ together.T
-        normal += 1e-6 * np.trace(normal) / len(normal) * np.eye(len(normal)) + 1e-300
-        value = np.linalg.solve(normal, weighted @ target)
+        value = _solved(together, weight, target)
         off = target - value @ together
-        scale = NORMAL * median(np.abs(off[use > 0.0]))
-        if scale == 0.0:
+        scale = NORMAL * np.array([median(row) for row in np.abs(off[:, use > 0.0])])
+        if np.any(scale == 0.0):
             break
-        weight = use * np.maximum(0.0, 1.0 - (off / (4.0 * scale)) ** 2) ** 2
+        weight = use * np.maximum(0.0, 1.0 - (off / (4.0 * scale[:, None])) ** 2) ** 2
+    value = value[_least(off[:, use > 0.0], float(np.min(scale)))]
     return np.split((value / size[:, 0]) @ whole, np.cumsum([len(item) for item in left])[:-1])
+
+
+def _but_one(count: int) -> Array:
+    """Return weights of so many bins that leave out one stretch each, of two neighbours' length, shape (`STARTS` - 1, count)."""
+    bounds = np.linspace(0, count, STARTS + 1).astype(int)
+    found = np.ones((STARTS - 1, count))
+    for row, begin, end in zip(found, bounds[:-2], bounds[2:], strict=True):
+        row[begin:end] = 0.0
+    return found
+
+
+def _solved(columns: Array, weight: Array, target: Array) -> Array:
+    """Return weighted least squares of columns (k, M), one for each of some weights (s, M), shape (s, k)."""
+    weighted = weight[:, None] * columns
+    normal = weighted @ columns.T
+    ridge = 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] / len(columns)
+    normal += ridge * np.eye(len(columns)) + 1e-300
+    return np.asarray(np.linalg.solve(normal, (weighted @ target)[:, :, None])[:, :, 0])
+
+
+def _least(off: Array, scale: float) -> int:
+    """Return which of some residuals (s, M) Tukey's loss makes least."""
+    if scale == 0.0:
+        return int(np.argmin(np.sum(off**2, axis=1)))
+    inside = np.maximum(0.0, 1.0 - (off / (HALF * scale)) ** 2) ** 3
+    return int(np.argmax(np.sum(inside, axis=1)))
 
 
 def without_states(stretches: Sequence[Binned]) -> list[Binned]:

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array, median
 from scara_ident.estimation.tail import HOUR, Tail, tail_of
 from scara_ident.identification.binned_residual import BOUND, FILLED, NORMAL, Binned
-from scara_ident.identification.event_background import without_states, without_trends
 from scara_ident.identification.event_ends import Ends, event_ends
 
 # Lengths of the windows, s.
@@ -91,7 +90,7 @@ def standing_out(
     Parameters
     ----------
     stretches : sequence of Binned
-        Of all recordings, of parameters that no event has steered.
+        Of all recordings, of parameters that no event has steered, less their background.
     fitted : callable
         Returns the same of least squares: what that explains is a state of motion that the robust fit took for an outlier.
         Asked only where something stands out.
@@ -99,10 +98,8 @@ def standing_out(
         Returns what an event from a bin to before another would leave in every bin, N m or N, shape (n, M); None where nobody
         can say. It helps to find the ends.
     """
-    places = [k for k, item in enumerate(stretches) if item.taken.shape[1] > 1]
-    if not places:
+    if not stretches:
         return []
-    stretches = without_trends(without_states([stretches[k] for k in places]))
     scores = _scores(stretches)
     shown_by = [k for k, score in enumerate(scores) if any(np.any(part > 1.0) for _, part in score)]
     if not shown_by:
@@ -115,7 +112,7 @@ def standing_out(
         own = _bin_noise([other for other in stretches if other.recording == item.recording])
         sigma = np.maximum(everywhere, own)
         for segment in _segments(item, scores[k], sigma, slow, shape):
-            size, before = _sizes(item, original[places[k]], segment)
+            size, before = _sizes(item, original[k], segment)
             large = (size > LEAST_SIZE * sigma) & (before > LEAST_BEFORE * size)
             shown = large & (segment.score >= 1.0)
             if np.any(shown) and _local(segment) and not _novel(segment, stretches, shown):

@@ -13,7 +13,8 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.information import LEAST_NOISE
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.identification.binned_residual import Binned, binned, bounded_noise
+from scara_ident.identification.binned_residual import BIN, Binned, binned, bounded_noise
+from scara_ident.identification.event_background import without_background
 from scara_ident.identification.event_search import Segment, standing_out
 from scara_ident.identification.usable import check_rows
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
@@ -158,11 +159,13 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
         least = _residuals(observations, weighted_value(observations.by_joint))[1]
         return [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, least, strict=True)]
 
+    # Of the motion's doing no more than what is left of it can repeat.
+    clean = without_background(stretches)
     whole = {id(part): row for part, row in zip(parts, left, strict=True)}
     found = [
         _event(robot, data, item, whole[id(item.binned.part)], held_out=fitted is not None)
-        for item in standing_out(stretches, plain, lambda *event: _of_tool_force(robot, *event))
-        if item.binned.recording < len(data.recordings) and not _repeated(item, stretches, data)
+        for item in standing_out(clean, plain, lambda *event: _of_tool_force(robot, *event))
+        if item.binned.recording < len(data.recordings) and not _repeated(item, clean, data)
     ]
     if found:
         # Of an exact fit only rounding is left, which may stand out from itself.
@@ -172,12 +175,16 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
 
 
 def _residuals(observations: Observations, value: Array) -> tuple[list[PreparedStretch], list[Array], list[int]]:
-    """Return the stretches that are long enough, their residual (n, N), not filtered, and the place of their recording."""
+    """Return the stretches of two bins at the least, their residual (n, N), not filtered, and the place of their recording."""
     data = observations.data
     places = [k for k, item in enumerate(data.recordings) for _ in item.stretches]
     found = zip(data.stretches, observations.predicted(value), places, strict=True)
-    usable = [(part, part.torque - predicted, k) for part, predicted, k in found if part.usable]
+    usable = [(part, part.torque - predicted, k) for part, predicted, k in found if _long(part)]
     return [part for part, _, _ in usable], [left for _, left, _ in usable], [k for _, _, k in usable]
+
+
+def _long(part: PreparedStretch) -> bool:
+    return part.usable and part.samples > 2.0 * BIN * part.rate + 1.0
 
 
 def data_place(data: PreparedData, name: str) -> int:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from scara_ident.identification.binned_residual import binned, bounded_noise
+from scara_ident.identification.event_background import without_background
 from scara_ident.identification.event_search import Segment, standing_out
 from scara_ident.motion.prepared import PreparedStretch, prepare
 from scara_ident.robot.robot import load_robot
@@ -23,7 +24,7 @@ def searched(left: list[np.ndarray]) -> list[Segment]:
     parts = [with_more(part, row) for part, row in zip(STRETCHES, left, strict=True)]
     noise = bounded_noise(parts, left, range(len(parts)))
     stretches = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
-    return standing_out(stretches, lambda: stretches)
+    return standing_out(without_background(stretches), lambda: stretches)
 
 
 def with_more(part: PreparedStretch, torque: np.ndarray) -> PreparedStretch:
@@ -85,7 +86,7 @@ def test_least_squares_is_asked_for_only_where_something_stands_out():
     parts, left = [with_more(part, row) for part, row in zip(STRETCHES, white(5), strict=True)], white(5)
     noise = bounded_noise(parts, left, range(len(parts)))
     quiet = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
-    assert standing_out(quiet, lambda: pytest.fail("nothing stands out")) == []
+    assert standing_out(without_background(quiet), lambda: pytest.fail("nothing stands out")) == []
 
 
 def test_what_depends_on_the_motion_is_no_event():
@@ -106,9 +107,9 @@ def test_what_stands_out_in_a_state_that_the_arm_is_in_once_is_no_event_unless_i
         parts = [with_more(part, row) for part, row in zip(STRETCHES, left, strict=True)]
         noise = bounded_noise(parts, left, range(len(parts)))
         usual = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
-        assert len(standing_out(usual, lambda own=usual: own)) == 1
+        assert len(standing_out(without_background(usual), lambda own=usual: own)) == 1
         # The torque is as large as usual, and at no other time against such a speed.
         *motion, torque = usual[2].state
         against = np.where((np.arange(torque.shape[1]) >= 175) & (np.arange(torque.shape[1]) < 200), -torque, torque)
         once = [*usual[:2], replace(usual[2], state=(*motion, against)), usual[3]]
-        assert len(standing_out(once, lambda own=once: own)) == found
+        assert len(standing_out(without_background(once), lambda own=once: own)) == found
