@@ -13,7 +13,7 @@ from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.motion import Motion
-from scara_ident.motion.position_noise import noisier, swings, unresolved_joints
+from scara_ident.motion.position_noise import noisier, unresolved_joints
 from scara_ident.motion.prepared import PreparedStretch
 from scara_ident.processes import halved
 
@@ -91,11 +91,6 @@ class CandidateColumns:
     def unresolved(self) -> dict[int, str]:
         """Joints of which nothing is to be believed, and why, see `unresolved_joints`."""
         return unresolved_joints(self.observations.data)
-
-    @cached_property
-    def swings(self) -> dict[int, float]:
-        """Torque by which joints swing beyond their bands, see `position_noise.swings`."""
-        return swings(self.observations.data)
 
     def unresolved_for(self, joint: int | None) -> str | None:
         """Say why nothing is to be believed of a joint; of the whole arm, for None, where that is so of all joints."""

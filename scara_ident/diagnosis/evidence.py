@@ -17,7 +17,6 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.cluster_test import needed
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
-from scara_ident.diagnosis.noise_check import hidden_by_swings
 from scara_ident.diagnosis.search import Search
 from scara_ident.effects import Parameter
 from scara_ident.estimation import Estimate
@@ -80,12 +79,7 @@ def evidence(
     limits = detection_limits(found, criteria)
     coloured = coloured_shares(residuals)
     repeated = {item.joint: item for item in fit}
-    hidden = {
-        joint: f"its torque swings so much beyond the band that friction may make of that {share:.0%} of what is left"
-        for joint, share in hidden_by_swings(found.step).items()
-        if share > criteria.least_power
-    }
-    unresolved = hidden | found.step.columns.unresolved
+    unresolved = found.step.columns.unresolved
     return tuple(
         Evidence(joint, False, "", unresolved[j], float(limits[j]))
         if j in unresolved

@@ -10,10 +10,6 @@ from scara_ident.diagnosis.candidate_tests import Examination, coefficients
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.selection_step import SelectionStep
 
-# Of a torque that swings beyond the band, friction and losses of the gear make up to so much within it: twice what was seen
-# on virtual arms that tremble by their encoders.
-RECTIFIED = 0.01
-
 
 def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     """Say so where an effect is no longer to be believed once the share of the positions' noise is taken from it.
@@ -32,9 +28,6 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     unresolved = step.columns.unresolved_for(decision.candidate.member.joint)
     if unresolved is not None:
         return unresolved
-    trembling = _trembling(step, decision)
-    if trembling is not None:
-        return trembling
     (own,) = step.noisier.columns.rows(step.noisier.scene, [decision.candidate])
     left = without_noise(found, *coefficients(step.noisier.model, own, criteria))
     share = float(left @ found.products @ left) / float(found.value @ found.products @ found.value)
@@ -45,35 +38,6 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     if p_value * step.tried <= criteria.family_error and decision.gain * share >= criteria.least_gain:
         return None
     return f"the noise of the positions makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
-
-
-def _trembling(step: SelectionStep, decision: Decision) -> str | None:
-    """Say so where an effect is so small beside what its joint swings by that the swinging may have made it."""
-    joint = decision.candidate.member.joint
-    if joint is None or joint not in step.columns.swings:
-        return None
-    share = float(np.sqrt(decision.examination.contribution)) / _of_swings(step)[joint]
-    if share >= RECTIFIED:
-        return None
-    return (
-        f"the torque swings by {step.columns.swings[joint]:.2g} (N m or N) beyond the band, more than it changes within, and "
-        f"friction makes of that as much as this is: {share:.1%} of it; find what shakes the arm"
-    )
-
-
-def hidden_by_swings(step: SelectionStep) -> dict[int, float]:
-    """Return the share of a joint's squared residual that swinging beyond the band may have made, of joints that swing so."""
-    left = {joint: float(np.linalg.norm(step.model.residual[joint])) for joint in step.columns.swings}
-    return {j: min(1.0, (RECTIFIED * of / left[j]) ** 2) if left[j] else 1.0 for j, of in _of_swings(step).items()}
-
-
-def _of_swings(step: SelectionStep) -> dict[int, float]:
-    """Return the root of the weighted sum of squares that the swings of joints would have as rows."""
-    model = step.model
-    return {
-        joint: float(swing * model.weights[joint] * np.sqrt(model.joints[joint].samples))
-        for joint, swing in step.columns.swings.items()
-    }
 
 
 def without_noise(found: Examination, value: Array, products: Array) -> Array:

@@ -142,39 +142,24 @@ def unresolved_joints(data: PreparedData) -> dict[int, str]:
     return found
 
 
-def swings(data: PreparedData) -> dict[int, float]:
-    """Return the rms torque, N m or N, by which joints swing beyond their bands, of those that change by less within.
-
-    Coarse encoders make arms tremble so: the position hardly shows it, as its steps are larger.
-    """
-    parts = [(part.stretch.torque, part.rate) for part in data.stretches if part.stretch.torque is not None]
-    found = {}
-    for joint, band in enumerate(data.bands if parts else ()):
-        sides = [_both_sides(torque[joint], rate, min(band or np.inf, WIDE * rate)) for torque, rate in parts]
-        change, swing = (np.concatenate(side) for side in zip(*sides, strict=True))
-        if swing @ swing > change @ change:
-            found[joint] = float(np.sqrt(np.mean(swing**2)))
-    return found
-
-
 def _shaking(data: PreparedData) -> str | None:
     """Name a joint whose torque swings more beyond any band than it changes within, and its position with it."""
     parts = [(part.stretch, part.stretch.torque) for part in data.stretches if part.stretch.torque is not None]
     for joint, name in enumerate(data.recordings[0].recording.joints if parts else ()):
-        sides = [_both_sides(torque[joint], part.rate, WIDE * part.rate) for part, torque in parts]
+        sides = [_both_sides(torque[joint], part.rate) for part, torque in parts]
         change, swing = (sum(float(own @ own) for own in side) for side in zip(*sides, strict=True))
         if swing <= change:
             continue
-        with_it = [_both_sides(np.diff(part.position[joint], 2), part.rate, WIDE * part.rate)[1] for part, _ in parts]
+        with_it = [_both_sides(np.diff(part.position[joint], 2), part.rate)[1] for part, _ in parts]
         both = sum(float(a @ b[1:-1]) for a, (_, b) in zip(with_it, sides, strict=True))
         if abs(both) > ALIKE * np.sqrt(swing * sum(float(own @ own) for own in with_it)):
             return f"the torque of {name} swings more beyond {WIDE * parts[0][0].rate:.3g} Hz than it changes below"
     return None
 
 
-def _both_sides(signal: Array, rate: float, band: float) -> tuple[Array, Array]:
-    """Return how a signal, shape (N,), changes within a band, and what is beyond it."""
-    within = low_pass(signal, rate, band)
+def _both_sides(signal: Array, rate: float) -> tuple[Array, Array]:
+    """Return how a signal, shape (N,), changes within the widest band, and what is beyond it."""
+    within = low_pass(signal, rate, WIDE * rate)
     return within - np.mean(within), signal - within
 
 

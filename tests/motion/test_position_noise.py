@@ -16,7 +16,6 @@ from scara_ident.motion.position_noise import (
     encoder_step,
     noise_level,
     noisier,
-    swings,
     unresolved_joints,
 )
 from scara_ident.motion.prepared import prepare
@@ -118,16 +117,6 @@ def test_a_joint_that_shakes_beyond_the_rate_is_not_resolved(swing: float, share
         if count
     ]
     assert set(unresolved_joints(prepare(runs, (25.0, 25.0)))) == ({0} if unresolved else set())
-
-
-@pytest.mark.parametrize(("size", "found"), [(3.0, True), (0.3, False)])
-def test_what_swings_beyond_the_band_by_more_than_it_changes_within_is_told(size: float, found: bool):
-    slow, fast = np.sin(2.0 * np.pi * 1.0 * TIME), size * np.sin(2.0 * np.pi * 40.0 * TIME)
-    run = recording(load_robot(), "A_1", TIME, SMOOTH, np.vstack([slow + fast, slow]))
-    expected = {0: pytest.approx(size / np.sqrt(2.0), rel=0.02)} if found else {}
-    assert swings(prepare([run], (10.0, 10.0))) == expected
-    # Within a band that holds both nothing is beyond.
-    assert swings(prepare([run], (80.0, 80.0))) == {}
 
 
 @pytest.mark.parametrize(("swing", "noise", "shaken"), [(3.0, 0.0, True), (0.3, 0.0, False), (0.0, 3.0, False)])
