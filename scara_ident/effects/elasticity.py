@@ -27,6 +27,8 @@ LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 2.0, 200.0
 DAMPING = 0.2
 # Damping ratios that the fit may reach: below it swings for longer than a move, above it does not swing.
 LOWEST_DAMPING, HIGHEST_DAMPING = 0.02, 0.7
+# Of the highest, at which a fit has gone as far as it may.
+ALL_BUT_DAMPED = 0.999
 # A resonance is told from a softer gear by what is above it: the band reaches so many times its frequency.
 BOTH_SIDES = 1.5
 # Clearances tried, rad or m at the joint: three times apart, which refinement bridges.
@@ -110,10 +112,13 @@ class JointElasticity(BehindGear):
         return TwoMasses(signals, member.place, *member.nonlinear).slopes()
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Say so where a spring does not pull back, or would swing slower than is seen."""
+        """Say so where a spring does not pull back, would swing slower than is seen, or does not swing at all."""
         wrong = super().inadmissible(scene, member, value, std)
         if wrong is not None:
             return wrong
+        frequency, ratio = member.nonlinear
+        if frequency < scene.band and ratio >= ALL_BUT_DAMPED * HIGHEST_DAMPING:
+            return f"within the band no resonance is seen at {frequency:.2g} Hz: what is damped so lags as a delay does"
         usual = usual_link_inertia(scene, member.place)
         least = value[0] - DOUBT_STDS * std[0]
         if usual > 0.0 and least > 0.0:

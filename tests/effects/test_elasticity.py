@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,5 +62,10 @@ def test_what_no_gear_can_have_is_refused():
     )
     assert "Hz" in str(JointElasticity().inadmissible(scene, Member(0, (30.0, 0.3)), np.array([1e-2]), std))
     assert JointElasticity().inadmissible(scene, Member(0, (30.0, 0.3)), np.array([1.2e-5]), std) is None
+    # Damped as far as a fit may go it has no resonance, where that would be seen.
+    wide, soft = replace(scene, band=60.0), np.array([1.2e-5])
+    assert "resonance" in str(JointElasticity().inadmissible(wide, Member(0, (30.0, 0.7)), soft, std))
+    assert JointElasticity().inadmissible(wide, Member(0, (30.0, 0.3)), soft, std) is None
+    assert JointElasticity().inadmissible(replace(scene, band=20.0), Member(0, (30.0, 0.7)), soft, std) is None
     assert "negative" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([-1e-4]), std))
     assert "rattle" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.2]), std))
