@@ -175,14 +175,16 @@ def search(
     without : collection of str, optional
         Labels of candidates that are not to be tried.
     known : Search, optional
-        An earlier one in other bands, where fits of tied effects may begin.
+        An earlier one in other bands, where fits may begin.
     """
     criteria = task.criteria
     observations = uncorrected = columns.observations
     start = wls(observations)
     first = scene = scene_of(task.model, start.value, observations)
     everything = [Candidate(effect, member) for effect in task.catalogue for member in effect.members(scene)]
-    candidates = [item for item in everything if item.label(scene) not in without]
+    # What was found in other bands may lie between the points that are tried, and show itself at none of them in these.
+    everything += [] if known is None else [item for item in known.chosen if not item.effect.fitted_first]
+    candidates = [item for item in dict.fromkeys(everything) if item.label(scene) not in without]
     if columns.unresolved_for(None) is not None:
         candidates = []
     tried = max(1, len(candidates))

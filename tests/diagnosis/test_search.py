@@ -28,6 +28,7 @@ from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
 from scara_ident.estimation import wls
 from tests.diagnosis.made import (
+    BANDS,
     complete,
     exact_runs,
     fitted,
@@ -142,6 +143,25 @@ def test_of_families_of_one_name_the_one_is_taken_that_is_better_once_refined():
     (chosen,) = searched(runs, Bump(), BumpAndSlope()).chosen
     assert chosen.effect == Bump()
     assert chosen.member.nonlinear[0] == pytest.approx(1.15, abs=0.01)
+
+
+class FarBump(Bump):
+    """One that is tried where it does not show."""
+
+    def members(self, scene):
+        return (Member(0, (3.3,)),)
+
+
+def test_what_another_search_found_between_the_points_is_tried_where_it_was_found():
+    runs = with_torque(exact_runs(), 0, lambda motion: 0.2 * np.exp(-(((motion.q[0] - 1.15) / 0.3) ** 2)))
+    missed = searched(runs, FarBump())
+    assert missed.chosen == ()
+    found = Candidate(FarBump(), Member(0, (1.13,)))
+    known = replace(missed, step=replace(missed.step, chosen=(found,)))
+    task, columns = SearchTask(complete(), (FarBump(),)), CandidateColumns(observed(runs, BANDS))
+    (chosen,) = search(task, columns, known=known).chosen
+    assert chosen.member.nonlinear[0] == pytest.approx(1.15, abs=0.01)
+    assert search(task, columns, without=[found.label(missed.scene)], known=known).chosen == ()
 
 
 def test_a_delay_is_corrected_in_the_data():
