@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from scara_ident.cli import options
 from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings, writing
+
+if TYPE_CHECKING:
+    from scara_ident.recording.recording import Recording
 
 
 def _known(names: str | None) -> str | None:
@@ -49,25 +52,32 @@ def diagnose(
     verbose: options.Verbose = False,
 ) -> None:
     """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
-    from scara_ident.diagnosis import diagnose as run
-    from scara_ident.effects import effects_named
-    from scara_ident.export.identified_model import identified_model
-    from scara_ident.files import write_json, write_text
-    from scara_ident.processes import beside
+    from scara_ident.cli.startup import read_beside
     from scara_ident.recording.recording import read_usable
-    from scara_ident.report.diagnosis import diagnosis_dict
-    from scara_ident.report.diagnosis_markdown import diagnosis_markdown
-    from scara_ident.report.told.diagnosis import tables
-    from scara_ident.report.use import worth_dict
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "diagnosis")
     arm = load_robot(robot)
     with progress() as work:
         work("reading the recordings")
-        training, useless = read_usable([*recordings, *(unloaded or ())], arm)
-        bare, _ = read_usable(unloaded or (), arm, needed=False)
-        held_out, more = read_usable(validate or (), arm, needed=False)
+        words = (*recordings, *(unloaded or ())), unloaded or (), validate or ()
+
+        def read() -> list[tuple[tuple[Recording, ...], list[str]]]:
+            return [read_usable(some, arm, needed=some is words[0]) for some in words]
+
+        with read_beside(read, [word for some in words for word in some]) as told:
+            from scara_ident.diagnosis import diagnose as run
+            from scara_ident.effects import effects_named
+            from scara_ident.export.identified_model import identified_model
+            from scara_ident.files import write_json, write_text
+            from scara_ident.processes import beside
+            from scara_ident.report.diagnosis import diagnosis_dict
+            from scara_ident.report.diagnosis_markdown import diagnosis_markdown
+            from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
+            from scara_ident.report.told.diagnosis import tables
+            from scara_ident.report.use import worth_dict
+
+            (training, useless), (bare, _), (held_out, more) = told()
         result = run(
             arm,
             training,
@@ -79,8 +89,6 @@ def diagnose(
             progress=work.part(READING_SHARE, 1.0),
         )
         if output is not None:
-            from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
-
             # What it holds is made once, for what is printed and for all files.
             context = DiagnosisContext(result)
             if result.effects:
