@@ -97,7 +97,7 @@ def diagnose(
                 with beside(lambda: worth_dict(identified_model(result))) as told:
                     import_module("matplotlib.figure")
                     context = DiagnosisContext(result, told)
-                    context.make_pictured()
+                    context.make_ready()
                     _ = context.worth
     content = diagnosis_dict(result) if output is None else context.content
     console = result_console(content, json)
