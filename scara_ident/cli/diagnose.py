@@ -74,9 +74,12 @@ def diagnose(
             from scara_ident.report.diagnosis import diagnosis_dict
             from scara_ident.report.diagnosis_markdown import diagnosis_markdown
             from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
+            from scara_ident.report.html.page import page_template
             from scara_ident.report.told.diagnosis import tables
             from scara_ident.report.use import worth_dict
 
+            if output is not None:
+                _ = page_template()
             (training, useless), (bare, _), (held_out, more) = told()
         result = run(
             arm,
