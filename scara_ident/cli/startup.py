@@ -17,7 +17,7 @@ T = TypeVar("T")
 UNUSED = ("f2py", "testing", "ctypeslib")
 # New containers after which Python looks for some that refer to each other alone. At its usual 700 all that has been loaded is
 # gone through while the rest is loaded.
-CONTAINERS = 100_000
+CONTAINERS = 10_000
 # What all work on recordings loads sooner or later.
 LATER = ("scipy.fft", "scipy.linalg", "scipy.special")
 # Bytes of files that another process reads: what it read of more takes longer to be sent, and memory twice.
@@ -33,8 +33,8 @@ def begin_soon() -> None:
 
     for name in UNUSED:
         whole = f"{np.__name__}.{name}"
-        spec = find_spec(whole)
-        if whole not in sys.modules and spec is not None and spec.loader is not None:
+        spec = None if whole in sys.modules else find_spec(whole)
+        if spec is not None and spec.loader is not None:
             # It is loaded when something of it is asked for.
             spec.loader = LazyLoader(spec.loader)
             sys.modules[whole] = module = module_from_spec(spec)
@@ -43,20 +43,21 @@ def begin_soon() -> None:
 
 
 @contextmanager
-def read_beside(read: Callable[[], T], words: Sequence[Path | str]) -> Iterator[Callable[[], T]]:
+def read_beside(read: Callable[[], T], words: Sequence[Sequence[Path | str]]) -> Iterator[Callable[[], T]]:
     """Read recordings in another process while what works on them is loaded; yields what waits for them.
 
     Parameters
     ----------
     read : callable
-    words : sequence of path or str
-        Which recordings it reads; many or long ones it reads here, when they are waited for.
+    words : sequence of sequence of path or str
+        Which recordings it reads, as they are given to `read_usable`; many or long ones it reads here, when they are waited for.
     """
     from scara_ident.processes import beside
     from scara_ident.recording.paths import recording_paths
 
-    sizes = (path.stat().st_size for path in recording_paths(words) if path.is_file())
-    if sum(sizes) > SMALL:
+    size = sum(path.stat().st_size for some in words for path in recording_paths(some) if path.is_file())
+    # Polars in a process that is forked from one that used it waits for threads that are not there.
+    if size > SMALL or "polars" in sys.modules:
         yield read
         return
     with beside(read) as told:
