@@ -65,7 +65,7 @@ def diagnose(
         def read() -> list[tuple[tuple[Recording, ...], list[str]]]:
             return [read_usable(some, arm, needed=some is words[0]) for some in words]
 
-        with read_beside(read, words) as told:
+        with read_beside(read, words) as wanted:
             from scara_ident.diagnosis import diagnose as run
             from scara_ident.effects import effects_named
             from scara_ident.export.identified_model import identified_model
@@ -80,7 +80,7 @@ def diagnose(
 
             if output is not None:
                 _ = page_template()
-            (training, useless), (bare, _), (held_out, more) = told()
+            (training, useless), (bare, _), (held_out, more) = wanted()
         result = run(
             arm,
             training,
