@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from scara_ident.cli import options
 from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, show_recordings, writing
-
-if TYPE_CHECKING:
-    from scara_ident.recording.recording import Recording
 
 
 def _known(names: str | None) -> str | None:
@@ -53,19 +50,13 @@ def diagnose(
 ) -> None:
     """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
     from scara_ident.cli.startup import read_beside
-    from scara_ident.recording.recording import read_usable
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "diagnosis")
     arm = load_robot(robot)
     with progress() as work:
         work("reading the recordings")
-        words = (*recordings, *(unloaded or ())), unloaded or (), validate or ()
-
-        def read() -> list[tuple[tuple[Recording, ...], list[str]]]:
-            return [read_usable(some, arm, needed=some is words[0]) for some in words]
-
-        with read_beside(read, words) as wanted:
+        with read_beside(arm, (*recordings, *(unloaded or ())), unloaded or (), validate or ()) as wanted:
             from scara_ident.diagnosis import diagnose as run
             from scara_ident.effects import effects_named
             from scara_ident.export.identified_model import identified_model

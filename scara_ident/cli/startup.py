@@ -10,9 +10,15 @@ from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import LazyLoader, find_spec, module_from_spec
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeAlias
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from scara_ident.recording.recording import Recording
+    from scara_ident.robot.robot import Robot
+
+Words: TypeAlias = Sequence[Path | str]
+# What `read_usable` returns.
+Usable: TypeAlias = "tuple[tuple[Recording, ...], list[str]]"
 # Parts of NumPy that SciPy asks for as it is loaded, whatever it needs of them: a tenth of a second.
 UNUSED = ("f2py", "testing", "ctypeslib")
 # New containers after which Python looks for some that refer to each other alone. At its usual 700 all that has been loaded is
@@ -43,21 +49,29 @@ def begin_soon() -> None:
 
 
 @contextmanager
-def read_beside(read: Callable[[], T], words: Sequence[Sequence[Path | str]]) -> Iterator[Callable[[], T]]:
+def read_beside(arm: Robot, needed: Words, *others: Words) -> Iterator[Callable[[], list[Usable]]]:
     """Read recordings in another process while what works on them is loaded; yields what waits for them.
+
+    Many or long ones are read here, when they are waited for.
 
     Parameters
     ----------
-    read : callable
-    words : sequence of sequence of path or str
-        Which recordings it reads, as they are given to `read_usable`; many or long ones it reads here, when they are waited for.
+    arm : Robot
+    needed : sequence of path or str
+        At least one of them has to be usable, see `read_usable`.
+    *others : sequence of path or str
+        None of them has.
     """
     from scara_ident.processes import beside
     from scara_ident.recording.paths import recording_paths
+    from scara_ident.recording.recording import read_usable
 
-    size = sum(path.stat().st_size for some in words for path in recording_paths(some) if path.is_file())
+    def read() -> list[Usable]:
+        return [read_usable(needed, arm), *(read_usable(words, arm, needed=False) for words in others)]
+
+    paths = (path for words in (needed, *others) for path in recording_paths(words))
     # Polars in a process that is forked from one that used it waits for threads that are not there.
-    if size > SMALL or "polars" in sys.modules:
+    if "polars" in sys.modules or sum(path.stat().st_size for path in paths if path.is_file()) > SMALL:
         yield read
         return
     with beside(read) as told:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,8 @@ import pytest
 from scara_ident.cli import startup
 from scara_ident.cli.startup import read_beside
 from scara_ident.errors import RecordingError
+from scara_ident.recording import recording
+from scara_ident.robot.robot import Robot, load_robot
 from tests.shared import ROOT
 
 
@@ -49,34 +52,45 @@ with one_blas_thread():
     assert printed(program) == ["False", "{1}"]
 
 
-@pytest.fixture
+ARM = load_robot()
+
+
+def where(words: Sequence[Path | str], arm: Robot, *, needed: bool = True) -> tuple[int, bool]:
+    """Stands for reading: where it is done, and whether it has to give a recording."""
+    return os.getpid(), needed
+
+
+@pytest.fixture(autouse=True)
 def without_polars(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, "polars", raising=False)
 
 
-@pytest.mark.usefixtures("without_polars")
 def test_small_recordings_are_read_in_another_process_and_large_ones_here(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(recording, "read_usable", where)
     path = tmp_path / "OJK_1.csv"
     path.write_text("time\n0\n", encoding="utf-8")
-    with read_beside(os.getpid, [[path], [], [str(tmp_path)]]) as told:
-        assert told() != os.getpid()
+    with read_beside(ARM, [path], [], [str(tmp_path)]) as wanted:
+        (there, *flags), *others = wanted()
+    assert (flags, [needed for _, needed in others]) == ([True], [False, False])
+    assert {there} == {process for process, _ in others} != {os.getpid()}
     monkeypatch.setattr(startup, "SMALL", 6)
-    with read_beside(os.getpid, [[path]]) as told:
-        assert told() == os.getpid()
+    with read_beside(ARM, [path]) as wanted:
+        assert wanted() == [(os.getpid(), True)]
 
 
 def test_what_has_threads_that_a_fork_would_lack_reads_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recording, "read_usable", where)
     monkeypatch.setitem(sys.modules, "polars", sys)
-    with read_beside(os.getpid, []) as told:
-        assert told() == os.getpid()
+    with read_beside(ARM, []) as wanted:
+        assert wanted() == [(os.getpid(), True)]
 
 
-@pytest.mark.usefixtures("without_polars")
-def test_what_is_wrong_with_a_recording_reaches_who_waits_for_it() -> None:
-    def read() -> None:
+def test_what_is_wrong_with_a_recording_reaches_who_waits_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(words: Sequence[Path | str], arm: Robot) -> None:
         raise RecordingError("OJK_1.csv: no numbers; record again")
 
-    with pytest.raises(RecordingError, match="no numbers"), read_beside(read, []) as told:
-        told()
+    monkeypatch.setattr(recording, "read_usable", refuse)
+    with pytest.raises(RecordingError, match="no numbers"), read_beside(ARM, []) as wanted:
+        wanted()
