@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -44,8 +45,9 @@ class made_once(Generic[T]):
 
 @cache
 def _controller() -> ThreadpoolController:
-    # NumPy and SciPy have a BLAS each; one that is loaded later would not be held.
-    import_module("scipy.linalg")
+    # NumPy and SciPy have a BLAS each; one that is loaded later would not be held, and has to begin with one thread.
+    if os.environ.get("OPENBLAS_NUM_THREADS") != "1":
+        import_module("scipy.linalg")
     return ThreadpoolController()
 
 

@@ -49,25 +49,29 @@ def diagnose(
     verbose: options.Verbose = False,
 ) -> None:
     """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
-    from scara_ident.diagnosis import diagnose as run
-    from scara_ident.effects import effects_named
-    from scara_ident.export.identified_model import identified_model
-    from scara_ident.files import write_json, write_text
-    from scara_ident.processes import beside
-    from scara_ident.recording.recording import read_usable
-    from scara_ident.report.diagnosis import diagnosis_dict
-    from scara_ident.report.diagnosis_markdown import diagnosis_markdown
-    from scara_ident.report.told.diagnosis import tables
-    from scara_ident.report.use import worth_dict
+    from scara_ident.cli.startup import read_beside
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "diagnosis")
     arm = load_robot(robot)
     with progress() as work:
         work("reading the recordings")
-        training, useless = read_usable([*recordings, *(unloaded or ())], arm)
-        bare, _ = read_usable(unloaded or (), arm, needed=False)
-        held_out, more = read_usable(validate or (), arm, needed=False)
+        with read_beside(arm, (*recordings, *(unloaded or ())), unloaded or (), validate or ()) as wanted:
+            from scara_ident.diagnosis import diagnose as run
+            from scara_ident.effects import effects_named
+            from scara_ident.export.identified_model import identified_model
+            from scara_ident.files import write_json, write_text
+            from scara_ident.processes import beside
+            from scara_ident.report.diagnosis import diagnosis_dict
+            from scara_ident.report.diagnosis_markdown import diagnosis_markdown
+            from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
+            from scara_ident.report.html.page import page_template
+            from scara_ident.report.told.diagnosis import tables
+            from scara_ident.report.use import worth_dict
+
+            if output is not None:
+                _ = page_template()
+            (training, useless), (bare, _), (held_out, more) = wanted()
         result = run(
             arm,
             training,
@@ -79,8 +83,6 @@ def diagnose(
             progress=work.part(READING_SHARE, 1.0),
         )
         if output is not None:
-            from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
-
             # What it holds is made once, for what is printed and for all files.
             context = DiagnosisContext(result)
             if result.effects:
@@ -89,7 +91,7 @@ def diagnose(
                 with beside(lambda: worth_dict(identified_model(result))) as told:
                     import_module("matplotlib.figure")
                     context = DiagnosisContext(result, told)
-                    context.make_pictured()
+                    context.make_ready()
                     _ = context.worth
     content = diagnosis_dict(result) if output is None else context.content
     console = result_console(content, json)

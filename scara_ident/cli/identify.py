@@ -29,20 +29,21 @@ def identify(
     verbose: options.Verbose = False,
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
-    from scara_ident.estimation.consistent.options import ConsistentOptions
-    from scara_ident.files import write_json, write_text
-    from scara_ident.identification.identify import identify as run
-    from scara_ident.recording.recording import read_usable
-    from scara_ident.report.identification import identification_dict, sentences
-    from scara_ident.report.told.identification import bands_said, tables
+    from scara_ident.cli.startup import read_beside
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "identification")
     arm = load_robot(robot)
     with progress() as work:
         work("reading the recordings")
-        training, useless = read_usable(recordings, arm)
-        held_out, more = read_usable(validate or (), arm, needed=False)
+        with read_beside(arm, recordings, validate or ()) as wanted:
+            from scara_ident.estimation.consistent.options import ConsistentOptions
+            from scara_ident.files import write_json, write_text
+            from scara_ident.identification.identify import identify as run
+            from scara_ident.report.identification import identification_dict, sentences
+            from scara_ident.report.told.identification import bands_said, tables
+
+            (training, useless), (held_out, more) = wanted()
         result = run(
             arm,
             training,

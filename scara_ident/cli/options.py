@@ -134,9 +134,11 @@ def limited(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(command)
     def limited(*arguments: Any, max_memory: float | None = None, **more: Any) -> Any:
+        from scara_ident.cli.startup import begin_soon
         from scara_ident.processes import own_process
         from scara_ident.threads import one_blas_thread
 
+        begin_soon()
         set_limit(max_memory)
         with one_blas_thread(), own_process():
             return command(*arguments, **more)

@@ -302,6 +302,8 @@ def _without_events(task: SearchTask, observations: Observations, *, free: bool)
     events = find_events(observations, robust_fit(observations).value)
     now, left = first(task.progress)
     outcome = select_model(replace(task, progress=now), without_events(observations, events), free=free)
+    if outcome.training is observations:
+        return outcome, events
     remaining = find_events(outcome.training, robust_fit(outcome.training).value)
     if same_events(events, remaining):
         return outcome, events

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from scara_ident.effects.spectra import (
     whitened,
 )
 from scara_ident.estimation.residuals import Residuals
+from scara_ident.threads import side_by_side
 
 # Points of the spectra per width of a line, so that its peak is hardly missed between two.
 POINTS_PER_WIDTH = 3.0
@@ -50,19 +52,21 @@ def line_candidates(
     seeded = [effect for effect in catalogue if effect.seeded_by is not None]
     if not seeded:
         return []
-    found: list[Candidate] = []
-    for j, reduction in enumerate(scene.robot.reduction):
-        pieces, turns, rates = [], [], []
-        for part, banded in zip(residuals.data.stretches, residuals.banded, strict=True):
-            if part.samples <= 4 * part.trim:
-                continue
+    long = [
+        (part, banded)
+        for part, banded in zip(residuals.data.stretches, residuals.banded, strict=True)
+        if part.samples > 4 * part.trim
+    ]
+
+    def of_joint(j: int) -> list[Candidate]:
+        pieces, turns = [], []
+        for part, banded in long:
             inside = slice(part.trim, part.samples - part.trim)
             pieces.append(np.where(part.rest[j], 0.0, banded[j])[inside])
-            turns.append((reduction * part.motion.q[j])[inside])
-            rates.append(part.rate)
+            turns.append((scene.robot.reduction[j] * part.motion.q[j])[inside])
         if not any(np.any(piece) for piece in pieces):
-            continue
-        rate, band = rates[0], residuals.data.bands[j]
+            return []
+        rate, band = long[0][0].rate, residuals.data.bands[j]
         highest = HIGHEST_FREQUENCY_SHARE * rate
         above_band = [min(ABOVE_BAND * band, highest)] if band is not None and band < highest else []
         white, *wider = whitened(pieces, rate, band, *above_band)
@@ -73,13 +77,14 @@ def line_candidates(
         for reach, wide in zip(above_band, wider, strict=True):
             above = _strongest_frequency(wide, rate, (band or 0.0, reach), criteria, reach)
             strongest += [] if above is None else [SpectralLine("frequency", above)]
-        found += [
+        return [
             Candidate(effect, member)
             for line in strongest
             for effect in seeded
             for member in effect.seeds(scene, j, line)
         ]
-    return found
+
+    return list(chain.from_iterable(side_by_side(of_joint, range(scene.robot.n))))
 
 
 def _strongest_order(residuals: Sequence[Array], turns: Sequence[Array], criteria: SelectionCriteria) -> float | None:

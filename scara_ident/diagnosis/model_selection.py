@@ -168,8 +168,11 @@ def _searched(
 def _outcome(task: SearchTask, found: Search) -> Outcome:
     """Say what a search leaves."""
     training = observed_at_every_sample(found.step)
-    after = wls(training)
-    before, left = found.uncorrected.residuals(found.start.value), training.residuals(after.value)
+    before = found.uncorrected.residuals(found.start.value)
+    after, left = found.start, before
+    if training is not found.uncorrected:
+        after = wls(training)
+        left = training.residuals(after.value)
     joints, criteria = task.model.robot.joints, task.criteria
     least = dict.fromkeys(joints, criteria.remainder)
     if after.variation:
@@ -195,7 +198,8 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     repeating = [fit for fit in repeating if fit.missing > least_rms[fit.joint]]
     depending = [item for item in depending if item.rms > least_rms[item.joint]]
     unexplained = _unexplained(repeating, depending, criteria)
-    names, fit_before = frozenset(fit.joint for fit in standing_out), lack_of_fit(before)
+    names = frozenset(fit.joint for fit in standing_out)
+    fit_before = fit_after if left is before else lack_of_fit(before)
     return Outcome(
         found, after, training, left, fit_before, fit_after, dependences, unexplained, tuple(small.tolist()), names
     )

@@ -141,6 +141,8 @@ def observed(step: SelectionStep) -> Observations:
 
 def observed_at_every_sample(step: SelectionStep) -> Observations:
     """Return the rows of the base model with the chosen effects, and the columns that nothing filtered."""
+    if not step.chosen:
+        return step.observations
     added = step.columns.raw(step.scene, step.chosen)
     raws, place = [], 0
     for recording in step.observations.raw:

@@ -221,8 +221,15 @@ def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Ar
     """
     by_q, by_v, by_a = (slope[:, : len(lag[0])] for slope in rigid_slopes(signals, joint))
     result = -(by_q * lag[0] + by_v * lag[1] + by_a * lag[2])
-    result[joint] += signals.scene.robot.row_scale[joint] * signals.scene.armature(joint) * lag[2]
+    result[joint] = own_lagging(signals, joint, lag)
     return np.asarray(result)
+
+
+def own_lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Array:
+    """Return what `lagging` changes at the lagging joint itself, of one lag (N,) or of several (..., N)."""
+    by_q, by_v, by_a = (slope[joint, : lag[0].shape[-1]] for slope in rigid_slopes(signals, joint))
+    rotor = signals.scene.robot.row_scale[joint] * signals.scene.armature(joint)
+    return np.asarray(rotor * lag[2] - (by_q * lag[0] + by_v * lag[1] + by_a * lag[2]))
 
 
 def link_inertia(signals: Signals, joint: int) -> Array:

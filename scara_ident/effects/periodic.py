@@ -105,8 +105,7 @@ class EncoderEccentricity(PerMotorTurn):
         j, order = member.place, member.nonlinear[0]
         motion = signals.motion
         per_turn = order * signals.scene.robot.reduction[j]
-        angle = per_turn * motion.q[j]
-        sine, cosine = np.sin(angle), np.cos(angle)
+        sine, cosine = sines(signals, j, order)
         by_q, by_v, by_a = _slopes(signals, j)
         speed, square = per_turn * motion.v[j], (per_turn * motion.v[j]) ** 2
         push = per_turn * motion.a[j]

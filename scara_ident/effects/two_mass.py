@@ -23,6 +23,7 @@ from scara_ident.effects.links import (
     behind,
     held_link_inertia,
     lagging,
+    own_lagging,
     rigid_columns,
     rigid_slopes,
     rigid_torque,
@@ -106,7 +107,7 @@ class TwoMasses:
         recorded = self.signals.motion.torque
         if self._initial is not None and recorded is not None:
             signals, j = self.signals, self.joint
-            left = recorded[j] - signals.predicted[j] - lagging(signals, j, lag)[j]
+            left = recorded[j] - signals.predicted[j] - own_lagging(signals, j, lag)
             lag = self._initial.added(lag, self._initial.state(left, (lag[0], lag[1])))
         for _ in range(0 if _small(lag) else STEPS - 1):
             moved = behind(self.signals.motion, self.joint, lag)
@@ -125,11 +126,9 @@ class TwoMasses:
         count = self.swing.memory(FADED) + int(FADED_PERIODS * signals.motion.rate / signals.scene.band)
         count = max(min(count, signals.motion.samples), 4 * trim)
         free = self.swing.solve(np.zeros((2, count)), np.array([[1.0, 1.0], [0.0, self.swing.step]]))
-        torque = np.array([lagging(signals, j, (free[0][k], free[1][k], free[2][k])) for k in range(2)])
         return InitialState(
             free,
-            torque,
-            j,
+            own_lagging(signals, j, free),
             signals.motion.rate,
             signals.scene.band,
             slice(trim, min(count, signals.motion.samples - trim)),
@@ -177,7 +176,9 @@ class TwoMasses:
             whole = result[j, :, :begun].copy()
             whole[:p] += recorded[j, :, :begun]
             state = self._initial.state(whole, (x, first))
-            result[..., :begun] -= np.einsum("kc,cjt->jkt", state, self._initial.torque)
+            free = self._initial.free
+            torque = np.array([lagging(self.signals, j, (free[0][k], free[1][k], free[2][k])) for k in range(2)])
+            result[..., :begun] -= np.einsum("kc,cjt->jkt", state, torque)
         share = np.append(usual[:, 0] / self.inertia, [2.0 / self.frequency, 0.0])
         return result + share[:, None] * self.change[:, None]
 
@@ -202,9 +203,8 @@ class InitialState:
     ----------
     free : tuple of ndarray, each of shape (2, M)
         x and its derivatives after a unit of x, and of its derivative, at the first sample; after M samples it has faded.
-    torque : ndarray, shape (2, n, M)
-        What they add to the torques.
-    joint : int
+    torque : ndarray, shape (2, M)
+        What they add to the torque of the joint.
     rate, band : float
         Hz; the torque is looked at within the band.
     used : slice
@@ -213,7 +213,6 @@ class InitialState:
 
     free: Lag
     torque: Array
-    joint: int
     rate: float
     band: float
     used: slice
@@ -225,7 +224,7 @@ class InitialState:
 
     @cached_property
     def _seen(self) -> Array:
-        return low_pass(self.torque[:, self.joint], self.rate, self.band)[:, self.used]
+        return low_pass(self.torque, self.rate, self.band)[:, self.used]
 
     def state(self, torque: Array, lag: tuple[Array, Array]) -> Array:
         """Return x and its derivative, beside those assumed, that explain a torque of the joint.

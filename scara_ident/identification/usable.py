@@ -165,12 +165,13 @@ def check_rows(observations: Observations) -> None:
 def data_notes(*data: PreparedData) -> list[str]:
     """Return what the audits found, the same remark on many recordings in one line, and where names contradict motions."""
     found: dict[str, list[str]] = {}
-    for item in (item for part in data for item in part.recordings):
+    items = [item for part in data for item in part.recordings]
+    audits = side_by_side(lambda item: audit_velocity(item.recording, item.longest.stretch), items)
+    for item, audited in zip(items, audits, strict=True):
         remarks = [finding.message for finding in item.recording.findings]
-        longest = item.longest.stretch
         verdicts: dict[str, list[str]] = {}
-        for audit in audit_velocity(item.recording, longest):
-            verdict = audit.verdict(longest.rate)
+        for audit in audited:
+            verdict = audit.verdict(item.longest.rate)
             if verdict is not None:
                 verdicts.setdefault(verdict, []).append(audit.joint)
         remarks += [

@@ -159,19 +159,14 @@ class PreparedStretch:
         return rows
 
     def rows_of(self, signals: Sequence[tuple[int, Array]]) -> list[Array]:
-        """Return what `rows` does of single signals (N,), each given with its joint, that pass the filter together."""
-        keys = [(self.steps[joint], self.bands[joint]) for joint, _ in signals]
-        alike = [[place for place, key in enumerate(keys) if key == one] for one in dict.fromkeys(keys)]
-        parts = [part[k : k + ROWS_AT_ONCE] for part in alike for k in range(0, len(part), ROWS_AT_ONCE)]
+        """Return what `rows` does of single signals (N,), each given with its joint; those of a joint pass the filter together."""
+        own = [[place for place, (k, _) in enumerate(signals) if k == joint] for joint in range(len(self.bands))]
+        parts = [part[k : k + ROWS_AT_ONCE] for part in own for k in range(0, len(part), ROWS_AT_ONCE)]
         # Made once, and not in two threads.
-        fade, kept = self.fade, self.kept
+        _ = self.fade, self.kept
 
-        def passed(places: list[int]) -> list[Array]:
-            joints = [signals[place][0] for place in places]
-            step, band = keys[places[0]]
-            weight = fade[joints] if len(set(joints)) > 1 else fade[joints[0]]
-            low = low_pass_every(np.array([signals[place][1] for place in places]), self.rate, band, step, weight)
-            return [np.sqrt(step) * row[kept[joint] // step] for joint, row in zip(joints, low, strict=True)]
+        def passed(places: list[int]) -> Array:
+            return self.rows(signals[places[0]][0], np.array([signals[place][1] for place in places]))
 
         made = side_by_side(passed, parts) if len(parts) > 1 else [passed(places) for places in parts]
         found = dict(zip(chain.from_iterable(parts), chain.from_iterable(made), strict=True))

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import EffectTerm
-from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.observations import Observations, Raw
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
 from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import Motion
-from scara_ident.motion.prepared import PreparedStretch
+from scara_ident.motion.prepared import PreparedRecording, PreparedStretch
+from scara_ident.threads import side_by_side
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,13 +119,14 @@ def traces(observations: Observations, value: Array) -> list[tuple[Trace, ...]]:
         Per recording.
     """
     columns = [joint.columns for joint in observations.joints]
-    return [
-        tuple(
+
+    def of_recording(item: PreparedRecording, raws: Sequence[Raw]) -> tuple[Trace, ...]:
+        return tuple(
             _trace(observations.model, value, part, columns, raw, float(item.recording.time[0]))
             for part, raw in zip(item.stretches, raws, strict=True)
         )
-        for item, raws in zip(observations.data.recordings, observations.raw, strict=True)
-    ]
+
+    return side_by_side(of_recording, observations.data.recordings, observations.raw)
 
 
 def _trace(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_array_equal
 
 from scara_ident.effects import Signals
 from scara_ident.effects.links import (
@@ -16,6 +17,7 @@ from scara_ident.effects.links import (
     lagging,
     largest_armature,
     link_inertia,
+    own_lagging,
     point_mass,
     rigid_torque,
     shared,
@@ -40,7 +42,11 @@ def test_a_lagging_link_loads_all_joints_as_pinocchio_says(name: str):
     scene, item = scene_of(robot), moving(robot, 1.0)
     joint, w = 1, 30.0
     lag = (1e-3 * np.sin(w * item.time), 1e-3 * w * np.cos(w * item.time), -1e-3 * w**2 * np.sin(w * item.time))
-    changed = lagging(Signals(scene, item), joint, lag)
+    signals = Signals(scene, item)
+    changed = lagging(signals, joint, lag)
+    assert_array_equal(own_lagging(signals, joint, lag), changed[joint])
+    twice = own_lagging(signals, joint, tuple(np.array([part[:9], 2.0 * part[:9]]) for part in lag))
+    assert twice == pytest.approx(np.outer([1.0, 2.0], np.ones(9)) * changed[joint, :9])
     size = 1e-3
     ends = []
     for side in (1.0, -1.0):

@@ -78,6 +78,8 @@ class Chapter:
 def chapters(diagnosis: Diagnosis) -> list[tuple[FoundEffect, Chapter]]:
     """Return the effects in the order in which they came in, each with the residuals before and after."""
     search = diagnosis.search
+    if not search.steps:
+        return []
     before = list(chain.from_iterable(traces(search.uncorrected, search.start.value)))
     found: list[tuple[FoundEffect, Chapter]] = []
     for step in search.steps:

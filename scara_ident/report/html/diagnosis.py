@@ -66,9 +66,9 @@ class DiagnosisContext(FittedContext):
         return self.told()
 
     @one_blas_thread()
-    def make_pictured(self) -> None:
-        """Make what pictures are of, for which nothing is waited for."""
-        _ = self.chapters, self.groups
+    def make_ready(self) -> None:
+        """Make what takes long and waits for nothing: what pictures are of, and what to do next."""
+        _ = self.chapters, self.groups, next_steps(self.diagnosis)
 
     @cached_property
     def content(self) -> dict[str, Any]:

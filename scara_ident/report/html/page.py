@@ -10,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 from scara_ident.errors import ScaraIdentError
@@ -74,7 +74,7 @@ class Page:
             figure.name: figure.spec() for block in blocks if isinstance(block, Group) for figure in block.figures
         }
         arms = {block.name: block.spec() for block in blocks if isinstance(block, Arm)}
-        return _environment().get_template("page.html").render(page=self, data={"figures": figures, "arms": arms})
+        return page_template().render(page=self, data={"figures": figures, "arms": arms})
 
     def write(self, path: Path) -> None:
         """Write the page, whole or not at all."""
@@ -97,6 +97,13 @@ def parts(kind: Kind, sections: Sequence[Section], context: Any) -> list[Part]:
         if blocks:
             found[section.id] = Part(section.id, section.title, blocks)
     return list(found.values())
+
+
+def page_template() -> Template:
+    """Return the template of a page; what it consists of is compiled when it is first asked for."""
+    templates = _environment()
+    templates.get_template("blocks.html")
+    return templates.get_template("page.html")
 
 
 def _flat(blocks: Sequence[Block]) -> list[Block]:

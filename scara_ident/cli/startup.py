@@ -1,0 +1,80 @@
+"""What lets a command begin sooner; nothing of it changes a result."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.util import LazyLoader, find_spec, module_from_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+if TYPE_CHECKING:
+    from scara_ident.recording.recording import Recording
+    from scara_ident.robot.robot import Robot
+
+Words: TypeAlias = Sequence[Path | str]
+# What `read_usable` returns.
+Usable: TypeAlias = "tuple[tuple[Recording, ...], list[str]]"
+# Parts of NumPy that SciPy asks for as it is loaded, whatever it needs of them: a tenth of a second.
+UNUSED = ("f2py", "testing", "ctypeslib")
+# New containers after which Python looks for some that refer to each other alone. At its usual 700 all that has been loaded is
+# gone through while the rest is loaded.
+CONTAINERS = 10_000
+# What all work on recordings loads sooner or later.
+LATER = ("scipy.fft", "scipy.linalg", "scipy.special")
+# Bytes of files that another process reads: what it read of more takes longer to be sent, and memory twice.
+SMALL = 30e6
+
+
+def begin_soon() -> None:
+    """Load of NumPy what is used, SciPy where it is used, and look for garbage less often."""
+    gc.set_threshold(CONTAINERS)
+    # Its BLAS need not be loaded at once then to be held to one thread, see `one_blas_thread`.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    import numpy as np
+
+    for name in UNUSED:
+        whole = f"{np.__name__}.{name}"
+        spec = None if whole in sys.modules else find_spec(whole)
+        if spec is not None and spec.loader is not None:
+            # It is loaded when something of it is asked for.
+            spec.loader = LazyLoader(spec.loader)
+            sys.modules[whole] = module = module_from_spec(spec)
+            spec.loader.exec_module(module)
+            setattr(np, name, module)
+
+
+@contextmanager
+def read_beside(arm: Robot, needed: Words, *others: Words) -> Iterator[Callable[[], list[Usable]]]:
+    """Read recordings in another process while what works on them is loaded; yields what waits for them.
+
+    Many or long ones are read here, when they are waited for.
+
+    Parameters
+    ----------
+    arm : Robot
+    needed : sequence of path or str
+        At least one of them has to be usable, see `read_usable`.
+    *others : sequence of path or str
+        None of them has.
+    """
+    from scara_ident.processes import beside
+    from scara_ident.recording.paths import recording_paths
+    from scara_ident.recording.recording import read_usable
+
+    def read() -> list[Usable]:
+        return [read_usable(needed, arm), *(read_usable(words, arm, needed=False) for words in others)]
+
+    paths = (path for words in (needed, *others) for path in recording_paths(words))
+    # Polars in a process that is forked from one that used it waits for threads that are not there.
+    if "polars" in sys.modules or sum(path.stat().st_size for path in paths if path.is_file()) > SMALL:
+        yield read
+        return
+    with beside(read) as told:
+        for name in LATER:
+            import_module(name)
+        yield told

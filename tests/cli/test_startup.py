@@ -1,0 +1,96 @@
+"""A command begins sooner, and does the same."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from scara_ident.cli import startup
+from scara_ident.cli.startup import read_beside
+from scara_ident.errors import RecordingError
+from scara_ident.recording import recording
+from scara_ident.robot.robot import Robot, load_robot
+from tests.shared import ROOT
+
+
+def printed(program: str) -> list[str]:
+    """Run lines of Python in a process of their own and return what they print."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "3"}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+    return done.stdout.split()
+
+
+def test_a_command_loads_no_compiler_of_fortran_but_who_asks_for_it_has_it() -> None:
+    program = """
+import sys
+from scara_ident.cli.startup import begin_soon
+begin_soon()
+import numpy, scipy.linalg
+print("numpy.f2py.crackfortran" in sys.modules)
+print(numpy.f2py.get_include is not None, "numpy.f2py.crackfortran" in sys.modules, numpy.testing.assert_allclose(1.0, 1.0))
+"""
+    assert printed(program) == ["False", "True", "True", "None"]
+
+
+def test_scipy_is_loaded_when_it_is_used_and_its_blas_has_one_thread_then() -> None:
+    program = """
+import sys
+from scara_ident.cli.startup import begin_soon
+from scara_ident.threads import one_blas_thread
+begin_soon()
+with one_blas_thread():
+    print("scipy.linalg" in sys.modules)
+    import scipy.linalg
+    from threadpoolctl import threadpool_info
+    print({item["num_threads"] for item in threadpool_info() if item["user_api"] == "blas"})
+"""
+    assert printed(program) == ["False", "{1}"]
+
+
+ARM = load_robot()
+
+
+def where(words: Sequence[Path | str], arm: Robot, *, needed: bool = True) -> tuple[int, bool]:
+    """Stands for reading: where it is done, and whether it has to give a recording."""
+    return os.getpid(), needed
+
+
+@pytest.fixture(autouse=True)
+def without_polars(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "polars", raising=False)
+
+
+def test_small_recordings_are_read_in_another_process_and_large_ones_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recording, "read_usable", where)
+    path = tmp_path / "OJK_1.csv"
+    path.write_text("time\n0\n", encoding="utf-8")
+    with read_beside(ARM, [path], [], [str(tmp_path)]) as wanted:
+        (there, *flags), *others = wanted()
+    assert (flags, [needed for _, needed in others]) == ([True], [False, False])
+    assert {there} == {process for process, _ in others} != {os.getpid()}
+    monkeypatch.setattr(startup, "SMALL", 6)
+    with read_beside(ARM, [path]) as wanted:
+        assert wanted() == [(os.getpid(), True)]
+
+
+def test_what_has_threads_that_a_fork_would_lack_reads_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recording, "read_usable", where)
+    monkeypatch.setitem(sys.modules, "polars", sys)
+    with read_beside(ARM, []) as wanted:
+        assert wanted() == [(os.getpid(), True)]
+
+
+def test_what_is_wrong_with_a_recording_reaches_who_waits_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(words: Sequence[Path | str], arm: Robot) -> None:
+        raise RecordingError("OJK_1.csv: no numbers; record again")
+
+    monkeypatch.setattr(recording, "read_usable", refuse)
+    with pytest.raises(RecordingError, match="no numbers"), read_beside(ARM, []) as wanted:
+        wanted()
