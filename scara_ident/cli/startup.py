@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
-from importlib.util import LazyLoader, find_spec, module_from_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 Words: TypeAlias = Sequence[Path | str]
 # What `read_usable` returns.
 Usable: TypeAlias = "tuple[tuple[Recording, ...], list[str]]"
-# Parts of NumPy that SciPy asks for as it is loaded, whatever it needs of them: a tenth of a second.
-UNUSED = ("f2py", "testing", "ctypeslib")
 # New containers after which Python looks for some that refer to each other alone. At its usual 700 all that has been loaded is
 # gone through while the rest is loaded.
 CONTAINERS = 10_000
@@ -31,21 +28,10 @@ SMALL = 30e6
 
 
 def begin_soon() -> None:
-    """Load of NumPy what is used, SciPy where it is used, and look for garbage less often."""
+    """Load SciPy where it is used, and look for garbage less often."""
     gc.set_threshold(CONTAINERS)
     # Its BLAS need not be loaded at once then to be held to one thread, see `one_blas_thread`.
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    import numpy as np
-
-    for name in UNUSED:
-        whole = f"{np.__name__}.{name}"
-        spec = None if whole in sys.modules else find_spec(whole)
-        if spec is not None and spec.loader is not None:
-            # It is loaded when something of it is asked for.
-            spec.loader = LazyLoader(spec.loader)
-            sys.modules[whole] = module = module_from_spec(spec)
-            spec.loader.exec_module(module)
-            setattr(np, name, module)
 
 
 @contextmanager

@@ -25,18 +25,6 @@ def printed(program: str) -> list[str]:
     return done.stdout.split()
 
 
-def test_a_command_loads_no_compiler_of_fortran_but_who_asks_for_it_has_it() -> None:
-    program = """
-import sys
-from scara_ident.cli.startup import begin_soon
-begin_soon()
-import numpy, scipy.linalg
-print("numpy.f2py.crackfortran" in sys.modules)
-print(numpy.f2py.get_include is not None, "numpy.f2py.crackfortran" in sys.modules, numpy.testing.assert_allclose(1.0, 1.0))
-"""
-    assert printed(program) == ["False", "True", "True", "None"]
-
-
 def test_scipy_is_loaded_when_it_is_used_and_its_blas_has_one_thread_then() -> None:
     program = """
 import sys
