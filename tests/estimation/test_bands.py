@@ -18,8 +18,10 @@ from scara_ident.estimation.bands import (
     choose_bands,
     narrowest_bands,
     needed_rows,
+    reach_of,
 )
-from scara_ident.estimation.observations import kept_rows
+from scara_ident.estimation.least_squares import ols
+from scara_ident.estimation.observations import kept_rows, observe
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
@@ -176,14 +178,14 @@ def test_binned_power_is_the_mean_square_whatever_the_bins():
     np.testing.assert_allclose(binned_power(tone + 7.0, RATE, edges), binned_power(tone, RATE, edges), atol=1e-6)
 
 
-def pendulum(model: TorqueModel, seconds: float, torque_noise: float, seed: int = 0) -> Recording:
+def pendulum(model: TorqueModel, seconds: float, torque_noise: float, seed: int = 0, pace: float = 1.0) -> Recording:
     """A slow swing at 500 Hz with half a milliradian of noise, and torque that is mostly noise if so wanted."""
     rng = np.random.default_rng(seed)
     time = np.arange(round(seconds * RATE)) / RATE
     q, v, a = (np.zeros((2, len(time))) for _ in range(3))
     for j in range(2):
         for frequency in (0.3, 0.7, 1.1, 1.6):
-            w, size, phase = 2 * np.pi * frequency, 0.5 / (1 + frequency**2), rng.uniform(0, 2 * np.pi)
+            w, size, phase = 2 * np.pi * pace * frequency, 0.5 / (1 + frequency**2), rng.uniform(0, 2 * np.pi)
             q[j] += size * np.sin(w * time + phase)
             v[j] += size * w * np.cos(w * time + phase)
             a[j] -= size * w**2 * np.sin(w * time + phase)
@@ -262,3 +264,28 @@ def test_the_rate_of_the_samples_does_not_move_the_band(model: TorqueModel):
     one, other = (choose_bands(model, prepare([item])).bands for item in (whole, half))
     # Bins are a third of an octave.
     assert np.all(np.abs(np.log2(np.array(one) / other)) < 0.7)
+
+
+def test_the_band_of_a_motion_that_is_not_recorded_yet_is_foreseen(model: TorqueModel):
+    """Slow swings have a narrow band; with one that has torque farther up it is as wide as recordings then say."""
+    slow, fast = pendulum(model, 12.0, 0.3), pendulum(model, 12.0, 0.02, pace=4.0)
+    fit = choose_bands(model, prepare([slow]))
+    data = prepare([slow], fit.bands)
+    value = ols(observe(model, data)).value
+    now = max(choose_bands(model, prepare([slow, replace(fast, name="fast_1")])).bands)
+    assert now > 1.5 * max(fit.bands)
+    assert fast.effort is not None
+    foreseen = reach_of(model, data, value).reached(fast.effort, RATE)
+    # Bins are a third of an octave wide.
+    assert 0.7 * now < foreseen < 1.5 * now
+
+
+def test_the_times_at_rest_of_a_motion_that_is_not_recorded_yet_are_foreseen(model: TorqueModel):
+    slow, fast = (prepare([pendulum(model, 12.0, 0.02, pace=pace)], (6.0, 6.0)) for pace in (1.0, 2.0))
+    reach = reach_of(model, slow, ols(observe(model, slow)).value, widening=False)
+    (part,) = fast.stretches
+    bands, fade = reach.foreseen(part.torque, part.motion.v, RATE)
+    assert bands == (6.0, 6.0)
+    # Short of a thirtieth of the time, and a fifth of that at most is not foreseen.
+    assert np.all(np.mean(part.fade < 0.5, axis=1) > 0.025)
+    assert np.all(np.mean((fade < 0.5) != (part.fade < 0.5), axis=1) < 0.005)
