@@ -35,11 +35,13 @@ from scara_ident.diagnosis.questions import (
 )
 from scara_ident.diagnosis.search import scene_of
 from scara_ident.diagnosis.shape import shape_over
-from scara_ident.diagnosis.unknowns import DERIVATIVE_STEP
+from scara_ident.diagnosis.unknowns import sides
 from scara_ident.effects import Member, Scene
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation.information import Information, merge, orthonormal
-from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.observations import observe
+from scara_ident.estimation.reach import Reach, reach_of
+from scara_ident.estimation.working_range import believable
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.low_pass import HIGHEST_CUT
@@ -77,6 +79,8 @@ class Inquiry:
         On the rows of these recordings.
     tried : int
         Candidates that the diagnosis tries.
+    reach : Reach or None
+        How far up motion explains torque, and what counts as rest; None where no recordings are at hand.
     """
 
     scene: Scene
@@ -87,6 +91,7 @@ class Inquiry:
     known: Information | None = None
     columns: CandidateColumns | None = None
     tried: int = USUALLY_TRIED
+    reach: Reach | None = None
 
     @cached_property
     def suspects(self) -> tuple[Suspect, ...]:
@@ -150,7 +155,7 @@ class Inquiry:
         return result
 
     def _freed_sides(self, item: Suspect) -> list[tuple[Candidate, Candidate, float]]:
-        return _sides(item.candidate) if self.freed(item) else []
+        return sides(item.candidate) if self.freed(item) else []
 
     def sigmas(self, rows: Information | None = None, some: Sequence[Question] | None = None) -> Array:
         """Return standard errors between the answers to each question, from what is known and further rows.
@@ -195,8 +200,7 @@ class Inquiry:
 
     def _view(self, rows: Information) -> _View:
         p = len(self.scene.model.columns)
-        factor = rows.factor[:, :-1]
-        return _View(self, factor, factor[p:, p:], self.places)
+        return _View(self, rows.factor[:, :-1], rows.factor[p:, p:-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +210,6 @@ class _View:
     inquiry: Inquiry
     factor: Array
     beside: Array
-    places: Sequence[tuple[slice, slice]]
 
     def sigma(self, question: Question) -> float:
         if question.kind == "parameter":
@@ -217,9 +220,8 @@ class _View:
             pairs = permutations(question.suspects, 2)
             names = {item.label for item in question.suspects}
             return min((self._apart(one, names, other) for one, other in pairs), default=0.0)
-        sizes = np.array([self._from_none(item) for item in question.suspects])
-        # The mean variance counts, so that no suspect is forgotten for the others.
-        return float(1.0 / np.sqrt(np.mean(1.0 / sizes**2))) if np.all(sizes > 0.0) else 0.0
+        # Of several the usual one: those that a motion does not tell are named.
+        return float(np.median([self._from_none(item) for item in question.suspects]))
 
     def _place(self, wanted: Suspect) -> int:
         # An effect in the model stands there once, whoever asks for it.
@@ -229,18 +231,18 @@ class _View:
     def _model(self, without: set[str]) -> list[Array]:
         """Return what the base model leaves of the effects in it, but for some."""
         names = [item.label for item in self.inquiry.in_model]
-        return [self.beside[:, self.places[k][1]] for k, name in enumerate(names) if name not in without]
+        return [self.beside[:, self.inquiry.places[k][1]] for k, name in enumerate(names) if name not in without]
 
     def _apart(self, truth: Suspect, questioned: set[str], instead: Suspect | None) -> float:
-        own = self.beside[:, self.places[self._place(truth)][0]] @ np.asarray(truth.value)
+        own = self.beside[:, self.inquiry.places[self._place(truth)][0]] @ np.asarray(truth.value)
         spanning = self._model(questioned)
         if instead is not None:
-            spanning.append(self.beside[:, self.places[self._place(instead)][1]])
+            spanning.append(self.beside[:, self.inquiry.places[self._place(instead)][1]])
         return float(np.linalg.norm(_outside(spanning, own)))
 
     def left(self, item: Suspect, questioned: set[str]) -> Array:
         """Return what the model without some effects leaves of a suspect's columns."""
-        own = self.beside[:, self.places[self._place(item)][0]]
+        own = self.beside[:, self.inquiry.places[self._place(item)][0]]
         spanning = self._model(questioned)
         return np.column_stack([_outside(spanning, column) for column in own.T])
 
@@ -256,7 +258,7 @@ class _View:
     def _parameter(self, question: Question) -> float:
         model = self.inquiry.scene.model
         p, k = len(model.columns), model.names.index(question.parameter or "")
-        stop = p + sum(self.places[i][1].stop - self.places[i][1].start for i in range(len(self.inquiry.in_model)))
+        stop = p + max((wide.stop for _, wide in self.inquiry.places[: len(self.inquiry.in_model)]), default=0)
         half = orthonormal(self.factor[:, :stop])
         known = _outside([np.delete(self.factor[:, :stop], k, axis=1)], self.factor[:, k])
         if np.linalg.norm(known) <= np.sqrt(_RANK) * np.linalg.norm(self.factor[:, k]):
@@ -267,7 +269,7 @@ class _View:
         shape = self.inquiry._shapes.get(question.text)
         if shape is None:
             return 0.0
-        own = self.beside[:, self.places[self._place(shape)][1]]
+        own = self.beside[:, self.inquiry.places[self._place(shape)][1]]
         spanning = self._model(set())
         left = np.column_stack([_outside(spanning, column) for column in own.T])
         before = np.eye(left.shape[1]) / (LARGEST_SHAPE * question.size) ** 2
@@ -294,18 +296,6 @@ def _outside(spanning: Sequence[Array], own: Array) -> Array:
     left, singular, _ = np.linalg.svd(columns, full_matrices=False)
     basis = left[:, singular > _RANK * singular[0]]
     return np.asarray(own - basis @ (basis.T @ own))
-
-
-def _sides(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
-    """Return for each nonlinear parameter the candidates on either side, and how far they are from it."""
-    found = []
-    for place, parameter in enumerate(candidate.effect.nonlinear):
-        value = candidate.member.nonlinear[place]
-        reach = DERIVATIVE_STEP * (abs(value) if value else parameter.upper - parameter.lower)
-        moved = [list(candidate.member.nonlinear) for _ in range(2)]
-        moved[0][place], moved[1][place] = value + reach, value - reach
-        found.append((candidate.at(moved[0]), candidate.at(moved[1]), reach))
-    return found
 
 
 def _width(item: Suspect) -> int:
@@ -341,13 +331,20 @@ def inquire(diagnosis: Diagnosis, asked: Sequence[Question] | None = None) -> In
     """
     search = diagnosis.search
     chosen = questions(diagnosis) if asked is None else tuple(asked)
-    inquiry = Inquiry(search.scene, chosen, suspects_in_model(diagnosis), noise_density(diagnosis), search.bands)
-    return knowing(replace(inquiry, tried=search.tried), search.step.columns) if chosen else inquiry
+    noise, bands = noise_density(diagnosis), search.bands
+    inquiry = Inquiry(search.scene, chosen, suspects_in_model(diagnosis), noise, bands, tried=search.tried)
+    return knowing(inquiry, search.step.columns, widening=not diagnosis.bands_given)
 
 
-def knowing(inquiry: Inquiry, columns: CandidateColumns) -> Inquiry:
-    """Return an inquiry with the recordings of columns as what is known."""
-    return replace(inquiry, known=known_rows(inquiry, columns), columns=columns)
+def knowing(inquiry: Inquiry, columns: CandidateColumns, *, widening: bool) -> Inquiry:
+    """Return an inquiry with the recordings of columns as what is known, and a model to foresee other motions with."""
+    if not inquiry.questions:
+        return inquiry
+    observations, scene = columns.observations, inquiry.scene
+    value = believable(observations, scene.value, inquiry.noise)
+    reach = reach_of(scene.model, observations.data, value, widening=widening)
+    inquiry = replace(inquiry, scene=replace(scene, value=value), columns=columns, reach=reach)
+    return replace(inquiry, known=known_rows(inquiry, columns))
 
 
 def inquiry_of(content: Mapping[str, Any], robot: Robot, recordings: Sequence[Recording] = ()) -> Inquiry:
@@ -381,12 +378,11 @@ def inquiry_of(content: Mapping[str, Any], robot: Robot, recordings: Sequence[Re
     if not recordings:
         scene = _unseen(model, value, bands, armatures)
         return Inquiry(scene, asked, in_model, noise, bands, tried=tried)
-    data, _, _ = usable_in_bands(model, recordings, (), bands, alike=True)
-    observations: Observations = observe(model, data)
+    observations = observe(model, usable_in_bands(model, recordings, (), bands, alike=True)[0])
     scene = scene_of(model, value, observations)
     scene = replace(scene, armatures={**scene.armatures, **armatures})
     inquiry = Inquiry(scene, asked, in_model, noise, bands, tried=tried)
-    return knowing(inquiry, CandidateColumns(observations)) if asked else inquiry
+    return knowing(inquiry, CandidateColumns(observations), widening=not content.get("band_given"))
 
 
 def _unseen(model: TorqueModel, value: Array, bands: Sequence[float | None], armatures: Mapping[int, float]) -> Scene:

@@ -88,6 +88,8 @@ class Diagnosis(Saved, told_by="diagnosis"):
         Behind the gears that found effects depend on.
     events : tuple of Event
         What is local in time: left out of every fit, or in recordings that were held out.
+    bands_given : bool
+        Whether somebody chose the bands, so that further recordings do not widen them.
     """
 
     verdict: Verdict
@@ -109,6 +111,7 @@ class Diagnosis(Saved, told_by="diagnosis"):
     notes: tuple[str, ...]
     rotors: tuple[RotorInertia, ...] = ()
     events: tuple[Event, ...] = ()
+    bands_given: bool = False
 
     @property
     def robot(self) -> Robot:
@@ -294,6 +297,7 @@ def diagnose(
         tuple(notes),
         parameters.rotors,
         events,
+        given,
     )
 
 

@@ -20,7 +20,7 @@ from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.search import Search
 from scara_ident.effects import Parameter
 from scara_ident.estimation import Estimate
-from scara_ident.estimation.bands import binned_power
+from scara_ident.estimation.explained_power import binned_power
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals

@@ -15,10 +15,12 @@ from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import needed
 from scara_ident.diagnosis.diagnose import Diagnosis
-from scara_ident.diagnosis.selection_step import best_of_each
+from scara_ident.diagnosis.selection_step import best_of_each, fitted_model
 from scara_ident.diagnosis.shape import shape_over
 from scara_ident.effects import EFFECTS, Effect, Member
 from scara_ident.errors import ScaraIdentError
+from scara_ident.estimation.bands import needed_rows
+from scara_ident.motion.low_pass import noise_share
 
 Kind = Literal["rivals", "unexplained", "below_limit", "parameter"]
 # Rivals of one effect, and candidates that these recordings would hardly have shown: of each family, in all, and by name.
@@ -339,27 +341,39 @@ def _limit(found: Examination, diagnosis: Diagnosis) -> float:
 def noise_density(diagnosis: Diagnosis) -> Array:
     """Return the noise of each joint that an estimate sees, (N m)^2 s, shape (n,).
 
-    Mean square of what is left per row, over the rows in a second, times by how much blocks of time scatter more than
-    white residuals would: the noise that the standard deviations of the diagnosis stand on.
+    Squares of what is left over those that white noise would leave, which the low-pass thins, the times at rest fade and the
+    columns take a part of; times by how much blocks of time scatter more than white residuals would, for all joints alike,
+    as few blocks tell it badly of one. What effects that are worth a look explain is no noise: it is what is asked for.
     """
-    step, after = diagnosis.search.step, diagnosis.after
-    rows = diagnosis.training_after.joints
-    rate = min(part.rate for part in step.observations.data.stretches)
-    level, count = np.zeros(len(rows)), 0
-    for j, own in enumerate(rows):
-        left = own.table[-1] - after.value[own.columns] @ own.table[:-1]
-        level[j] = float(np.mean(left**2)) if len(left) else np.nan
-        count += len(left)
+    search, after = diagnosis.search, diagnosis.after
+    step, observations = search.step, diagnosis.training_after
+    maybe = [item.decision.candidate for item in diagnosis.tentative if item.decision is not None]
+    columns = step.columns.rows(search.scene, [*search.chosen, *maybe])
+    model = fitted_model(step.observations, columns, after.weights, 1)
+    parts = [part for part in step.observations.data.stretches if part.usable]
+    rate = min(part.rate for part in parts)
+    level, thinned, samples = np.full(len(model.joints), np.nan), 0.0, 0.0
+    taken = needed_rows(after.model)
+    for rows in columns[len(search.chosen) :]:
+        for j, own in rows.items():
+            taken[j] += len(own) / len(rows)
+    for j, (error, weight) in enumerate(zip(model.residual, after.weights, strict=True)):
+        white = sum(
+            part.steps[j] * noise_share(part.rate, part.bands[j]) * np.sum(part.fade[j, part.kept[j]] ** 2)
+            for part in parts
+        )
+        if white > taken[j] and weight > 0.0:
+            level[j] = float(error @ error) / (weight**2 * (white - taken[j]))
+            thinned, samples = thinned + white, samples + sum(part.steps[j] * len(part.kept[j]) for part in parts)
     size = np.sqrt(np.clip(np.diag(after.information.inverse()), 0.0, None))
-    white = np.sqrt(after.information.residual_sum(after.value) / max(1, count)) * size
-    known = (white > 0.0) & np.isfinite(after.std) & ~after.undetermined
-    ratio = np.divide(after.std, white, out=np.ones(len(size)), where=known) ** 2
-    joints = diagnosis.robot.joints
-    names = np.array([column.joint for column in after.model.columns], dtype=object)
-    for j, joint in enumerate(joints):
-        own = known & (names == joint)
-        level[j] *= max(1.0, float(np.median(ratio[own if own.any() else known]))) if known.any() else 1.0
-    return level / rate
+    count = sum(own.table.shape[1] for own in observations.joints)
+    plain = np.sqrt(after.information.residual_sum(after.value) / max(1, count)) * size
+    known = (plain > 0.0) & np.isfinite(after.std) & ~after.undetermined
+    if not (np.any(known) and samples):
+        return level / rate
+    scatter = float(np.median((after.std[known] / plain[known]) ** 2)) * thinned / samples
+    # A variance told by so many blocks is this far off by chance, one standard deviation.
+    return level * max(1.0, scatter / float(1.0 + np.sqrt(2.0 / len(model.owner)))) / rate
 
 
 def all_suspects(asked: Sequence[Question]) -> tuple[Suspect, ...]:

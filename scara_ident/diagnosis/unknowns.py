@@ -95,3 +95,15 @@ def _armature(scene: Scene, joint: int, nominal: float, rotor_inertia_std: float
         lower = min(lower, upper - WIDEST * spread)
     held = min(float(np.log(scene.armature(joint))), upper)
     return Unknown(None, joint, held, lower, upper, mean, spread)
+
+
+def sides(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
+    """Return for each nonlinear parameter the candidates on either side, and how far they are from it."""
+    found = []
+    for place, parameter in enumerate(candidate.effect.nonlinear):
+        value = candidate.member.nonlinear[place]
+        reach = DERIVATIVE_STEP * (abs(value) if value else parameter.upper - parameter.lower)
+        moved = [list(candidate.member.nonlinear) for _ in range(2)]
+        moved[0][place], moved[1][place] = value + reach, value - reach
+        found.append((candidate.at(moved[0]), candidate.at(moved[1]), reach))
+    return found

@@ -20,12 +20,16 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import LEAST_NOISE, UNDETERMINED, Information, triangular, weighted
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.urdf_scale import USUAL
 from scara_ident.model.terms.friction import Friction, Offset
 from scara_ident.model.terms.rigid_body import RigidBody
+from scara_ident.model.urdf_values import urdf_values
 from scara_ident.motion.motion import Motion
 
 # The drive's torque is so many standard deviations of what is known without data.
 SURE = 3.0
+# How many times the friction recorded each of its terms may be, anywhere in the range: one standard deviation.
+MOST_FRICTION = 2.0
 # Random states per parameter that stand for the range.
 STATES_PER_PARAMETER = 8
 # An open share of a parameter's variance, as it is known without data, above which the parameter is called undetermined.
@@ -99,8 +103,54 @@ def told_directions(observations: Observations, value: Array) -> Told | None:
     return Told(directions[:, ~unknown], directions[:, unknown])
 
 
-def _range_factor(observations: Observations) -> Array | None:
-    """Return sums of columns, shape (p, p), whose torques over the arm's range are orthonormal, in drives' torques."""
+def believable(observations: Observations, value: Array, noise: Array) -> Array:
+    """Return parameters to foresee torques of other motions with, shape (p,).
+
+    An estimate as far as data tell it, and else what is known without them: bodies that the URDF describes have its torque
+    over the arm's range within a factor of `USUAL`, no term of friction is there many times the friction recorded, and all
+    together is what drives give. In units of what each is known to, the squares of all deviations are least.
+
+    Parameters
+    ----------
+    observations : Observations
+    value : ndarray, shape (p,)
+        The estimate.
+    noise : ndarray, shape (n,)
+        Of each joint's torque, (N m)^2 s.
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        The estimate itself for a model with terms that are no function of the state.
+    """
+    range_ = _range_rows(observations)
+    if range_ is None:
+        return value
+    model, (rows, drive) = observations.model, range_
+    rate = min(part.rate for part in observations.data.stretches)
+    stated = urdf_values(model)
+    bodies, aim = np.isfinite(stated), np.nan_to_num(stated)
+    rubbing = np.zeros(len(value), dtype=bool)
+    for term in model.terms:
+        rubbing[model.place(term)] = isinstance(term, Friction)
+    data = weighted(observations.by_joint, 1.0 / np.sqrt(noise * rate)).regressor_factor
+    known = [SURE * (rows / (drive[:, None, None] * np.sqrt(len(rows)))).reshape(-1, len(value))]
+    for own, torque in zip(observations.joints, rows, strict=True):
+        size = float(np.sqrt(np.mean((torque @ aim) ** 2)))
+        if size > 0.0:
+            known.append(torque * bodies / ((1.0 - 1.0 / USUAL) * size))
+        rubbed = value[own.columns] * rubbing[own.columns] @ own.table[:-1]
+        size = float(np.sqrt(rubbed @ rubbed / max(own.samples, 1.0)))
+        if size > 0.0:
+            most = np.max(np.abs(torque), axis=0) * np.sqrt(rows.shape[1])
+            known.append(np.diag(rubbing * most / (MOST_FRICTION * size)))
+    before = np.vstack(known) / np.sqrt(rows.shape[1])
+    wanted = np.concatenate([data @ value, before @ aim])
+    return np.asarray(np.linalg.lstsq(np.vstack([data, before]), wanted, rcond=None)[0])
+
+
+def _range_rows(observations: Observations) -> tuple[Array, Array] | None:
+    """Return the regressor over random states of the arm's range, shape (n, N, p), and the drives' torques, shape (n,)."""
     model, robot = observations.model, observations.model.robot
     if not all(isinstance(term, RigidBody | Friction | Offset) for term in model.terms):
         return None
@@ -133,9 +183,16 @@ def _range_factor(observations: Observations) -> Array | None:
     # A joint that swings through its range at its highest speed reaches this acceleration.
     q, v, a = 0.5 * (lower + upper)[:, None] + half[:, None] * q, speed[:, None] * v, (speed**2 / half)[:, None] * a
     motion = Motion("range", "range", np.arange(count, dtype=float), q, v, a, None, 1.0)
-    table = model.regressor(motion) / drive[:, None, None]
-    rows = table.transpose(0, 2, 1).reshape(-1, observations.parameters) / np.sqrt(robot.n * count)
-    factor = triangular(rows)
+    return model.regressor(motion).transpose(0, 2, 1), drive
+
+
+def _range_factor(observations: Observations) -> Array | None:
+    """Return sums of columns, shape (p, p), whose torques over the arm's range are orthonormal, in drives' torques."""
+    found = _range_rows(observations)
+    if found is None:
+        return None
+    rows = found[0] / found[1][:, None, None]
+    factor = triangular(rows.reshape(-1, rows.shape[2]) / np.sqrt(rows.shape[0] * rows.shape[1]))
     size = np.linalg.norm(factor, axis=0)
     if np.any(size == 0.0) or np.linalg.cond(factor / size) > 1.0 / UNDETERMINED:
         return None

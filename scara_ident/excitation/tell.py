@@ -123,14 +123,17 @@ def rows_in_blocks(inquiry: Inquiry, motion: Motion) -> Blocks:
     """
     signals = Signals(inquiry.scene, motion)
     model, count = inquiry.scene.model, motion.samples
-    seconds = count / motion.rate
+    seconds, bands, fade = count / motion.rate, inquiry.bands, np.ones(motion.v.shape)
+    if inquiry.reach is not None:
+        torque = [inquiry.scene.value[own] @ raw for own, raw in zip(model.active, signals.columns, strict=True)]
+        bands, fade = inquiry.reach.foreseen(np.array(torque), motion.v, motion.rate)
 
     def within(joint: int, columns: Array) -> Array:
-        band = inquiry.bands[joint]
+        band = bands[joint]
         kept = count // 2 + 1 if band is None else min(count // 2 + 1, int(band * seconds) + 1)
         steps = 2 * kept - 1
         size = np.sqrt(steps / (count * motion.rate * inquiry.noise[joint]))
-        return np.asarray(size * np.fft.irfft(np.fft.rfft(columns, axis=1)[:, :kept], steps, axis=1))
+        return np.asarray(size * np.fft.irfft(np.fft.rfft(fade[joint] * columns, axis=1)[:, :kept], steps, axis=1))
 
     def made(wanted: Sequence[Candidate]) -> list[Rows]:
         each = [item.effect.by_joint(signals, item.member) for item in wanted]
@@ -139,7 +142,7 @@ def rows_in_blocks(inquiry: Inquiry, motion: Motion) -> Blocks:
     added = inquiry.rows(made)
     widths = [len(next(iter(rows.values()))) for rows in added]
     total = len(model.columns) + sum(widths)
-    blocks = max(1, round(seconds / block_seconds(inquiry.bands)))
+    blocks = max(1, round(seconds / block_seconds(bands)))
     tables, starts = [], []
     for joint, (own, raw) in enumerate(zip(model.active, signals.columns, strict=True)):
         base = within(joint, raw)
@@ -159,11 +162,10 @@ def rows_in_blocks(inquiry: Inquiry, motion: Motion) -> Blocks:
 def told(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[Told, ...]:
     """Return what motions tell of every question, beside what is known."""
     new = [rows_in_blocks(inquiry, motion) for motion in motions]
-    before = inquiry.sigmas()
     after = inquiry.sigmas(merge([blocks.information() for blocks in new]))
     sure = _sure_of(inquiry, new)
     found = []
-    for item, one, other in zip(inquiry.questions, before, after, strict=True):
+    for item, one, other in zip(inquiry.questions, inquiry.sigmas(), after, strict=True):
         asked = item.suspects if item.kind == "below_limit" else ()
         found.append(Told(item, float(one), float(other), tuple(own.label for own in asked if sure[own.label] < 1.0)))
     return tuple(found)

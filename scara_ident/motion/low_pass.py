@@ -22,6 +22,8 @@ HIGHEST_CUT = 0.45
 MEMORY_PERIODS = 4.0
 # A low-passed signal has nothing beyond this many times its cut-off, where the filter would leave 6e-8.
 HIGHEST = 8.0
+# Integral of its squared gain over frequency, in cut-offs: of 1 / (1 + x^8)^2 from 0 on.
+NOISE_WIDTH = 7.0 * np.pi / (64.0 * np.sin(np.pi / 8.0))
 # Signals that are transformed together: of more the memory leaves the cache, of fewer the calls take longer.
 ROWS_AT_ONCE = 8
 
@@ -46,6 +48,11 @@ def low_pass(signal: Array, rate: float, cut: float | None, step: int = 1) -> Ar
     if cut is None:
         return signal
     return np.asarray(_filtered(signal, rate, cut, (0,), HIGHEST * cut, step)[0])
+
+
+def noise_share(rate: float, cut: float | None) -> float:
+    """Return the share of the variance of white noise that `low_pass` leaves."""
+    return 1.0 if cut is None else min(1.0, 2.0 * NOISE_WIDTH * cut / rate)
 
 
 def low_pass_every(signal: Array, rate: float, cut: float | None, step: int, weight: Array | None = None) -> Array:

@@ -320,12 +320,19 @@ def row_step(rate: float, band: float | None) -> int:
 
 def standstill(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) -> NDArray[np.bool_]:
     """Return where each joint stands still, shape (n, N), widened by the memory of the position's filter."""
-    result = np.zeros(motion.q.shape, dtype=bool)
-    for j, (band, speed) in enumerate(zip(bands, np.abs(motion.v), strict=True)):
-        least = REST_SHARE / REST_NOISE * float(np.max(speed))
-        threshold = REST_NOISE * velocity_noise(stretch, motion, j, band, least)
-        result[j] = _runs_longer_than(speed <= threshold, 1, widen=_widening(REST_WIDEN, stretch.rate, band))
-    return result
+    return slower(motion.v, rest_speeds(stretch, motion, bands), stretch.rate, bands)
+
+
+def rest_speeds(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) -> Array:
+    """Return the speeds below which noise may be what moves each joint, shape (n,)."""
+    least = REST_SHARE / REST_NOISE * np.max(np.abs(motion.v), axis=1)
+    return REST_NOISE * np.array([velocity_noise(stretch, motion, j, bands[j], least[j]) for j in range(len(bands))])
+
+
+def slower(v: Array, speeds: Array, rate: float, bands: Sequence[float | None]) -> NDArray[np.bool_]:
+    """Return where each joint is slower than a speed for some samples, shape (n, N), widened as `standstill`."""
+    slow = zip(np.abs(v) <= speeds[:, None], bands, strict=True)
+    return np.array([_runs_longer_than(own, 1, _widening(REST_WIDEN, rate, band)) for own, band in slow])
 
 
 def fading(rest: NDArray[np.bool_], rate: float, bands: Sequence[float | None]) -> Array:
@@ -354,9 +361,7 @@ def fading(rest: NDArray[np.bool_], rate: float, bands: Sequence[float | None]) 
 
 
 def _widening(periods: float, rate: float, band: float | None) -> int:
-    if band is None:
-        return 1
-    return max(1, int(rate * min(periods / (POSITION_BAND * band), LONGEST_WIDENING)))
+    return 1 if band is None else max(1, int(rate * min(periods / (POSITION_BAND * band), LONGEST_WIDENING)))
 
 
 def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | None, least: float) -> float:

@@ -48,6 +48,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
         "verdict": diagnosis.verdict,
         "summary": list(sentences(diagnosis)),
         "band_hz": dict(zip(joints, diagnosis.search.bands, strict=True)),
+        "band_given": diagnosis.bands_given,
         "noise_floor": {fit.joint: fit.noise for fit in diagnosis.fit_after} or dict.fromkeys(joints),
         "lack_of_fit": {
             "before": {fit.joint: fit.missing for fit in diagnosis.fit_before},

@@ -71,6 +71,15 @@ def test_an_effect_is_apart_from_none_by_what_the_model_leaves_of_it_and_a_param
     assert after**2 == pytest.approx(before**2 / worse, rel=1e-9)
 
 
+def test_of_several_that_may_be_there_the_usual_one_counts():
+    found = open_diagnosis()
+    pair = questions(found)[0].suspects
+    faint = replace(pair[1], label="faint", value=tuple(1e-6 * x for x in pair[1].value))
+    each = [Question("below_limit", item.label, (item,)) for item in (*pair, faint)]
+    one, other, least, all_ = inquire(found, [*each, Question("below_limit", "all", (*pair, faint))]).sigmas()
+    assert least < 1e-3 * one and all_ == pytest.approx(np.median([one, other, least]))
+
+
 def test_a_remainder_is_as_sure_as_the_knots_of_a_free_curve():
     found = open_diagnosis()
     name = "position of joint2"

@@ -11,14 +11,12 @@ from scipy.signal import butter, sosfiltfilt
 from scara_ident.estimation.bands import (
     HIGHEST_BAND,
     ROWS_PER_PARAMETER,
-    _Fit,
-    _Spectra,
     _widened,
-    binned_power,
     choose_bands,
     narrowest_bands,
     needed_rows,
 )
+from scara_ident.estimation.explained_power import Explained, Spectra, binned_power
 from scara_ident.estimation.observations import kept_rows
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.prepared import prepare
@@ -162,28 +160,14 @@ def test_the_order_of_recordings_does_not_matter(model: TorqueModel, clean: Reco
     np.testing.assert_allclose(forth.bands, back.bands, rtol=1e-9)
 
 
-def test_binned_power_is_the_mean_square_whatever_the_bins():
-    rng = np.random.default_rng(0)
-    count = 20_000
-    signals = rng.standard_normal((2, count)) * np.array([[1.0], [3.0]])
-    edges = np.array([0.0, 10.0, 60.0, 250.0])
-    power = binned_power(signals, RATE, edges)
-    # White noise: shares as wide as the bins.
-    np.testing.assert_allclose(power[1] / power[0], 9.0, rtol=0.1)
-    np.testing.assert_allclose(power[0] / power[0].sum(), np.diff(edges) / 250.0, rtol=0.1)
-    tone = np.sin(2 * np.pi * 30.0 * np.arange(count) / RATE)[None]
-    assert binned_power(tone, RATE, edges)[0, 1] > 0.999 * binned_power(tone, RATE, edges).sum()
-    np.testing.assert_allclose(binned_power(tone + 7.0, RATE, edges), binned_power(tone, RATE, edges), atol=1e-6)
-
-
-def pendulum(model: TorqueModel, seconds: float, torque_noise: float, seed: int = 0) -> Recording:
+def pendulum(model: TorqueModel, seconds: float, torque_noise: float, seed: int = 0, pace: float = 1.0) -> Recording:
     """A slow swing at 500 Hz with half a milliradian of noise, and torque that is mostly noise if so wanted."""
     rng = np.random.default_rng(seed)
     time = np.arange(round(seconds * RATE)) / RATE
     q, v, a = (np.zeros((2, len(time))) for _ in range(3))
     for j in range(2):
         for frequency in (0.3, 0.7, 1.1, 1.6):
-            w, size, phase = 2 * np.pi * frequency, 0.5 / (1 + frequency**2), rng.uniform(0, 2 * np.pi)
+            w, size, phase = 2 * np.pi * pace * frequency, 0.5 / (1 + frequency**2), rng.uniform(0, 2 * np.pi)
             q[j] += size * np.sin(w * time + phase)
             v[j] += size * w * np.cos(w * time + phase)
             a[j] -= size * w**2 * np.sin(w * time + phase)
@@ -205,13 +189,13 @@ def test_noisy_torque_does_not_swing_the_band(model: TorqueModel, torque_noise: 
 def test_the_search_for_bands_ends_where_fits_contradict_each_other():
     """Fits in a wide band that explain a narrow one only, and the other way round."""
 
-    class Contrary(_Spectra):
+    class Contrary(Spectra):
         def __init__(self) -> None:
             self.fits = 0
 
-        def fit(self, bands: np.ndarray) -> _Fit:
+        def fit(self, bands: np.ndarray) -> Explained:
             self.fits += 1
-            return _Fit(bands, bands, np.where(bands > 5.0, 1.0, 90.0), np.zeros((2, 1)))
+            return Explained(bands, bands, np.where(bands > 5.0, 1.0, 90.0), np.zeros((2, 1)))
 
     spectra = Contrary()
     bands, fit = _widened(spectra, np.full(2, 2.0), np.full(2, 0.5), 100.0, None)

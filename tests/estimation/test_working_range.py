@@ -11,7 +11,7 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.information import weighted
 from scara_ident.estimation.least_squares import ols, wls
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.estimation.working_range import told_directions
+from scara_ident.estimation.working_range import believable, told_directions
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.robot.robot import Robot, load_robot
@@ -85,3 +85,16 @@ def test_a_drive_that_is_stated_far_too_weak_is_as_strong_as_it_was_seen(robot: 
     unstated = replace(robot, effort_limit=np.full(robot.n, np.inf), velocity_limit=np.full(robot.n, np.inf))
     found = observations(unstated, 1, (1.0, 1.0))
     assert told_directions(found, wls(found).value) is None
+
+
+def test_a_slow_motion_foresees_the_torques_of_a_fast_one(robot: Robot):
+    """Powers of a speed that was hardly there make friction of many times the real one where the arm is fast."""
+    slow, fast = observations(robot, 5, (0.05, 0.05), noise=0.2), observations(robot, 6, (1.0, 1.0))
+    plain, noise = weighted(slow.by_joint, np.ones(robot.n)).solve().value, np.array([0.2, 0.02]) ** 2 / RATE
+    assert largest_error(plain, fast) > 10.0
+    found = believable(slow, plain, np.full(robot.n, noise[0]))
+    # Better than what leaves at zero what no data tell, too.
+    assert largest_error(found, fast) < 0.7 * largest_error(wls(slow).value, fast)
+    # What data tell it leaves as it was.
+    told = wls(fast).value
+    assert largest_error(believable(fast, told, np.full(robot.n, noise[1])), fast) < 1.02 * largest_error(told, fast)

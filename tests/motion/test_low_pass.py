@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from scara_ident.motion.low_pass import differentiate, low_pass, low_pass_every
+from scara_ident.motion.low_pass import differentiate, low_pass, low_pass_every, noise_share
 from scara_ident.motion.prepared import row_step
 from tests.motion.test_motion import RATE, sine
 
@@ -148,3 +148,12 @@ def test_a_weight_is_multiplied_in_before_the_filter(shape: tuple[int, ...]):
         atol=1e-15,
     )
     assert_array_equal(low_pass_every(signals, RATE, None, 7, weight), (weight * signals)[:, ::7])
+
+
+@pytest.mark.parametrize("cut", [5.0, 20.0, None])
+def test_the_share_of_white_noise_that_passes(cut: float | None):
+    noise = np.random.default_rng(3).standard_normal((40, 4000))
+    # Away from the ends, where the continued signal turns about its last sample.
+    passed = low_pass(noise, 500.0, cut)[:, 400:-400]
+    # The variance of 40 times 2 B T values is known to 3 % at the narrowest.
+    assert np.var(passed) == pytest.approx(noise_share(500.0, cut), rel=0.1)
