@@ -6,7 +6,6 @@ the nearest points with the direction between them give its derivative by the jo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -16,10 +15,9 @@ from numpy.typing import NDArray
 from pinocchio import coal
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RobotError, UsageError
 from scara_ident.excitation.joint_frames import JointFrames, joint_frames, joints_of
 from scara_ident.manners import Frozen
-from scara_ident.robot.collision_shapes import bare_links, collision_shapes
+from scara_ident.robot.collision_shapes import collision_shapes
 from scara_ident.robot.kinematics import place_of
 from scara_ident.robot.robot import Robot
 
@@ -28,15 +26,10 @@ Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 # Distances are told apart up to so much more than the margin, m.
 REACH = 0.05
-# Of Coal's search for nearest points, m; and where it begins.
+# Pairs count by this power of their room: the larger, the more the nearest alone.
+POWER = 2.0
+# Of Coal's search for nearest points, m.
 TOLERANCE = 1e-8
-GUESS, HINT = np.array([1.0, 0.0, 0.0]), np.zeros(2, dtype=np.int32)
-# Random postures at which pairs are looked at.
-POSTURES = 100
-# A pair is likely to come near if its least distance there is so much of the range of its distances, or less.
-SPREAD = 0.5
-# Links of the arm that are never further apart than this touch by design, m.
-TOUCHING = 0.02
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,26 +60,32 @@ class Clearance(Frozen):
     notes: tuple[str, ...]
     likely: tuple[bool, ...] = ()
 
-    @property
+    @cached_property
     def groups(self) -> tuple[str, ...]:
         """Groups with a pair, in order."""
         return tuple(dict.fromkeys(group for *_, group in self.pairs))
 
     @cached_property
+    def _group(self) -> NDArray[np.intp]:
+        """Which group each pair counts in, shape (P,)."""
+        return np.array([self.groups.index(group) for *_, group in self.pairs], dtype=np.intp)
+
+    @cached_property
     def shapes(self) -> pin.GeometryModel:
         """Shapes of the robot, then the floor and the boxes, with the pairs."""
-        shapes = pin.GeometryModel(_shapes_about(self.robot, self.floor, self.boxes))
+        shapes = pin.GeometryModel(shapes_about(self.robot, self.floor, self.boxes))
         for first, second, _ in self.pairs:
             shapes.addCollisionPair(pin.CollisionPair(first, second))
         return shapes
 
     @cached_property
-    def _data(self) -> tuple[pin.Data, pin.GeometryData, list[coal.DistanceRequest], list[coal.DistanceResult]]:
+    def _data(self) -> tuple[pin.Data, pin.GeometryData, list[coal.DistanceResult]]:
         measured = self.shapes.createData()
-        requests = list(measured.distanceRequests)
-        for request in requests:
-            request.gjk_tolerance = TOLERANCE
-        return self.robot.model.createData(), measured, requests, list(measured.distanceResults)
+        # Pinocchio's own let Coal begin where it last ended: digits would depend on what was measured before.
+        for pair in range(len(self.pairs)):
+            measured.distanceRequests[pair] = coal.DistanceRequest()
+            measured.distanceRequests[pair].gjk_tolerance = TOLERANCE
+        return self.robot.model.createData(), measured, list(measured.distanceResults)
 
     @cached_property
     def _spheres(self) -> tuple[Array, Array]:
@@ -139,46 +138,46 @@ class Clearance(Frozen):
         # What moves both alike changes nothing.
         return np.where(self._moved_by[first] != self._moved_by[second], rates[first] + rates[second], 0.0)
 
-    def nearest(self, q: Array, reach: float = np.inf, *, likely: bool = False) -> Nearest:
-        """Measure the smallest distance of each group.
+    def nearest(self, q: Array, reach: float, *, likely: bool = False) -> Nearest:
+        """Measure the pairs that are nearer than a reach.
 
         Parameters
         ----------
         q : ndarray, shape (n, N)
             rad or m.
         reach : float
-            Distances from this on need not be told apart, m.
+            m.
         likely : bool
             Whether to look at likely pairs alone.
         """
-        groups = self.groups
-        distance = np.full((len(groups), q.shape[1]), reach)
-        nearest = np.full(distance.shape, -1, dtype=np.intp)
-        bounds = self._bounds(joint_frames(self.robot, q))
+        near = self._bounds(joint_frames(self.robot, q)) < reach
+        if likely:
+            near &= np.array(self.likely)[:, None]
         # How much the distance of each pair may have changed on the way to every posture.
         way = np.cumsum(self._rates(q) @ np.abs(np.diff(q, axis=1, prepend=q[:, :1])), axis=1)
-        near = np.flatnonzero(np.any(bounds < reach, axis=1) & (self.likely if likely else True))
-        postures, measure = self._configurations(q), self._measure
-        # Pairs that are near on the whole come first: beside them most others need not be measured.
-        for pair in near[np.argsort(bounds[near].mean(axis=1), kind="stable")].tolist():
-            group = groups.index(self.pairs[pair][2])
-            least, found = distance[group], nearest[group]
-            places = np.flatnonzero(bounds[pair] < least)
-            last = -np.inf
-            for k, gone, most in zip(places.tolist(), way[pair, places].tolist(), least[places].tolist(), strict=True):
-                if last - gone < most:
-                    value = measure(pair, postures[k]).min_distance
-                    last = value + gone
-                    if value < most:
-                        least[k], found[k] = value, pair
-        return Nearest(distance, nearest)
+        place, pair = np.nonzero(near.T)
+        postures, last, placed = self._configurations(q), [-np.inf] * len(near), -1
+        found = []
+        for k, one, gone in zip(place.tolist(), pair.tolist(), way[pair, place].tolist(), strict=True):
+            if last[one] - gone < reach:
+                if k != placed:
+                    self._place(postures[k])
+                    placed = k
+                value = self._measure(one).min_distance
+                last[one] = value + gone
+                if value < reach:
+                    found.append((k, one, value))
+        places, pairs, distances = zip(*found, strict=True) if found else ((), (), ())
+        return Nearest(np.array(places, dtype=np.intp), np.array(pairs, dtype=np.intp), np.array(distances))
 
-    def _measure(self, pair: int, posture: Array) -> coal.DistanceResult:
-        """Measure a pair at a posture as Pinocchio has it; what is returned holds until the next measurement."""
-        data, measured, requests, results = self._data
-        # Coal begins where it last ended, so that digits would depend on what was measured before.
-        requests[pair].cached_gjk_guess, requests[pair].cached_support_func_guess = GUESS, HINT
+    def _place(self, posture: Array) -> None:
+        """Bring the shapes to a posture as Pinocchio has it."""
+        data, measured, _ = self._data
         pin.updateGeometryPlacements(self.robot.model, data, self.shapes, measured, posture)
+
+    def _measure(self, pair: int) -> coal.DistanceResult:
+        """Measure a pair where its shapes are; what is returned holds until it is measured again."""
+        _, measured, results = self._data
         pin.computeDistance(self.shapes, measured, pair)
         return results[pair]
 
@@ -189,33 +188,50 @@ class Clearance(Frozen):
         neutral = pin.neutral(model)
         return [each if plain else pin.integrate(model, neutral, each) for each in np.ascontiguousarray(q[back].T)]
 
-    def slopes(self, q: Array, found: Nearest) -> Array:
-        """Return the derivative of the distances by the joints, shape (G, n, N); 0 where they were not measured."""
-        frames = joint_frames(self.robot, q)
-        slope = np.zeros((len(found.distance), *q.shape))
-        group, place = np.nonzero(found.pair >= 0)
-        chosen, postures = found.pair[group, place], self._configurations(q[:, place])
-        # Nearest points on the first and on the second shape, and the direction from one to the other.
-        where = np.empty((3, 3, len(chosen)))
-        for k, (pair, posture) in enumerate(zip(chosen.tolist(), postures, strict=True)):
-            result = self._measure(pair, posture)
-            where[:, :, k] = result.getNearestPoint1(), result.getNearestPoint2(), result.normal
-        axes, origins = frames.axis[:, :, place], frames.origin[:, :, place]
-        slides = frames.prismatic[:, None, None]
-        for side, sign, point in zip(self._sides, (-1.0, 1.0), where[:2], strict=True):
-            arm = np.cross(axes, point - origins, axis=1)
-            moved = self._moved_by[side[chosen]].T
-            slope[group, :, place] += sign * (moved * np.einsum("jcN,cN->jN", np.where(slides, axes, arm), where[2])).T
-        return slope
-
     @property
     def reach(self) -> float:
         """Distance from which on there is room enough, m."""
         return self.margin + REACH
 
-    def rows(self, found: Nearest) -> Array:
-        """Return distances within reach as rows of limits, 1 at the margin and 0 where there is room, shape (G, N)."""
-        return 1.0 - (found.distance - self.margin) / REACH
+    def rows(self, found: Nearest, samples: int) -> Array:
+        """Return what is within reach as rows of limits, 1 at the margin and 0 where there is room, shape (G, N).
+
+        The rooms of all pairs of a group make up one that is a little less than the least of them, and none where that is
+        none, and that changes smoothly when another pair becomes the nearest. Where a pair is too near the worst counts alone.
+        """
+        room = (found.distance - self.margin) / REACH
+        place = self._group[found.pair], found.place
+        least, parallel = np.ones((2, len(self.groups), samples))
+        np.minimum.at(least, place, room)
+        np.add.at(parallel, place, np.where(room > 0.0, room, 1.0) ** -POWER - 1.0)
+        return 1.0 - np.where(least > 0.0, parallel ** (-1.0 / POWER), least)
+
+    def slopes(self, q: Array, found: Nearest) -> Array:
+        """Return the derivative of the rows by the joints where nothing is too near, shape (G, n, N)."""
+        slope = np.zeros((len(self.groups), q.shape[1], len(q)))
+        place = self._group[found.pair], found.place
+        share = (1.0 - self.rows(found, q.shape[1])[place]) * REACH / (found.distance - self.margin)
+        np.add.at(slope, place, -self.gradients(q, found) * (share ** (POWER + 1.0) / REACH)[:, None])
+        return slope.transpose(0, 2, 1)
+
+    def gradients(self, q: Array, found: Nearest) -> Array:
+        """Return the derivative of the distances by the joints, shape (K, n)."""
+        frames, postures = joint_frames(self.robot, q), self._configurations(q)
+        # Nearest points on the first and on the second shape, and the direction from one to the other.
+        where = np.empty((len(found.pair), 3, 3))
+        placed = -1
+        for k, pair, place in zip(where, found.pair.tolist(), found.place.tolist(), strict=True):
+            if place != placed:
+                self._place(postures[place])
+                placed = place
+            result = self._measure(pair)
+            k[0], k[1], k[2] = result.getNearestPoint1(), result.getNearestPoint2(), result.normal
+        axes, origins = (each[:, :, found.place].transpose(2, 0, 1) for each in (frames.axis, frames.origin))
+        slope = np.zeros((len(found.pair), len(q)))
+        for side, sign, point in zip(self._sides, (-1.0, 1.0), (where[:, 0], where[:, 1]), strict=True):
+            way = np.where(frames.prismatic[:, None], axes, np.cross(axes, point[:, None] - origins))
+            slope += sign * self._moved_by[side[found.pair]] * np.einsum("kjc,kc->kj", way, where[:, 2])
+        return slope
 
     def _bounds(self, frames: JointFrames) -> Array:
         """Return a lower bound of the distance of every pair, shape (P, N)."""
@@ -237,16 +253,18 @@ class Clearance(Frozen):
 
     def all_distances(self, q: Array) -> Array:
         """Return the distance of every pair at postures (n, N), shape (P, N), m."""
-        pairs, measure = range(len(self.pairs)), self._measure
-        each = [[measure(pair, posture).min_distance for pair in pairs] for posture in self._configurations(q)]
-        return np.array(each).reshape(q.shape[1], len(pairs)).T
+        found = np.empty((len(self.pairs), q.shape[1]))
+        for k, posture in enumerate(self._configurations(q)):
+            self._place(posture)
+            found[:, k] = [self._measure(pair).min_distance for pair in range(len(self.pairs))]
+        return found
 
     def nearest_of(self, posture: Array) -> str:
         """Say which pair is nearest at a posture (n,)."""
         distance = self.all_distances(posture[:, None])[:, 0]
         first, second, _ = self.pairs[int(np.argmin(distance))]
         return (
-            f"{_link(self, first)} comes within {distance.min():.4g} m of {_link(self, second)}, where {self.margin:g} m "
+            f"{link_of(self, first)} comes within {distance.min():.4g} m of {link_of(self, second)}, where {self.margin:g} m "
             "are to be kept"
         )
 
@@ -259,133 +277,36 @@ class Clearance(Frozen):
         # Where spheres are nearest first, so that most postures need not be measured.
         for part in np.array_split(np.argsort(bounds.min(axis=0)), max(1, q.shape[1] // 50)):
             if bounds[:, part].min() < least:
-                least = min(least, float(alone.nearest(q[:, part], least).distance.min()))
+                least = float(alone.nearest(q[:, part], least).distance.min(initial=least))
         return least
 
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """Smallest distances of groups at postures, and of which pairs they are.
+    """Pairs that are near at some of N postures.
 
     Attributes
     ----------
-    distance : ndarray, shape (G, N)
-        m; negative where shapes overlap, and what was asked as reach where none is nearer.
-    pair : ndarray of int, shape (G, N)
-        Which it is of all pairs; -1 where none is nearer than the reach.
+    place, pair : ndarray of int, shape (K,)
+        Which posture, and which of all pairs.
+    distance : ndarray, shape (K,)
+        m; negative where shapes overlap.
     """
 
-    distance: Array
+    place: NDArray[np.intp]
     pair: NDArray[np.intp]
+    distance: Array
 
 
-def clearance_of(
-    robot: Robot,
-    lower: Array,
-    upper: Array,
-    *,
-    margin: float,
-    floor: float = -np.inf,
-    boxes: Sequence[Box] = (),
-) -> Clearance:
-    """Choose the pairs of shapes that a motion keeps apart.
-
-    Shapes of one body and of links that a joint connects are not watched, nor are two shapes of the arm that overlap both
-    at the neutral posture and in the middle of the ranges, or are never 2 cm (or the margin) apart; nor any pair that, in
-    every posture tried, touches, or is nearer than the margin without touching.
-
-    Parameters
-    ----------
-    robot : Robot
-    lower, upper : ndarray, shape (n,)
-        Ranges, rad or m.
-    margin : float
-        m.
-    floor : float
-        Height, m.
-    boxes : sequence of Box
-
-    Raises
-    ------
-    UsageError
-        If the margin is negative, or a box has no size.
-    """
-    if not 0.0 <= margin < np.inf:
-        raise UsageError(f"clearance {margin:g} m: expected 0 or more")
-    for centre, edges in boxes:
-        if not (np.all(np.isfinite(centre)) and np.all(np.isfinite(edges)) and min(edges) > 0.0):
-            raise UsageError(f"box at {centre} with edges {edges}: expected finite places and edges above 0, in m")
-    kept = tuple((_triple(centre), _triple(edges)) for centre, edges in boxes)
-    watched = Clearance(robot, float(margin), float(floor), kept, (), ())
-    unwatched = "Collisions were not looked for: {}; rehearse the motion slowly."
-    try:
-        shapes = _shapes_about(robot, watched.floor, watched.boxes)
-    except RobotError as error:
-        return replace(watched, notes=(unwatched.format(error),))
-    moved = [shape.parentJoint for shape in shapes.geometryObjects]
-    if not any(moved):
-        return replace(watched, notes=(unwatched.format(f"{robot.urdf.name} has no collision shapes"),))
-    bare = bare_links(robot)
-    notes = (f"Links without a collision shape are not watched: {', '.join(bare)}.",) if bare else ()
-    obstacles = [*(["floor"] if np.isfinite(floor) else []), *(f"box{k + 1}" for k in range(len(boxes)))]
-    count, found = shapes.ngeoms - len(obstacles), shapes.geometryObjects
-    pairs = [
-        (i, j, "self")
-        for i in range(count)
-        for j in range(i + 1, count)
-        if moved[i] != moved[j]
-        and not _hangs(robot.model, found[i], found[j])
-        and not _hangs(robot.model, found[j], found[i])
-    ]
-    pairs += [(i, count + k, name) for k, name in enumerate(obstacles) for i in range(count) if moved[i]]
-    if not pairs:
-        return replace(watched, notes=(unwatched.format("all links that have shapes hang on one another"),))
-    return _parted(replace(watched, pairs=tuple(pairs), notes=notes), lower, upper)
-
-
-def _hangs(model: pin.Model, shape: pin.GeometryObject, on: pin.GeometryObject) -> bool:
-    """Whether a joint that moves connects a shape's link to that of another; what is fixed to either is a link of its own."""
-    joint = model.frames[model.frames[shape.parentFrame].parentFrame]
-    return bool(joint.type == pin.FrameType.JOINT and joint.parentFrame == on.parentFrame)
-
-
-def _parted(watched: Clearance, lower: Array, upper: Array) -> Clearance:
-    """Leave out the pairs that touch where the designer of the arm let them, and those that no motion parts."""
-    drawn = np.random.default_rng(0).uniform(lower, upper, (POSTURES, len(lower)))
-    postures = np.vstack([np.clip(np.zeros(len(lower)), lower, upper), 0.5 * (lower + upper), drawn]).T
-    distance = watched.all_distances(postures)
-    own = np.array([group == "self" for *_, group in watched.pairs])
-    near = np.all(distance < min(watched.margin, TOUCHING), axis=1)
-    touching = own & (near | np.all(distance[:, :2] <= 0.0, axis=1)) | np.all(distance <= 0.0, axis=1)
-    # What comes apart and collides is watched, though the margin be more than it can have: the design then says so.
-    touching |= np.all((distance > 0.0) & (distance < watched.margin), axis=1)
-    names = [_link(watched, shape) for shape in range(watched.shapes.ngeoms)]
-    left_out = sorted({
-        f"{names[first]} and {names[second]}"
-        for (first, second, _), never in zip(watched.pairs, touching, strict=True) if never
-    })  # fmt: skip
-    kept = tuple(pair for pair, never in zip(watched.pairs, touching, strict=True) if not never)
-    room = distance[~touching].min(axis=1) - watched.margin
-    likely = room < SPREAD * np.ptp(distance[~touching], axis=1)
-    said = f"Not kept {watched.margin:g} m apart, as they touch by design, or never: {{}}."
-    notes = (*watched.notes, said.format("; ".join(left_out))) if left_out else watched.notes
-    return replace(watched, pairs=kept, notes=notes, likely=tuple(likely.tolist()))
-
-
-def _link(watched: Clearance, shape: int) -> str:
+def link_of(watched: Clearance, shape: int) -> str:
     """Return the link of a shape, or the name of an obstacle."""
     found = watched.shapes.geometryObjects[shape]
     frame = found.parentFrame
     return str(watched.robot.model.frames[frame].name) if 0 < frame < watched.robot.model.nframes else str(found.name)
 
 
-def _triple(numbers: Sequence[float]) -> tuple[float, float, float]:
-    x, y, z = map(float, numbers)
-    return x, y, z
-
-
 @lru_cache(maxsize=4)
-def _shapes_about(robot: Robot, floor: float, boxes: tuple[Box, ...]) -> pin.GeometryModel:
+def shapes_about(robot: Robot, floor: float, boxes: tuple[Box, ...]) -> pin.GeometryModel:
     """Return shapes of the robot, then the floor and the boxes, without pairs."""
     shapes = collision_shapes(robot)
     found = []

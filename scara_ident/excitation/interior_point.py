@@ -177,7 +177,8 @@ class _Direction:
                     usual = mu / room
                     wanted = np.where(wanted > 0.0, wanted, usual)
                     held = np.clip(wanted, usual / MULTIPLIER_RANGE, usual * MULTIPLIER_RANGE)
-                    eased: float = damping * (0.3 if halving == 0 else 2.0)
+                    # A step that had to be halved was so many times too long.
+                    eased: float = damping * (0.3 if halving == 0 else 2.0**halving)
                     return _Step(there, room, held, max(eased, LEAST_DAMPING), slope)
                 length *= 0.5
             damping *= 10.0

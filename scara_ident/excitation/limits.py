@@ -10,8 +10,9 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, ScaraIdentError, UsageError
-from scara_ident.excitation.clearance import Box, Clearance, clearance_of
+from scara_ident.excitation.clearance import Box, Clearance
 from scara_ident.excitation.tool import Tool, tool_motion, tool_of
+from scara_ident.excitation.watched_pairs import clearance_of
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
 from scara_ident.motion.motion import Motion
@@ -344,11 +345,11 @@ def _at_rest(model: TorqueModel, limits: Limits, nominal: Array, q: Array) -> tu
     shares += list(np.abs(q - limits.centre[:, None]) / half[:, None] - 1.0)
     height: Array = np.full(samples, np.inf)
     if limits.tool is not None and np.isfinite(limits.floor):
-        height = tool_motion(limits.tool, q, still, still).position[2]
+        height = tool_motion(limits.tool, q).position[2]
         shares.append(limits.floor - height)
     if limits.clearance is not None and limits.clearance.pairs:
         near = limits.clearance.nearest(q, limits.clearance.reach)
-        shares += list(limits.clearance.rows(near) - 1.0)
+        shares += list(limits.clearance.rows(near, samples) - 1.0)
     stacked = np.array(shares)
 
     def broken(index: int) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.excitation.clearance import REACH, Nearest
+from scara_ident.excitation.clearance import Nearest
 from scara_ident.excitation.criteria import Criterion
 from scara_ident.excitation.curves import Basis
 from scara_ident.excitation.limits import Limits
@@ -84,6 +84,8 @@ class Point:
     tool : ToolMotion or None
     near : Nearest or None
         Distances, where they are measured.
+    uphill : ndarray, shape (p, p), or None
+        Derivative of the cost by the information, where the cost is finite.
     """
 
     x: Array
@@ -93,6 +95,7 @@ class Point:
     regressor: Array | None = None
     tool: ToolMotion | None = None
     near: Nearest | None = None
+    uphill: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +152,8 @@ class Problem:
         found = self._limited(x, motion, values)
         if found.regressor is None or not self._kept(found.values):
             return found
-        return replace(found, cost=self._cost(found.regressor)[0])
+        cost, uphill = self._cost(found.regressor)
+        return replace(found, cost=cost, uphill=uphill)
 
     def inside(self, x: Array) -> bool:
         """Tell whether all limits are kept, whatever the cost."""
@@ -172,11 +176,11 @@ class Problem:
         task, motion, regressor = self.task, point.motion, point.regressor
         assert regressor is not None
         k, n = point.x.shape[:2]
-        cost, gradient = self._cost(regressor)
+        cost, uphill = self._cost(regressor) if point.uphill is None else (point.cost, point.uphill)
         counted = self._counted(regressor)
         weights = np.zeros_like(regressor)
         scale = 2.0 * self._share[:, None] * task.weights[:, None, None, None] ** 2
-        weights.reshape(n, -1, k, motion.samples // k)[..., :: self.stride] = scale * (gradient @ counted).reshape(
+        weights.reshape(n, -1, k, motion.samples // k)[..., :: self.stride] = scale * (uphill @ counted).reshape(
             n, -1, k, counted.shape[2] // k
         )
         by_motion, torque = task.smooth.derivatives(motion, weights, task.nominal)
@@ -223,7 +227,8 @@ class Problem:
         values = [own, torque[limited] / limits.torque[limited, None]]
         tool, near = None, None
         if limits.tool is not None and limits.watches_tool:
-            tool = tool_motion(limits.tool, motion.q, motion.v, motion.a)
+            moving = np.isfinite([limits.tool_acceleration, limits.tool_speed]).any()
+            tool = tool_motion(limits.tool, motion.q, *((motion.v, motion.a) if moving else ()))
             values += [row[None] for row, _ in tool_rows(limits, tool, False)]
         rows = np.concatenate(values)
         clearance = limits.clearance
@@ -231,7 +236,7 @@ class Problem:
             places = self._measured(motion)
             near = clearance.nearest(motion.q[:, places], clearance.reach, likely=self.sparse > 1)
             distances = np.zeros((len(clearance.groups), motion.samples))
-            distances[:, places] = clearance.rows(near)
+            distances[:, places] = clearance.rows(near, len(places))
             rows = np.concatenate([rows, distances])
         return Point(x, motion, np.inf, rows, regressor, tool, near)
 
@@ -243,8 +248,8 @@ class Problem:
         """Return derivatives of the rows of distances by the motion, shape (G, 3, n, k M)."""
         clearance, places = self.task.limits.clearance, self._measured(motion)
         assert clearance is not None
-        slope = np.zeros((len(near.distance), 3, *motion.q.shape))
-        slope[:, 0][..., places] = -clearance.slopes(motion.q[:, places], near) / REACH
+        slope = np.zeros((len(clearance.groups), 3, *motion.q.shape))
+        slope[:, 0][..., places] = clearance.slopes(motion.q[:, places], near)
         return slope
 
     def _counted(self, regressor: Array) -> Array:
@@ -264,7 +269,9 @@ class Problem:
         parts = slopes.reshape(count, 3, n, k, -1)
         result = np.einsum("rnkM,kMm->rkMnm", parts[:, 0], self.rows[0])
         for kind in (1, 2):
-            result += np.einsum("rnkM,kMm->rkMnm", parts[:, kind], self.rows[kind])
+            # Distances and heights, which come last, depend on positions alone.
+            some = 1 + np.flatnonzero(np.any(parts[:, kind], axis=(1, 2, 3))).max(initial=-1)
+            result[:some] += np.einsum("rnkM,kMm->rkMnm", parts[:some, kind], self.rows[kind])
         return np.asarray(result.reshape(count, k, self.rows.shape[2], -1))
 
 

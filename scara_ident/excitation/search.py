@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,10 +24,14 @@ SPARSE = {COARSE: 2, FINE: 1}
 LEAST_TIMES = 60
 # Times of the verification per time of the winner's limits, and at least per second.
 FINER, LEAST_RATE = 10, 1000.0
-# Bounds of the search and of the winner, as shares, and what a bound is tightened by besides its excess.
-BOUND, EXACT, MARGIN = 0.999, 1.0 - 1e-6, 5e-4
+# Bounds of the search, and of the winner for what happens between its times, as shares; and what a bound is tightened by
+# besides its excess.
+BOUND, CLOSE, MARGIN = 0.999, 0.998, 5e-4
+# How the winner of the search, which is near its limits, goes on; and once more where it broke some between the times.
+WINNER = Schedule(first=0.2, last=1e-2, tolerance=1e-2, steps=100, sharpness=1.0)
+CORRECTION = replace(WINNER, first=0.05, steps=50)
 # Size of changes of a good motion, as shares of it.
-CHANGES = (0.1, 0.2, 0.3)
+CHANGES = (0.03, 0.1, 0.2)
 ELITE = 3
 # Random starts have this share of the highest frequency as their bandwidth, and this share of the velocity limits.
 SLOW, GENTLE = 0.25, 0.5
@@ -174,8 +178,7 @@ def _random_motion(task: Task, random: np.random.Generator) -> Array:
 
 def _finish(task: Task, x: Array) -> tuple[Array, int]:
     """Take a motion to a fine grid, and tighten bounds until it keeps its limits between the samples as well."""
-    bounds = np.full(_rows(task), EXACT)
-    plan = Schedule(first=2.0, last=2e-3, tolerance=1e-2, steps=300)
+    bounds, plan = np.full(_rows(task), CLOSE), WINNER
     problem = within_grid(task, FINE, bounds, FINE // COARSE)
     times = _verified_times(problem)
     for _ in range(CORRECTIONS):
@@ -188,7 +191,7 @@ def _finish(task: Task, x: Array) -> tuple[Array, int]:
             return x, times
         bounds = bounds * np.where(excess > 1.0, (1.0 - MARGIN) / np.maximum(excess, 1.0), 1.0)
         problem = within_grid(task, FINE, bounds, FINE // COARSE)
-        plan = Schedule(first=0.5, last=2e-3, tolerance=1e-2, steps=150, sharpness=1.0)
+        plan = CORRECTION
     return verified_inside(problem, x)
 
 

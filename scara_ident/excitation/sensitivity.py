@@ -1,13 +1,9 @@
 """How the regressor of a motion changes with the motion.
 
 What an optimiser needs is linear in the regressor: the derivative of ``sum_ij G_ij W_ij`` by positions, velocities
-and accelerations, for weights G of every sample, and that of the torques of given parameters. The first goes backwards
-through the arithmetic of rigid bodies; other terms and torques are evaluated beside the motion and differences taken.
-
-For rigid bodies the differences are exact. Kinetic energy is a trigonometric polynomial of degree 2 in the angle of
-a revolute joint, and a polynomial of degree 2 in the position of a prismatic one, and so is the regressor; it is
-quadratic in velocities and linear in accelerations. The derivative of a trigonometric polynomial of degree 2 is a sum
-of its values at four points (M. Riesz's interpolation formula), that of a parabola a central difference.
+and accelerations, for weights G of every sample, and that of the torques of given parameters. Of rigid bodies the first
+goes backwards through their arithmetic and the second is Pinocchio's; other terms are evaluated beside the motion and
+differences taken.
 """
 
 from __future__ import annotations
@@ -22,17 +18,9 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction, Offset, RigidBody, Term
 from scara_ident.motion.motion import Motion
 
-Stencil = tuple[tuple[float, float], ...]
-
-# f'(x) = sum_k weight_k f(x + shift_k), exact for trigonometric polynomials of degree 2.
-RIESZ: Stencil = tuple(
-    ((2 * k - 1) * np.pi / 4, (-1) ** (k + 1) / (8.0 * np.sin((2 * k - 1) * np.pi / 8) ** 2)) for k in range(1, 5)
-)
-# Exact for parabolas, whatever the step.
-CENTRAL: Stencil = ((1.0, 0.5), (-1.0, -0.5))
-# For any smooth function; the step balances its error h^4 with rounding 1e-16 / h.
+# f'(x) = sum_k weight_k f(x + shift_k); the step balances its error h^4 with rounding 1e-16 / h.
 SMOOTH_STEP = 1e-3
-SMOOTH: Stencil = tuple(
+SMOOTH = tuple(
     (k * SMOOTH_STEP, weight / (12.0 * SMOOTH_STEP)) for k, weight in ((1, 8.0), (-1, -8.0), (2, -1.0), (-2, 1.0))
 )
 
@@ -97,7 +85,7 @@ class SmoothModel:
             if isinstance(term, RigidBody):
                 gradient += term.pulled_back(motion, part)
                 if value is not None:
-                    torque += _of_torque(term, motion, value)
+                    torque += term.torque_slopes(motion, value)
                 continue
             for kind, joint, weight, columns in _beside(term, motion):
                 gradient[kind, joint] += weight * np.einsum("ipN,ipN->N", part, columns)
@@ -131,27 +119,6 @@ def _friction(term: Friction, motion: Motion, width: Array) -> tuple[Array, Arra
         columns[i] *= term.robot.drive_sign[i]
         slopes[i] *= term.robot.drive_sign[i]
     return columns, slopes
-
-
-def _of_torque(term: RigidBody, motion: Motion, value: Array) -> Array:
-    """Differentiate the torque of bodies by the motion, all differences at once, shape (n, 3, n, N)."""
-    n = len(motion.q)
-    beside = [
-        (kind, joint, shift, weight)
-        for kind in range(3)
-        for joint in range(n)
-        for shift, weight in (CENTRAL if kind or term.robot.prismatic[joint] else RIESZ)
-    ]
-    states = np.repeat(np.array([motion.q, motion.v, motion.a])[:, :, None], len(beside), axis=2)
-    for place, (kind, joint, shift, _) in enumerate(beside):
-        states[kind, joint, place] += shift
-    q, v, a = states.reshape(3, n, -1)
-    moved = replace(motion, time=np.arange(q.shape[1], dtype=np.float64), q=q, v=v, a=a)
-    torque = term.torque(moved, value).reshape(n, len(beside), -1)
-    result = np.zeros((n, 3, n, motion.samples))
-    for place, (kind, joint, _, weight) in enumerate(beside):
-        result[:, kind, joint] += weight * torque[:, place]
-    return result
 
 
 def _beside(term: Term, motion: Motion) -> Iterator[tuple[int, int, float, Array]]:

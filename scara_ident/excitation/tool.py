@@ -12,6 +12,8 @@ from scara_ident.model.regressor.recursion import JointGeometry, joint_geometry
 from scara_ident.robot.kinematics import place_of, tool_frame
 from scara_ident.robot.robot import Robot
 
+IDENTITY = np.eye(3)[:, :, None]
+
 
 @dataclass(frozen=True, eq=False)
 class Tool:
@@ -48,6 +50,8 @@ class ToolMotion:
         in time or, of one that turns, that and the way from the joint to the point with two derivatives, each (3, N).
     joints : int
         Number n of joints of the robot.
+    moves : bool
+        Whether it does not rest at every sample.
     """
 
     position: Array
@@ -55,6 +59,7 @@ class ToolMotion:
     acceleration: Array
     parts: tuple[tuple[int, bool, tuple[Array, ...]], ...]
     joints: int
+    moves: bool
 
     @cached_property
     def jacobians(self) -> Array:
@@ -70,6 +75,8 @@ class ToolMotion:
                 continue
             r, dr, ddr = arms
             found[0, place] = _cross(axis, r)
+            if not self.moves:
+                continue
             found[1, place] = _cross(rate, r) + _cross(axis, dr)
             found[2, place] = _cross(change, r) + 2.0 * _cross(rate, dr) + _cross(axis, ddr)
         return found
@@ -101,8 +108,8 @@ def tool_of(robot: Robot, frame: str | None = None) -> Tool:
     return Tool(found.name, tuple(reversed(chain)), np.array(found.placement.translation), robot.n)
 
 
-def tool_motion(tool: Tool, q: Array, v: Array, a: Array) -> ToolMotion:
-    """Return the motion of a tool.
+def tool_motion(tool: Tool, q: Array, v: Array | None = None, a: Array | None = None) -> ToolMotion:
+    """Return the motion of a tool; without velocities and accelerations it rests at every sample, which is quicker.
 
     Parameters
     ----------
@@ -110,41 +117,47 @@ def tool_motion(tool: Tool, q: Array, v: Array, a: Array) -> ToolMotion:
     q, v, a : ndarray, shape (n, N)
         In the order of ``robot.joints``.
     """
-    samples = q.shape[1]
+    samples, moves = q.shape[1], v is not None and a is not None
     turn = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, samples))
     origin, speed, push, spin, twist = (np.zeros((3, samples)) for _ in range(5))
     # Per joint: its axis with two derivatives, and the point it turns about with two derivatives.
     axes, centres = [], []
     for place, joint in tool.chain:
         arm = np.einsum("abN,b->aN", turn, joint.offset)
-        swing = _cross(spin, arm)
         origin = origin + arm
-        push = push + _cross(twist, arm) + _cross(spin, swing)
-        speed = speed + swing
         turn = np.einsum("abN,bc->acN", turn, joint.rotation)
         axis = np.einsum("abN,b->aN", turn, joint.axis)
-        rate = _cross(spin, axis)
-        change = _cross(twist, axis) + _cross(spin, rate)
+        rate = change = spin
+        if moves:
+            swing, rate = _cross(spin, arm), _cross(spin, axis)
+            push = push + _cross(twist, arm) + _cross(spin, swing)
+            speed = speed + swing
+            change = _cross(twist, axis) + _cross(spin, rate)
         axes.append((axis, rate, change))
-        x, dx, ddx = q[place], v[place], a[place]
+        x = q[place]
         if joint.prismatic:
             origin = origin + axis * x
-            push = push + axis * ddx + 2.0 * rate * dx + change * x
-            speed = speed + axis * dx + rate * x
         else:
-            twist = twist + axis * ddx + rate * dx
-            spin = spin + axis * dx
             turn = np.einsum("abN,bcN->acN", turn, rotation(joint.axis, x))
+        if v is not None and a is not None:
+            dx, ddx = v[place], a[place]
+            if joint.prismatic:
+                push = push + axis * ddx + 2.0 * rate * dx + change * x
+                speed = speed + axis * dx + rate * x
+            else:
+                twist = twist + axis * ddx + rate * dx
+                spin = spin + axis * dx
         centres.append((origin, speed, push))
     arm = np.einsum("abN,b->aN", turn, tool.point)
-    swing = _cross(spin, arm)
-    position, velocity = origin + arm, speed + swing
-    acceleration = push + _cross(twist, arm) + _cross(spin, swing)
+    position, velocity, acceleration = origin + arm, speed, push
+    if moves:
+        swing = _cross(spin, arm)
+        velocity, acceleration = speed + swing, push + _cross(twist, arm) + _cross(spin, swing)
     parts = []
     for (place, joint), axis, (centre, moved, pushed) in zip(tool.chain, axes, centres, strict=True):
         arms = () if joint.prismatic else (position - centre, velocity - moved, acceleration - pushed)
         parts.append((place, joint.prismatic, (*axis, *arms)))
-    return ToolMotion(position, velocity, acceleration, tuple(parts), tool.joints)
+    return ToolMotion(position, velocity, acceleration, tuple(parts), tool.joints, moves)
 
 
 def _cross(x: Array, y: Array) -> Array:
@@ -159,4 +172,4 @@ def rotation(axis: Array, angle: Array) -> Array:
     x, y, z = axis
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     first, second = skew[:, :, None], (skew @ skew)[:, :, None]
-    return np.asarray(np.eye(3)[:, :, None] + np.sin(angle) * first + (1.0 - np.cos(angle)) * second)
+    return np.asarray(IDENTITY + np.sin(angle) * first + (1.0 - np.cos(angle)) * second)

@@ -148,15 +148,12 @@ def reached(task: Task, torque: Array, x: Array, times: int) -> tuple[Reached, .
 def _of_distance(task: Task, x: Array, group: str, value: float, times: int) -> Reached:
     clearance = task.limits.clearance
     assert clearance is not None
-    margin = clearance.margin
-    if value > 0.0:
-        return Reached(f"distance.{group}", margin, margin + REACH * (1.0 - value), "m", value)
-    # Nothing came near: rows do not tell how far away it stayed.
     least = np.inf
     for shares in np.array_split(np.linspace(0.0, 1.0, times), -(-times // CHUNK)):
         motion = Problem(task, rows_at(task.bases, shares), 1, np.ones(0)).motion(x)
         least = min(least, clearance.smallest(motion.q, group))
-    return Reached(f"distance.{group}", margin, least, "m", max(0.0, 1.0 - (least - margin) / REACH))
+    share = value if value > 1.0 else max(0.0, 1.0 - (least - clearance.margin) / REACH)
+    return Reached(f"distance.{group}", clearance.margin, least, "m", share)
 
 
 def _of_tool(limits: Limits, kind: str, value: float) -> Reached:

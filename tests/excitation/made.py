@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from scara_ident.arrays import Array
 from scara_ident.excitation.criteria import Criterion, LogDet
 from scara_ident.excitation.curves import make_basis
-from scara_ident.excitation.limits import limits_of, nominal_parameters, resting_posture
+from scara_ident.excitation.limits import limits_of, nominal_parameters, resting_posture, without_coulomb
 from scara_ident.excitation.problem import Problem, Task, row_names
 from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.verification import grid
@@ -17,8 +19,11 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import RigidBody
 from scara_ident.model.terms.rigid_body import rigid_body
 from scara_ident.robot.description import JointDescription, RobotDescription
-from scara_ident.robot.robot import Robot, build_robot, embedded_urdf
-from tests.arms import example_urdf
+from scara_ident.robot.robot import Robot, build_robot, embedded_urdf, load_robot
+from tests.arms import Link, example_urdf, write_urdf
+
+ENDS = np.full(3, -2.0), np.full(3, 2.0)
+BALL = '<sphere radius="0.05"/>'
 
 
 def panda() -> Robot:
@@ -55,7 +60,8 @@ def small_problem(
     """Return a problem of six harmonics over 8 s, or others, with a grid of 60 times, every second in the criterion."""
     robot = model.robot
     bounds = limits_of(robot, **{"share": 1.0, **limits})
-    nominal = nominal_parameters(model)
+    # What a search lets turn more and more sharply must not move the limits.
+    nominal, bounds = without_coulomb(model, bounds, nominal_parameters(model))
     count = len(model.names)
     task = Task(
         smooth=SmoothModel(model, 0.2 * bounds.velocity),
@@ -70,3 +76,23 @@ def small_problem(
     )
     rows = len(row_names(bounds, robot.n))
     return Problem(task, grid(task.bases, 60), 2, np.full(rows, 0.999))
+
+
+def upright(folder: Path, *shapes: str) -> Robot:
+    """Three links in a vertical plane, each 0.4 m long with its shape in the middle, lying along x at zero."""
+    links = [
+        Link(axis=(0.0, 1.0, 0.0), xyz=(0.4 * bool(k), 0.0, 0.0), com=(0.2, 0.0, 0.0), shape=shape)
+        for k, shape in enumerate(shapes)
+    ]
+    return load_robot(write_urdf(folder / "arm.urdf", links))
+
+
+def middle(q: Array, link: int) -> Array:
+    """x and z of the middle of a link, (2, N)."""
+    angle = np.cumsum(q, axis=0)
+    lengths = [0.4] * link + [0.2]
+    return sum(r * np.array([np.cos(angle[k]), -np.sin(angle[k])]) for k, r in enumerate(lengths))
+
+
+def drawn(count: int = 40) -> Array:
+    return np.random.default_rng(0).uniform(-2.0, 2.0, (3, count))

@@ -13,8 +13,8 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from scara_ident.excitation import BlockLogDet, Condition, Effort, LogDet, design_excitation, limits_of
-from scara_ident.excitation.clearance import clearance_of
 from scara_ident.excitation.tool import tool_of
+from scara_ident.excitation.watched_pairs import clearance_of
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import Link, rnea, write_urdf

@@ -26,6 +26,8 @@ from scara_ident.robot.robot import Robot
 
 # Samples at a time where columns are not kept: few enough for the cache.
 CHUNK = 8192
+# Mass of a body for which any will do, kg.
+SPECK = 1e-3
 # The SCARA of Indri et al. 2002 and its P_d (equation 2), told by what the reduction finds.
 _SCARA_LEADS = ("I1zz", "mx2", "my2", "I2zz", "Ia2")
 _SCARA_MEANINGS = ("I1z + m2 l1^2 + Jm1/tau1^2", "m2 s2x", "m2 s2y", "I2z", "Jm2/tau2^2")
@@ -157,6 +159,55 @@ class RigidBody(Filled):
             result[2, joint] += scaled[joint, column]
         return result
 
+    def torque_slopes(self, motion: Motion, value: Array) -> Array:
+        """Differentiate the torque of parameters ``value`` (p,) by the motion, with Pinocchio.
+
+        Parameters
+        ----------
+        motion : Motion
+            N samples.
+        value : ndarray, shape (p,)
+
+        Returns
+        -------
+        ndarray, shape (n, 3, n, N)
+            Of every joint, by position, velocity and acceleration of each.
+
+        References
+        ----------
+        J. Carpentier, N. Mansard, "Analytical derivatives of rigid body dynamics algorithms", RSS 2018.
+        """
+        masses = np.isin(self.base.kept[self.kept], np.arange(0, 10 * self.robot.n, 10))
+        if np.any(value[masses] <= SPECK * self.robot.n):
+            # Pinocchio's bodies have a mass; torque is linear in it.
+            more = masses * (1.0 - value[masses].min())
+            return self.torque_slopes(motion, value + more) - self.torque_slopes(motion, more)
+        robot, order = self.robot, self.robot.order
+        back = np.argsort(order)
+        model, armature = self._arm(value)
+        data, turning = model.createData(), _turning(model)
+        slopes = np.empty((motion.samples, 3, robot.n, robot.n))
+        for q, v, a, slope in zip(motion.q[back].T, motion.v[back].T, motion.a[back].T, slopes, strict=True):
+            pin.computeRNEADerivatives(model, data, _configuration(model, q, turning) if turning else q, v, a)
+            slope[0], slope[1], slope[2] = data.dtau_dq, data.dtau_dv, data.M
+        found = slopes[:, :, order[:, None], order].transpose(2, 1, 3, 0)
+        found[np.arange(robot.n), 2, np.arange(robot.n)] += armature[:, None]
+        return np.asarray(found * robot.row_scale[:, None, None, None])
+
+    def _arm(self, value: Array) -> tuple[pin.Model, Array]:
+        """Return an arm whose torque is that of parameters ``value`` (p,), each body with a mass, and its armatures."""
+        n, back, model = self.robot.n, np.argsort(self.robot.order), self.robot.model.copy()
+        standard, lead = np.zeros(11 * n), self.base.kept
+        standard[lead[self.kept]] = value
+        masses = np.setdiff1d(np.arange(0, 10 * n, 10), lead)
+        standard[masses] = SPECK
+        # What leads makes up for it.
+        standard[lead] -= SPECK * self.base.grouping[:, masses].sum(axis=1)
+        for k, body in enumerate(standard[: 10 * n].reshape(n, 10)[back], 1):
+            model.inertias[k] = pin.Inertia.FromDynamicParameters(body)
+        model.armature = np.zeros(n)
+        return model, standard[10 * n :]
+
     @cached_property
     def _adjoint(self) -> Program:
         """The gradient of the kernel's weighted sum by its states; weights follow these, row by row."""
@@ -186,7 +237,7 @@ class RigidBody(Filled):
         back, same_side = np.argsort(order), bool(np.all(robot.row_scale == 1.0))
         scale = robot.row_scale
         plain = bool(np.all(order == np.arange(robot.n)))
-        turning = [(joint.idx_q, joint.idx_v) for joint in list(model.joints)[1:] if joint.nq == 2]
+        turning = _turning(model)
         own = threading.local()  # Pinocchio writes into its data, which two threads cannot share.
 
         def torque(q: Array, v: Array, a: Array) -> Array:
@@ -201,6 +252,11 @@ class RigidBody(Filled):
             return np.asarray((found if same_side else scale * found) + armature * a)
 
         return torque
+
+
+def _turning(model: pin.Model) -> list[tuple[int, int]]:
+    """Return where the configuration and the velocities hold each continuous joint."""
+    return [(joint.idx_q, joint.idx_v) for joint in list(model.joints)[1:] if joint.nq == 2]
 
 
 def _configuration(model: pin.Model, q: Array, turning: Sequence[tuple[int, int]]) -> Array:
