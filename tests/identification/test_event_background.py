@@ -75,7 +75,7 @@ def test_a_long_push_in_a_run_that_turns_twice_is_no_trend_of_it():
         state=(q, speed, a, load),
     )
     (after,) = without_trends([pushed])
-    assert np.all(np.mean(after.left[:, 36:74], axis=1) > 0.45)
+    assert np.all(np.mean(after.left[:, 16:72], axis=1) > 0.25)
 
 
 def test_what_comes_with_the_motion_in_all_recordings_is_taken_off_and_what_happens_once_is_not():
