@@ -18,7 +18,7 @@ BIN = 0.04
 BOUND = 5.0
 NORMAL = 1.4826
 # Nothing is said of a joint slower than this share of its peak speed, where friction is known least.
-SLOW = 0.02
+SLOW = 0.03
 # The arm stands still where all joints are slower than this share, and for so long, s, before and after; longer than this, s.
 STILL, SETTLED, SHORTEST = 0.01, 0.06, 0.12
 # Share of a window that has to be used, or nothing is said of it.

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array, median
 from scara_ident.estimation.tail import HOUR, Tail, tail_of
 from scara_ident.identification.binned_residual import BOUND, FILLED, NORMAL, Binned
-from scara_ident.identification.event_ends import Ends, event_ends
+from scara_ident.identification.event_ends import GAP, Ends, event_ends
 
 # Lengths of the windows, s.
 WINDOWS = (0.16, 0.32, 0.6, 1.2, 2.0)
@@ -111,12 +111,14 @@ def standing_out(
         item = stretches[k]
         own = _bin_noise([other for other in stretches if other.recording == item.recording])
         sigma = np.maximum(everywhere, own)
+        novel, usual = list[Segment](), list[Segment]()
         for segment in _segments(item, scores[k], sigma, slow, shape):
             size, before = _sizes(item, original[k], segment)
             large = (size > LEAST_SIZE * sigma) & (before > LEAST_BEFORE * size)
             shown = large & (segment.score >= 1.0)
-            if np.any(shown) and _local(segment) and not _novel(segment, stretches, shown):
-                found.append(segment)
+            if np.any(shown) and _local(segment):
+                (novel if _novel(segment, stretches, shown) else usual).append(segment)
+        found += [segment for segment in usual if not _part_of(segment, novel)]
     total = sum(item.left.shape[1] * item.width for item in stretches)
     lasting = sum((segment.stop - segment.start) * segment.binned.width for segment in found)
     return found if lasting <= RARE * total else []
@@ -163,6 +165,13 @@ def _novel(segment: Segment, stretches: Sequence[Binned], shown: NDArray[np.bool
         return all(np.sum(power[j, there]) <= 0.5 * np.sum(power[j]) for there in beyond)
 
     return not any(segment.score[j] >= SURE or usual(int(j)) for j in np.flatnonzero(shown))
+
+
+def _part_of(segment: Segment, novel: Sequence[Segment]) -> bool:
+    """Whether it is next to what is in states hardly ever seen: filters carry that beyond them. What is large stands by itself."""
+    near = GAP / segment.binned.width
+    gaps = (max(segment.start, item.start) - min(segment.stop, item.stop) for item in novel)
+    return bool(np.max(segment.score) < SURE) and any(gap <= near for gap in gaps)
 
 
 def _alone(segment: Segment, stretches: Sequence[Binned], joint: int) -> tuple[Array, Array]:

@@ -159,7 +159,7 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
         least = _residuals(observations, weighted_value(observations.by_joint))[1]
         return [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, least, strict=True)]
 
-    # Of the motion's doing no more than what is left of it can repeat.
+    # A repetition is asked as well for what is left once the motion's doing is off.
     clean = without_background(stretches)
     whole = {id(part): row for part, row in zip(parts, left, strict=True)}
     found = [

@@ -60,6 +60,24 @@ def test_a_runs_own_friction_is_taken_off_where_it_hardly_ever_turns_back():
     assert np.max(np.abs(np.mean(after.left[:, 255:295], axis=1))) < 0.1
 
 
+def test_a_long_push_in_a_run_that_turns_twice_is_no_trend_of_it():
+    item = made([np.zeros(part.samples) for part in STRETCHES])[0]
+    # Three seconds forth, eight back, and forth again: a friction that falls explains most of a push in the first of them.
+    speed = np.ones(item.taken.shape)
+    speed[:, 75:275] = -1.0
+    push = np.zeros_like(speed)
+    push[:, 15:73] = 0.3
+    q, _, a, load = item.state
+    pushed = replace(
+        item,
+        raw=item.raw + np.repeat(push, item.size, axis=1),
+        used=np.ones_like(item.used),
+        state=(q, speed, a, load),
+    )
+    (after,) = without_trends([pushed])
+    assert np.all(np.mean(after.left[:, 16:72], axis=1) > 0.25)
+
+
 def test_what_comes_with_the_motion_in_all_recordings_is_taken_off_and_what_happens_once_is_not():
     speed = max(float(np.abs(part.motion.v[0]).max()) for part in STRETCHES)
     falling = [

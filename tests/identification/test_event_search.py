@@ -113,3 +113,34 @@ def test_what_stands_out_in_a_state_that_the_arm_is_in_once_is_no_event_unless_i
         against = np.where((np.arange(torque.shape[1]) >= 175) & (np.arange(torque.shape[1]) < 200), -torque, torque)
         once = [*usual[:2], replace(usual[2], state=(*motion, against)), usual[3]]
         assert len(standing_out(without_background(once), lambda own=once: own)) == found
+
+
+def test_beside_a_state_that_the_arm_is_in_once_nothing_is_an_event_unless_it_is_large():
+    for size, found in ((1.5, []), (6.0, [7.72])):
+        left = white(8)
+        left[2][0, int(7.0 * RATE) : int(7.32 * RATE)] += 2.5
+        left[2][1, int(7.72 * RATE) : int(8.72 * RATE)] += size
+        parts = [with_more(part, row) for part, row in zip(STRETCHES, left, strict=True)]
+        noise = bounded_noise(parts, left, range(len(parts)))
+        usual = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
+        *motion, torque = usual[2].state
+        against = np.where((np.arange(torque.shape[1]) >= 175) & (np.arange(torque.shape[1]) < 183), -torque, torque)
+        once = [*usual[:2], replace(usual[2], state=(*motion, against)), usual[3]]
+        assert len(standing_out(without_background(usual), lambda own=usual: own)) == 2
+        shown = standing_out(without_background(once), lambda own=once: own)
+        assert [segment.start * segment.binned.width for segment in shown] == pytest.approx(found, abs=0.1)
+
+
+def test_a_push_is_found_while_its_joint_turns_at_a_twenty_fifth_of_its_speed():
+    part = STRETCHES[2]
+    speed = part.motion.v.copy()
+    speed[0, int(6.0 * RATE) : int(9.0 * RATE)] = 0.04 * np.max(np.abs(speed[0]))
+    left = white(9)
+    left[2][0, int(7.0 * RATE) : int(8.0 * RATE)] += 3.0
+    slow = with_more(part, left[2])
+    object.__setattr__(slow, "motion", replace(part.motion, v=speed))
+    parts = [*STRETCHES[:2], slow, STRETCHES[3]]
+    noise = bounded_noise(parts, left, range(len(parts)))
+    stretches = [binned(k, own, row, noise[k]) for k, (own, row) in enumerate(zip(parts, left, strict=True))]
+    (found,) = standing_out(without_background(stretches), lambda: stretches)
+    assert (found.start * found.binned.width, found.stop * found.binned.width) == pytest.approx((7.0, 8.0), abs=0.1)

@@ -113,6 +113,17 @@ def test_a_repetition_with_the_like_makes_it_the_motions_doing():
     assert find_events(observations, robust_fit(observations).value) == ()
 
 
+def test_a_push_does_not_repeat_what_the_model_lacks_in_a_repetition():
+    plain = runs()
+    again = noisy(swing(ROBOT, "again", seed=0, seconds=15.0, rate=250.0), np.random.default_rng(9), 0.01)
+    observations = observed([pushed(ROBOT, plain[0], FORCE, 10.0, 11.2), again, *plain[1:]])
+    value = robust_fit(observations).value
+    # Viscous friction that is wrong leaves in the repetition what the push leaves on both joints.
+    places = [observations.model.names.index(name) for name in ("a11", "a12")]
+    value[places] += -0.12, 0.05
+    assert [event.recording for event in find_events(observations, value)] == ["swing0"]
+
+
 def test_of_very_many_events_the_strongest_are_said():
     scores = np.random.default_rng(0).permutation(MOST_SAID + 5)
     events = [
