@@ -79,8 +79,8 @@ class Inquiry:
         On the rows of these recordings.
     tried : int
         Candidates that the diagnosis tries.
-    reach : Reach or None
-        How far up motion explains torque, and what counts as rest; None where no recordings are at hand.
+    widening : bool
+        Whether further recordings widen the bands.
     """
 
     scene: Scene
@@ -91,7 +91,14 @@ class Inquiry:
     known: Information | None = None
     columns: CandidateColumns | None = None
     tried: int = USUALLY_TRIED
-    reach: Reach | None = None
+    widening: bool = True
+
+    @cached_property
+    def reach(self) -> Reach | None:
+        """How far up motion explains torque, and what counts as rest; None where no recordings are at hand."""
+        if self.columns is None:
+            return None
+        return reach_of(self.scene.model, self.columns.observations.data, self.scene.value, widening=self.widening)
 
     @cached_property
     def suspects(self) -> tuple[Suspect, ...]:
@@ -342,8 +349,7 @@ def knowing(inquiry: Inquiry, columns: CandidateColumns, *, widening: bool) -> I
         return inquiry
     observations, scene = columns.observations, inquiry.scene
     value = believable(observations, scene.value, inquiry.noise)
-    reach = reach_of(scene.model, observations.data, value, widening=widening)
-    inquiry = replace(inquiry, scene=replace(scene, value=value), columns=columns, reach=reach)
+    inquiry = replace(inquiry, scene=replace(scene, value=value), columns=columns, widening=widening)
     return replace(inquiry, known=known_rows(inquiry, columns))
 
 

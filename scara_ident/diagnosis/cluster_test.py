@@ -32,6 +32,8 @@ ASKED = 1e-5
 LEAST_FREEDOM = 0.1
 # Directions of a few columns below this share of the largest are not tested.
 _RANK = 1e-9
+# Squares of columns that are none: the inverse of less leaves the range of numbers.
+_NOTHING = 1e-200
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,10 +289,10 @@ def _hotelling(value: Array, covariance: Array, freedom: Array, rank: NDArray[np
 def _whitening(whole: Array) -> tuple[Array, Array, NDArray[np.intp]]:
     """Return A with ``A' W A = 1`` where W says something, its inverse there, and in how many directions that is."""
     # Of a column within the model rounding may leave less than nothing.
-    size = np.sqrt(np.maximum(np.diagonal(whole, axis1=1, axis2=2), 0.0))
-    size = np.where(size == 0.0, 1.0, size)
+    squares = np.diagonal(whole, axis1=1, axis2=2)
+    size = np.sqrt(np.where(squares > _NOTHING, squares, 1.0))
     values, vectors = np.linalg.eigh(whole / (size[:, :, None] * size[:, None, :]))
-    kept = values > _RANK * np.maximum(values[:, -1:], np.finfo(float).tiny)
+    kept = (values > _RANK * values[:, -1:]) & (values > _NOTHING)
     root = np.sqrt(np.where(kept, values, 1.0))
     into = np.where(kept[:, None], vectors / root[:, None] / size[:, :, None], 0.0)
     back = np.where(kept[:, None], vectors * root[:, None] * size[:, :, None], 0.0)

@@ -235,6 +235,10 @@ def assumed_variation(observations: Observations, joints: Sequence[JointRows], v
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
     found: list[JointVariation | None] = []
     for joint, rows in enumerate(joints):
+        if rows.table.shape[1] == 0:
+            # At rest throughout.
+            found.append(None)
+            continue
         noise = float(np.sqrt(np.mean((rows.table[-1] - value[rows.columns] @ rows.table[:-1]) ** 2)))
         directions = _directions(observations, joint, rows, value)
         offset = ASSUMED_OFFSET * float(np.sqrt(np.mean(directions[KINDS.index("torque scale")] ** 2)))

@@ -135,3 +135,13 @@ def test_as_many_standard_errors_as_are_needed_have_the_chance_asked_for(count: 
 
 def test_a_column_of_which_rounding_leaves_less_than_nothing_is_not_tested():
     assert significance(np.ones(1), np.eye(1), 9.0, np.array([[-1e-25]])) == 1.0
+
+
+def test_a_column_of_next_to_nothing_is_none():
+    """Its squares are the smallest numbers that there are, as where a ripple's or a Stribeck's decay leaves them."""
+    rng = np.random.default_rng(9)
+    model = model_of(slow(rng, 4, 20 * ROWS, 8.0), rng.standard_normal(20 * ROWS), 20)
+    tried = np.zeros((1, 20 * ROWS))
+    tried[0, 3 * ROWS : 9 * ROWS] = 1e-160 * rng.standard_normal(6 * ROWS)
+    (item,) = examine(model, [{0: tried}])
+    assert item.p_value == 1.0
