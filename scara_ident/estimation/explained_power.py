@@ -12,7 +12,7 @@ from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import informations, kept_rows
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Stretch, motion_of, torque_of
-from scara_ident.motion.prepared import PreparedData, PreparedStretch, fading
+from scara_ident.motion.prepared import LONGEST_WIDENING, PreparedData, PreparedStretch, fading
 from scara_ident.motion.thinning import thinned
 from scara_ident.threads import side_by_side
 
@@ -105,10 +105,14 @@ def _moving_weight(part: PreparedStretch) -> Array:
 
     A reversal is shorter than a period of the band, and counts: noise turns the sign of friction there, which ends a band.
     """
-    rest = part.rest.copy()
-    for row in rest:
+    rest = np.zeros_like(part.rest)
+    # Where a joint begins and ends to move friction is hard to tell, and fits see it: of a standstill twice their fade counts
+    # with that.
+    margin = round(2.0 * LONGEST_WIDENING * part.rate)
+    for inner, row in zip(rest, part.rest, strict=True):
         for start, stop in runs_of(row):
-            row[start:stop] = stop - start >= part.rate / FIRST_BAND
+            if stop - start >= part.rate / FIRST_BAND:
+                inner[start + margin : stop - margin] = True
     return fading(rest, part.rate, part.bands)
 
 
