@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import held_out_gains
 from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.search import fitted_beside
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 from scara_ident.effects import Scene
 
@@ -77,10 +78,13 @@ def _confounders_of(
     for columns, asked in ((first, LEAST_AT_FIRST * least), (scene, least)):
         found_gains = held_out_gains(step.model, step.columns.rows(columns, enough), criteria)
         enough = [item for item, gain in zip(enough, found_gains, strict=True) if gain > asked]
-    judged = best_of_each(step.judge(enough)).values()
-    near = [item for item in judged if item.accepted and item.examination.held_out > least]
+    judged = list(best_of_each(step.judge(enough)).values())
+    to_fit = [item for item in judged if item.candidate.effect.fitted_first]
+    # What is chosen by a fit is compared by one: its grid points lose most of it.
+    fits = [decision for _, decision in fitted_beside(step, to_fit, 0.0, None) if decision.accepted]
+    near = [item for item in judged if item not in to_fit and item.accepted and item.examination.held_out > least]
     others = []
-    for decision in step.refine(near):
+    for decision in [*step.refine(near), *fits]:
         worse = decision.examination.left - own.examination.left
         error = float(np.sqrt(len(worse) * np.var(worse)))
         same = abs(float(np.sum(worse))) < criteria.alike * error

@@ -273,7 +273,7 @@ def _choose(
     best = [item for family in by_family.values() for item in best_of_each(family).values()]
     first = [item for item in best if item.candidate.effect.fitted_first]
     accepted = [item for item in best if item.accepted and not item.candidate.effect.fitted_first]
-    found = _fitted(step, first, max((item.gain for item in accepted), default=0.0), known)
+    found = fitted_beside(step, first, max((item.gain for item in accepted), default=0.0), known)
     refused = {item.label: item for _, item in found if not item.accepted}
     accepted += _sure_once_refined(step, best, max((item.examination.held_out for item in accepted), default=0.0))
     open_ = [(step, item) for item in accepted] + [(own, item) for own, item in found if item.accepted]
@@ -318,7 +318,7 @@ def _sure_once_refined(step: SelectionStep, best: Sequence[Decision], enough: fl
     return [item for item in replace(step, tried=step.tried + points).refine(worth) if item.accepted]
 
 
-def _fitted(
+def fitted_beside(
     step: SelectionStep, candidates: Sequence[Decision], best: float, known: Search | None
 ) -> list[tuple[SelectionStep, Decision]]:
     """Fit those of some candidates that promise something, all else with them, and judge them there.

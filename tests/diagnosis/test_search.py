@@ -15,10 +15,10 @@ from scara_ident.diagnosis.model_selection import rms_of
 from scara_ident.diagnosis.search import (
     SearchTask,
     _backward,
-    _fitted,
     _sure_once_refined,
     _worth_fitting,
     columns_at_hand,
+    fitted_beside,
     scene_of,
     search,
 )
@@ -254,7 +254,7 @@ def test_what_takes_the_place_of_an_effect_in_the_model_does_not_come_in(monkeyp
     step = step_beside(with_torque(exact_runs(), 1, spring), [held])
     (promised,) = replace(step, chosen=()).judge([held])
     monkeypatch.setattr(sys.modules[search.__module__], "tune", lambda scene, *_, **__: (scene, (spoilt, held)))
-    ((own, decision),) = _fitted(step, [promised], 0.0, None)
+    ((own, decision),) = fitted_beside(step, [promised], 0.0, None)
     assert own.chosen == (spoilt,)
     assert decision.gain > 0.5
     assert (decision.accepted, decision.why) == (False, "takes the place of an effect in the model")
