@@ -15,7 +15,7 @@ from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search
 from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.effects import Effect
+from scara_ident.effects import Coefficient, Effect, Member, NonlinearParameter
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations, observe
@@ -34,6 +34,21 @@ Array = NDArray[np.float64]
 BANDS = (11.0, 11.0)
 NOISE = (0.02, 0.008)
 RATE = 250.0
+
+
+class Bump(Effect):
+    """A torque at one place of the first joint, which is tried at a few only."""
+
+    name = "bump"
+    summary = "bump"
+    coefficients = (Coefficient("height", "N m", "height of a bump"),)
+    nonlinear = (NonlinearParameter("place", "rad", -1.0, 4.0, False),)
+
+    def members(self, scene):
+        return tuple(Member(0, (place,)) for place in (0.5, 1.0, 1.5, 2.0))
+
+    def signal_columns(self, signals, member):
+        return [np.exp(-(((signals.motion.q[0] - member.nonlinear[0]) / 0.3) ** 2))]
 
 
 def multisine(name: str, seed: int, duration: float, size: float = 1.9) -> ReferenceMotion:

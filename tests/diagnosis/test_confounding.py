@@ -8,10 +8,10 @@ import numpy as np
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.confounding import confounders
-from scara_ident.effects import Coefficient, Effect, Member, NonlinearParameter
+from scara_ident.effects import Coefficient, Effect, Member
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.position import Spring
-from tests.diagnosis.made import exact_runs, searched, with_torque
+from tests.diagnosis.made import Bump, exact_runs, searched, with_torque
 
 MIDDLE = 1.57
 STIFFNESS = 0.3
@@ -97,13 +97,8 @@ def test_another_cause_of_the_same_columns_is_named_though_it_is_not_tried():
     assert (twin.label, twin.gain) == ("twin of joint1", twin.found_gain)
 
 
-class Bump(Effect):
-    """A torque at one place of the first joint."""
-
-    name = "bump"
-    summary = "bump"
-    coefficients = (Coefficient("height", "N m", "height of a bump"),)
-    nonlinear = (NonlinearParameter("place", "rad", -1.0, 4.0, False),)
+class KnownBump(Bump):
+    """One that is tried where it is."""
 
     def members(self, scene):
         return (Member(0, (1.15,)),)
@@ -112,11 +107,8 @@ class Bump(Effect):
         # Lines about a grid point reach no farther.
         return (0.01,)
 
-    def signal_columns(self, signals, member):
-        return [np.exp(-(((signals.motion.q[0] - member.nonlinear[0]) / 0.3) ** 2))]
 
-
-class FittedBump(Bump):
+class FittedBump(KnownBump):
     """Another cause of it, at a grid point that loses half."""
 
     name = "fitted"
@@ -128,7 +120,7 @@ class FittedBump(Bump):
 
 def test_a_rival_that_a_fit_chooses_is_compared_by_its_fit():
     runs = with_torque(exact_runs(size=1.9), 0, lambda motion: 0.2 * np.exp(-(((motion.q[0] - 1.15) / 0.3) ** 2)))
-    step = searched(runs, Bump()).step
+    step = searched(runs, KnownBump()).step
     rival = Candidate(FittedBump(), Member(0, (1.35,)))
     ((found,),) = confounders(step, step.without(0).judge([rival]), step.scene)
     assert found.label == "fitted of joint1"

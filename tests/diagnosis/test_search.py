@@ -22,13 +22,14 @@ from scara_ident.diagnosis.search import (
     scene_of,
     search,
 )
-from scara_ident.effects import Coefficient, Effect, Member, NonlinearParameter
+from scara_ident.effects import Coefficient, Member
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
 from scara_ident.estimation import wls
 from tests.diagnosis.made import (
     BANDS,
+    Bump,
     complete,
     exact_runs,
     fitted,
@@ -105,21 +106,6 @@ def test_what_is_sure_only_beside_its_grid_point_is_refined_before_it_is_refused
     assert found.accepted and found.candidate.member.nonlinear[0] == pytest.approx(0.43, rel=0.1)
     # Where something else removes much more it is not its turn.
     assert _sure_once_refined(strict, [refused], 2.0) == []
-
-
-class Bump(Effect):
-    """A torque at one place of the first joint, which is tried at a few only."""
-
-    name = "bump"
-    summary = "bump"
-    coefficients = (Coefficient("height", "N m", "height of a bump"),)
-    nonlinear = (NonlinearParameter("place", "rad", -1.0, 4.0, False),)
-
-    def members(self, scene):
-        return tuple(Member(0, (place,)) for place in (0.5, 1.0, 1.5, 2.0))
-
-    def signal_columns(self, signals, member):
-        return [np.exp(-(((signals.motion.q[0] - member.nonlinear[0]) / 0.3) ** 2))]
 
 
 class BumpAndSlope(Bump):
