@@ -29,11 +29,6 @@ LONG_ENOUGH = 10.0
 PART = 3.0
 
 
-def without_background(stretches: Sequence[Binned]) -> list[Binned]:
-    """Take off what the motion makes, and what a run has all along."""
-    return without_trends(without_states(stretches))
-
-
 def without_trends(stretches: Sequence[Binned]) -> list[Binned]:
     """Take off what its own run has all along: an offset, a share of the load and of friction, and their drift."""
     trends = [np.zeros_like(item.taken) for item in stretches]

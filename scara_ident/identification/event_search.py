@@ -83,7 +83,9 @@ class Segment:
 
 
 def standing_out(
-    stretches: Sequence[Binned], fitted: Callable[[], Sequence[Binned]], shape: Shape = lambda item, start, stop: None
+    stretches: Sequence[Binned],
+    earlier: Callable[[], Sequence[Sequence[Binned]]],
+    shape: Shape = lambda item, start, stop: None,
 ) -> list[Segment]:
     """Return the stretches of time that stand out, in the order in which they come.
 
@@ -91,9 +93,10 @@ def standing_out(
     ----------
     stretches : sequence of Binned
         Of all recordings, of parameters that no event has steered, less their background.
-    fitted : callable
-        Returns the same of least squares: what that explains is a state of motion that the robust fit took for an outlier.
-        Asked only where something stands out.
+    earlier : callable
+        Returns residuals of the same in which an event has to be seen too: of least squares, because what that explains is a
+        state of motion that the robust fit took for an outlier; before trends were taken off, because one that is told by the
+        rest of a run may be wrong where the run was once. Asked only where something stands out.
     shape : callable, optional
         Returns what an event from a bin to before another would leave in every bin, N m or N, shape (n, M); None where nobody
         can say. It helps to find the ends.
@@ -104,7 +107,7 @@ def standing_out(
     shown_by = [k for k, score in enumerate(scores) if any(np.any(part > 1.0) for _, part in score)]
     if not shown_by:
         return []
-    original, everywhere = fitted(), _bin_noise(stretches)
+    others, everywhere = earlier(), _bin_noise(stretches)
     slow = _median([np.where(_slow(item), np.abs(item.anyhow), np.nan) for item in stretches])
     found = []
     for k in shown_by:
@@ -113,7 +116,7 @@ def standing_out(
         sigma = np.maximum(everywhere, own)
         novel, usual = list[Segment](), list[Segment]()
         for segment in _segments(item, scores[k], sigma, slow, shape):
-            size, before = _sizes(item, original[k], segment)
+            size, before = _sizes(item, [other[k] for other in others], segment)
             large = (size > LEAST_SIZE * sigma) & (before > LEAST_BEFORE * size)
             shown = large & (segment.score >= 1.0)
             if np.any(shown) and _local(segment):
@@ -124,13 +127,14 @@ def standing_out(
     return found if lasting <= RARE * total else []
 
 
-def _sizes(item: Binned, original: Binned, segment: Segment) -> tuple[Array, Array]:
-    """Return the rms of each joint in a segment, and as much of it as was there before anything was taken off, (n,) each."""
+def _sizes(item: Binned, earlier: Sequence[Binned], segment: Segment) -> tuple[Array, Array]:
+    """Return the rms of each joint in a segment, and the least of it that is there in each of some residuals, (n,) each."""
     inside = slice(segment.start, segment.stop)
     known, left = item.known[:, inside], item.left[:, inside]
     weight = np.maximum(np.sum(known, axis=1), 1e-9)
     size = np.sqrt(np.sum(known * left**2, axis=1) / weight)
-    return size, np.sum(known * left * original.left[:, inside], axis=1) / weight / np.maximum(size, 1e-300)
+    seen = [np.sum(known * left * other.left[:, inside], axis=1) for other in earlier]
+    return size, np.min(seen, axis=0) / weight / np.maximum(size, 1e-300)
 
 
 def _local(segment: Segment) -> bool:
@@ -183,7 +187,9 @@ def _alone(segment: Segment, stretches: Sequence[Binned], joint: int) -> tuple[A
     def states(k: int, bins: NDArray[np.intp]) -> Array:
         # Stretch and time tell what is another time.
         time = bins * stretches[k].width / LONGEST
-        return np.array([np.full(len(bins), k), time, *(row[joint, bins] for row in stretches[k].state[1:])])
+        v, a, load = (row[joint, bins] for row in stretches[k].state[1:])
+        # Friction turns with the speed: next to a slow motion is none the other way.
+        return np.array([np.full(len(bins), k), time, v, np.sign(v), a, load])
 
     among = np.concatenate([states(k, bins) for k, bins in enumerate(used)], axis=1)
     scale = np.maximum(np.std(among[2:], axis=1), 1e-300)

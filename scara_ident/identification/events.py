@@ -14,7 +14,7 @@ from scara_ident.estimation.information import LEAST_NOISE
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.binned_residual import BIN, Binned, binned, bounded_noise
-from scara_ident.identification.event_background import without_background
+from scara_ident.identification.event_background import without_states, without_trends
 from scara_ident.identification.event_search import Segment, standing_out
 from scara_ident.identification.usable import check_rows
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
@@ -153,18 +153,23 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
     noise = bounded_noise(parts, left, owner)
     stretches = [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, left, strict=True)]
 
-    def plain() -> list[Binned]:
-        if fitted is not None:
-            return stretches
-        least = _residuals(observations, weighted_value(observations.by_joint))[1]
-        return [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, least, strict=True)]
-
     # A repetition is asked as well for what is left once the motion's doing is off.
-    clean = without_background(stretches)
+    without_motion = without_states(stretches)
+    clean = without_trends(without_motion)
+
+    def earlier() -> list[list[Binned]]:
+        if fitted is not None:
+            return [stretches, without_motion]
+        least = _residuals(observations, weighted_value(observations.by_joint))[1]
+        return [
+            [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, least, strict=True)],
+            without_motion,
+        ]
+
     whole = {id(part): row for part, row in zip(parts, left, strict=True)}
     found = [
         _event(robot, data, item, whole[id(item.binned.part)], held_out=fitted is not None)
-        for item in standing_out(clean, plain, lambda *event: _of_tool_force(robot, *event))
+        for item in standing_out(clean, earlier, lambda *event: _of_tool_force(robot, *event))
         if item.binned.recording < len(data.recordings) and not _repeated(item, clean, data)
     ]
     if found:

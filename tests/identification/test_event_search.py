@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.identification.binned_residual import binned, bounded_noise
-from scara_ident.identification.event_background import without_background
+from scara_ident.identification.binned_residual import Binned, binned, bounded_noise
+from scara_ident.identification.event_background import without_states, without_trends
 from scara_ident.identification.event_search import Segment, standing_out
 from scara_ident.motion.prepared import PreparedStretch, prepare
 from scara_ident.robot.robot import load_robot
@@ -24,7 +24,13 @@ def searched(left: list[np.ndarray]) -> list[Segment]:
     parts = [with_more(part, row) for part, row in zip(STRETCHES, left, strict=True)]
     noise = bounded_noise(parts, left, range(len(parts)))
     stretches = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
-    return standing_out(without_background(stretches), lambda: stretches)
+    return found_in(stretches)
+
+
+def found_in(stretches: list[Binned]) -> list[Segment]:
+    """What stands out of residuals of least squares, the robust ones and those of least squares being the same."""
+    states = without_states(stretches)
+    return standing_out(without_trends(states), lambda: [stretches, states])
 
 
 def with_more(part: PreparedStretch, torque: np.ndarray) -> PreparedStretch:
@@ -86,7 +92,7 @@ def test_least_squares_is_asked_for_only_where_something_stands_out():
     parts, left = [with_more(part, row) for part, row in zip(STRETCHES, white(5), strict=True)], white(5)
     noise = bounded_noise(parts, left, range(len(parts)))
     quiet = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
-    assert standing_out(without_background(quiet), lambda: pytest.fail("nothing stands out")) == []
+    assert standing_out(without_trends(without_states(quiet)), lambda: pytest.fail("nothing stands out")) == []
 
 
 def test_what_depends_on_the_motion_is_no_event():
@@ -107,12 +113,39 @@ def test_what_stands_out_in_a_state_that_the_arm_is_in_once_is_no_event_unless_i
         parts = [with_more(part, row) for part, row in zip(STRETCHES, left, strict=True)]
         noise = bounded_noise(parts, left, range(len(parts)))
         usual = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
-        assert len(standing_out(without_background(usual), lambda own=usual: own)) == 1
+        assert len(found_in(usual)) == 1
         # The torque is as large as usual, and at no other time against such a speed.
         *motion, torque = usual[2].state
         against = np.where((np.arange(torque.shape[1]) >= 175) & (np.arange(torque.shape[1]) < 200), -torque, torque)
         once = [*usual[:2], replace(usual[2], state=(*motion, against)), usual[3]]
-        assert len(standing_out(without_background(once), lambda own=once: own)) == found
+        assert len(found_in(once)) == found
+
+
+def test_next_to_a_slow_motion_is_none_the_other_way():
+    left = white(8)
+    left[2][0, int(7.0 * RATE) : int(8.0 * RATE)] += 1.5
+    parts = [with_more(part, row) for part, row in zip(STRETCHES, left, strict=True)]
+    noise = bounded_noise(parts, left, range(len(parts)))
+    # Slow from 2 to 18 s, and forth at all times, or back while something is left.
+    forth = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
+    place = np.arange(forth[2].taken.shape[1])
+    q, v, a, load = forth[2].state
+    speed = np.where((place >= 50) & (place < 450), 0.01, 1.0) * np.abs(v)
+    for turns, found in ((1.0, 1), (-1.0, 0)):
+        turned = np.where((place >= 175) & (place < 200), turns, 1.0) * speed
+        assert len(found_in([*forth[:2], replace(forth[2], state=(q, turned, 0.0 * a, load)), forth[3]])) == found
+
+
+def test_what_only_a_trend_has_made_is_no_event():
+    left = white(10)
+    parts = [with_more(part, row) for part, row in zip(STRETCHES, left, strict=True)]
+    noise = bounded_noise(parts, left, range(len(parts)))
+    plain = [binned(k, part, row, noise[k]) for k, (part, row) in enumerate(zip(parts, left, strict=True))]
+    made = np.zeros_like(plain[2].taken)
+    made[0, 175:200] = -3.0
+    after = [*plain[:2], plain[2].without(made), plain[3]]
+    assert len(standing_out(after, lambda: [after, after])) == 1
+    assert standing_out(after, lambda: [after, plain]) == []
 
 
 def test_beside_a_state_that_the_arm_is_in_once_nothing_is_an_event_unless_it_is_large():
@@ -126,8 +159,8 @@ def test_beside_a_state_that_the_arm_is_in_once_nothing_is_an_event_unless_it_is
         *motion, torque = usual[2].state
         against = np.where((np.arange(torque.shape[1]) >= 175) & (np.arange(torque.shape[1]) < 183), -torque, torque)
         once = [*usual[:2], replace(usual[2], state=(*motion, against)), usual[3]]
-        assert len(standing_out(without_background(usual), lambda own=usual: own)) == 2
-        shown = standing_out(without_background(once), lambda own=once: own)
+        assert len(found_in(usual)) == 2
+        shown = found_in(once)
         assert [segment.start * segment.binned.width for segment in shown] == pytest.approx(found, abs=0.1)
 
 
@@ -142,5 +175,5 @@ def test_a_push_is_found_while_its_joint_turns_at_a_twenty_fifth_of_its_speed():
     parts = [*STRETCHES[:2], slow, STRETCHES[3]]
     noise = bounded_noise(parts, left, range(len(parts)))
     stretches = [binned(k, own, row, noise[k]) for k, (own, row) in enumerate(zip(parts, left, strict=True))]
-    (found,) = standing_out(without_background(stretches), lambda: stretches)
+    (found,) = found_in(stretches)
     assert (found.start * found.binned.width, found.stop * found.binned.width) == pytest.approx((7.0, 8.0), abs=0.1)
