@@ -21,7 +21,7 @@ REACH = 5.0
 GAP = 0.6
 # Its ends are looked for again between so long within and so long beyond them, s, in which something is seen.
 EDGE = (0.3, 0.6)
-# A step of the torque at rest is bounded at that of the event by this factor, and so many standard deviations of bins.
+# The torque of a joint at rest is off by no more than an event's step by this factor, and so many standard deviations of bins.
 LARGEST_STEP, LOOSE = 2.0, 4.0
 # What has under this share of the power that an event has at its strongest, after that, is what friction keeps of it or none of it.
 WEAK = 0.1
@@ -138,13 +138,15 @@ def _lasting(parts: Sequence[Array], length: int, near: int, far: int) -> tuple[
     # So many bins further that say something.
     seen = np.cumsum(np.max(trust[:, length:], axis=0, initial=0.0))
     last = length + int(np.searchsorted(seen, far, side="right"))
-    inside, weight = slice(first, last), trust[:, first:length]
-    mean = np.sum(weight * relative[:, first:length], axis=1) / np.maximum(np.sum(weight, axis=1), 1e-300)
+    # Where it surely is, or of a short one where it may end.
+    sure = slice(max(0, first - near), first) if first >= near else slice(first, length)
+    inside, weight = slice(first, last), trust[:, sure]
+    mean = np.sum(weight * relative[:, sure], axis=1) / np.maximum(np.sum(weight, axis=1), 1e-300)
     shift = np.repeat(mean[:, None], last - first, axis=1)
     if len(parts) > 3:
         # A force that is told by other joints may be wrong about one.
-        of_shape = parts[3][:, first:length]
-        agrees = np.sum(weight * (2.0 * relative[:, first:length] - of_shape) * of_shape, axis=1) >= 0.0
+        of_shape = parts[3][:, sure]
+        agrees = np.sum(weight * (2.0 * relative[:, sure] - of_shape) * of_shape, axis=1) >= 0.0
         shift[agrees] = parts[3][agrees, inside]
     gain = np.cumsum(np.sum(trust[:, inside] * (2.0 * relative[:, inside] * shift - shift**2), axis=0))
     gain += _at_rest(still[:, inside], shift)
@@ -161,18 +163,18 @@ def _at_rest(still: Array, shift: Array) -> Array:
     """Return the likelihood that the shift ends after each bin of a rest, against none in that rest, (M,)."""
     found = np.zeros(still.shape[1])
     for begin, end in runs_of(np.any(np.isfinite(still), axis=0)):
-        count = end - begin
         # Nothing moves: it is the same all along.
         mean = shift[:, begin : begin + 1]
-        most = LARGEST_STEP * np.abs(mean) + LOOSE
         left = still[:, begin:end] - np.median(still[:, begin:end], axis=1, keepdims=True)
-        left = np.clip(left, -most, most)
-        left -= np.mean(left, axis=1, keepdims=True)
-        before = np.arange(1, count + 1)
-        up = np.cumsum(left, axis=1)
-        gain = 2.0 * mean * up - mean**2 * before * (count - before) / count
+        # What is larger is friction that comes or goes.
+        use = (np.abs(left) <= LARGEST_STEP * np.abs(mean) + LOOSE).astype(float)
+        before, whole = np.cumsum(use, axis=1), np.maximum(np.sum(use, axis=1, keepdims=True), 1.0)
+        left = np.where(use > 0.0, left, 0.0)
+        left = use * (left - np.sum(left, axis=1, keepdims=True) / whole)
+        up, parted = np.cumsum(left, axis=1), before * (whole - before) / whole
+        gain = 2.0 * mean * up - mean**2 * parted
         # What one step does not explain is how constant friction is there.
-        by_step = np.max(up[:, :-1] ** 2 * count / (before[:-1] * (count - before[:-1])), axis=1, initial=0.0)
-        gain /= np.maximum((np.sum(left**2, axis=1) - by_step) / count, 1.0)[:, None]
-        found[begin:end] = np.nansum(gain, axis=0)
+        by_step = np.max(up**2 / np.where(parted > 0.0, parted, np.inf), axis=1, keepdims=True)
+        gain /= np.maximum((np.sum(left**2, axis=1, keepdims=True) - by_step) / whole, 1.0)
+        found[begin:end] = np.sum(gain, axis=0)
     return found

@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array, median
 from scara_ident.estimation.tail import HOUR, Tail, tail_of
-from scara_ident.identification.binned_residual import BOUND, FILLED, NORMAL, Binned
+from scara_ident.identification.binned_residual import BOUND, FILLED, NORMAL, STILL, Binned
 from scara_ident.identification.event_ends import GAP, Ends, event_ends
 
 # Lengths of the windows, s.
 WINDOWS = (0.16, 0.32, 0.6, 1.2, 2.0)
 # Windows that a scale is taken from at the least, and seconds that the largest are.
 LEAST_WINDOWS, LEAST_SECONDS = 20, 5
-# At most one false event in so many seconds.
-FALSE_EVERY = 36_000.0
+# Noise makes at most one false event in so many seconds; of what a model lacks there are more, and one in 10 h is too many.
+FALSE_EVERY = 360_000.0
 # The law is of the largest of so many seconds, or of that share of all if that is more, and of no more than half of them.
 TOPS, TOPS_SHARE = 50, 0.1
 # One event and the windows beside it are in so many seconds, all events in that share of all at the most. For each second beyond
@@ -144,7 +144,7 @@ def _local(segment: Segment) -> bool:
     beside, seen = round(BESIDE / item.width), SEEN / item.width
     # Rests do not count.
     moves = np.logical_not(np.isfinite(item.still[0]))
-    shown = item.known[segment.score >= 1.0]
+    shown = np.maximum(item.known, _slow(item))[segment.score >= 1.0]
     before = np.sum(shown[:, : segment.start][:, moves[: segment.start]][:, -beside:], axis=1)
     after = np.sum(shown[:, segment.stop :][:, moves[segment.stop :]][:, :beside], axis=1)
     whole = item.left.shape[1] * item.width
@@ -274,8 +274,10 @@ def _bin_noise(stretches: Sequence[Binned]) -> Array:
 
 
 def _slow(item: Binned) -> NDArray[np.bool_]:
-    """Return where a joint turns slowly, and the arm does not stand still, shape (n, M)."""
-    return np.logical_not((item.known > FILLED) | np.isfinite(item.still))
+    """Return where a joint turns slowly, but not so slowly that its friction may be of either sign, shape (n, M)."""
+    speed = np.abs(item.state[1])
+    turns = speed > STILL * np.max(speed, axis=1, keepdims=True)
+    return np.asarray(turns & ~(item.known > FILLED))
 
 
 def _segments(

@@ -128,3 +128,30 @@ def test_a_force_that_is_wrong_about_a_joint_does_not_shorten_it():
         left, weight, nothing, every, slice(72, 98), np.array([True, True]), WIDTH, lambda start, stop: shape
     )
     assert pair(ends) == (60, 100)
+
+
+def test_what_stands_out_once_a_third_of_a_second_after_it_does_not_lengthen_it():
+    rng = np.random.default_rng(8)
+    left = rng.standard_normal((2, 300))
+    left[:, 60:90] += np.array([[15.0], [30.0]])
+    left[1, 98] += 25.0
+    nothing, every = np.full_like(left, np.nan), np.ones(300, dtype=bool)
+    force = np.repeat(np.array([[14.0], [27.0]]), 300, axis=1)
+    ends = event_ends(
+        left, np.ones_like(left), nothing, every, slice(62, 88), np.ones(2, dtype=bool), WIDTH, lambda *_: force
+    )
+    assert pair(ends) == (pytest.approx(60, abs=1), pytest.approx(90, abs=1))
+
+
+def test_friction_that_goes_as_a_rest_begins_and_comes_as_it_ends_is_no_step_of_the_push():
+    rng = np.random.default_rng(9)
+    left = rng.standard_normal((2, 300))
+    left[0, 70:125] += 5.0
+    trust, still = np.ones_like(left), np.full_like(left, np.nan)
+    trust[:, 100:150] = 0.0
+    still[:, REST] = left[:, REST]
+    still[0, 104:107] -= 30.0
+    still[0, 142:146] += 40.0
+    free, shows = np.ones(300, dtype=bool), np.array([True, False])
+    ends = event_ends(left, trust, still, free, slice(70, 100), shows, WIDTH)
+    assert pair(ends) == (pytest.approx(70, abs=1), pytest.approx(125, abs=1))

@@ -164,16 +164,35 @@ def test_beside_a_state_that_the_arm_is_in_once_nothing_is_an_event_unless_it_is
         assert [segment.start * segment.binned.width for segment in shown] == pytest.approx(found, abs=0.1)
 
 
-def test_a_push_is_found_while_its_joint_turns_at_a_twenty_fifth_of_its_speed():
+def slowed(
+    share: float, push: slice, seconds: tuple[float, float], size: float = 3.0, friction: slice | None = None
+) -> list[Segment]:
+    """What stands out where a joint is slowed to that share of its peak speed, of a push of so many times the noise."""
     part = STRETCHES[2]
     speed = part.motion.v.copy()
-    speed[0, int(6.0 * RATE) : int(9.0 * RATE)] = 0.04 * np.max(np.abs(speed[0]))
+    speed[0, int(seconds[0] * RATE) : int(seconds[1] * RATE)] = share * np.max(np.abs(speed[0]))
     left = white(9)
-    left[2][0, int(7.0 * RATE) : int(8.0 * RATE)] += 3.0
+    left[2][0, push] += size
+    if friction is not None:
+        left[2][0, friction] += 20.0
     slow = with_more(part, left[2])
     object.__setattr__(slow, "motion", replace(part.motion, v=speed))
     parts = [*STRETCHES[:2], slow, STRETCHES[3]]
     noise = bounded_noise(parts, left, range(len(parts)))
-    stretches = [binned(k, own, row, noise[k]) for k, (own, row) in enumerate(zip(parts, left, strict=True))]
-    (found,) = found_in(stretches)
+    return found_in([binned(k, own, row, noise[k]) for k, (own, row) in enumerate(zip(parts, left, strict=True))])
+
+
+def test_a_push_is_found_while_its_joint_turns_at_a_twenty_fifth_of_its_speed():
+    (found,) = slowed(0.04, slice(int(7.0 * RATE), int(8.0 * RATE)), (6.0, 9.0))
+    assert (found.start * found.binned.width, found.stop * found.binned.width) == pytest.approx((7.0, 8.0), abs=0.1)
+
+
+def test_a_joint_is_seen_before_a_push_where_it_turns_at_a_fiftieth_of_its_speed():
+    (found,) = slowed(0.02, slice(int(7.0 * RATE), int(8.0 * RATE)), (5.0, 7.0), 1.0)
+    assert (found.start * found.binned.width, found.stop * found.binned.width) == pytest.approx((7.0, 8.0), abs=0.1)
+
+
+def test_friction_while_a_joint_hardly_turns_does_not_lengthen_a_push():
+    turning = slice(int(8.2 * RATE), int(8.5 * RATE))
+    (found,) = slowed(0.002, slice(int(7.0 * RATE), int(8.0 * RATE)), (8.1, 9.0), friction=turning)
     assert (found.start * found.binned.width, found.stop * found.binned.width) == pytest.approx((7.0, 8.0), abs=0.1)
