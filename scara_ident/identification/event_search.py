@@ -3,7 +3,7 @@
 Of the residual of a robust fit in bins what the motion makes is taken off (see `event_background`). Means over windows of 0.15
 to 2 s are compared with their own scale (the median absolute value over all recordings, and over this one), in
 which colour of the noise and what the model lacks everywhere are included. A stretch stands out where such a mean is beyond
-what the largest of each second lets expect once in ten hours, by all laws that its square may have (see `estimation.tail`):
+what the largest of each second lets expect once in a hundred hours, by all laws that its square may have (see `estimation.tail`):
 the mean of many samples is nearly normal, and the upper tail of its square exponential. Where an event begins and ends is
 looked for last (see `event_ends`).
 """
