@@ -12,6 +12,7 @@ from scara_ident.diagnosis.candidate_tests import held_out_gains
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.search import fitted_beside
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
+from scara_ident.diagnosis.variation_check import variation_beside
 from scara_ident.effects import Scene
 
 # Columns that follow the base model's estimate instead of the last one gain at least this share of what they would.
@@ -68,6 +69,11 @@ def _confounders_of(
     scene, criteria = step.scene, replace(step.criteria, family_error=step.criteria.significant)
     step = replace(step, criteria=criteria, tried=1)
     own = step.judge([found])[0]
+    variation = variation_beside(step, own)
+    if variation:
+        # What a model fits of what runs differ by says nothing for it.
+        step = replace(step, variation=variation)
+        own = step.judge([found])[0]
     twins = [Candidate(*twin) for twin in found.effect.same_columns(scene, found.member)]
     # Of all joints together: candidates of different joints are compared. Those that remove too little, most of them, need
     # no test.
@@ -76,13 +82,14 @@ def _confounders_of(
     enough = list(dict.fromkeys([*pool, *twins]))
     # By the columns at hand first: most come nowhere near, and need no others.
     for columns, asked in ((first, LEAST_AT_FIRST * least), (scene, least)):
-        found_gains = held_out_gains(step.model, step.columns.rows(columns, enough), criteria)
+        found_gains = held_out_gains(step.model, step.rows(columns, enough), criteria)
         enough = [item for item, gain in zip(enough, found_gains, strict=True) if gain > asked]
     judged = list(best_of_each(step.judge(enough)).values())
     to_fit = [item for item in judged if item.candidate.effect.fitted_first]
     # What is chosen by a fit is compared by one: its grid points lose most of it.
     fits = [decision for _, decision in fitted_beside(step, to_fit, 0.0, None) if decision.accepted]
-    near = [item for item in judged if item not in to_fit and item.accepted and item.examination.held_out > least]
+    near = [item for item in judged if item.accepted and item.examination.held_out > least]
+    near = [item for item in near if not item.candidate.effect.fitted_first]
     others = []
     for decision in [*step.refine(near), *fits]:
         worse = decision.examination.left - own.examination.left

@@ -9,7 +9,6 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import with_columns
-from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.gain import gains
 from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.diagnosis.selection_step import SelectionStep
@@ -44,28 +43,20 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     """
     if decision.candidate.corrects_data:
         return None
-    found = decision.examination
-    (own,) = step.columns.rows(step.scene, [decision.candidate])
-    chosen = step.columns.rows(step.scene, step.chosen)
-    value, added = np.concatenate([found.model_value, found.value]), [*chosen, own]
-    if decision.candidate.effect.by_recording:
-        value, added = step.model.root @ step.model.projected, chosen
-    joints = with_columns(step.observations, added)
-    variation = run_variation(step.observations, joints, value)
-    why = "runs differ from one another by as much: with that counted as noise"
-    if len(step.observations.data.recordings) < LEAST_RUNS:
-        variation = assumed_variation(step.observations, joints, value)
-        each = f"friction by some {ASSUMED_FRICTION:.0%}, an offset by {ASSUMED_OFFSET:.0%} of its torque, a delay by "
-        why = f"{each}{ASSUMED_DELAY * 1e3:g} ms: runs that differ so may do as much: with that counted as noise"
+    variation = variation_beside(step, decision)
     if not variation:
         return None
-    model = whitened(step.model, variation)
-    rows = {joint: variation.whitened(joint, columns) for joint, columns in own.items()}
-    (again,) = examine(model, [rows], step.criteria)
-    (gain,) = gains(model, [rows], [decision.candidate.member.joint], [again])
+    counted = replace(step, variation=variation)
+    rows = counted.rows(step.scene, [decision.candidate])
+    (again,) = examine(counted.model, rows, step.criteria)
+    (gain,) = gains(counted.model, rows, [decision.candidate.member.joint], [again])
     # Whether it leaves little but noise is seen where what runs differ by takes no part in it.
     if step.in_doubt(again, max(gain, decision.gain)):
-        again = examine_rows(model, rows, again)
+        again = examine_rows(counted.model, rows[0], again)
+    why = "runs differ from one another by as much: with that counted as noise"
+    if len(step.observations.data.recordings) < LEAST_RUNS:
+        each = f"friction by some {ASSUMED_FRICTION:.0%}, an offset by {ASSUMED_OFFSET:.0%} of its torque, a delay by "
+        why = f"{each}{ASSUMED_DELAY * 1e3:g} ms: runs that differ so may do as much: with that counted as noise"
     if again.p_value * step.tried > step.criteria.family_error:
         return f"{why} p = {again.p_value:.1e}"
     if gain < least_gain:
@@ -73,7 +64,22 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     return None
 
 
-def whitened(model: FittedModel, variation: RunVariation) -> FittedModel:
-    """Return a model fitted to rows on which what runs differ by is weighted as the noise it is."""
-    rows = tuple(replace(item, table=variation.whitened(joint, item.table)) for joint, item in enumerate(model.joints))
-    return replace(model, joints=rows)
+def variation_beside(step: SelectionStep, decision: Decision) -> RunVariation:
+    """Return what runs differ by, or might where they are too few to say, beside a model with an effect.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The model that the effect was tried beside.
+    decision : Decision
+        On the effect.
+    """
+    found, chosen = decision.examination, step.columns.rows(step.scene, step.chosen)
+    value, added = step.model.root @ step.model.projected, chosen
+    if not decision.candidate.effect.by_recording:
+        value = np.concatenate([found.model_value, found.value])
+        added = [*chosen, *step.columns.rows(step.scene, [decision.candidate])]
+    told = len(step.observations.data.recordings) >= LEAST_RUNS
+    return (run_variation if told else assumed_variation)(
+        step.observations, with_columns(step.observations, added), value
+    )

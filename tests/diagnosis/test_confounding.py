@@ -8,10 +8,12 @@ import numpy as np
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.confounding import confounders
+from scara_ident.diagnosis.selection_step import observed
 from scara_ident.effects import Coefficient, Effect, Member
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.position import Spring
-from tests.diagnosis.made import Bump, exact_runs, searched, with_torque
+from scara_ident.estimation.least_squares import value_and_weights
+from tests.diagnosis.made import Bump, exact_runs, searched, step_beside, with_torque
 
 MIDDLE = 1.57
 STIFFNESS = 0.3
@@ -75,6 +77,29 @@ def test_an_effect_of_another_kind_is_no_rival():
 def test_two_effects_at_once_are_not_rivals_of_each_other():
     both = groups(1.9, lambda motion: spring(motion) + 0.03 * np.abs(motion.v[0]))
     assert both == {"spring of joint1": {}, "asymmetric_friction of joint1": {}}
+
+
+class Bent(Spring):
+    """A spring that is softer on one side."""
+
+    name = "bent"
+
+    def signal_columns(self, signals, member):
+        turn = signals.motion.q[0] - MIDDLE
+        return [turn + 0.01 * turn**2]
+
+
+def test_what_runs_differ_by_does_not_tell_which_of_two_is_there():
+    # The runs of large motion have another offset, which a spring of another shape can stand for.
+    small, large = exact_runs(size=0.6)[:2], exact_runs(size=1.2)[2:]
+    runs = with_torque(small, 0, lambda motion: 10.0 * spring(motion) - 0.1)
+    runs += with_torque(large, 0, lambda motion: 10.0 * spring(motion) + 0.1)
+    found, there = (Candidate(effect, Member(0)) for effect in (Bent(), Spring()))
+    for chosen, other, rivals in ((found, there, ["spring of joint1"]), (there, found, [])):
+        step = step_beside(runs, (chosen,))
+        step = replace(step, weights=value_and_weights(observed(step))[1])
+        (others,) = confounders(step, step.without(0).judge([other]), step.scene)
+        assert [item.label for item in others] == rivals
 
 
 class Twin(Pendulum):
