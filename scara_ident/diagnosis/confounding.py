@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import held_out_gains
 from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.noise_check import noise_left
 from scara_ident.diagnosis.search import fitted_beside
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 from scara_ident.diagnosis.variation_check import variation_beside
@@ -87,18 +88,27 @@ def _confounders_of(
     judged = list(best_of_each(step.judge(enough)).values())
     to_fit = [item for item in judged if item.candidate.effect.fitted_first]
     # What is chosen by a fit is compared by one: its grid points lose most of it.
-    fits = [decision for _, decision in fitted_beside(step, to_fit, 0.0, None) if decision.accepted]
+    fits = [pair for pair in fitted_beside(step, to_fit, 0.0, None) if pair[1].accepted]
     near = [item for item in judged if item.accepted and item.examination.held_out > least]
-    near = [item for item in near if not item.candidate.effect.fitted_first]
+    near = step.refine([item for item in near if not item.candidate.effect.fitted_first])
     others = []
-    for decision in [*step.refine(near), *fits]:
-        worse = decision.examination.left - own.examination.left
-        error = float(np.sqrt(len(worse) * np.var(worse)))
-        same = abs(float(np.sum(worse))) < criteria.alike * error
-        alike = decision.examination.held_out >= criteria.least_share * saved and same
-        if decision.accepted and (alike or decision.examination.held_out >= saved):
+    for beside, decision in [*((step, item) for item in near), *fits]:
+        better = decision.examination.held_out >= saved
+        able = better or decision.examination.held_out >= criteria.least_share * saved
+        if decision.accepted and able and (better or _same((step, own), (beside, decision))):
             candidate = decision.candidate
             name, joint = candidate.effect.name, candidate.joint(scene)
             value = tuple(float(x) for x in decision.examination.value)
             others.append(Confounder(decision.label, name, joint, decision.gain, own.gain, candidate, value))
     return tuple(sorted(others, key=lambda item: -item.gain))
+
+
+def _same(own: tuple[SelectionStep, Decision], other: tuple[SelectionStep, Decision]) -> bool:
+    """Whether the errors of two models, each a candidate beside a step, differ by no more than chance or noise makes."""
+    worse = other[1].examination.left - own[1].examination.left
+    difference, least = float(np.sum(worse)), own[0].criteria.alike * float(np.sqrt(len(worse) * np.var(worse)))
+    if abs(difference) < least:
+        return True
+    # The noise of the positions is in the columns of one more than in those of the other.
+    grown, own_grown = (noise_left(step, decision.candidate) for step, decision in (other, own))
+    return abs(difference - grown + own_grown) < least

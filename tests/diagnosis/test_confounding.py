@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.confounding import confounders
@@ -100,6 +102,43 @@ def test_what_runs_differ_by_does_not_tell_which_of_two_is_there():
         step = replace(step, weights=value_and_weights(observed(step))[1])
         (others,) = confounders(step, step.without(0).judge([other]), step.scene)
         assert [item.label for item in others] == rivals
+
+
+class Pull(Spring):
+    """A torque by the acceleration, which has the noise of the positions most."""
+
+    name = "pull"
+
+    def signal_columns(self, signals, member):
+        return [signals.motion.a[0] * np.sin(3.0 * signals.motion.q[0])]
+
+
+class SmoothPull(Pull):
+    """The same without what is fast in it."""
+
+    name = "smooth"
+
+    def signal_columns(self, signals, member):
+        return [smooth_pull(signals.motion)]
+
+
+def smooth_pull(motion):
+    return gaussian_filter1d(motion.a[0] * np.sin(3.0 * motion.q[0]), 8.0)
+
+
+@pytest.mark.parametrize(("size", "turn", "found", "other", "named"), [
+    (0.02, 2.0**12, Pull(), SmoothPull(), True),
+    (0.05, np.inf, SmoothPull(), Pull(), False),
+])  # fmt: skip
+def test_the_noise_of_the_positions_does_not_tell_which_of_two_is_there(size, turn, found, other, named):
+    runs = with_torque(exact_runs(), 0, lambda motion: size * smooth_pull(motion))
+    if np.isfinite(turn):
+        step = 2.0 * np.pi / turn
+        runs = [replace(item, position=step * np.round(item.position / step)) for item in runs]
+    step = step_beside(runs, (Candidate(found, Member(0)),))
+    step = replace(step, weights=value_and_weights(observed(step))[1])
+    (others,) = confounders(step, step.without(0).judge([Candidate(other, Member(0))]), step.scene)
+    assert bool(others) is named
 
 
 class Twin(Pendulum):
