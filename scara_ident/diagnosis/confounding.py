@@ -13,7 +13,7 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.noise_check import noise_left
 from scara_ident.diagnosis.search import fitted_beside
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
-from scara_ident.diagnosis.variation_check import variation_beside
+from scara_ident.diagnosis.variation_check import counted
 from scara_ident.effects import Scene
 
 # Columns that follow the base model's estimate instead of the last one gain at least this share of what they would.
@@ -69,12 +69,9 @@ def _confounders_of(
     # says nothing of whether these two can be told apart.
     scene, criteria = step.scene, replace(step.criteria, family_error=step.criteria.significant)
     step = replace(step, criteria=criteria, tried=1)
+    # What a model fits of what runs differ by says nothing for it.
+    step = counted(step, step.judge([found])[0])
     own = step.judge([found])[0]
-    variation = variation_beside(step, own)
-    if variation:
-        # What a model fits of what runs differ by says nothing for it.
-        step = replace(step, variation=variation)
-        own = step.judge([found])[0]
     twins = [Candidate(*twin) for twin in found.effect.same_columns(scene, found.member)]
     # Of all joints together: candidates of different joints are compared. Those that remove too little, most of them, need
     # no test.

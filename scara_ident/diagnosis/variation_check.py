@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -43,16 +44,16 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     """
     if decision.candidate.corrects_data:
         return None
-    variation = variation_beside(step, decision)
+    variation = _variation_beside(step, decision)
     if not variation:
         return None
-    counted = replace(step, variation=variation)
-    rows = counted.rows(step.scene, [decision.candidate])
-    (again,) = examine(counted.model, rows, step.criteria)
-    (gain,) = gains(counted.model, rows, [decision.candidate.member.joint], [again])
+    beside = replace(step, variation=variation)
+    rows = beside.rows(step.scene, [decision.candidate])
+    (again,) = examine(beside.model, rows, step.criteria)
+    (gain,) = gains(beside.model, rows, [decision.candidate.member.joint], [again])
     # Whether it leaves little but noise is seen where what runs differ by takes no part in it.
     if step.in_doubt(again, max(gain, decision.gain)):
-        again = examine_rows(counted.model, rows[0], again)
+        again = examine_rows(beside.model, rows[0], again)
     why = "runs differ from one another by as much: with that counted as noise"
     if len(step.observations.data.recordings) < LEAST_RUNS:
         each = f"friction by some {ASSUMED_FRICTION:.0%}, an offset by {ASSUMED_OFFSET:.0%} of its torque, a delay by "
@@ -64,16 +65,54 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     return None
 
 
-def variation_beside(step: SelectionStep, decision: Decision) -> RunVariation:
-    """Return what runs differ by, or might where they are too few to say, beside a model with an effect.
+def best_first(pairs: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:
+    """Return candidates in the order of what they remove on rows that they were not fitted to.
+
+    Those that do nearly as well as the best are compared with what runs differ by counted as noise: of two models the
+    wrong one may fit more of that.
+
+    Parameters
+    ----------
+    pairs : sequence of (SelectionStep, Decision)
+        Candidates, each with the step that it was tried beside.
+    """
+    order = sorted(pairs, key=lambda pair: -pair[1].examination.held_out)
+    near = [
+        (step, item)
+        for step, item in order
+        if item.examination.held_out >= step.criteria.least_share * order[0][1].examination.held_out
+    ]
+    variation = counted(*near[0]).variation if len(near) > 1 else None
+    if variation is None or any(_of_the_runs(item) for _, item in near):
+        return order
+
+    def removed(pair: tuple[SelectionStep, Decision]) -> float:
+        (again,) = replace(pair[0], variation=variation).judge([pair[1].candidate])
+        return again.examination.held_out
+
+    return [*sorted(near, key=removed, reverse=True), *order[len(near) :]]
+
+
+def counted(step: SelectionStep, decision: Decision) -> SelectionStep:
+    """Return a step beside which effects are compared with what runs differ by counted as noise.
 
     Parameters
     ----------
     step : SelectionStep
-        The model that the effect was tried beside.
+        The model that an effect was tried beside.
     decision : Decision
-        On the effect.
+        On the effect: with it runs differ by less. Nothing is counted where it may itself be what they differ by.
     """
+    variation = None if _of_the_runs(decision) else _variation_beside(step, decision)
+    return replace(step, variation=variation) if variation else step
+
+
+def _of_the_runs(decision: Decision) -> bool:
+    return decision.candidate.corrects_data or decision.candidate.effect.by_recording
+
+
+def _variation_beside(step: SelectionStep, decision: Decision) -> RunVariation:
+    """Return what runs differ by, or might where they are too few to say, beside a model with an effect."""
     found, chosen = decision.examination, step.columns.rows(step.scene, step.chosen)
     value, added = step.model.root @ step.model.projected, chosen
     if not decision.candidate.effect.by_recording:

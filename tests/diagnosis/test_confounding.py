@@ -15,7 +15,7 @@ from scara_ident.effects import Coefficient, Effect, Member
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.position import Spring
 from scara_ident.estimation.least_squares import value_and_weights
-from tests.diagnosis.made import Bump, exact_runs, searched, step_beside, with_torque
+from tests.diagnosis.made import Bent, Bump, exact_runs, runs_with_a_spring, searched, step_beside, with_torque
 
 MIDDLE = 1.57
 STIFFNESS = 0.3
@@ -81,21 +81,8 @@ def test_two_effects_at_once_are_not_rivals_of_each_other():
     assert both == {"spring of joint1": {}, "asymmetric_friction of joint1": {}}
 
 
-class Bent(Spring):
-    """A spring that is softer on one side."""
-
-    name = "bent"
-
-    def signal_columns(self, signals, member):
-        turn = signals.motion.q[0] - MIDDLE
-        return [turn + 0.01 * turn**2]
-
-
 def test_what_runs_differ_by_does_not_tell_which_of_two_is_there():
-    # The runs of large motion have another offset, which a spring of another shape can stand for.
-    small, large = exact_runs(size=0.6)[:2], exact_runs(size=1.2)[2:]
-    runs = with_torque(small, 0, lambda motion: 10.0 * spring(motion) - 0.1)
-    runs += with_torque(large, 0, lambda motion: 10.0 * spring(motion) + 0.1)
+    runs = runs_with_a_spring()
     found, there = (Candidate(effect, Member(0)) for effect in (Bent(), Spring()))
     for chosen, other, rivals in ((found, there, ["spring of joint1"]), (there, found, [])):
         step = step_beside(runs, (chosen,))
