@@ -66,8 +66,9 @@ def _confounders_of(
     step: SelectionStep, found: Candidate, pool: Sequence[Candidate], first: Scene
 ) -> tuple[Confounder, ...]:
     # A rival is asked for once, not in every round of a search, and need not be believed itself: how many others were tried
-    # says nothing of whether these two can be told apart.
-    scene, criteria = step.scene, replace(step.criteria, family_error=step.criteria.significant)
+    # says nothing of whether these two can be told apart. One of the whole arm need not remove as much as all joints leave.
+    scene, of_one = step.scene, replace(step.criteria, family_error=step.criteria.significant)
+    criteria = replace(of_one, least_gain=of_one.least_gain / scene.robot.n)
     step = replace(step, criteria=criteria, tried=1)
     # What a model fits of what runs differ by says nothing for it.
     step = counted(step, step.judge([found])[0])
@@ -85,11 +86,11 @@ def _confounders_of(
     judged = list(best_of_each(step.judge(enough)).values())
     to_fit = [item for item in judged if item.candidate.effect.fitted_first]
     # What is chosen by a fit is compared by one: its grid points lose most of it.
-    fits = [pair for pair in fitted_beside(step, to_fit, 0.0, None) if pair[1].accepted]
+    fitted = fitted_beside(replace(step, criteria=of_one), to_fit, 0.0, None)
     near = [item for item in judged if item.accepted and item.examination.held_out > least]
     near = step.refine([item for item in near if not item.candidate.effect.fitted_first])
     others = []
-    for beside, decision in [*((step, item) for item in near), *fits]:
+    for beside, decision in [*((step, item) for item in near), *fitted]:
         better = decision.examination.held_out >= saved
         able = better or decision.examination.held_out >= criteria.least_share * saved
         if decision.accepted and able and (better or _same((step, own), (beside, decision))):

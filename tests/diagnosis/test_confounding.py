@@ -10,6 +10,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.confounding import confounders
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.selection_step import observed
 from scara_ident.effects import Coefficient, Effect, Member
 from scara_ident.effects.friction import AsymmetricFriction
@@ -89,6 +90,28 @@ def test_what_runs_differ_by_does_not_tell_which_of_two_is_there():
         step = replace(step, weights=value_and_weights(observed(step))[1])
         (others,) = confounders(step, step.without(0).judge([other]), step.scene)
         assert [item.label for item in others] == rivals
+
+
+class OfTheArm(Spring):
+    """The same spring as an effect of the whole arm."""
+
+    name = "of_the_arm"
+
+    def members(self, scene):
+        return (Member(None),)
+
+    def signal_columns(self, signals, member):
+        turn = signals.motion.q[0] - MIDDLE
+        return [np.array([turn, np.zeros_like(turn)])]
+
+
+def test_a_rival_of_the_whole_arm_is_named_where_it_removes_little_of_what_all_joints_leave():
+    step = searched(with_torque(exact_runs(), 0, lambda motion: 0.0023 * (motion.q[0] - MIDDLE)), Spring()).step
+    (own,) = step.without(0).judge(step.chosen)
+    beside = step.without(0).judge([Candidate(OfTheArm(), Member(None))])
+    assert beside[0].gain < CRITERIA.least_gain < own.gain
+    ((rival,),) = confounders(step, beside, step.scene)
+    assert rival.label == "of_the_arm"
 
 
 class Pull(Spring):
