@@ -73,6 +73,11 @@ class SelectionStep:
         joints = tuple(replace(item, table=table) for item, table in zip(model.joints, tables, strict=True))
         return replace(model, joints=joints)
 
+    @property
+    def filled(self) -> NDArray[np.intp]:
+        """Places of the blocks that have rows."""
+        return filled_blocks(self.observations.joints)
+
     @cached_property
     def noisier(self) -> SelectionStep:
         """The same step had the positions their noise once more on top."""
@@ -124,10 +129,15 @@ class SelectionStep:
         return current
 
 
+def filled_blocks(joints: Sequence[JointRows]) -> NDArray[np.intp]:
+    """Return the places of the blocks that have rows of any joint."""
+    return np.flatnonzero(sum(np.diff(rows.starts) for rows in joints))
+
+
 def fitted_model(observations: Observations, chosen: Sequence[Rows], weights: Array, parts: int) -> FittedModel:
     """Return the base model with further columns, to be tried beside; blocks without any row are left out."""
     joints = with_columns(observations, chosen)
-    filled = np.flatnonzero(sum(np.diff(rows.starts) for rows in joints))
+    filled = filled_blocks(joints)
     owner = observations.owner[filled]
     # No column of a row is lost: only empty blocks go.
     joints = tuple(
