@@ -68,8 +68,8 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
 def best_first(pairs: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:
     """Return candidates in the order of what they remove on rows that they were not fitted to.
 
-    Those that do nearly as well as the best are compared with what runs differ by counted as noise: of two models the
-    wrong one may fit more of that.
+    The best is compared with those that do nearly as well in its place and hardly anything beside it, with what runs
+    differ by counted as noise: of two models the wrong one may fit more of that.
 
     Parameters
     ----------
@@ -77,20 +77,29 @@ def best_first(pairs: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[Se
         Candidates, each with the step that it was tried beside.
     """
     order = sorted(pairs, key=lambda pair: -pair[1].examination.held_out)
-    near = [
-        (step, item)
-        for step, item in order
-        if item.examination.held_out >= step.criteria.least_share * order[0][1].examination.held_out
-    ]
-    variation = counted(*near[0]).variation if len(near) > 1 else None
-    if variation is None or any(_of_the_runs(item) for _, item in near):
+    if len(order) < 2 or _of_the_runs(order[0][1]):
+        return order
+    step, best = order[0]
+    enough = step.criteria.least_share * best.examination.held_out
+    near = [pair for pair in order[1:] if pair[1].examination.held_out >= enough and not _of_the_runs(pair[1])]
+    beside = replace(step, chosen=(*step.chosen, best.candidate))
+    again = beside.judge([item.candidate for _, item in near]) if near else []
+    little = 1.0 - step.criteria.least_share
+    rivals = [pair for pair, item in zip(near, again, strict=True) if _saved(beside, item) < little * _saved(*pair)]
+    variation = counted(step, best).variation if rivals else None
+    if variation is None:
         return order
 
     def removed(pair: tuple[SelectionStep, Decision]) -> float:
         (again,) = replace(pair[0], variation=variation).judge([pair[1].candidate])
         return again.examination.held_out
 
-    return [*sorted(near, key=removed, reverse=True), *order[len(near) :]]
+    first = max([order[0], *rivals], key=removed)
+    return [first, *(pair for pair in order if pair is not first)]
+
+
+def _saved(step: SelectionStep, decision: Decision) -> float:
+    return decision.examination.held_out * float(np.sum(step.model.squares))
 
 
 def counted(step: SelectionStep, decision: Decision) -> SelectionStep:
