@@ -10,8 +10,10 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import held_out_gains
 from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.noise_check import noise_left
 from scara_ident.diagnosis.search import fitted_beside
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
+from scara_ident.diagnosis.variation_check import counted
 from scara_ident.effects import Scene
 
 # Columns that follow the base model's estimate instead of the last one gain at least this share of what they would.
@@ -64,9 +66,12 @@ def _confounders_of(
     step: SelectionStep, found: Candidate, pool: Sequence[Candidate], first: Scene
 ) -> tuple[Confounder, ...]:
     # A rival is asked for once, not in every round of a search, and need not be believed itself: how many others were tried
-    # says nothing of whether these two can be told apart.
-    scene, criteria = step.scene, replace(step.criteria, family_error=step.criteria.significant)
+    # says nothing of whether these two can be told apart. One of the whole arm need not remove as much as all joints leave.
+    scene, of_one = step.scene, replace(step.criteria, family_error=step.criteria.significant)
+    criteria = replace(of_one, least_gain=of_one.least_gain / scene.robot.n)
     step = replace(step, criteria=criteria, tried=1)
+    # What a model fits of what runs differ by says nothing for it.
+    step = counted(step, step.judge([found])[0])
     own = step.judge([found])[0]
     twins = [Candidate(*twin) for twin in found.effect.same_columns(scene, found.member)]
     # Of all joints together: candidates of different joints are compared. Those that remove too little, most of them, need
@@ -76,22 +81,32 @@ def _confounders_of(
     enough = list(dict.fromkeys([*pool, *twins]))
     # By the columns at hand first: most come nowhere near, and need no others.
     for columns, asked in ((first, LEAST_AT_FIRST * least), (scene, least)):
-        found_gains = held_out_gains(step.model, step.columns.rows(columns, enough), criteria)
+        found_gains = held_out_gains(step.model, step.rows(columns, enough), criteria)
         enough = [item for item, gain in zip(enough, found_gains, strict=True) if gain > asked]
     judged = list(best_of_each(step.judge(enough)).values())
     to_fit = [item for item in judged if item.candidate.effect.fitted_first]
     # What is chosen by a fit is compared by one: its grid points lose most of it.
-    fits = [decision for _, decision in fitted_beside(step, to_fit, 0.0, None) if decision.accepted]
-    near = [item for item in judged if item not in to_fit and item.accepted and item.examination.held_out > least]
+    fitted = fitted_beside(replace(step, criteria=of_one), to_fit, 0.0, None)
+    near = [item for item in judged if item.accepted and item.examination.held_out > least]
+    near = step.refine([item for item in near if not item.candidate.effect.fitted_first])
     others = []
-    for decision in [*step.refine(near), *fits]:
-        worse = decision.examination.left - own.examination.left
-        error = float(np.sqrt(len(worse) * np.var(worse)))
-        same = abs(float(np.sum(worse))) < criteria.alike * error
-        alike = decision.examination.held_out >= criteria.least_share * saved and same
-        if decision.accepted and (alike or decision.examination.held_out >= saved):
+    for beside, decision in [*((step, item) for item in near), *fitted]:
+        better = decision.examination.held_out >= saved
+        able = better or decision.examination.held_out >= criteria.least_share * saved
+        if decision.accepted and able and (better or _same((step, own), (beside, decision))):
             candidate = decision.candidate
             name, joint = candidate.effect.name, candidate.joint(scene)
             value = tuple(float(x) for x in decision.examination.value)
             others.append(Confounder(decision.label, name, joint, decision.gain, own.gain, candidate, value))
     return tuple(sorted(others, key=lambda item: -item.gain))
+
+
+def _same(own: tuple[SelectionStep, Decision], other: tuple[SelectionStep, Decision]) -> bool:
+    """Whether the errors of two models, each a candidate beside a step, differ by no more than chance or noise makes."""
+    worse = other[1].examination.left - own[1].examination.left
+    difference, least = float(np.sum(worse)), own[0].criteria.alike * float(np.sqrt(len(worse) * np.var(worse)))
+    if abs(difference) < least:
+        return True
+    # The noise of the positions is in the columns of one more than in those of the other.
+    grown, own_grown = (noise_left(step, decision.candidate) for step, decision in (other, own))
+    return abs(difference - grown + own_grown) < least

@@ -165,7 +165,9 @@ class SelectionCriteria:
     near_confounder: float = _criterion(
         0.4, "of its gain", "that another effect must remove at a grid point to be refined and compared"
     )
-    least_share: float = _criterion(0.8, "of its gain", "that another effect must remove to be a confounder")
+    least_share: float = _criterion(
+        0.8, "of its gain", "that another effect must remove to be compared with the best, and to be a confounder"
+    )
 
     def documented(self) -> list[tuple[str, Any, str, str, str]]:
         """Return name, value, unit, reason and source of every criterion."""

@@ -14,6 +14,7 @@ from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.evidence import coloured_shares
 from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
+from scara_ident.diagnosis.moments import examine_moments
 from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, SearchTask, search
 from scara_ident.diagnosis.selection_step import observed, observed_at_every_sample
@@ -291,6 +292,12 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
             share = max(0.0, removed / repeats)
             why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"
             proxies.append(decision.refused(why))
+        elif decision.label in labels and found.unexplained and owner in (None, found.unexplained.joint):
+            place = labels.index(decision.label)
+            p_value = examine_moments(search.step.without(place), search.chosen[place]).p_value
+            if p_value * search.tried > criteria.family_error:
+                why = f"what is left repeats: with repetitions of a motion counted once p = {p_value:.1e}"
+                proxies.append(decision.refused(why))
     return proxies
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import Examination, coefficients
+from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.selection_step import SelectionStep
 
@@ -44,3 +47,16 @@ def without_noise(found: Examination, value: Array, products: Array) -> Array:
     """Return coefficients without the share of the positions' noise, from those with it twice and their products."""
     share = products @ value - found.products @ found.value
     return np.asarray(found.value - np.linalg.pinv(found.products, rcond=1e-9, hermitian=True) @ share)
+
+
+def noise_left(step: SelectionStep, candidate: Candidate) -> float:
+    """Return how much of the weighted squared residual beside a candidate the positions' noise makes.
+
+    It is what as much noise once more adds, as in `noise_objection`. What runs differ by is left in both.
+    """
+    left = []
+    for each in (replace(step, variation=None), replace(step, variation=None).noisier):
+        (own,) = each.rows(each.scene, [candidate])
+        value, products = coefficients(each.model, own, step.criteria)
+        left.append(float(np.sum(each.model.squares) - value @ products @ value))
+    return left[1] - left[0]

@@ -17,7 +17,7 @@ from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, model_with, observed, points_of_lines
-from scara_ident.diagnosis.variation_check import variation_objection
+from scara_ident.diagnosis.variation_check import best_first, variation_objection
 from scara_ident.diagnosis.work import after_rounds
 from scara_ident.effects import Effect, Scene
 from scara_ident.effects.catalogue import available_effects
@@ -288,7 +288,7 @@ def _choose(
             [replace(item, effect=full) for item in sure if (full := item.effect.in_full()) is not None]
         )
         pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in leaders if pair[0] is not step]
-        for own, decision in sorted(pairs, key=lambda pair: -pair[1].examination.held_out):
+        for own, decision in best_first(pairs):
             why = _insignificant(own, decision.candidate) or noise_objection(own, decision)
             why = why or variation_objection(own, decision)
             if why is None:

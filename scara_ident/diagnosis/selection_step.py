@@ -20,6 +20,7 @@ from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.effects import Scene
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_variation import RunVariation
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.prepared import PreparedData
 
@@ -44,6 +45,8 @@ class SelectionStep:
     tried : int
         Candidates and scan points tried.
     criteria : SelectionCriteria
+    variation : RunVariation or None
+        What runs differ by, where all rows are to weigh it as the noise it is.
     """
 
     scene: Scene
@@ -52,6 +55,7 @@ class SelectionStep:
     weights: Array
     tried: int
     criteria: SelectionCriteria
+    variation: RunVariation | None = None
 
     @property
     def observations(self) -> Observations:
@@ -62,7 +66,17 @@ class SelectionStep:
     def model(self) -> FittedModel:
         """The base model with the chosen effects, fitted."""
         own = self.columns.rows(self.scene, self.chosen)
-        return fitted_model(self.observations, own, self.weights, self.criteria.parts)
+        model = fitted_model(self.observations, own, self.weights, self.criteria.parts)
+        if self.variation is None:
+            return model
+        tables = [self.variation.whitened(joint, item.table) for joint, item in enumerate(model.joints)]
+        joints = tuple(replace(item, table=table) for item, table in zip(model.joints, tables, strict=True))
+        return replace(model, joints=joints)
+
+    @property
+    def filled(self) -> NDArray[np.intp]:
+        """Places of the blocks that have rows."""
+        return filled_blocks(self.observations.joints)
 
     @cached_property
     def noisier(self) -> SelectionStep:
@@ -70,12 +84,16 @@ class SelectionStep:
         twin = self.columns.noisier
         return replace(self, scene=replace(self.scene, columns=columns_at_hand(twin.observations)), columns=twin)
 
+    def rows(self, scene: Scene, candidates: Sequence[Candidate]) -> list[Rows]:
+        """Return the columns of candidates as they are tried beside the model."""
+        found = self.columns.rows(scene, candidates)
+        if self.variation is None:
+            return found
+        return [{joint: self.variation.whitened(joint, own) for joint, own in rows.items()} for rows in found]
+
     def judge(self, candidates: Sequence[Candidate], scene: Scene | None = None) -> list[Decision]:
         """Examine candidates, by the columns of another scene if one is given, and decide on each."""
-        return self.judge_rows(candidates, self.columns.rows(scene or self.scene, candidates))
-
-    def judge_rows(self, candidates: Sequence[Candidate], rows: Sequence[Rows]) -> list[Decision]:
-        """Examine candidates whose columns are given, and decide on each."""
+        rows = self.rows(scene or self.scene, candidates)
         found = examine(self.model, rows, self.criteria)
         gained = gains(self.model, rows, [item.member.joint for item in candidates], found)
         for k, (result, gain) in enumerate(zip(found, gained, strict=True)):
@@ -111,10 +129,15 @@ class SelectionStep:
         return current
 
 
+def filled_blocks(joints: Sequence[JointRows]) -> NDArray[np.intp]:
+    """Return the places of the blocks that have rows of any joint."""
+    return np.flatnonzero(sum(np.diff(rows.starts) for rows in joints))
+
+
 def fitted_model(observations: Observations, chosen: Sequence[Rows], weights: Array, parts: int) -> FittedModel:
     """Return the base model with further columns, to be tried beside; blocks without any row are left out."""
     joints = with_columns(observations, chosen)
-    filled = np.flatnonzero(sum(np.diff(rows.starts) for rows in joints))
+    filled = filled_blocks(joints)
     owner = observations.owner[filled]
     # No column of a row is lost: only empty blocks go.
     joints = tuple(

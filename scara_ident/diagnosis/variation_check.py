@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,6 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import with_columns
-from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.gain import gains
 from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.diagnosis.selection_step import SelectionStep
@@ -44,28 +44,20 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     """
     if decision.candidate.corrects_data:
         return None
-    found = decision.examination
-    (own,) = step.columns.rows(step.scene, [decision.candidate])
-    chosen = step.columns.rows(step.scene, step.chosen)
-    value, added = np.concatenate([found.model_value, found.value]), [*chosen, own]
-    if decision.candidate.effect.by_recording:
-        value, added = step.model.root @ step.model.projected, chosen
-    joints = with_columns(step.observations, added)
-    variation = run_variation(step.observations, joints, value)
-    why = "runs differ from one another by as much: with that counted as noise"
-    if len(step.observations.data.recordings) < LEAST_RUNS:
-        variation = assumed_variation(step.observations, joints, value)
-        each = f"friction by some {ASSUMED_FRICTION:.0%}, an offset by {ASSUMED_OFFSET:.0%} of its torque, a delay by "
-        why = f"{each}{ASSUMED_DELAY * 1e3:g} ms: runs that differ so may do as much: with that counted as noise"
+    variation = _variation_beside(step, decision)
     if not variation:
         return None
-    model = whitened(step.model, variation)
-    rows = {joint: variation.whitened(joint, columns) for joint, columns in own.items()}
-    (again,) = examine(model, [rows], step.criteria)
-    (gain,) = gains(model, [rows], [decision.candidate.member.joint], [again])
+    beside = replace(step, variation=variation)
+    rows = beside.rows(step.scene, [decision.candidate])
+    (again,) = examine(beside.model, rows, step.criteria)
+    (gain,) = gains(beside.model, rows, [decision.candidate.member.joint], [again])
     # Whether it leaves little but noise is seen where what runs differ by takes no part in it.
     if step.in_doubt(again, max(gain, decision.gain)):
-        again = examine_rows(model, rows, again)
+        again = examine_rows(beside.model, rows[0], again)
+    why = "runs differ from one another by as much: with that counted as noise"
+    if len(step.observations.data.recordings) < LEAST_RUNS:
+        each = f"friction by some {ASSUMED_FRICTION:.0%}, an offset by {ASSUMED_OFFSET:.0%} of its torque, a delay by "
+        why = f"{each}{ASSUMED_DELAY * 1e3:g} ms: runs that differ so may do as much: with that counted as noise"
     if again.p_value * step.tried > step.criteria.family_error:
         return f"{why} p = {again.p_value:.1e}"
     if gain < least_gain:
@@ -73,7 +65,69 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     return None
 
 
-def whitened(model: FittedModel, variation: RunVariation) -> FittedModel:
-    """Return a model fitted to rows on which what runs differ by is weighted as the noise it is."""
-    rows = tuple(replace(item, table=variation.whitened(joint, item.table)) for joint, item in enumerate(model.joints))
-    return replace(model, joints=rows)
+def best_first(pairs: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:
+    """Return candidates in the order of what they remove on rows that they were not fitted to.
+
+    The best is compared with those that do nearly as well in its place and hardly anything beside it, with what runs
+    differ by counted as noise: of two models the wrong one may fit more of that.
+
+    Parameters
+    ----------
+    pairs : sequence of (SelectionStep, Decision)
+        Candidates, each with the step that it was tried beside.
+    """
+    order = sorted(pairs, key=lambda pair: -pair[1].examination.held_out)
+    if len(order) < 2 or _of_the_runs(order[0][1]):
+        return order
+    step, best = order[0]
+    enough = step.criteria.least_share * best.examination.held_out
+    near = [pair for pair in order[1:] if pair[1].examination.held_out >= enough and not _of_the_runs(pair[1])]
+    beside = replace(step, chosen=(*step.chosen, best.candidate))
+    again = beside.judge([item.candidate for _, item in near]) if near else []
+    little = 1.0 - step.criteria.least_share
+    rivals = [pair for pair, item in zip(near, again, strict=True) if _saved(beside, item) < little * _saved(*pair)]
+    variation = counted(step, best).variation if rivals else None
+    if variation is None:
+        return order
+
+    def removed(pair: tuple[SelectionStep, Decision]) -> float:
+        (again,) = replace(pair[0], variation=variation).judge([pair[1].candidate])
+        return again.examination.held_out
+
+    first = max([order[0], *rivals], key=removed)
+    return [first, *(pair for pair in order if pair is not first)]
+
+
+def _saved(step: SelectionStep, decision: Decision) -> float:
+    return decision.examination.held_out * float(np.sum(step.model.squares))
+
+
+def counted(step: SelectionStep, decision: Decision) -> SelectionStep:
+    """Return a step beside which effects are compared with what runs differ by counted as noise.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The model that an effect was tried beside.
+    decision : Decision
+        On the effect: with it runs differ by less. Nothing is counted where it may itself be what they differ by.
+    """
+    variation = None if _of_the_runs(decision) else _variation_beside(step, decision)
+    return replace(step, variation=variation) if variation else step
+
+
+def _of_the_runs(decision: Decision) -> bool:
+    return decision.candidate.corrects_data or decision.candidate.effect.by_recording
+
+
+def _variation_beside(step: SelectionStep, decision: Decision) -> RunVariation:
+    """Return what runs differ by, or might where they are too few to say, beside a model with an effect."""
+    found, chosen = decision.examination, step.columns.rows(step.scene, step.chosen)
+    value, added = step.model.root @ step.model.projected, chosen
+    if not decision.candidate.effect.by_recording:
+        value = np.concatenate([found.model_value, found.value])
+        added = [*chosen, *step.columns.rows(step.scene, [decision.candidate])]
+    told = len(step.observations.data.recordings) >= LEAST_RUNS
+    return (run_variation if told else assumed_variation)(
+        step.observations, with_columns(step.observations, added), value
+    )

@@ -16,6 +16,7 @@ from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Coefficient, Effect, Member, NonlinearParameter
+from scara_ident.effects.position import Spring
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations, observe
@@ -49,6 +50,16 @@ class Bump(Effect):
 
     def signal_columns(self, signals, member):
         return [np.exp(-(((signals.motion.q[0] - member.nonlinear[0]) / 0.3) ** 2))]
+
+
+class Bent(Spring):
+    """A spring that is softer on one side."""
+
+    name = "bent"
+
+    def signal_columns(self, signals, member):
+        turn = signals.motion.q[0] - 1.57
+        return [turn + 0.01 * turn**2]
 
 
 def multisine(name: str, seed: int, duration: float, size: float = 1.9) -> ReferenceMotion:
@@ -114,6 +125,15 @@ def with_torque(recordings: Sequence[Recording], joint: int, added) -> list[Reco
         effort[joint] += added(motion_of(part, (None, None)))
         made.append(replace(item, effort=effort))
     return made
+
+
+def runs_with_a_spring() -> list[Recording]:
+    """Runs of small and of large motion, with offsets of their own that a spring of another shape can stand for."""
+    runs = [*exact_runs(size=0.6)[:2], *exact_runs(size=1.2)[2:]]
+    return [
+        with_torque([item], 0, lambda motion, offset=offset: 3.0 * (motion.q[0] - 1.57) + offset)[0]
+        for item, offset in zip(runs, (-0.1, -0.1, 0.1, 0.1), strict=True)
+    ]
 
 
 def complete() -> TorqueModel:

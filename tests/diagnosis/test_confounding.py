@@ -5,13 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.confounding import confounders
+from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.selection_step import observed
 from scara_ident.effects import Coefficient, Effect, Member
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.position import Spring
-from tests.diagnosis.made import Bump, exact_runs, searched, with_torque
+from scara_ident.estimation.least_squares import value_and_weights
+from tests.diagnosis.made import Bent, Bump, exact_runs, runs_with_a_spring, searched, step_beside, with_torque
 
 MIDDLE = 1.57
 STIFFNESS = 0.3
@@ -75,6 +80,75 @@ def test_an_effect_of_another_kind_is_no_rival():
 def test_two_effects_at_once_are_not_rivals_of_each_other():
     both = groups(1.9, lambda motion: spring(motion) + 0.03 * np.abs(motion.v[0]))
     assert both == {"spring of joint1": {}, "asymmetric_friction of joint1": {}}
+
+
+def test_what_runs_differ_by_does_not_tell_which_of_two_is_there():
+    runs = runs_with_a_spring()
+    found, there = (Candidate(effect, Member(0)) for effect in (Bent(), Spring()))
+    for chosen, other, rivals in ((found, there, ["spring of joint1"]), (there, found, [])):
+        step = step_beside(runs, (chosen,))
+        step = replace(step, weights=value_and_weights(observed(step))[1])
+        (others,) = confounders(step, step.without(0).judge([other]), step.scene)
+        assert [item.label for item in others] == rivals
+
+
+class OfTheArm(Spring):
+    """The same spring as an effect of the whole arm."""
+
+    name = "of_the_arm"
+
+    def members(self, scene):
+        return (Member(None),)
+
+    def signal_columns(self, signals, member):
+        turn = signals.motion.q[0] - MIDDLE
+        return [np.array([turn, np.zeros_like(turn)])]
+
+
+def test_a_rival_of_the_whole_arm_is_named_where_it_removes_little_of_what_all_joints_leave():
+    step = searched(with_torque(exact_runs(), 0, lambda motion: 0.0023 * (motion.q[0] - MIDDLE)), Spring()).step
+    (own,) = step.without(0).judge(step.chosen)
+    beside = step.without(0).judge([Candidate(OfTheArm(), Member(None))])
+    assert beside[0].gain < CRITERIA.least_gain < own.gain
+    ((rival,),) = confounders(step, beside, step.scene)
+    assert rival.label == "of_the_arm"
+
+
+class Pull(Spring):
+    """A torque by the acceleration, which has the noise of the positions most."""
+
+    name = "pull"
+
+    def signal_columns(self, signals, member):
+        return [signals.motion.a[0] * np.sin(3.0 * signals.motion.q[0])]
+
+
+class SmoothPull(Pull):
+    """The same without what is fast in it."""
+
+    name = "smooth"
+
+    def signal_columns(self, signals, member):
+        return [smooth_pull(signals.motion)]
+
+
+def smooth_pull(motion):
+    return gaussian_filter1d(motion.a[0] * np.sin(3.0 * motion.q[0]), 8.0)
+
+
+@pytest.mark.parametrize(("size", "turn", "found", "other", "named"), [
+    (0.02, 2.0**12, Pull(), SmoothPull(), True),
+    (0.05, np.inf, SmoothPull(), Pull(), False),
+])  # fmt: skip
+def test_the_noise_of_the_positions_does_not_tell_which_of_two_is_there(size, turn, found, other, named):
+    runs = with_torque(exact_runs(), 0, lambda motion: size * smooth_pull(motion))
+    if np.isfinite(turn):
+        step = 2.0 * np.pi / turn
+        runs = [replace(item, position=step * np.round(item.position / step)) for item in runs]
+    step = step_beside(runs, (Candidate(found, Member(0)),))
+    step = replace(step, weights=value_and_weights(observed(step))[1])
+    (others,) = confounders(step, step.without(0).judge([Candidate(other, Member(0))]), step.scene)
+    assert bool(others) is named
 
 
 class Twin(Pendulum):

@@ -10,20 +10,30 @@ from numpy.testing import assert_array_equal
 
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.lack_of_fit import lack_of_fit
-from scara_ident.diagnosis.model_selection import Outcome, _asked_band, _promised_band, _proxies, rms_of, select_model
+from scara_ident.diagnosis.model_selection import (
+    Outcome,
+    Unexplained,
+    _asked_band,
+    _promised_band,
+    _proxies,
+    rms_of,
+    select_model,
+)
+from scara_ident.diagnosis.moments import examine_moments
 from scara_ident.diagnosis.search import SearchTask
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.effects import CATALOGUE
 from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.friction import AsymmetricFriction, FrictionCoupling
 from scara_ident.effects.periodic import Vibration
+from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
 from scara_ident.estimation import wls
 from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.observations import observe
 from scara_ident.estimation.run_variation import JointVariation, RunVariation
 from scara_ident.motion.prepared import prepare
-from tests.diagnosis.made import complete, searched, virtual_runs
+from tests.diagnosis.made import complete, exact_runs, searched, virtual_runs, with_torque
 
 MODEL = complete()
 
@@ -137,6 +147,22 @@ def test_nothing_is_demoted_where_the_rest_is_noise() -> None:
     for joint, after in zip(lack_of_fit(outcome.residuals), outcome.fit_after, strict=True):
         assert joint == after
     assert_array_equal(outcome.training.model.names, outcome.search.model.names)
+
+
+def test_where_something_stays_unexplained_repetitions_of_a_motion_count_once() -> None:
+    runs = with_torque(exact_runs(1, 4), 0, lambda motion: 0.003 * motion.q[0])
+    outcome = selected(runs, Spring(), bands=(11.0, 11.0), free=False)
+    beside, candidates = outcome.search.step.without(0), outcome.search.chosen
+    each, once = beside.judge(candidates)[0].examination.p_value, examine_moments(beside, candidates[0]).p_value
+    assert each < 0.01 * once
+    # So many tried that it is significant by all blocks only.
+    tried = round(CRITERIA.family_error / np.sqrt(each * once))
+    left = replace(outcome, unexplained=Unexplained("joint1", (), 0.01, 0.5), repeating=frozenset({"joint1"}))
+    search = replace(outcome.search, step=replace(outcome.search.step, tried=tried))
+    (proxy,) = _proxies(replace(left, search=search), CRITERIA)
+    assert "with repetitions of a motion counted once" in proxy.why
+    assert _proxies(left, CRITERIA) == []
+    assert _proxies(replace(left, search=search, unexplained=None), CRITERIA) == []
 
 
 def test_the_rms_of_a_joint_is_that_of_its_rows() -> None:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.variation_check import variation_objection
+from scara_ident.diagnosis.variation_check import best_first, variation_objection
 from scara_ident.effects import Member
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.payload import PayloadOfRecordings
 from scara_ident.effects.position import Spring
-from tests.diagnosis.made import step_beside, with_torque
+from tests.diagnosis.made import Bent, runs_with_a_spring, searched, step_beside, with_torque
 from tests.estimation.test_run_variation import runs
 
 
@@ -87,3 +87,28 @@ def test_the_mean_delay_of_runs_that_differ_by_theirs_is_taken_out_of_the_data()
     common, own = step.judge([Candidate(TimeDelay(), Member(None)), Candidate(TimeDelay(), Member(1))])
     assert variation_objection(step, common) is None
     assert "runs differ" in (variation_objection(step, own) or "")
+
+
+def test_of_two_that_do_nearly_as_well_the_better_is_that_beside_which_runs_that_differ_count_as_noise():
+    runs = runs_with_a_spring()
+    step = step_beside(runs)
+    bent, spring = step.judge([Candidate(Bent(), Member(0)), Candidate(Spring(), Member(0))])
+    assert bent.examination.held_out > spring.examination.held_out
+    assert [item.label for _, item in best_first([(step, spring), (step, bent)])] == [
+        "spring of joint1",
+        "bent of joint1",
+    ]
+    (found,) = searched(runs, Bent(), Spring()).chosen
+    assert found.label(step.scene) == "spring of joint1"
+
+
+def test_what_does_much_less_or_something_else_is_not_compared():
+    runs = with_torque(runs_with_a_spring(), 1, lambda motion: 0.5 * motion.q[1])
+    step = step_beside(runs)
+    first, second, small = step.judge(
+        [Candidate(Spring(), Member(0)), Candidate(Spring(), Member(1)), Candidate(TimeDelay(), Member(1))]
+    )
+    best, other = sorted([first, second], key=lambda item: -item.examination.held_out)
+    assert other.examination.held_out > step.criteria.least_share * best.examination.held_out
+    order = [item.label for _, item in best_first([(step, item) for item in (small, other, best)])]
+    assert order == [best.label, other.label, small.label]
