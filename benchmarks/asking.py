@@ -48,7 +48,7 @@ from scara_ident.diagnosis.shape import KNOTS
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation.observations import observe
 from scara_ident.excitation import Design, Effort, Limits, design_excitation, limits_of
-from scara_ident.excitation.tell import Told, sure_of
+from scara_ident.excitation.promise import Told, sure_of
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import Recording

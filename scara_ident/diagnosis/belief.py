@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -23,8 +24,9 @@ from scara_ident.diagnosis.cluster_test import least_sizes
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel, products_of
 from scara_ident.diagnosis.questions import Suspect, all_suspects
-from scara_ident.estimation.information import Information, triangular
+from scara_ident.estimation.information import Information, merge, triangular
 from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.motion.prepared import Bands
 
 # Directions of a few columns below this share of the largest are not known without a fold.
 _RANK = 1e-9
@@ -44,12 +46,15 @@ class Blocks:
         Where each block begins among the rows of a joint.
     owner, trajectory : ndarray of int, shape (blocks,)
         Recording and trajectory of each block.
+    parts : tuple of Blocks
+        Which these are one after the other, where they are.
     """
 
     tables: tuple[Array, ...]
     starts: tuple[NDArray[np.intp], ...]
     owner: NDArray[np.intp]
     trajectory: NDArray[np.intp]
+    parts: tuple[Blocks, ...] = ()
 
     def with_more(self, other: Blocks) -> Blocks:
         """Return both, the other's recordings being of other trajectories."""
@@ -59,6 +64,7 @@ class Blocks:
             tuple(starts),
             np.append(self.owner, self.owner.max(initial=-1) + 1 + other.owner),
             np.append(self.trajectory, self.trajectory.max(initial=-1) + 1 + other.trajectory),
+            (self, other),
         )
 
     def fewer(self) -> Blocks:
@@ -86,8 +92,11 @@ class Blocks:
             fold = (np.arange(len(fold)) - begin[self.owner]) * parts // np.maximum(1, count[self.owner])
         return FittedModel(tuple(joints), len(columns), self.owner, fold, np.ones(len(joints)))
 
+    @cached_property
     def information(self) -> Information:
-        """Return the triangular factor of all rows."""
+        """The triangular factor of all rows."""
+        if self.parts:
+            return merge([part.information for part in self.parts])
         factors = [triangular(np.vstack([table, np.zeros((1, table.shape[1]))]).T) for table in self.tables]
         return Information(triangular(np.vstack(factors)), float(sum(table.shape[1] for table in self.tables)))
 
@@ -96,11 +105,12 @@ class Blocks:
         return {j: table[columns] for j, table in enumerate(self.tables) if np.any(table[columns])}
 
 
-def known_blocks(inquiry: Inquiry) -> Blocks | None:
-    """Return the rows of the recordings at hand, None where there are none."""
+def known_blocks(inquiry: Inquiry, bands: Bands) -> Blocks | None:
+    """Return the rows of the recordings at hand in bands, which a further one may widen; None where there are none."""
     if inquiry.columns is None:
         return None
-    columns, observations = inquiry.columns, inquiry.columns.observations
+    columns = inquiry.columns.at(bands)
+    observations = columns.observations
     added = inquiry.rows(lambda wanted: columns.rows(inquiry.scene, wanted))
     total = observations.parameters + sum(len(next(iter(rows.values()))) for rows in added)
     rate = min(part.rate for part in observations.data.stretches)
@@ -147,7 +157,7 @@ def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
             inquiry.tried,
         )
         found |= dict(zip((item.label for item in some), times.tolist(), strict=True))
-    apart = times_apart(inquiry, [item for item in asked if item.label in found], blocks.information())
+    apart = times_apart(inquiry, asked, blocks.information)
     return {label: min(times, apart.get(label, np.inf)) for label, times in found.items()}
 
 
