@@ -24,12 +24,15 @@ from scara_ident.diagnosis.cluster_test import least_sizes
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel, products_of
 from scara_ident.diagnosis.questions import Suspect, all_suspects
+from scara_ident.effects import Scene
 from scara_ident.estimation.information import Information, merge, triangular
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.motion.prepared import Bands
 
 # Directions of a few columns below this share of the largest are not known without a fold.
 _RANK = 1e-9
+# The largest effect that is too small to speak of is looked for to this share.
+NEAR = 0.01
 # Blocks of time of one inquiry: more of longer recordings are taken together, which says no more than there is.
 MOST_BLOCKS = 200
 
@@ -128,7 +131,7 @@ def known_blocks(inquiry: Inquiry, bands: Bands) -> Blocks | None:
 def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
     """Return how many times as large as the diagnosis needs it is each effect that may be below the limit, by label.
 
-    That it is let in, and that none of the others asked for is taken for it.
+    That it is let in, that it is not too small to speak of, and that none of the others asked for is taken for it.
 
     Parameters
     ----------
@@ -158,7 +161,22 @@ def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
         )
         found |= dict(zip((item.label for item in some), times.tolist(), strict=True))
     apart = times_apart(inquiry, asked, blocks.information)
-    return {label: min(times, apart.get(label, np.inf)) for label, times in found.items()}
+    return {
+        item.label: min(found[item.label], apart.get(item.label, np.inf), _times_negligible(inquiry.scene, item))
+        for item in asked
+    }
+
+
+def _times_negligible(scene: Scene, item: Suspect) -> float:
+    """Return how many times as large an effect is as the largest that is too small to speak of; inf where none is."""
+    effect, member, value = item.candidate.effect, item.candidate.member, np.asarray(item.value)
+    small, large = 1e-12, 1e12
+    if effect.negligible(scene, member, small * value) is None:
+        return np.inf
+    while large > (1.0 + NEAR) * small:
+        size = float(np.sqrt(small * large))
+        small, large = (small, size) if effect.negligible(scene, member, size * value) is None else (size, large)
+    return 1.0 / large
 
 
 def times_apart(
