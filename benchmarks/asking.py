@@ -7,8 +7,8 @@ same limits, and of the motion of the largest log determinant. An effect is name
 its joint, and nothing is confounded with it. Beside that the separation that was promised of the first question and that
 which recordings show, by the scatter of blocks of time: in one recording of the motion, and by the mean variance of five with
 other noise, as one variance of a dozen blocks is itself a fifth to a third off; beside the model that was asked, with what was
-found by then taken out of the torque. And whether it was said before that the motion would tell the effect that is there: whether it
-is at least as large as the least that the motion was said to find. Where no motion named the effect, one is designed for it alone,
+found by then taken out of the torque. And whether it was said before that the motion would tell the effect that is there: whether
+the motion was said to find one of its size. Where no motion named the effect, one is designed for it alone,
 of the size that all recordings together show: how many times as large as the diagnosis needs it is then expected
 (``best``), and whether it is named after it (``best_right``). A set where neither comes about is not to be settled.
 
@@ -48,7 +48,7 @@ from scara_ident.diagnosis.shape import KNOTS
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation.observations import observe
 from scara_ident.excitation import Design, Effort, Limits, design_excitation, limits_of
-from scara_ident.excitation.promise import Told, sure_of
+from scara_ident.excitation.promise import sure_of
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import Recording
@@ -154,31 +154,34 @@ def seen(found: Diagnosis, first: Diagnosis, question: Question, runs: Sequence[
     return float(np.median([apart(item, None) for item in question.suspects]))
 
 
-def said(first: Diagnosis, tells: Sequence[Told], truth: Effect, quiet: Sequence[Recording]) -> bool | None:
+def said(first: Diagnosis, design: Design, truth: Effect, quiet: Sequence[Recording]) -> bool | None:
     """Return whether the motion was said to tell the effect that is there; None where nothing was asked of it.
 
-    Of what may be below the limit, by its true size: that which recordings without noise have, in standard errors of the
-    first, against the least that the motion was said to find.
+    Of what may be below the limit, by its true size, which recordings without noise have.
     """
     places = () if truth.joint is None else (f"{truth.name} of {truth.joint}",)
 
     def right_one(label: str) -> bool:
         return label in (truth.name, *places) or (truth.joint is None and label.startswith(f"{truth.name} of "))
 
-    asked = [item for item in tells if any(right_one(own.label) for own in item.question.suspects)]
+    asked = [item for item in design.tells if any(right_one(own.label) for own in item.question.suspects)]
     if not asked or asked[0].question.kind == "rivals":
         return asked[0].settled if asked else None
-    shown = next(item for item in asked[0].shown if right_one(item.suspect.label))
-    label, scene = shown.suspect.label, inquire(first).scene
-    members = list(dict.fromkeys(item.candidate for item in first.search.decisions if item.label == label))
+    inquiry = inquire(first)
+    scene, suspects = inquiry.scene, asked[0].question.suspects
+    own = next(item for item in suspects if right_one(item.label))
     columns = CandidateColumns(observe(scene.model, usable_in_bands(scene.model, quiet, (), first.search.bands)[0]))
     model = fitted_model(columns.observations, [], first.after.weights, 4)
-    found = examine(model, columns.rows(scene, members))
-    k = max(range(len(found)), key=lambda place: found[place].contribution)
-    true = Suspect(members[k], label, tuple(float(x) for x in found[k].value))
-    each = [Question("below_limit", label, (item,)) for item in (shown.suspect, true)]
-    limit, size = (inquire(first, [item]).sigmas()[0] for item in each)
-    return bool(size * shown.times >= limit)
+    (found,) = examine(model, columns.rows(scene, [own.candidate]))
+    true = replace(own, value=tuple(float(x) for x in found.value))
+    others = tuple(true if item is own else item for item in suspects)
+    inquiry = knowing(
+        replace(inquiry, questions=(replace(asked[0].question, suspects=others),)),
+        first.search.step.columns,
+        widening=True,
+    )
+    # Without what is known this size alone is asked for, not all that the first recordings would show as well.
+    return sure_of(replace(inquiry, known=None), [design.motion()])[own.label] >= 1.0
 
 
 def record(arm: VirtualArm, motion: ReferenceMotion, truth: Effect, seed: int, repetition: int = 1) -> Recording:
@@ -248,7 +251,7 @@ def one_set(
     }
     silent = replace(arm, torque_noise=np.zeros(arm.robot.n))
     quiet = [record(silent, followed, truth, number) for followed in (motion, as_reference(design))]
-    result["said"] = said(first, design.tells, truth, quiet)
+    result["said"] = said(first, design, truth, quiet)
     result["unshown"] = [label for item in design.tells for label in item.unshown]
     more = {}
     for way in WAYS:
