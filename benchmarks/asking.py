@@ -7,8 +7,8 @@ same limits, and of the motion of the largest log determinant. An effect is name
 its joint, and nothing is confounded with it. Beside that the separation that was promised of the first question and that
 which recordings show, by the scatter of blocks of time: in one recording of the motion, and by the mean variance of five with
 other noise, as one variance of a dozen blocks is itself a fifth to a third off; beside the model that was asked, with what was
-found by then taken out of the torque. And whether it was said before that the motion would tell the effect that is there, if it
-is as large as the first recordings would just have shown. Where no motion named the effect, one is designed for it alone,
+found by then taken out of the torque. And whether it was said before that the motion would tell the effect that is there: whether
+the motion was said to find one of its size. Where no motion named the effect, one is designed for it alone,
 of the size that all recordings together show: how many times as large as the diagnosis needs it is then expected
 (``best``), and whether it is named after it (``best_right``). A set where neither comes about is not to be settled.
 
@@ -48,7 +48,7 @@ from scara_ident.diagnosis.shape import KNOTS
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation.observations import observe
 from scara_ident.excitation import Design, Effort, Limits, design_excitation, limits_of
-from scara_ident.excitation.tell import Told, sure_of
+from scara_ident.excitation.promise import sure_of
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import Recording
@@ -154,18 +154,34 @@ def seen(found: Diagnosis, first: Diagnosis, question: Question, runs: Sequence[
     return float(np.median([apart(item, None) for item in question.suspects]))
 
 
-def said(tells: Sequence[Told], truth: Effect) -> bool | None:
-    """Return whether the motion was said to tell the effect that is there; None where nothing was asked of it."""
+def said(first: Diagnosis, design: Design, truth: Effect, quiet: Sequence[Recording]) -> bool | None:
+    """Return whether the motion was said to tell the effect that is there; None where nothing was asked of it.
+
+    Of what may be below the limit, by its true size, which recordings without noise have.
+    """
     places = () if truth.joint is None else (f"{truth.name} of {truth.joint}",)
 
     def right_one(label: str) -> bool:
         return label in (truth.name, *places) or (truth.joint is None and label.startswith(f"{truth.name} of "))
 
-    asked = [item for item in tells if any(right_one(own.label) for own in item.question.suspects)]
-    if not asked:
-        return None
-    told = asked[0]
-    return told.settled if told.question.kind == "rivals" else not any(right_one(label) for label in told.unshown)
+    asked = [item for item in design.tells if any(right_one(own.label) for own in item.question.suspects)]
+    if not asked or asked[0].question.kind == "rivals":
+        return asked[0].settled if asked else None
+    inquiry = inquire(first)
+    scene, suspects = inquiry.scene, asked[0].question.suspects
+    own = next(item for item in suspects if right_one(item.label))
+    columns = CandidateColumns(observe(scene.model, usable_in_bands(scene.model, quiet, (), first.search.bands)[0]))
+    model = fitted_model(columns.observations, [], first.after.weights, 4)
+    (found,) = examine(model, columns.rows(scene, [own.candidate]))
+    true = replace(own, value=tuple(float(x) for x in found.value))
+    others = tuple(true if item is own else item for item in suspects)
+    inquiry = knowing(
+        replace(inquiry, questions=(replace(asked[0].question, suspects=others),)),
+        first.search.step.columns,
+        widening=True,
+    )
+    # Without what is known this size alone is asked for, not all that the first recordings would show as well.
+    return sure_of(replace(inquiry, known=None), [design.motion()])[own.label] >= 1.0
 
 
 def record(arm: VirtualArm, motion: ReferenceMotion, truth: Effect, seed: int, repetition: int = 1) -> Recording:
@@ -186,10 +202,10 @@ def _robot(name: str) -> Robot:
 
 
 @cache
-def _plain(robot: Robot) -> ReferenceMotion:
+def _plain(robot: Robot, seconds: float) -> ReferenceMotion:
     """Return the motion of the largest log determinant, the same for every set of a robot with the same limits."""
     limits = limits_of(robot, clearance=None, share=1.0)
-    return as_reference(design_excitation(build_model(robot), duration=ASKED, limits=limits, effort=PLAIN))
+    return as_reference(design_excitation(build_model(robot), duration=seconds, limits=limits, effort=PLAIN))
 
 
 def in_cell(robot: Robot, motion: ReferenceMotion) -> Robot:
@@ -201,7 +217,9 @@ def in_cell(robot: Robot, motion: ReferenceMotion) -> Robot:
     return replace(robot, lower=lower, upper=upper, velocity_limit=speed)
 
 
-def one_set(robot: str, number: int, seed: int, tight: bool = False, quick: bool = False) -> dict[str, Any]:
+def one_set(
+    robot: str, number: int, seed: int, tight: bool = False, quick: bool = False, seconds: float = ASKED
+) -> dict[str, Any]:
     """Return what one set tells."""
     rng = np.random.default_rng([seed, number])
     arm = virtual_arm(_robot(robot))
@@ -212,7 +230,7 @@ def one_set(robot: str, number: int, seed: int, tight: bool = False, quick: bool
     begun = [record(arm, motion, truth, number, run) for run in (1, 2)]
     first = diagnose(arm.robot, begun)
     result: dict[str, Any] = {"robot": robot, "seed": seed, "set": number, "tight": tight, "pair": list(pair)}
-    result["truth"] = name
+    result |= {"truth": name, "seconds": seconds}
     result |= {"joint": truth.joint, "before": right(first, truth), "verdict": first.verdict, "found": _found(first)}
     if result["before"]:
         return result
@@ -224,17 +242,17 @@ def one_set(robot: str, number: int, seed: int, tight: bool = False, quick: bool
     # All of the limits for each, as the random motion has them.
     within = in_cell(arm.robot, motion) if tight else arm.robot
     limits = limits_of(within, clearance=None, share=1.0)
-    design = design_excitation(model, duration=ASKED, tell=inquiry, limits=limits, effort=EFFORT)
+    design = design_excitation(model, duration=seconds, tell=inquiry, limits=limits, effort=EFFORT)
     result["design_seconds"] = time.perf_counter() - start
     motions = {
         "tell": lambda: as_reference(design),
-        "random": lambda: random_motion("more", replace(arm, robot=within), "fourier", ASKED, rng),
-        "logdet": lambda: _plain(within),
+        "random": lambda: random_motion("more", replace(arm, robot=within), "fourier", seconds, rng),
+        "logdet": lambda: _plain(within, seconds),
     }
-    result["said"], result["unshown"] = (
-        said(design.tells, truth),
-        [label for item in design.tells for label in item.unshown],
-    )
+    silent = replace(arm, torque_noise=np.zeros(arm.robot.n))
+    quiet = [record(silent, followed, truth, number) for followed in (motion, as_reference(design))]
+    result["said"] = said(first, design, truth, quiet)
+    result["unshown"] = [label for item in design.tells for label in item.unshown]
     more = {}
     for way in WAYS:
         followed = motions[way]()
@@ -252,7 +270,7 @@ def one_set(robot: str, number: int, seed: int, tight: bool = False, quick: bool
     if not quick and not any(result[way] for way in WAYS):
         # Each as a trajectory of its own.
         runs = [replace(run, name=f"{way}_1") for way, run in more.items()]
-        result |= best(first, diagnose(arm.robot, [*begun, *runs]), arm, limits, begun, truth, number)
+        result |= best(first, diagnose(arm.robot, [*begun, *runs]), arm, limits, begun, truth, number, seconds)
     return result
 
 
@@ -264,6 +282,7 @@ def best(
     begun: Sequence[Recording],
     truth: Effect,
     number: int,
+    seconds: float,
 ) -> dict[str, Any]:
     """Return what a motion designed for the effect that is there alone tells of it, its size taken from all recordings."""
     scene = whole.search.scene
@@ -283,7 +302,7 @@ def best(
     question = Question("below_limit", suspects[0].label, (suspects[0],))
     inquiry = replace(inquire(first, [question]), noise=noise_density(whole), bands=whole.search.bands)
     inquiry = knowing(inquiry, first.search.step.columns, widening=True)
-    design = design_excitation(first.before.model, duration=ASKED, tell=inquiry, limits=limits, effort=EFFORT)
+    design = design_excitation(first.before.model, duration=seconds, tell=inquiry, limits=limits, effort=EFFORT)
     (times,) = sure_of(inquiry, [design.motion()]).values()
     found = diagnose(arm.robot, [*begun, record(arm, as_reference(design), truth, number, 3)])
     return {"best": times, "best_right": right(found, truth), "best_why": _why(found, truth)}
@@ -387,6 +406,7 @@ def show(rows: Sequence[dict[str, Any]]) -> None:
             (f"said before to {words} it", [row for row in opened if row.get("said") is answer])
             for words, answer in (("tell", True), ("not tell", False), ("have nothing to ask of", None))
         ]
+        pairs += [("a random motion does not name it", [row for row in opened if not row["random"]])]
         pairs += [(f"first question {kind}", [row for row in opened if row.get("kind") == kind]) for kind in KINDS]
         pairs += [(" / ".join(pair), [row for row in opened if row["pair"] == list(pair)]) for pair in PAIRS]
         for name, some in pairs:
@@ -429,11 +449,12 @@ def main() -> None:
     words.add_argument("--seed", type=int, default=1)
     words.add_argument("--bump", action="store_true", help="torques that no catalogue lists, instead of pairs")
     words.add_argument("--tight", action="store_true", help="the asked motion keeps to a cell at a reduced speed")
+    words.add_argument("--seconds", type=float, default=ASKED, help="of the motion of a set")
     words.add_argument("--quick", action="store_true", help="without what a motion for the effect alone would tell")
     words.add_argument("--show", action="store_true")
     given = words.parse_args()
     lines = given.output.read_text(encoding="utf-8").splitlines() if given.output.is_file() else []
-    sets = partial(one_set, tight=given.tight, quick=given.quick)
+    sets = partial(one_set, tight=given.tight, quick=given.quick, seconds=given.seconds)
     what, run, tell = ("bump", one_bump, show_bumps) if given.bump else ("set", sets, show)
     rows = [row for row in map(json.loads, lines) if what in row]
     done = {(row["robot"], row["seed"], row[what]) for row in rows}

@@ -22,8 +22,8 @@ from scara_ident.excitation.design import Design, design_excitation
 from scara_ident.excitation.known import read_diagnosis
 from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.output import excitation_dict, write_joint_trajectory, write_trajectory
+from scara_ident.excitation.promise import SURE, Told
 from scara_ident.excitation.search import Effort, Progress
-from scara_ident.excitation.tell import SURE, Told
 from scara_ident.files import write_json, written_together
 from scara_ident.model.model import build_model
 from scara_ident.progress import Work

@@ -14,7 +14,7 @@ from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.questions import Question, questions
 from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation import Effort, limits_of
-from scara_ident.excitation.tell import Told
+from scara_ident.excitation.promise import Shown, Told
 from scara_ident.recording.recording import write_recording
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.asked import PAIR, open_diagnosis, small_runs
@@ -105,8 +105,8 @@ def test_only_a_motion_that_makes_surer_is_recorded():
     assert worth_recording(told) == told[:1]
     first, *_ = questions(open_diagnosis())
     hidden = replace(first, kind="below_limit")
-    names = tuple(item.label for item in hidden.suspects)
-    told = [Told(hidden, 1.0, 8.0, names), Told(hidden, 1.0, 8.0, names[:1])]
+    faint = tuple(Shown(item, 0.5, {}) for item in hidden.suspects)
+    told = [Told(hidden, 1.0, 8.0, faint), Told(hidden, 1.0, 8.0, faint[:1])]
     assert worth_recording(told) == told[1:]
 
 

@@ -165,7 +165,7 @@ class Inquiry:
         return sides(item.candidate) if self.freed(item) else []
 
     def sigmas(self, rows: Information | None = None, some: Sequence[Question] | None = None) -> Array:
-        """Return standard errors between the answers to each question, from what is known and further rows.
+        """Return standard errors between the answers to each question.
 
         Where no recordings are at hand, what the diagnosis said stands for them: no fit to all rows leaves less than fits
         to each, so that the squares add up to the least that all tell.
@@ -173,16 +173,15 @@ class Inquiry:
         Parameters
         ----------
         rows : Information, optional
-            Further rows.
+            All that there will be, see `Blocks`; what is known by default.
         some : sequence of Question, optional
             Of the questions; all by default.
         """
-        asked = self.questions if some is None else some
-        parts = [part for part in (self.known, rows) if part is not None]
+        asked, rows = self.questions if some is None else some, self.known if rows is None else rows
         said = np.array([item.sigma if self.known is None else 0.0 for item in asked])
-        if not parts:
+        if rows is None:
             return said
-        view = self._view(parts[0] if len(parts) == 1 else merge(parts))
+        view = self._view(rows)
         return np.asarray(np.hypot(said, [view.sigma(item) for item in asked]))
 
     @cached_property

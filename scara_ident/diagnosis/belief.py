@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -23,11 +24,15 @@ from scara_ident.diagnosis.cluster_test import least_sizes
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel, products_of
 from scara_ident.diagnosis.questions import Suspect, all_suspects
-from scara_ident.estimation.information import Information, triangular
+from scara_ident.effects import Scene
+from scara_ident.estimation.information import Information, merge, triangular
 from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.motion.prepared import Bands
 
 # Directions of a few columns below this share of the largest are not known without a fold.
 _RANK = 1e-9
+# The largest effect that is too small to speak of is looked for to this share.
+NEAR = 0.01
 # Blocks of time of one inquiry: more of longer recordings are taken together, which says no more than there is.
 MOST_BLOCKS = 200
 
@@ -44,12 +49,15 @@ class Blocks:
         Where each block begins among the rows of a joint.
     owner, trajectory : ndarray of int, shape (blocks,)
         Recording and trajectory of each block.
+    parts : tuple of Blocks
+        Which these are one after the other, where they are.
     """
 
     tables: tuple[Array, ...]
     starts: tuple[NDArray[np.intp], ...]
     owner: NDArray[np.intp]
     trajectory: NDArray[np.intp]
+    parts: tuple[Blocks, ...] = ()
 
     def with_more(self, other: Blocks) -> Blocks:
         """Return both, the other's recordings being of other trajectories."""
@@ -59,6 +67,7 @@ class Blocks:
             tuple(starts),
             np.append(self.owner, self.owner.max(initial=-1) + 1 + other.owner),
             np.append(self.trajectory, self.trajectory.max(initial=-1) + 1 + other.trajectory),
+            (self, other),
         )
 
     def fewer(self) -> Blocks:
@@ -86,8 +95,11 @@ class Blocks:
             fold = (np.arange(len(fold)) - begin[self.owner]) * parts // np.maximum(1, count[self.owner])
         return FittedModel(tuple(joints), len(columns), self.owner, fold, np.ones(len(joints)))
 
+    @cached_property
     def information(self) -> Information:
-        """Return the triangular factor of all rows."""
+        """The triangular factor of all rows."""
+        if self.parts:
+            return merge([part.information for part in self.parts])
         factors = [triangular(np.vstack([table, np.zeros((1, table.shape[1]))]).T) for table in self.tables]
         return Information(triangular(np.vstack(factors)), float(sum(table.shape[1] for table in self.tables)))
 
@@ -96,11 +108,12 @@ class Blocks:
         return {j: table[columns] for j, table in enumerate(self.tables) if np.any(table[columns])}
 
 
-def known_blocks(inquiry: Inquiry) -> Blocks | None:
-    """Return the rows of the recordings at hand, None where there are none."""
+def known_blocks(inquiry: Inquiry, bands: Bands) -> Blocks | None:
+    """Return the rows of the recordings at hand in bands, which a further one may widen; None where there are none."""
     if inquiry.columns is None:
         return None
-    columns, observations = inquiry.columns, inquiry.columns.observations
+    columns = inquiry.columns.at(bands)
+    observations = columns.observations
     added = inquiry.rows(lambda wanted: columns.rows(inquiry.scene, wanted))
     total = observations.parameters + sum(len(next(iter(rows.values()))) for rows in added)
     rate = min(part.rate for part in observations.data.stretches)
@@ -118,7 +131,7 @@ def known_blocks(inquiry: Inquiry) -> Blocks | None:
 def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
     """Return how many times as large as the diagnosis needs it is each effect that may be below the limit, by label.
 
-    That it is let in, and that none of the others asked for is taken for it.
+    That it is let in, that it is not too small to speak of, and that none of the others asked for is taken for it.
 
     Parameters
     ----------
@@ -147,8 +160,23 @@ def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
             inquiry.tried,
         )
         found |= dict(zip((item.label for item in some), times.tolist(), strict=True))
-    apart = times_apart(inquiry, [item for item in asked if item.label in found], blocks.information())
-    return {label: min(times, apart.get(label, np.inf)) for label, times in found.items()}
+    apart = times_apart(inquiry, asked, blocks.information)
+    return {
+        item.label: min(found[item.label], apart.get(item.label, np.inf), _times_negligible(inquiry.scene, item))
+        for item in asked
+    }
+
+
+def _times_negligible(scene: Scene, item: Suspect) -> float:
+    """Return how many times as large an effect is as the largest that is too small to speak of; inf where none is."""
+    effect, member, value = item.candidate.effect, item.candidate.member, np.asarray(item.value)
+    small, large = 1e-12, 1e12
+    if effect.negligible(scene, member, small * value) is None:
+        return np.inf
+    while large > (1.0 + NEAR) * small:
+        size = float(np.sqrt(small * large))
+        small, large = (small, size) if effect.negligible(scene, member, size * value) is None else (size, large)
+    return 1.0 / large
 
 
 def times_apart(

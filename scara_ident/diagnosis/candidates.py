@@ -14,7 +14,7 @@ from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.position_noise import noisier, unresolved_joints
-from scara_ident.motion.prepared import PreparedStretch
+from scara_ident.motion.prepared import Bands, PreparedStretch
 from scara_ident.processes import halved
 
 # Columns of a candidate, shape (k, N) on the N rows of each joint that it acts on.
@@ -81,6 +81,16 @@ class CandidateColumns:
     _rows: dict[Key, Rows] = field(default_factory=dict, repr=False)
     _raw: dict[Key, tuple[Rows, ...]] = field(default_factory=dict, repr=False)
     _signals: dict[Motion, Signals] = field(default_factory=dict, repr=False)
+    _at: dict[tuple[float | None, ...], CandidateColumns] = field(default_factory=dict, init=False, repr=False)
+
+    def at(self, bands: Bands) -> CandidateColumns:
+        """Return columns on the rows that the same recordings have in other bands."""
+        data, wanted = self.observations.data, tuple(bands)
+        if wanted == data.bands:
+            return self
+        if wanted not in self._at:
+            self._at[wanted] = CandidateColumns(observe(self.observations.model, data.at(wanted)))
+        return self._at[wanted]
 
     @cached_property
     def noisier(self) -> CandidateColumns:

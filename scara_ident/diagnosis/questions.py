@@ -15,7 +15,7 @@ from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import needed
 from scara_ident.diagnosis.diagnose import Diagnosis
-from scara_ident.diagnosis.selection_step import best_of_each, fitted_model
+from scara_ident.diagnosis.selection_step import fitted_model
 from scara_ident.diagnosis.shape import shape_over
 from scara_ident.effects import EFFECTS, Effect, Member
 from scara_ident.errors import ScaraIdentError
@@ -270,21 +270,23 @@ def _parameters(diagnosis: Diagnosis) -> Iterator[Question]:
 
 
 def _others(diagnosis: Diagnosis) -> list[Decision]:
-    """Return the best member of each family and joint not in the model that a motion can show and an arm can have."""
+    """Return of each family and joint not in the model the likeliest member that a motion can show and an arm can have.
+
+    Of members of which nothing is known that which takes the fewest standard errors: what lives in one block of time would
+    have to be of a size that no arm has.
+    """
     search = diagnosis.search
     known = {item.label(search.scene) for item in search.chosen}
-    best = best_of_each(search.decisions).values()
-    found = [
-        item
-        for item in best
-        if item.label not in known
-        and not item.accepted
-        and not item.candidate.corrects_data
-        and _moves(item.candidate)
-        and bool(np.isfinite(item.examination.covariance).all())
-    ]
-    either = [item if possible(item, diagnosis) else _mirrored(item) for item in found]
-    return [item for item in either if possible(item, diagnosis)]
+    best: dict[str, tuple[tuple[float, float], Decision]] = {}
+    for item in search.decisions:
+        open_ = item.label not in known and not item.accepted and not item.candidate.corrects_data
+        if not (open_ and _moves(item.candidate) and np.isfinite(item.examination.covariance).all()):
+            continue
+        own = item if possible(item, diagnosis) else _mirrored(item)
+        rank = (_odds(own), -_limit(own.examination, diagnosis))
+        if possible(own, diagnosis) and (own.label not in best or rank > best[own.label][0]):
+            best[own.label] = rank, own
+    return [item for _, item in best.values()]
 
 
 def _mirrored(decision: Decision) -> Decision:

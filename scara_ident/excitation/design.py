@@ -17,9 +17,10 @@ from scara_ident.excitation.criteria import Criterion, LogDet
 from scara_ident.excitation.curves import ExcitationTrajectory, Family, make_basis
 from scara_ident.excitation.limits import Limits, limits_of, nominal_parameters, resting_posture, without_coulomb
 from scara_ident.excitation.problem import NARROWEST, Task
+from scara_ident.excitation.promise import FINE_RATE, Told, told
 from scara_ident.excitation.search import Effort, Progress, search
 from scara_ident.excitation.sensitivity import SmoothModel
-from scara_ident.excitation.tell import FINE_RATE, Told, motion_of, search_to_tell, told
+from scara_ident.excitation.tell import motion_of, search_to_tell
 from scara_ident.excitation.verification import Reached, reached
 from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel

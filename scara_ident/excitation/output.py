@@ -235,11 +235,7 @@ def summary(design: Design) -> list[str]:
         f"Limits broken: {', '.join(broken)}."
         if broken
         else f"All limits hold, at {design.verified} samples and between them.",
-        *(
-            f"{capital(item.question.text)}: {item.before:.2g} standard errors apart so far, {item.after:.2g} expected with it."
-            + (f" {item.instead}" if item.instead else "")
-            for item in design.tells
-        ),
+        *(f"{capital(item.question.text)}: {item.words}" for item in design.tells),
         f"Held back by {_few(held, 'limit')}." if held else "No limit holds it back: use more harmonics.",
         f"Information: ln det {design.log_det:.2f} over {samples} samples{each}, condition of the regressor {condition:.4g}.",
     ]

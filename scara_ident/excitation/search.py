@@ -184,6 +184,9 @@ def _finish(task: Task, x: Array) -> tuple[Array, int]:
     for _ in range(CORRECTIONS):
         start = shrunk_inside(problem.sharpened(plan.sharpness), x, room=1e-3, factor=0.998)
         if start is None:
+            # It is far outside where the coarse grid did not look, and is searched again from where it is inside.
+            start, plan = shrunk_inside(problem.sharpened(0.0), x), Schedule()
+        if start is None:
             break
         x = minimise(problem, start, plan).x
         excess = _excess(task, x, times)

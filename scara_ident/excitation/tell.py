@@ -11,22 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, reduce
+from functools import cache, cached_property, lru_cache
 from itertools import compress
 
 import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.answerability import Inquiry
-from scara_ident.diagnosis.belief import Blocks, believed, known_blocks
-from scara_ident.diagnosis.candidates import Candidate, Rows
-from scara_ident.diagnosis.questions import MOST_NAMED, Question
-from scara_ident.effects import Signals
-from scara_ident.estimation.information import merge
+from scara_ident.diagnosis.belief import believed, known_blocks
+from scara_ident.diagnosis.questions import Question
 from scara_ident.excitation.curves import Basis
 from scara_ident.excitation.interior_point import Minimum
 from scara_ident.excitation.limits import InfeasibleLimits
 from scara_ident.excitation.problem import Problem, Task, row_names
+from scara_ident.excitation.promise import SURE, KnownBlocks, all_rows
 from scara_ident.excitation.search import (
     BOUND,
     COARSE,
@@ -40,12 +38,11 @@ from scara_ident.excitation.search import (
 )
 from scara_ident.excitation.verification import grid
 from scara_ident.motion.motion import Motion
-from scara_ident.motion.prepared import block_seconds
 from scara_ident.processes import map_in_order
 from scara_ident.threads import one_blas_thread
 
-# Samples per second of a motion in the search, where a suspect follows the motor's turns, and of what is promised.
-RATE, TURNING_RATE, FINE_RATE = 200.0, 500.0, 1000.0
+# Samples per second of a motion in the search, and where a suspect follows the motor's turns.
+RATE, TURNING_RATE = 200.0, 500.0
 # Motions that a search draws first, and changes of the best of them per round.
 DRAWN, CHANGED = 48, 60
 # Speeds of a drawn motion as shares of the limits, evenly in their logarithm; how often a joint stands still.
@@ -59,126 +56,8 @@ FIRST, GROWN, LEAST = 0.3, 1.5, 0.01
 SHRINKING, MOST_SHRINKING, TRIES = 0.01, 0.2, 40
 # Weights of kinds of questions against that of what may be below the limit: what was found comes first.
 WEIGHTS = {"rivals": 2.0, "unexplained": 2.0, "below_limit": 1.0, "parameter": 0.2}
-# Standard errors at which an answer is sure enough, and how many times what is needed is worth having: noise and size are
-# foreseen to a factor or two.
-SURE, ENOUGH = 5.0, 5.0
-
-
-@dataclass(frozen=True)
-class Told:
-    """What a motion tells of a question.
-
-    Attributes
-    ----------
-    question : Question
-    before, after : float
-        Standard errors between the answers, without and with it.
-    unshown : tuple of str
-        Of effects of a size that the recordings at hand would just have shown, those which the diagnosis would not let in.
-    """
-
-    question: Question
-    before: float
-    after: float
-    unshown: tuple[str, ...] = ()
-
-    @property
-    def settled(self) -> bool:
-        """Whether the diagnosis is expected to be sure of the answer afterwards."""
-        return not self.unshown if self.question.kind == "below_limit" else self.after >= SURE
-
-    @property
-    def instead(self) -> str:
-        """Say what the motion does not tell, and what would; nothing where it tells all."""
-        if self.settled:
-            return ""
-        which = ", ".join(self.unshown[:MOST_NAMED]) or self.question.text
-        more = f" and {len(self.unshown) - MOST_NAMED} more" if len(self.unshown) > MOST_NAMED else ""
-        return f"Would not tell: {which}{more}. What would: {self.question.experiment}."
-
-    def entry(self) -> dict[str, object]:
-        """Return it as plain values."""
-        return {
-            "question": self.question.text,
-            "sigma_before": self.before,
-            "sigma_after": self.after,
-            "settled": self.settled,
-            "unshown": list(self.unshown),
-        }
-
-
-def rows_in_blocks(inquiry: Inquiry, motion: Motion) -> Blocks:
-    """Return what a motion would say of an inquiry: rows of unit noise within the bands, in blocks of time.
-
-    Parameters
-    ----------
-    inquiry : Inquiry
-    motion : Motion
-        At rest at both ends.
-
-    Notes
-    -----
-    A period of a signal within a band is told by as many equal steps as it has Fourier coefficients there, and by
-    Parseval's theorem their squares are those of all samples; white noise is then as large in any of them.
-    """
-    signals = Signals(inquiry.scene, motion)
-    model, count = inquiry.scene.model, motion.samples
-    seconds, bands, fade = count / motion.rate, inquiry.bands, np.ones(motion.v.shape)
-    if inquiry.reach is not None:
-        torque = [inquiry.scene.value[own] @ raw for own, raw in zip(model.active, signals.columns, strict=True)]
-        bands, fade = inquiry.reach.foreseen(np.array(torque), motion.v, motion.rate)
-
-    def within(joint: int, columns: Array) -> Array:
-        band = bands[joint]
-        kept = count // 2 + 1 if band is None else min(count // 2 + 1, int(band * seconds) + 1)
-        steps = 2 * kept - 1
-        size = np.sqrt(steps / (count * motion.rate * inquiry.noise[joint]))
-        return np.asarray(size * np.fft.irfft(np.fft.rfft(fade[joint] * columns, axis=1)[:, :kept], steps, axis=1))
-
-    def made(wanted: Sequence[Candidate]) -> list[Rows]:
-        each = [item.effect.by_joint(signals, item.member) for item in wanted]
-        return [{joint: within(joint, np.array(own)) for joint, own in item.items()} for item in each]
-
-    added = inquiry.rows(made)
-    widths = [len(next(iter(rows.values()))) for rows in added]
-    total = len(model.columns) + sum(widths)
-    blocks = max(1, round(seconds / block_seconds(bands)))
-    tables, starts = [], []
-    for joint, (own, raw) in enumerate(zip(model.active, signals.columns, strict=True)):
-        base = within(joint, raw)
-        table = np.zeros((total, base.shape[1]))
-        table[own] = base
-        start = len(model.columns)
-        for rows, width in zip(added, widths, strict=True):
-            if joint in rows:
-                table[start : start + width] = rows[joint]
-            start += width
-        tables.append(table)
-        starts.append(np.linspace(0, table.shape[1], blocks + 1).astype(np.intp))
-    owner = np.zeros(blocks, dtype=np.intp)
-    return Blocks(tuple(tables), tuple(starts), owner, owner)
-
-
-def told(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[Told, ...]:
-    """Return what motions tell of every question, beside what is known."""
-    new = [rows_in_blocks(inquiry, motion) for motion in motions]
-    after = inquiry.sigmas(merge([blocks.information() for blocks in new]))
-    sure = _sure_of(inquiry, new)
-    found = []
-    for item, one, other in zip(inquiry.questions, inquiry.sigmas(), after, strict=True):
-        asked = item.suspects if item.kind == "below_limit" else ()
-        found.append(Told(item, float(one), float(other), tuple(own.label for own in asked if sure[own.label] < 1.0)))
-    return tuple(found)
-
-
-def sure_of(inquiry: Inquiry, motions: Sequence[Motion]) -> dict[str, float]:
-    """Return `believed` of what is known and motions to be recorded."""
-    return _sure_of(inquiry, [rows_in_blocks(inquiry, motion) for motion in motions])
-
-
-def _sure_of(inquiry: Inquiry, new: Sequence[Blocks]) -> dict[str, float]:
-    known = known_blocks(inquiry)
-    return believed(inquiry, reduce(Blocks.with_more, new if known is None else [known, *new]))
+# How many times what is needed is worth having: noise and size are foreseen to a factor or two.
+ENOUGH = 5.0
 
 
 def search_to_tell(
@@ -240,20 +119,20 @@ class _Judge:
     def cost(self, x: Array) -> float:
         """Return minus the weighted sum of the logarithms of what questions gain, up to what is enough."""
         (basis,) = self.task.bases
-        new = rows_in_blocks(self.each, motion_of(basis, self.task.posture, x[0], self.rate))
-        sure = believed(self.each, new if self.known is None else self.known.with_more(new))
+        rows = all_rows(self.each, [motion_of(basis, self.task.posture, x[0], self.rate)], self.known)
+        sure = believed(self.each, rows)
         sizes = np.array(
             [sure.get(item.text, 0.0) if item.kind == "below_limit" else 0.0 for item in self.each.questions]
         )
         rest = [item.kind != "below_limit" for item in self.each.questions]
         if any(rest):
-            sizes[rest] = self.each.sigmas(new.information(), [*compress(self.each.questions, rest)]) / SURE
+            sizes[rest] = self.each.sigmas(rows.information, [*compress(self.each.questions, rest)]) / SURE
         return -float(self.weights @ np.log((1.0 + sizes**2) / (1.0 + (sizes / ENOUGH) ** 2)))
 
     @cached_property
-    def known(self) -> Blocks | None:
-        """Rows of the recordings at hand."""
-        return known_blocks(self.each)
+    def known(self) -> KnownBlocks:
+        """The rows of the recordings at hand, made once for all motions with which they have the same bands."""
+        return cache(known_blocks)
 
     @cached_property
     def each(self) -> Inquiry:

@@ -13,7 +13,7 @@ from scara_ident.diagnosis.questions import Question, questions
 from scara_ident.diagnosis.selection_step import fitted_model
 from scara_ident.diagnosis.shape import KNOTS
 from scara_ident.errors import ScaraIdentError
-from scara_ident.estimation.information import Information
+from scara_ident.estimation.information import Information, merge
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.asked import PAIR, open_diagnosis, small_runs
 
@@ -38,7 +38,7 @@ def test_rivals_are_apart_by_what_neither_does_for_the_other():
     of_a = left_of(np.column_stack([model, b]), a @ spring.value)
     of_b = left_of(np.column_stack([model, a]), b[:, : len(tilt.value)] @ tilt.value)
     # What is known and further rows count alike, and the worse direction counts.
-    sigma = replace(inquiry, known=infos[0]).sigmas(infos[1])
+    sigma = replace(inquiry, known=infos[0]).sigmas(merge(infos))
     assert sigma[0] == pytest.approx(np.sqrt(min(of_a, of_b)), rel=1e-9)
 
 
@@ -63,7 +63,7 @@ def test_an_effect_is_apart_from_none_by_what_the_model_leaves_of_it_and_a_param
     # What is known says which coefficients would just have been seen; the mean variance over all of them counts.
     known = np.random.default_rng(5).normal(size=(40, width))
     inquiry = replace(inquiry, known=Information.empty(width).absorb(known, np.zeros(40)))
-    before, after = inquiry.sigmas()[0], inquiry.sigmas(Information.empty(width).absorb(rows, np.zeros(90)))[0]
+    before, after = inquiry.sigmas()[0], inquiry.sigmas(inquiry.known.absorb(rows, np.zeros(90)))[0]
     place = slice(p + own, p + own + len(tilt.value))
     first, both = (left_matrix(each[:, : p + own], each[:, place]) for each in (known, np.vstack([known, rows])))
     assert before**2 == pytest.approx(tilt.value @ first @ tilt.value, rel=1e-9)

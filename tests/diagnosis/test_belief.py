@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.answerability import inquire
-from scara_ident.diagnosis.belief import Blocks, times_apart, times_believed
+from scara_ident.diagnosis.belief import Blocks, believed, known_blocks, times_apart, times_believed
 from scara_ident.diagnosis.candidate_tests import examine
+from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.gain import gains
-from scara_ident.diagnosis.questions import Question, questions
+from scara_ident.diagnosis.questions import Question, Suspect, questions
+from scara_ident.effects import Member
+from scara_ident.effects.measurement import SAMPLING, TimeDelay
 from scara_ident.estimation.information import Information
 from tests.diagnosis.asked import open_diagnosis
+from tests.diagnosis.made import BANDS
 
 ROWS, BLOCKS, PARAMETERS, TRIED = 12, 40, 4, 100
 
@@ -118,3 +122,13 @@ def test_what_another_effect_does_nearly_as_well_is_not_told_from_it():
     expected = max(left[1] / (2.0 * CRITERIA.alike) ** 2, left[1] / ((1.0 - CRITERIA.least_share) * left[0]))
     assert apart(np.hstack([model, near, tilt])) == pytest.approx(np.sqrt(expected), rel=1e-9)
     assert apart(np.hstack([model, 40.0 * tilt[:, :1], tilt])) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_what_is_too_small_to_speak_of_is_not_promised_however_sure():
+    found = open_diagnosis()
+    delay = Suspect(Candidate(TimeDelay(), Member(0)), "time_delay of joint1", (0.02,))
+    inquiry = inquire(found, [Question("below_limit", "delay", (delay,))])
+    # Recordings without noise to speak of would show a thousandth of a sample.
+    blocks = known_blocks(replace(inquiry, noise=1e-12 * inquiry.noise), BANDS)
+    (times,) = believed(inquiry, blocks).values()
+    assert times == pytest.approx(0.02 * inquiry.scene.rate / SAMPLING, rel=0.02)

@@ -75,3 +75,21 @@ def test_the_noise_is_that_of_the_recordings(seed: int):
     runs = [simulate(arm, motion, seed=seed, repetition=k, rate=250.0).recording for k in (1, 2)]
     found = diagnose(arm.robot, runs, bands=BANDS, catalogue=())
     assert noise_density(found) == pytest.approx(arm.torque_noise**2 / 250.0, rel=0.16)
+
+
+def test_of_members_of_which_nothing_is_known_that_which_takes_fewest_standard_errors_is_asked_for():
+    found = open_diagnosis()
+    (decision,) = [item for item in found.search.decisions if item.label == "spring of joint2"][:1]
+    usual = replace(decision.examination, value=np.array([0.1]), p_value=0.8, gain=0.0, freedom=12.0)
+    # One block of time tells it, so that it would have to be thousands of standard errors large.
+    lonely = replace(usual, value=np.array([1.0]), p_value=0.4, gain=0.2, freedom=1.04)
+    likely = replace(usual, value=np.array([2.0]), p_value=1e-3, freedom=6.0)
+
+    def asked(*examinations) -> tuple[float, ...]:
+        tried = tuple(replace(decision, examination=item, gain=item.gain) for item in examinations)
+        held = questions(replace(found, search=replace(found.search, decisions=tried)))
+        (spring,) = [item for question in held for item in question.suspects if item.label == "spring of joint2"]
+        return spring.value
+
+    assert asked(lonely, usual) == asked(usual)
+    assert asked(usual, likely, lonely) == asked(likely) != asked(usual)

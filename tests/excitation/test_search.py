@@ -11,9 +11,10 @@ from scara_ident.excitation import (
     design_excitation,
     limits_of,
 )
+from scara_ident.excitation.search import COARSE, FINE, _finish, from_random, verified_inside, within_grid
 from scara_ident.model.model import build_model
 from tests.excitation.designs import COMPLETE, QUICK, SCARA, SHORT
-from tests.excitation.made import scara_with_quill
+from tests.excitation.made import scara_with_quill, small_problem
 
 
 @pytest.mark.slow
@@ -50,3 +51,17 @@ def test_parameters_that_no_motion_tells_apart_are_said():
 def test_limits_too_tight_for_any_motion_are_named(given, said):
     with pytest.raises(InfeasibleLimits, match=f"no motion within the limits shows all parameters; the {said}"):
         design_excitation(COMPLETE, **SHORT, limits=limits_of(SCARA, share=1.0, **given), effort=QUICK)
+
+
+def test_a_winner_far_outside_on_the_fine_grid_is_searched_again():
+    problem = small_problem(COMPLETE)
+    task, ones = problem.task, np.ones(len(problem.bounds))
+    # Ten times what the limits allow, as a motion through an obstacle that the coarse grid did not see.
+    found = from_random(problem, 3, 0)
+    far = np.random.default_rng(1).permutation(found.x.ravel()).reshape(found.x.shape)
+    far *= 10.0 / np.max(np.abs(within_grid(task, COARSE, ones).limited(far)))
+    x, _ = _finish(task, far)
+    fine = within_grid(task, FINE, ones)
+    least, _ = verified_inside(fine, far)
+    costs = [fine.sharpened(1.0).at(item).cost for item in (x, least, verified_inside(fine, found.x)[0])]
+    assert costs[0] < costs[1] - 10.0 and costs[0] < costs[2] + 1.0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -16,7 +14,7 @@ from scara_ident.effects.tilt import BaseTilt
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.observations import observe
 from scara_ident.excitation import Effort, design_excitation, excitation_dict, limits_of
-from scara_ident.excitation.tell import told
+from scara_ident.excitation.promise import told
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.simulation import ReferenceMotion
 from tests.diagnosis.asked import PAIR, open_diagnosis, recorded, small_runs
@@ -46,16 +44,6 @@ def test_the_motion_keeps_its_limits_and_is_said_to_tell(asked):
     same = told(asked[0], [part.motion for part in open_diagnosis().search.data.stretches[:1]])
     assert same[0].after < 2.0 * same[0].before + 0.1
     assert not same[0].settled and same[0].instead.startswith(f"Would not tell: {PAIR}. What would: ")
-
-
-def test_of_what_may_be_below_the_limit_that_which_would_not_be_let_in_is_named(asked):
-    first, second = asked[0].questions[0].suspects
-    faint = replace(second, value=tuple(1e-3 * x for x in second.value))
-    each = [Question("below_limit", item.label, (item,), experiment="weigh it") for item in (first, faint)]
-    spring, tilt = told(inquire(open_diagnosis(), each), [asked[1].motion(rate=200.0)])
-    assert spring.settled and spring.unshown == () and spring.instead == ""
-    assert not tilt.settled and tilt.unshown == ("base_tilt",)
-    assert tilt.instead == "Would not tell: base_tilt. What would: weigh it."
 
 
 def test_what_was_promised_is_seen_and_the_effect_is_told(asked):

@@ -1,0 +1,214 @@
+"""What a motion would tell of questions: how sure the answers, and from which size on effects are seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.answerability import Inquiry
+from scara_ident.diagnosis.belief import Blocks, believed, known_blocks
+from scara_ident.diagnosis.candidates import Candidate, Rows
+from scara_ident.diagnosis.questions import MOST_NAMED, Question, Suspect
+from scara_ident.effects import Parameter, Scene, Signals
+from scara_ident.motion.motion import Motion
+from scara_ident.motion.prepared import Bands, block_seconds
+
+# Samples per second of a motion whose promise is given.
+FINE_RATE = 1000.0
+# Standard errors at which an answer is sure enough.
+SURE = 5.0
+
+KnownBlocks = Callable[[Inquiry, Bands], Blocks | None]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How large an effect that may be below the limit has to be, to be found with a motion.
+
+    Attributes
+    ----------
+    suspect : Suspect
+        Of a size that the recordings at hand would just have shown.
+    times : float
+        How many times as large as the diagnosis will need it that is.
+    limit : mapping of str to Parameter
+        The parameter of the least that would be found; empty where no single one says how large it is.
+    """
+
+    suspect: Suspect
+    times: float
+    limit: Mapping[str, Parameter]
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a motion tells of a question.
+
+    Attributes
+    ----------
+    question : Question
+    before, after : float
+        Standard errors between the answers, without and with it.
+    shown : tuple of Shown
+        Of effects that may be below the limit, each.
+    """
+
+    question: Question
+    before: float
+    after: float
+    shown: tuple[Shown, ...] = ()
+
+    @property
+    def unshown(self) -> tuple[str, ...]:
+        """Of effects of a size that the recordings at hand would just have shown, those that would not be found."""
+        return tuple(item.suspect.label for item in self.shown if item.times < 1.0)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the diagnosis is expected to be sure of the answer afterwards."""
+        return not self.unshown if self.question.kind == "below_limit" else self.after >= SURE
+
+    @property
+    def words(self) -> str:
+        """Say for a person what it tells, from which size on, and what would tell what it does not."""
+        said = f"{self.before:.2g} standard errors apart so far, {self.after:.2g} expected with it."
+        least = [f"{item.suspect.label}, {_size(item.limit)}" for item in self.shown if item.limit]
+        if least:
+            said += f" The least that would be found: {'; '.join(least[:MOST_NAMED])}."
+        return f"{said} {self.instead}".rstrip()
+
+    @property
+    def instead(self) -> str:
+        """Say what the motion does not tell, and what would; nothing where it tells all."""
+        if self.settled:
+            return ""
+        unshown = [item.suspect for item in self.shown if item.times < 1.0][:MOST_NAMED]
+        more = f" and {len(self.unshown) - len(unshown)} more" if len(self.unshown) > len(unshown) else ""
+        which = ", ".join(item.label for item in unshown) or self.question.text
+        experiments = dict.fromkeys(item.candidate.effect.experiment for item in unshown)
+        what = "; ".join(experiments) if len(self.question.suspects) > 1 and unshown else self.question.experiment
+        return f"Would not tell: {which}{more}. What would: {what}."
+
+    def entry(self) -> dict[str, object]:
+        """Return it as plain values."""
+        return {
+            "question": self.question.text,
+            "sigma_before": self.before,
+            "sigma_after": self.after,
+            "settled": self.settled,
+            "unshown": list(self.unshown),
+            "detection_limit": {
+                item.suspect.label: {name: own.value for name, own in item.limit.items()} for item in self.shown
+            },
+        }
+
+
+def _size(limit: Mapping[str, Parameter]) -> str:
+    return ", ".join(
+        f"{name.replace('_', ' ')} {item.value:.2g}{'' if item.unit == '1' else f' {item.unit}'}"
+        for name, item in limit.items()
+    )
+
+
+def told(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[Told, ...]:
+    """Return what motions tell of every question, beside what is known."""
+    rows = all_rows(inquiry, motions)
+    times, after = believed(inquiry, rows), inquiry.sigmas(rows.information)
+    found = []
+    for item, one, other in zip(inquiry.questions, inquiry.sigmas(), after, strict=True):
+        asked = item.suspects if item.kind == "below_limit" else ()
+        shown = (Shown(own, times[own.label], _least(inquiry.scene, own, times[own.label])) for own in asked)
+        found.append(Told(item, float(one), float(other), tuple(shown)))
+    return tuple(found)
+
+
+def _least(scene: Scene, suspect: Suspect, times: float) -> Mapping[str, Parameter]:
+    """Return how large the least is that would be found: one so many times smaller."""
+    value, effect = np.abs(suspect.value), suspect.candidate.effect
+    if not times > 0.0:
+        return {}
+    found = effect.parameters(scene, suspect.candidate.member, value / times, np.zeros((len(value), len(value))))
+    return dict([next(iter(found.items()))]) if len(value) == 1 or len(found) == 1 else {}
+
+
+def sure_of(inquiry: Inquiry, motions: Sequence[Motion]) -> dict[str, float]:
+    """Return `believed` of what is known and motions to be recorded."""
+    return believed(inquiry, all_rows(inquiry, motions))
+
+
+def all_rows(inquiry: Inquiry, motions: Sequence[Motion], known: KnownBlocks = known_blocks) -> Blocks:
+    """Return all rows that there will be: of what is known, in the bands that it then has, and of motions.
+
+    Parameters
+    ----------
+    inquiry : Inquiry
+    motions : sequence of Motion
+        Each at rest at both ends.
+    known : callable, optional
+        Makes the rows of what is known, `known_blocks`.
+    """
+    each = [rows_in_blocks(inquiry, motion) for motion in motions]
+    new = [blocks for blocks, _ in each]
+    held = known(inquiry, tuple(map(_widest, zip(*(bands for _, bands in each), strict=True))))
+    return reduce(Blocks.with_more, new if held is None else [held, *new])
+
+
+def _widest(bands: Sequence[float | None]) -> float | None:
+    some = [band for band in bands if band is not None]
+    return max(some) if len(some) == len(bands) else None
+
+
+def rows_in_blocks(inquiry: Inquiry, motion: Motion) -> tuple[Blocks, tuple[float | None, ...]]:
+    """Return what a motion would say of an inquiry: rows of unit noise within the bands, in blocks of time; and the bands, Hz.
+
+    Parameters
+    ----------
+    inquiry : Inquiry
+    motion : Motion
+        At rest at both ends.
+
+    Notes
+    -----
+    A period of a signal within a band is told by as many equal steps as it has Fourier coefficients there, and by
+    Parseval's theorem their squares are those of all samples; white noise is then as large in any of them.
+    """
+    signals = Signals(inquiry.scene, motion)
+    model, count = inquiry.scene.model, motion.samples
+    seconds, bands, fade = count / motion.rate, inquiry.bands, np.ones(motion.v.shape)
+    if inquiry.reach is not None:
+        torque = [inquiry.scene.value[own] @ raw for own, raw in zip(model.active, signals.columns, strict=True)]
+        bands, fade = inquiry.reach.foreseen(np.array(torque), motion.v, motion.rate)
+
+    def within(joint: int, columns: Array) -> Array:
+        band = bands[joint]
+        kept = count // 2 + 1 if band is None else min(count // 2 + 1, int(band * seconds) + 1)
+        steps = 2 * kept - 1
+        size = np.sqrt(steps / (count * motion.rate * inquiry.noise[joint]))
+        return np.asarray(size * np.fft.irfft(np.fft.rfft(fade[joint] * columns, axis=1)[:, :kept], steps, axis=1))
+
+    def made(wanted: Sequence[Candidate]) -> list[Rows]:
+        each = [item.effect.by_joint(signals, item.member) for item in wanted]
+        return [{joint: within(joint, np.array(own)) for joint, own in item.items()} for item in each]
+
+    added = inquiry.rows(made)
+    widths = [len(next(iter(rows.values()))) for rows in added]
+    total = len(model.columns) + sum(widths)
+    blocks = max(1, round(seconds / block_seconds(bands)))
+    tables, starts = [], []
+    for joint, (own, raw) in enumerate(zip(model.active, signals.columns, strict=True)):
+        base = within(joint, raw)
+        table = np.zeros((total, base.shape[1]))
+        table[own] = base
+        start = len(model.columns)
+        for rows, width in zip(added, widths, strict=True):
+            if joint in rows:
+                table[start : start + width] = rows[joint]
+            start += width
+        tables.append(table)
+        starts.append(np.linspace(0, table.shape[1], blocks + 1).astype(np.intp))
+    owner = np.zeros(blocks, dtype=np.intp)
+    return Blocks(tuple(tables), tuple(starts), owner, owner), tuple(bands)
