@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array, median
+from scara_ident.arrays import Array, median, medians
 from scara_ident.identification.binned_residual import FILLED, NORMAL, STILL, Binned
 
 # Standard deviations at which a sample is bounded where it is asked what other recordings have at the same state.
@@ -59,25 +59,25 @@ def without_trends(stretches: Sequence[Binned]) -> list[Binned]:
 
 def _robust_trend(rows: Sequence[Array], left: Sequence[Array], known: Sequence[Array]) -> list[Array]:
     """Return what columns (k, M) explain of a residual by Tukey's weights of bins; nothing where there is too little."""
-    together, target = np.concatenate(rows, axis=1), np.concatenate(left)
-    use = (np.concatenate(known) > FILLED).astype(float)
-    whole, together, target, use = together, together[:, ::THIN], target[::THIN], use[::THIN]
+    whole, target = np.concatenate(rows, axis=1), np.concatenate(left)[::THIN]
+    together, use = whole[:, ::THIN], np.concatenate(known)[::THIN] > FILLED
     size = np.sqrt(np.mean(together**2, axis=1, keepdims=True))
     size = np.where(size > 0.0, size, 1.0)
-    together = together / size
-    if np.sum(use) < LEAST_BINS * len(together):
+    if np.count_nonzero(use) < LEAST_BINS * len(together):
         return [np.zeros_like(item) for item in left]
     # Begun by least squares of all, which holds what is so in a run's single turn back, and of all but each of some stretches,
     # so that what happens in one of them alone is seen not to be a trend: of all that these end in, what leaves least.
-    weight = use * np.concatenate([np.ones((1, len(use))), _but_one(len(use))])
+    weight = np.concatenate([np.ones((1, len(use))), _but_one(len(use))])[:, use]
+    together, target = (together / size)[:, use], target[use]
+    products = np.concatenate([together, target[None]])[:, None] * together
     for _ in range(ROUNDS):
-        value = _solved(together, weight, target)
+        value = _solved(products, weight)
         off = target - value @ together
-        scale = NORMAL * np.array([median(row) for row in np.abs(off[:, use > 0.0])])
+        scale = NORMAL * medians(np.abs(off))
         if np.any(scale == 0.0):
             break
-        weight = use * np.maximum(0.0, 1.0 - (off / (4.0 * scale[:, None])) ** 2) ** 2
-    value = value[_least(off[:, use > 0.0], float(np.min(scale)))]
+        weight = np.maximum(0.0, 1.0 - (off / (4.0 * scale[:, None])) ** 2) ** 2
+    value = value[_least(off, float(np.min(scale)))]
     return np.split((value / size[:, 0]) @ whole, np.cumsum([len(item) for item in left])[:-1])
 
 
@@ -90,13 +90,16 @@ def _but_one(count: int) -> Array:
     return found
 
 
-def _solved(columns: Array, weight: Array, target: Array) -> Array:
-    """Return weighted least squares of columns (k, M), one for each of some weights (s, M), shape (s, k)."""
-    weighted = weight[:, None] * columns
-    normal = weighted @ columns.T
-    ridge = 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] / len(columns)
-    normal += ridge * np.eye(len(columns)) + 1e-300
-    return np.asarray(np.linalg.solve(normal, (weighted @ target)[:, :, None])[:, :, 0])
+def _solved(products: Array, weight: Array) -> Array:
+    """Return weighted least squares, one for each of some weights (s, M), shape (s, k).
+
+    ``products``, (k + 1, k, M), are those of k columns, and then of the target, with the columns.
+    """
+    count = products.shape[1]
+    sums = (weight @ products.reshape(-1, products.shape[2]).T).reshape(-1, count + 1, count)
+    normal = sums[:, :count]
+    ridge = 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] / count
+    return np.asarray(np.linalg.solve(normal + (ridge * np.eye(count) + 1e-300), sums[:, count, :, None])[:, :, 0])
 
 
 def _least(off: Array, scale: float) -> int:
@@ -112,7 +115,7 @@ def without_states(stretches: Sequence[Binned]) -> list[Binned]:
 
     Only where that makes a recording's residual smaller; what happens once is seen at no other time, and stays.
     """
-    lengths = [item.left.shape[1] for item in stretches]
+    lengths = [item.taken.shape[1] for item in stretches]
     parts = [max(1, round(count * item.width / PART)) for item, count in zip(stretches, lengths, strict=True)]
     # Where each part begins.
     ends = np.cumsum(lengths)
