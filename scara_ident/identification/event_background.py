@@ -130,9 +130,10 @@ def without_states(stretches: Sequence[Binned]) -> list[Binned]:
     known = np.concatenate([item.known for item in stretches], axis=1) > FILLED
     left = np.concatenate([item.bounded(LOOSE) for item in stretches], axis=1)
     state = [np.concatenate([item.state[k] for item in stretches], axis=1) for k in range(4)]
-    taken = np.zeros_like(left)
+    taken, shared = np.zeros_like(left), _shared_features(state)
     for j in np.flatnonzero(np.any(known, axis=1)).tolist():
-        taken[j] = _of_others(_features(state, j), left[j], known[j], starts, firsts)
+        columns = np.concatenate([_features(state, j), shared])
+        taken[j] = _of_others(columns, left[j], known[j], starts, firsts)
     return [item.without(part) for item, part in zip(stretches, np.split(taken, ends[:-1], axis=1), strict=True)]
 
 
@@ -187,17 +188,26 @@ def _turning(velocity: Array, most: Array | float) -> Array:
 
 
 def _features(state: Sequence[Array], joint: int) -> Array:
-    """Return functions of the state that a joint's residual may depend on, of unit size, shape (k, M)."""
-    q, v, a, load = state
-    speed = np.maximum(np.max(np.abs(v), axis=1, keepdims=True), 1e-9)
-    turn, own = _turning(v, speed), v[joint] / speed[joint]
-    sign, angle, torque = turn[joint], q[joint], load[joint]
+    """Return functions of its own state that a joint's residual may depend on, of unit size, shape (k, M)."""
+    angle, v, _, torque = (part[joint] for part in state)
+    speed = max(float(np.max(np.abs(v))), 1e-9)
+    sign, own = _turning(v, speed), v / speed
     columns = [sign * np.exp(-np.abs(own) / slow) for slow in SLOWER]
     columns += [np.tanh(2.0 * own), own, own**3, own * np.abs(own)]
     columns += [np.sin(2.0 * angle), np.cos(2.0 * angle), sign * np.sin(angle), sign * np.cos(angle)]
     columns += [sign * np.abs(torque), torque, torque**3, sign * np.minimum(sign * torque, 0.0)]
+    return _of_unit_size(np.array(columns))
+
+
+def _shared_features(state: Sequence[Array]) -> Array:
+    """Return functions of the state of all joints that any joint's residual may depend on, of unit size, shape (k, M)."""
+    q, v, a, _ = state
+    speed = np.maximum(np.max(np.abs(v), axis=1, keepdims=True), 1e-9)
     # A spring, or a cable, pulls by the angle itself.
     away = q - np.mean(q, axis=1, keepdims=True)
-    result = np.array([*columns, *away, *np.sin(q), *np.cos(q), *turn, *v, *a])
-    size = np.sqrt(np.mean(result**2, axis=1, keepdims=True))
-    return np.asarray(result / np.where(size > 0.0, size, 1.0))
+    return _of_unit_size(np.concatenate([away, np.sin(q), np.cos(q), _turning(v, speed), v, a]))
+
+
+def _of_unit_size(columns: Array) -> Array:
+    size = np.sqrt(np.mean(columns**2, axis=1, keepdims=True))
+    return np.asarray(columns / np.where(size > 0.0, size, 1.0))
