@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.arrays import median, runs_of
+from scara_ident.arrays import median, medians, runs_of
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 10, 1001])
@@ -14,12 +14,15 @@ def test_the_median_is_that_of_numpy(count: int) -> None:
     before = values.copy()
     assert median(values) == np.median(values)
     assert np.array_equal(values, before)
+    rows = np.random.default_rng(count).standard_normal((2, 3, count))
+    assert np.array_equal(medians(rows), np.median(rows, axis=-1))
 
 
 def test_one_number_that_is_none_leaves_none() -> None:
     assert np.isnan(median(np.array([1.0, np.nan, 2.0, 0.0])))
     assert np.isnan(median(np.array([np.nan])))
     assert median(np.array([1.0, np.inf, 2.0])) == 2.0
+    assert np.array_equal(medians(np.array([[1.0, np.nan], [1.0, 2.0]])), [np.nan, 1.5], equal_nan=True)
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from scara_ident.threads import LONG, made_once, one_blas_thread, side_by_side, threads_for
+from scara_ident.threads import LONG, SOON, made_once, one_blas_thread, side_by_side, threads_for
 from tests.shared import PATIENCE
 
 
@@ -42,6 +43,24 @@ def test_what_is_done_to_short_arrays_is_done_in_one_thread():
 
     assert len(names(LONG)) == 2
     assert names(LONG - 1) == {threading.get_ident()}
+
+
+def test_threads_ask_for_the_interpreter_soon_until_the_last_caller_is_done():
+    before = sys.getswitchinterval()
+    begun, ended = threading.Event(), threading.Event()
+
+    def later(item: int) -> bool:
+        begun.set()
+        return ended.wait(PATIENCE)
+
+    other = threading.Thread(target=side_by_side, args=(later, range(2)))
+    other.start()
+    assert begun.wait(PATIENCE)
+    assert side_by_side(lambda _: sys.getswitchinterval(), range(2)) == pytest.approx([SOON] * 2)
+    assert sys.getswitchinterval() == pytest.approx(SOON)
+    ended.set()
+    other.join(PATIENCE)
+    assert sys.getswitchinterval() == before > SOON
 
 
 def test_an_error_reaches_the_caller():

@@ -191,17 +191,41 @@ class Observations(Frozen):
 
         That of the last parameters is kept, for more than one ask for it, and cannot be written to.
         """
-        known = self.__dict__.get("_predicted")
+        columns = [joint.columns for joint in self.joints]
+
+        def of_stretch(raw: Raw) -> Array:
+            torque = np.array([value[own] @ row for own, row in zip(columns, raw, strict=True)])
+            torque.flags.writeable = False
+            return torque
+
+        return self._of_last(
+            "_predicted", value, lambda: tuple(side_by_side(of_stretch, chain.from_iterable(self.raw)))
+        )
+
+    def late(self, value: Array) -> tuple[Array, ...]:
+        """Return for each joint by what the predicted torque on its rows changes with each second it is late, shape (N,).
+
+        That of the last parameters is kept.
+        """
+
+        def made() -> tuple[Array, ...]:
+            torques = zip(self.data.stretches, self.predicted(value), strict=True)
+            parts = [(part, torque) for part, torque in torques if part.usable]
+
+            def of_joint(joint: int) -> Array:
+                # A torque that comes late lacks so much of its rate.
+                rates = ((part, -np.gradient(torque[joint], 1.0 / part.rate)) for part, torque in parts)
+                return np.concatenate([part.rows(joint, rate[None])[0] for part, rate in rates])
+
+            return tuple(side_by_side(of_joint, range(len(self.joints))))
+
+        return self._of_last("_late", value, made)
+
+    def _of_last(self, name: str, value: Array, made: Callable[[], tuple[Array, ...]]) -> tuple[Array, ...]:
+        """Return what is kept of the last parameters, made anew where these are others."""
+        known = self.__dict__.get(name)
         if known is None or not np.array_equal(known[0], value):
-            columns = [joint.columns for joint in self.joints]
-
-            def of_stretch(raw: Raw) -> Array:
-                torque = np.array([value[own] @ row for own, row in zip(columns, raw, strict=True)])
-                torque.flags.writeable = False
-                return torque
-
-            known = value.copy(), tuple(side_by_side(of_stretch, chain.from_iterable(self.raw)))
-            self.__dict__["_predicted"] = known
+            known = self.__dict__[name] = value.copy(), made()
         return known[1]
 
     def residuals(self, value: Array) -> Residuals:

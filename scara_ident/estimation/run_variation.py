@@ -210,7 +210,7 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
     # Made once, and not in two threads.
-    _ = observations.predicted(value[: observations.parameters])
+    _ = observations.late(value[: observations.parameters])
 
     def of_joint(joint: int, rows: JointRows) -> _Sums | None:
         directions = _directions(observations, joint, rows, value)
@@ -251,14 +251,8 @@ def assumed_variation(observations: Observations, joints: Sequence[JointRows], v
 
 def _directions(observations: Observations, joint: int, rows: JointRows, value: Array) -> Array:
     """Return what one unit of each kind does on the rows of a joint, shape (kinds, N); zero where it does nothing."""
-    # A torque that comes late lacks so much of its rate.
-    torques = observations.predicted(value[: observations.parameters])
-    parts = [
-        part.rows(joint, -np.gradient(torque[joint], 1.0 / part.rate)[None])[0]
-        for part, torque in zip(observations.data.stretches, torques, strict=True)
-        if part.usable
-    ]
-    return _of_columns(observations, rows.columns, value, rows.table[:-1], np.concatenate(parts))
+    late = observations.late(value[: observations.parameters])[joint]
+    return _of_columns(observations, rows.columns, value, rows.table[:-1], late)
 
 
 def _of_columns(

@@ -34,6 +34,8 @@ MOST_FRICTION = 2.0
 STATES_PER_PARAMETER = 8
 # An open share of a parameter's variance, as it is known without data, above which the parameter is called undetermined.
 OPEN_SHARE = 0.5
+# What moves the torques over the arm's range by less than this share of them leaves the estimate as it is, and what was made of it.
+SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +123,7 @@ def believable(observations: Observations, value: Array, noise: Array) -> Array:
     Returns
     -------
     ndarray, shape (p,)
-        The estimate itself for a model with terms that are no function of the state.
+        The estimate itself where all of it is told, and for a model with terms that are no function of the state.
     """
     range_ = _range_rows(observations)
     if range_ is None:
@@ -146,7 +148,9 @@ def believable(observations: Observations, value: Array, noise: Array) -> Array:
             known.append(np.diag(rubbing * most / (MOST_FRICTION * size)))
     before = np.vstack(known) / np.sqrt(rows.shape[1])
     wanted = np.concatenate([data @ value, before @ aim])
-    return np.asarray(np.linalg.lstsq(np.vstack([data, before]), wanted, rcond=None)[0])
+    found = np.asarray(np.linalg.lstsq(np.vstack([data, before]), wanted, rcond=None)[0])
+    moved = (np.linalg.norm(torque @ (found - value)) > SAME * np.linalg.norm(torque @ value) for torque in rows)
+    return found if any(moved) else value
 
 
 def _range_rows(observations: Observations) -> tuple[Array, Array] | None:

@@ -44,7 +44,7 @@ def clock_drift(value: Array, observations: Observations) -> str | None:
     noise = np.array([rows.rms(value) for rows in observations.joints])
     weight = np.where(noise > 0.0, 1.0 / np.where(noise > 0.0, noise, 1.0), 0.0)
     # Made once, and not in two threads.
-    _ = observations.predicted(value)
+    _ = observations.late(value)
 
     joints = side_by_side(lambda j: _sums(value, observations, j, float(weight[j])), range(len(weight)))
     # What parameters and one delay for each recording explain is none of the drift's: the model's columns are projected out
@@ -114,17 +114,15 @@ class _Sums:
 
 
 def _sums(value: Array, observations: Observations, joint: int, weight: float) -> _Sums:
-    rows, parts = observations.joints[joint], []
-    columns, ends = rows.table[:-1], [0]
-    torques = iter(observations.predicted(value))
+    rows, columns = observations.joints[joint], observations.joints[joint].table[:-1]
+    times, ends = list[Array](), [0]
     for item in observations.data.recordings:
         start = item.stretches[0].stretch.time[0]
-        for part, torque in zip(item.stretches, torques, strict=False):
-            if part.usable:
-                slope = -np.gradient(torque[joint]) * part.rate
-                parts.append(part.rows(joint, np.array([slope, slope * (part.stretch.time - start)])))
-        ends.append(sum(part.shape[1] for part in parts))
-    lag, growing = weight * np.concatenate(parts, axis=1)
+        times += [part.stretch.time[part.kept[joint]] - start for part in item.stretches if part.usable]
+        ends.append(sum(map(len, times)))
+    # A filter's memory is short against the time in which a delay grows, so that it may be multiplied after it.
+    lag = weight * observations.late(value)[joint]
+    growing = lag * np.concatenate(times)
     others = np.array([growing, weight * (rows.table[-1] - value[rows.columns] @ columns)])
     runs = [slice(a, b) for a, b in pairwise(ends)]
     return _Sums(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array, median
+from scara_ident.arrays import Array, median, medians
 from scara_ident.identification.binned_residual import FILLED, NORMAL, STILL, Binned
 
 # Standard deviations at which a sample is bounded where it is asked what other recordings have at the same state.
@@ -54,25 +54,25 @@ def without_trends(stretches: Sequence[Binned]) -> list[Binned]:
 
 def _robust_trend(rows: Sequence[Array], left: Sequence[Array], known: Sequence[Array]) -> list[Array]:
     """Return what columns (k, M) explain of a residual by Tukey's weights of bins; nothing where there is too little."""
-    together, target = np.concatenate(rows, axis=1), np.concatenate(left)
-    use = (np.concatenate(known) > FILLED).astype(float)
-    whole, together, target, use = together, together[:, ::THIN], target[::THIN], use[::THIN]
+    whole, target = np.concatenate(rows, axis=1), np.concatenate(left)[::THIN]
+    together, use = whole[:, ::THIN], np.concatenate(known)[::THIN] > FILLED
     size = np.sqrt(np.mean(together**2, axis=1, keepdims=True))
     size = np.where(size > 0.0, size, 1.0)
-    together = together / size
-    if np.sum(use) < LEAST_BINS * len(together):
+    if np.count_nonzero(use) < LEAST_BINS * len(together):
         return [np.zeros_like(item) for item in left]
     # Begun by least squares of all, which holds what is so in a run's single turn back, and of all but each of some stretches,
     # so that what happens in one of them alone is seen not to be a trend: of all that these end in, what leaves least.
-    weight = use * np.concatenate([np.ones((1, len(use))), _but_one(len(use))])
+    weight = np.concatenate([np.ones((1, len(use))), _but_one(len(use))])[:, use]
+    together, target = (together / size)[:, use], target[use]
+    products = np.concatenate([together, target[None]])[:, None] * together
     for _ in range(ROUNDS):
-        value = _solved(together, weight, target)
+        value = _solved(products, weight)
         off = target - value @ together
-        scale = NORMAL * np.array([median(row) for row in np.abs(off[:, use > 0.0])])
+        scale = NORMAL * medians(np.abs(off))
         if np.any(scale == 0.0):
             break
-        weight = use * np.maximum(0.0, 1.0 - (off / (4.0 * scale[:, None])) ** 2) ** 2
-    value = value[_least(off[:, use > 0.0], float(np.min(scale)))]
+        weight = np.maximum(0.0, 1.0 - (off / (4.0 * scale[:, None])) ** 2) ** 2
+    value = value[_least(off, float(np.min(scale)))]
     return np.split((value / size[:, 0]) @ whole, np.cumsum([len(item) for item in left])[:-1])
 
 
@@ -85,13 +85,16 @@ def _but_one(count: int) -> Array:
     return found
 
 
-def _solved(columns: Array, weight: Array, target: Array) -> Array:
-    """Return weighted least squares of columns (k, M), one for each of some weights (s, M), shape (s, k)."""
-    weighted = weight[:, None] * columns
-    normal = weighted @ columns.T
-    ridge = 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] / len(columns)
-    normal += ridge * np.eye(len(columns)) + 1e-300
-    return np.asarray(np.linalg.solve(normal, (weighted @ target)[:, :, None])[:, :, 0])
+def _solved(products: Array, weight: Array) -> Array:
+    """Return weighted least squares, one for each of some weights (s, M), shape (s, k).
+
+    ``products``, (k + 1, k, M), are those of k columns, and then of the target, with the columns.
+    """
+    count = products.shape[1]
+    sums = (weight @ products.reshape(-1, products.shape[2]).T).reshape(-1, count + 1, count)
+    normal = sums[:, :count]
+    ridge = 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] / count
+    return np.asarray(np.linalg.solve(normal + (ridge * np.eye(count) + 1e-300), sums[:, count, :, None])[:, :, 0])
 
 
 def _least(off: Array, scale: float) -> int:
@@ -107,7 +110,7 @@ def without_states(stretches: Sequence[Binned]) -> list[Binned]:
 
     Only where that makes a recording's residual smaller; what happens once is seen at no other time, and stays.
     """
-    lengths = [item.left.shape[1] for item in stretches]
+    lengths = [item.taken.shape[1] for item in stretches]
     parts = [max(1, round(count * item.width / PART)) for item, count in zip(stretches, lengths, strict=True)]
     # Where each part begins.
     ends = np.cumsum(lengths)
@@ -122,9 +125,10 @@ def without_states(stretches: Sequence[Binned]) -> list[Binned]:
     known = np.concatenate([item.known for item in stretches], axis=1) > FILLED
     left = np.concatenate([item.bounded(LOOSE) for item in stretches], axis=1)
     state = [np.concatenate([item.state[k] for item in stretches], axis=1) for k in range(4)]
-    taken = np.zeros_like(left)
+    taken, shared = np.zeros_like(left), _shared_features(state)
     for j in np.flatnonzero(np.any(known, axis=1)).tolist():
-        taken[j] = _of_others(_features(state, j), left[j], known[j], starts, firsts)
+        columns = np.concatenate([_features(state, j), shared])
+        taken[j] = _of_others(columns, left[j], known[j], starts, firsts)
     return [item.without(part) for item, part in zip(stretches, np.split(taken, ends[:-1], axis=1), strict=True)]
 
 
@@ -179,17 +183,26 @@ def _turning(velocity: Array, most: Array | float) -> Array:
 
 
 def _features(state: Sequence[Array], joint: int) -> Array:
-    """Return functions of the state that a joint's residual may depend on, of unit size, shape (k, M)."""
-    q, v, a, load = state
-    speed = np.maximum(np.max(np.abs(v), axis=1, keepdims=True), 1e-9)
-    turn, own = _turning(v, speed), v[joint] / speed[joint]
-    sign, angle, torque = turn[joint], q[joint], load[joint]
+    """Return functions of its own state that a joint's residual may depend on, of unit size, shape (k, M)."""
+    angle, v, _, torque = (part[joint] for part in state)
+    speed = max(float(np.max(np.abs(v))), 1e-9)
+    sign, own = _turning(v, speed), v / speed
     columns = [sign * np.exp(-np.abs(own) / slow) for slow in SLOWER]
     columns += [np.tanh(2.0 * own), own, own**3, own * np.abs(own)]
     columns += [np.sin(2.0 * angle), np.cos(2.0 * angle), sign * np.sin(angle), sign * np.cos(angle)]
     columns += [sign * np.abs(torque), torque, torque**3, sign * np.minimum(sign * torque, 0.0)]
+    return _of_unit_size(np.array(columns))
+
+
+def _shared_features(state: Sequence[Array]) -> Array:
+    """Return functions of the state of all joints that any joint's residual may depend on, of unit size, shape (k, M)."""
+    q, v, a, _ = state
+    speed = np.maximum(np.max(np.abs(v), axis=1, keepdims=True), 1e-9)
     # A spring, or a cable, pulls by the angle itself.
     away = q - np.mean(q, axis=1, keepdims=True)
-    result = np.array([*columns, *away, *np.sin(q), *np.cos(q), *turn, *v, *a])
-    size = np.sqrt(np.mean(result**2, axis=1, keepdims=True))
-    return np.asarray(result / np.where(size > 0.0, size, 1.0))
+    return _of_unit_size(np.concatenate([away, np.sin(q), np.cos(q), _turning(v, speed), v, a]))
+
+
+def _of_unit_size(columns: Array) -> Array:
+    size = np.sqrt(np.mean(columns**2, axis=1, keepdims=True))
+    return np.asarray(columns / np.where(size > 0.0, size, 1.0))

@@ -17,6 +17,7 @@ from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import Stretch
 from scara_ident.motion.prepared import (
     REST_NOISE,
+    WIDE,
     PreparedData,
     PreparedRecording,
     PreparedStretch,
@@ -27,8 +28,6 @@ from scara_ident.motion.prepared import (
 # Positions have steps where their changes are whole multiples of the least one, but for this much of it in the mean:
 # numbers of random size leave a quarter.
 WHOLE = 0.1
-# The noise of an unfiltered joint is what a filter at this share of the rate takes out.
-WIDE = 0.2
 # Drawn by seed: fits, candidates and what is left all look at the same.
 _NOISIER: WeakKeyDictionary[PreparedData, dict[int, PreparedData]] = WeakKeyDictionary()
 # Of every joint of a stretch the step of its encoder, or else the standard deviation of its white noise.

@@ -41,6 +41,8 @@ REST_NOISE = 5.0
 REST_WIDEN = 0.5
 # Both sides of the equation fade out towards rest over this many periods of the position's low-pass.
 FADE_PERIODS = 1.0
+# The noise of an unfiltered joint is what a filter at this share of the rate takes out.
+WIDE = 0.2
 # Neither is longer than this, s: in a narrow band too little would be left between turning points.
 LONGEST_WIDENING = 0.05
 # Blocks are long against the band's memory, so that scores of different blocks are nearly independent.
@@ -326,6 +328,9 @@ def standstill(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) 
 def rest_speeds(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) -> Array:
     """Return the speeds below which noise may be what moves each joint, shape (n,)."""
     least = REST_SHARE / REST_NOISE * np.max(np.abs(motion.v), axis=1)
+    # Those that are not filtered pass a wide filter together.
+    unfiltered = [j for j, cut in enumerate(position_cuts(stretch.rate, bands)) if cut is None]
+    stretch.filter_all(dict.fromkeys(unfiltered, WIDE * stretch.rate))
     return REST_NOISE * np.array([velocity_noise(stretch, motion, j, bands[j], least[j]) for j in range(len(bands))])
 
 
@@ -372,7 +377,7 @@ def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | N
     cut = reach = position_cuts(stretch.rate, [band])[0]
     if cut is None or reach is None:
         # Nothing was filtered; the noise is what a wide filter would take out. Within a wide band all of it is there.
-        cut = 0.2 * stretch.rate
+        cut = WIDE * stretch.rate
         reach = cut if band is None else 0.5 * stretch.rate
         smooth = stretch.filtered(joint, cut)[0]
     else:

@@ -1,4 +1,4 @@
-"""A command begins sooner, and does the same."""
+"""A command begins and ends sooner, and does the same."""
 
 from __future__ import annotations
 
@@ -38,6 +38,17 @@ with one_blas_thread():
     print({item["num_threads"] for item in threadpool_info() if item["user_api"] == "blas"})
 """
     assert printed(program) == ["False", "{1}"]
+
+
+def test_what_goes_with_the_process_is_not_looked_through_for_garbage() -> None:
+    program = """
+import atexit, gc
+from scara_ident.cli.startup import begin_soon
+atexit.register(lambda: print(gc.get_freeze_count() > 0))
+begin_soon()
+print(gc.get_freeze_count())
+"""
+    assert printed(program) == ["0", "True"]
 
 
 ARM = load_robot()

@@ -98,3 +98,11 @@ def test_a_slow_motion_foresees_the_torques_of_a_fast_one(robot: Robot):
     # What data tell it leaves as it was.
     told = wls(fast).value
     assert largest_error(believable(fast, told, np.full(robot.n, noise[1])), fast) < 1.02 * largest_error(told, fast)
+
+
+@pytest.mark.parametrize(("size", "same"), [(1.0, True), (0.05, False)])
+def test_an_estimate_that_is_told_well_is_believed_itself(robot: Robot, size: float, same: bool):
+    """What was made of it need not be made again."""
+    found = observations(robot, 6, (size, size), noise=1e-3)
+    told = wls(found).value
+    assert (believable(found, told, np.full(robot.n, 1e-6 / RATE)) is told) == same

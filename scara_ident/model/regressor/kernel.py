@@ -19,6 +19,7 @@ from scara_ident.manners import Frozen
 from scara_ident.model.regressor.program import Program
 from scara_ident.model.regressor.recursion import JointGeometry, joint_geometry, trace_regressor
 from scara_ident.model.regressor.tracing import compile_program
+from scara_ident.threads import LONG, THREADS, side_by_side, works_alone
 
 PARAMETERS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """Standard parameters of a body in Pinocchio's order; the inertia is about the origin of the joint's frame."""
@@ -111,13 +112,19 @@ class RegressorKernel(Frozen):
         """
         states = [row for part in self._parts(q, v, a) for row in part]
         samples = len(states[0])
+        count = max(1, -(-samples // _CHUNK))
+        if not works_alone() and samples >= THREADS * LONG:
+            count = THREADS * -(-count // THREADS)
         # Equal chunks, so that the last is not a short one.
-        length = -(-samples // max(1, -(-samples // _CHUNK)))
-        buffers = np.empty((self._program.buffers, length))
-        for start in range(0, samples, max(1, length)):
-            stop = min(start + length, samples)
-            parts = {place: target[start:stop] for place, target in targets.items()}
-            self._program.evaluate([row[start:stop] for row in states], parts, buffers[:, : stop - start])
+        length = max(1, -(-samples // count))
+
+        def chunk(start: int) -> None:
+            some = slice(start, start + length)
+            parts = {place: target[some] for place, target in targets.items()}
+            own = [row[some] for row in states]
+            self._program.evaluate(own, parts, np.empty((self._program.buffers, len(own[0]))))
+
+        side_by_side(chunk, range(0, samples, length))
 
     def _states(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
         """Return the three inputs as one array (3 nv, samples)."""
