@@ -94,12 +94,11 @@ class SelectionCriteria:
         0.6, "of the best gain", "families worth refining before one is chosen: a grid point loses up to 40 %"
     )
     most_refined: int = _criterion(4, "families", "refined at once, for time")
-    least_gain_to_fit: float = _criterion(
-        0.1,
-        "share of squared residual",
-        "a joint whose gear may be elastic is simulated anew in every step of a fit, for time",
+    most_fitted: int = _criterion(
+        2,
+        "candidates",
+        "fitted with all else in one round, for time: an elastic joint is simulated anew in every step of a fit",
     )
-    most_fitted: int = _criterion(2, "candidates", "fitted with all else in one round, for time")
     # What is left over.
     remainder: float = _criterion(
         0.08,
@@ -153,6 +152,11 @@ class SelectionCriteria:
     # Choosing the band again.
     wider: float = _criterion(
         1.3, "of the band", "with an effect found the search is repeated where the band grows by so much"
+    )
+    beyond: float = _criterion(
+        2.0,
+        "of the band",
+        "above it is looked for what the band's end may itself come from, an elastic joint's resonance",
     )
     most_widenings: int = _criterion(2, "times", "bands grow no further")
     # Effects that stand for another.

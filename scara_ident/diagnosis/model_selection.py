@@ -10,21 +10,24 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision, hopeless
 from scara_ident.diagnosis.audit import outdone, unsettled
-from scara_ident.diagnosis.candidates import CandidateColumns
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.evidence import coloured_shares
 from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
 from scara_ident.diagnosis.moments import examine_moments
+from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.screening import Dependence, screen
-from scara_ident.diagnosis.search import Search, SearchTask, search
-from scara_ident.diagnosis.selection_step import observed, observed_at_every_sample
+from scara_ident.diagnosis.search import Search, SearchTask, fitted_beside, scene_of, search
+from scara_ident.diagnosis.selection_step import SelectionStep, observed, observed_at_every_sample
 from scara_ident.diagnosis.work import first, next_of, search_and_rest
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.bands import HIGHEST_BAND, choose_bands
+from scara_ident.estimation.explained_power import EXPLAINED, sample
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
+from scara_ident.motion.prepared import PreparedData
 
 
 @dataclass(frozen=True)
@@ -102,13 +105,15 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
     data = observations.data
     columns = CandidateColumns(observations)
     now, left = first(task.progress)
-    found = _searched(replace(task, progress=now), columns, ())
+    found, looked = _searched(replace(task, progress=now), columns, ()), False
     for _ in range(criteria.most_widenings if free else 0):
         left("choosing the band again")
         # What was missing had hidden how far up the motion explains the torque, and other effects with it.
         explains = max(choose_bands(found.search.model, found.search.data).bands) if found.search.chosen else 0.0
         asked = _asked_band(found.search)
         promised = max(asked, _promised_band(found.search, criteria))
+        if not looked and max(explains, promised) < criteria.wider * _band(found):
+            looked, promised = True, _band_beyond(task, found.search)
         wider = max(explains, promised)
         if wider < criteria.wider * _band(found):
             break
@@ -140,6 +145,33 @@ def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
         return 0.0
     best = max(promising, key=lambda item: item.gain).candidate
     return _within(best.effect.band(best.member), found)
+
+
+def _band_beyond(task: SearchTask, found: Search) -> float:
+    """Return a band beyond that tells effects that this one does not, Hz; 0 where nothing is seen of them there.
+
+    Below a resonance little tells of it, and where it begins the model without it explains no torque: the band ends.
+    """
+    band = _within(task.criteria.beyond * _widest(found.data), found)
+    if band < task.criteria.wider * _widest(found.data):
+        return 0.0
+    # One repetition of each motion shows what is large enough.
+    columns = CandidateColumns(observe(task.model, sample(found.data.at((band,) * len(found.bands)))))
+    start = wls(columns.observations)
+    scene = replace(scene_of(task.model, start.value, columns.observations), armatures=found.scene.armatures)
+    members = [Candidate(effect, item) for effect in task.catalogue for item in effect.members(scene)]
+    # What the band at hand holds was tried there.
+    needing = [item for item in members if item.effect.band(item.member) > _widest(found.data)]
+    step = SelectionStep(scene, columns, found.chosen, start.weights, found.tried + len(needing), task.criteria)
+    # The band was left where the motion explains less than half: so much of what is seen further up must be this effect.
+    seen = [item for item in step.judge(needing) if item.accepted and item.gain >= task.criteria.near_best * EXPLAINED]
+    fitted = [(own, item) for own, item in fitted_beside(step, seen, 0.0, None) if item.accepted]
+    if not fitted:
+        return 0.0
+    own, best = max(fitted, key=lambda pair: pair[1].gain)
+    if best.gain < EXPLAINED or noise_objection(own, best) is not None:
+        return 0.0
+    return _within(best.candidate.effect.band(best.candidate.member), found)
 
 
 def _asked_band(found: Search) -> float:
@@ -232,7 +264,11 @@ def _above_noise(fit: LackOfFit, criteria: SelectionCriteria) -> bool:
 
 
 def _band(found: Outcome) -> float:
-    return max(band or np.inf for band in found.search.bands)
+    return _widest(found.search.data)
+
+
+def _widest(data: PreparedData) -> float:
+    return max(band or np.inf for band in data.bands)
 
 
 def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome) -> Outcome:

@@ -271,7 +271,7 @@ def _choose(
     for item in decisions:
         by_family.setdefault(item.candidate.effect, []).append(item)
     best = [item for family in by_family.values() for item in best_of_each(family).values()]
-    first = [item for item in best if item.candidate.effect.fitted_first]
+    first = [item for item in decisions if item.candidate.effect.fitted_first]
     accepted = [item for item in best if item.accepted and not item.candidate.effect.fitted_first]
     found = fitted_beside(step, first, max((item.gain for item in accepted), default=0.0), known)
     refused = {item.label: item for _, item in found if not item.accepted}
@@ -327,7 +327,7 @@ def fitted_beside(
     ----------
     step : SelectionStep
     candidates : sequence of Decision
-        The best grid points of families that are fitted first.
+        Grid points of families that are fitted first.
     best : float
         Largest gain among the other families.
     known : Search or None
@@ -339,7 +339,7 @@ def fitted_beside(
         With the step at the estimate that goes with the candidate.
     """
     criteria = step.criteria
-    worth = _worth_fitting(candidates, max(criteria.least_gain_to_fit, criteria.near_best * best), step.tried, criteria)
+    worth = _worth_fitting(candidates, max(criteria.least_gain, criteria.near_best * best), step.tried, criteria)
     begins = {item.label: (step.scene, item.candidate) for item in worth}
     if known is not None:
         # Found in another band: from there it is near.
@@ -361,15 +361,19 @@ def fitted_beside(
 
 
 def _worth_fitting(
-    candidates: Sequence[Decision], enough: float, tried: int, criteria: SelectionCriteria
+    points: Sequence[Decision], enough: float, tried: int, criteria: SelectionCriteria
 ) -> list[Decision]:
-    """Return those that promise so much gain and what they may stand for, the most promising first."""
-    # A fit is dear: only what chance would not bring among so many at a grid point is worth one.
-    sure = [item for item in candidates if item.gain >= enough and item.examination.p_value * tried <= 1.0]
-    # The same of another joint, however unsure or small at its grid point, which loses most of a resonance with little damping.
-    names = {item.candidate.effect.name for item in sure}
-    worth = [item for item in candidates if item.candidate.effect.name in names]
-    return sorted(worth, key=lambda item: -item.gain)[: criteria.most_fitted]
+    """Return the best points of those that promise so much gain and what they may stand for, the most promising first."""
+    # A fit is dear: only what chance would not bring among so many is worth one. Of a resonance with little damping a grid
+    # point loses most, or is unsure where it removes most, as its waves are others in every run; a point beside it, or the
+    # same of another joint, may be sure.
+    sure = {
+        item.candidate.effect.name for item in points if item.gain > 0.0 and item.examination.p_value * tried <= 1.0
+    }
+    best = [item for item in best_of_each(points).values() if item.candidate.effect.name in sure]
+    worth = {item.candidate.effect.name for item in best if item.gain >= enough}
+    best = [item for item in best if item.candidate.effect.name in worth]
+    return sorted(best, key=lambda item: -item.gain)[: criteria.most_fitted]
 
 
 def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:

@@ -8,19 +8,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from scara_ident.diagnosis import model_selection
+from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.lack_of_fit import lack_of_fit
 from scara_ident.diagnosis.model_selection import (
     Outcome,
     Unexplained,
     _asked_band,
+    _band_beyond,
     _promised_band,
     _proxies,
     rms_of,
     select_model,
 )
 from scara_ident.diagnosis.moments import examine_moments
-from scara_ident.diagnosis.search import SearchTask
+from scara_ident.diagnosis.search import SearchTask, search
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.effects import CATALOGUE
 from scara_ident.effects.elasticity import JointElasticity
@@ -76,6 +79,24 @@ def test_a_joint_that_swings_within_the_band_is_found_there() -> None:
     assert _asked_band(wider.search) == pytest.approx(1.5 * swings)
     assert band is not None
     assert CRITERIA.wider * band > 1.5 * swings
+
+
+@pytest.mark.slow
+def test_a_band_beyond_is_looked_at_for_what_this_one_does_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    task = SearchTask(MODEL, (JointElasticity(), Spring()))
+    for stiffness, swings in (("40000", True), ("1e9", False)):
+        runs = virtual_runs(f"joint_elasticity:joint1:stiffness={stiffness}")
+        narrow = search(task, CandidateColumns(observe(MODEL, prepare(runs, (7.0, 7.0)))))
+        assert narrow.chosen == ()
+        assert (_band_beyond(task, narrow) >= CRITERIA.wider * 7.0) == swings
+        # A person must not be led to where most of what is seen is something else.
+        with monkeypatch.context() as context:
+            context.setattr(model_selection, "EXPLAINED", 1.0)
+            assert _band_beyond(task, narrow) == 0.0
+    # For no family that every band shows, and not where it is hardly another.
+    assert _band_beyond(SearchTask(MODEL, (Spring(),)), narrow) == 0.0
+    nearly = replace(CRITERIA, beyond=0.9 * CRITERIA.wider)
+    assert _band_beyond(replace(task, criteria=nearly), narrow) == 0.0
 
 
 @pytest.mark.slow

@@ -218,20 +218,35 @@ def test_the_scene_is_how_far_the_recordings_reach():
             assert np.array_equal(held, made)
 
 
+def point(label: str, gain: float, p_value: float):
+    """Return a decision on a grid point of a family of one letter on a joint."""
+    effect = SimpleNamespace(effect=SimpleNamespace(name=label[0]))
+    examination = SimpleNamespace(p_value=p_value)
+    return SimpleNamespace(candidate=effect, label=label, gain=gain, examination=examination, accepted=False)
+
+
 def test_what_an_effect_may_stand_for_on_another_joint_is_fitted_beside_it():
     """An elastic second joint was believed where the first was, whose grid point chance might have brought."""
 
-    def decision(name: str, gain: float, p_value: float):
-        effect = SimpleNamespace(effect=SimpleNamespace(name=name))
-        return SimpleNamespace(candidate=effect, gain=gain, examination=SimpleNamespace(p_value=p_value))
-
-    other, first, faint = decision("a", 0.16, 3e-9), decision("a", 0.13, 0.13), decision("a", 0.05, 0.13)
-    beside = decision("b", 0.15, 0.13)
+    other, first, faint = point("a1", 0.16, 3e-9), point("a2", 0.13, 0.13), point("a3", 0.05, 0.13)
+    beside = point("b1", 0.15, 0.13)
     assert _worth_fitting([faint, first, beside, other], 0.1, 100, CRITERIA) == [other, first]
     # It may gain next to nothing there, and most once it is fitted.
     assert _worth_fitting([faint, beside, other], 0.1, 100, CRITERIA) == [other, faint]
     # Alone it is not worth a fit.
     assert _worth_fitting([first, beside], 0.1, 100, CRITERIA) == []
+
+
+def test_a_resonance_that_one_grid_point_shows_large_and_another_sure_is_fitted():
+    """At 20,000 N m/rad, with little damping, the point that removed most was unsure, and a sure one removed too little."""
+    large, sure, other = point("a1", 0.091, 0.033), point("a1", 0.027, 1.4e-4), point("a2", 0.005, 0.13)
+    assert _worth_fitting([sure, other, large], CRITERIA.least_gain, 116, CRITERIA) == [large, other]
+    # Sure of the other joint alone, for which it may stand.
+    sure = point("a2", 0.027, 1.4e-4)
+    assert _worth_fitting([large, sure], CRITERIA.least_gain, 116, CRITERIA) == [large, sure]
+    # A point that makes things worse is sure of nothing, and none may be large enough.
+    assert _worth_fitting([large, point("a1", -0.1, 1e-9)], CRITERIA.least_gain, 116, CRITERIA) == []
+    assert _worth_fitting([sure, other], CRITERIA.least_gain, 116, CRITERIA) == []
 
 
 def test_what_takes_the_place_of_an_effect_in_the_model_does_not_come_in(monkeypatch):

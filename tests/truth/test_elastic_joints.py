@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
@@ -16,6 +18,7 @@ from tests.effects.scenes import wandering
 
 pytestmark = pytest.mark.slow
 
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 SECONDS, RATE = 14.0, 500.0
 
 
@@ -52,6 +55,18 @@ def test_a_soft_first_joint_is_found_alone_with_its_stiffness(stiffness: float):
     (entry,) = diagnosis_dict(found)["effects"]
     assert entry["direct"]["stiffness"]["value"] == told.value
     assert any("tells stiffness" in sentence and "agrees" in sentence for sentence in sentences(found))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [92, 94])
+def test_a_resonance_above_the_first_band_is_looked_for_there(seed: int, monkeypatch: pytest.MonkeyPatch):
+    """`complete`: the band ended where the resonance of 13 Hz begins, and no grid point below was both sure and large."""
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    made = pytest.importorskip("elasticity", reason="benchmarks are not part of an installed package")
+    runs = made.runs("joint_elasticity:joint1:stiffness=20000", seed, 15.0)
+    found = diagnosed([item.recording for item in runs])
+    assert alone(found, "joint_elasticity", "joint1", "stiffness") == pytest.approx(20000.0, rel=0.05)
+    assert max(found.search.bands) > 13.0
 
 
 @pytest.mark.slow
