@@ -99,6 +99,11 @@ class SelectionCriteria:
         "candidates",
         "fitted with all else in one round, for time: an elastic joint is simulated anew in every step of a fit",
     )
+    least_without_noise: float = _criterion(
+        0.5,
+        "of the squared torque",
+        "what an effect must keep without the noise of the positions: noise of many rows is as sure as an effect",
+    )
     # What is left over.
     remainder: float = _criterion(
         0.08,

@@ -15,7 +15,7 @@ from scara_ident.diagnosis.selection_step import SelectionStep
 
 
 def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
-    """Say so where an effect is no longer to be believed once the share of the positions' noise is taken from it.
+    """Say so where an effect is no longer to be believed, or mostly gone, once the positions' noise is taken from it.
 
     What a candidate's column has in common with the residual grows linearly with the variance of the noise in both.
     With the noise twice, the difference is the noise's share (Cook and Stefanski 1994).
@@ -38,7 +38,8 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
         # What is no smaller without the noise was not made by it.
         return None
     p_value = significance(found.tested - found.value + left, found.covariance, found.freedom, found.products)
-    if p_value * step.tried <= criteria.family_error and decision.gain * share >= criteria.least_gain:
+    sure = p_value * step.tried <= criteria.family_error and decision.gain * share >= criteria.least_gain
+    if sure and share >= criteria.least_without_noise:
         return None
     return f"the noise of the positions makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
 

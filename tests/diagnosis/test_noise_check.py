@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from scara_ident.diagnosis import noise_check
+from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import Examination, examine
+from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import significance
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitted_model import FittedModel
-from scara_ident.diagnosis.noise_check import without_noise
+from scara_ident.diagnosis.noise_check import noise_objection, without_noise
+from scara_ident.effects import Member
+from scara_ident.effects.position import Spring
 from scara_ident.estimation.joint_rows import JointRows
 
 BLOCKS, ROWS = 100, 12
@@ -38,3 +46,28 @@ def test_what_the_noise_makes_is_taken_off_and_what_the_arm_does_is_left(true: f
     assert abs(left[0]) == pytest.approx(true, abs=0.07)
     p_value = significance(left, once.covariance, once.freedom, once.products)
     assert (p_value < 1e-6) if true else (p_value > 1e-3)
+
+
+@pytest.mark.parametrize(("true", "believed"), [(0.4, True), (-0.12, False)])
+def test_what_is_mostly_noise_is_not_believed_however_sure_the_rest_is(
+    true: float, believed: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """An elastic elbow stood for a wrist's: a tenth of it was left without the noise, with p = 1e-20."""
+    rng = np.random.default_rng(4)
+    smooth, other = lfilter([1.0], [1.0, -0.9], rng.standard_normal((2, LENGTH)), axis=1)
+    torque = 2.0 * smooth + true * other + 0.02 * rng.standard_normal(LENGTH)
+    noise, again = 0.3 * rng.standard_normal((2, LENGTH))
+    once = examined(smooth + noise, other + 3.0 * noise, torque)
+    twice = examined(smooth + noise + again, other + 3.0 * (noise + again), torque)
+    rows = SimpleNamespace(rows=lambda scene, candidates: [None])
+    noisier = SimpleNamespace(columns=rows, scene=None, model=None)
+    columns = SimpleNamespace(unresolved_for=lambda joint: None)
+    step = SimpleNamespace(columns=columns, noisier=noisier, criteria=CRITERIA, tried=100)
+    monkeypatch.setattr(noise_check, "coefficients", lambda *_: (twice.value, twice.products))
+    candidate = Candidate(Spring(), Member(0))
+    decision = Decision(candidate, "spring", once, accepted=True, why="", gain=0.9)
+    left = without_noise(once, twice.value, twice.products)
+    assert significance(left, once.covariance, once.freedom, once.products) < 1e-6
+    said = noise_objection(step, decision)
+    assert (said is None) == believed
+    assert believed or "the noise of the positions makes it" in said
