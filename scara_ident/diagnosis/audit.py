@@ -12,7 +12,7 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters
-from scara_ident.diagnosis.noise_check import noise_objection
+from scara_ident.diagnosis.noise_check import noise_objection, within_a_step
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.variation_check import variation_objection
 
@@ -64,10 +64,12 @@ def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[
         On the effects that are not believed.
     """
     step = replace(found.step, weights=weights)
+    # What turns within a step of the encoder is not there: it mends friction's sign, as some of what is there does too.
+    rivals = [item.candidate for item in refused if within_a_step(step, item.candidate) is None]
     result = []
-    for place, candidate in enumerate(step.chosen if refused else ()):
+    for place, candidate in enumerate(step.chosen if rivals else ()):
         beside = step.without(place)
-        own, *others = beside.judge([candidate, *(item.candidate for item in refused)])
+        own, *others = beside.judge([candidate, *rivals])
         enough = step.criteria.least_share * own.examination.held_out
         best = max(others, key=lambda item: item.examination.held_out)
         if best.examination.held_out >= enough:

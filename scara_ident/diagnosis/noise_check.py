@@ -12,6 +12,7 @@ from scara_ident.diagnosis.candidate_tests import Examination, coefficients
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.motion.position_noise import noise_sizes
 
 
 def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
@@ -28,7 +29,7 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
         That lets it in.
     """
     found, criteria = decision.examination, step.criteria
-    unresolved = step.columns.unresolved_for(decision.candidate.member.joint)
+    unresolved = step.columns.unresolved_for(decision.candidate.member.joint) or within_a_step(step, decision.candidate)
     if unresolved is not None:
         return unresolved
     (own,) = step.noisier.columns.rows(step.noisier.scene, [decision.candidate])
@@ -42,6 +43,18 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     if sure and share >= criteria.least_without_noise:
         return None
     return f"the noise of the positions makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
+
+
+def within_a_step(step: SelectionStep, candidate: Candidate) -> str | None:
+    """Say so where an effect turns on a way that the encoder's steps hide: it mends the sign of friction where they spoil it."""
+    way, joint = candidate.effect.shortest_way(candidate.member), candidate.member.joint
+    if joint is None or not np.isfinite(way):
+        return None
+    sizes = [part[joint][0] or 0.0 for parts in noise_sizes(step.observations.data) for part in parts]
+    unit = "m" if step.scene.robot.prismatic[joint] else "rad"
+    if way >= max(sizes, default=0.0):
+        return None
+    return f"it turns on {way:.2g} {unit}, less than a step of the encoder, {max(sizes):.2g} {unit}"
 
 
 def without_noise(found: Examination, value: Array, products: Array) -> Array:

@@ -249,6 +249,10 @@ class Effect(ABC):
         """Return the band, Hz, that holds where a member shows most; 0 where every band does."""
         return 0.0
 
+    def shortest_way(self, member: Member) -> float:
+        """Return the shortest way of its joint that a member turns on, rad or m; infinite where none does."""
+        return np.inf
+
     def knowing(self, unloaded: frozenset[str]) -> Effect:
         """Return the family that knows the names of recordings in which the arm carries nothing."""
         return self

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scara_ident.diagnosis import audit
 from scara_ident.diagnosis.audit import outdone, uncertain, unsettled
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
@@ -57,7 +58,7 @@ def test_only_what_is_essential_is_asked():
         assert (uncertain(own, examined(100.0, 2), essential, 3.0) is None) is stands
 
 
-def test_a_spring_of_the_arm_stands():
+def test_a_spring_of_the_arm_stands(monkeypatch: pytest.MonkeyPatch):
     made = with_torque(exact_runs(), 1, lambda motion: 0.05 * motion.q[1])
     found = searched(made, Spring())
     assert [item.label(found.scene) for item in found.chosen] == ["spring of joint2"]
@@ -72,6 +73,9 @@ def test_a_spring_of_the_arm_stands():
     (fallen,) = outdone(proxy, found.step.weights, (other.refused(""), spring.refused("")))
     assert (fallen.label, fallen.accepted, fallen.tentative) == (other.label, False, True)
     assert fallen.why == "spring of joint2, which is not believed, does as well in its place"
+    # What turns within a step of the encoder is no rival: nothing real was refused.
+    monkeypatch.setattr(audit, "within_a_step", lambda step, candidate: "less than a step")
+    assert outdone(proxy, found.step.weights, (spring.refused(""),)) == []
 
 
 def test_without_effects_there_is_nothing_to_look_at():

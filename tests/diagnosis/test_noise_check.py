@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,7 +19,9 @@ from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.noise_check import noise_objection, without_noise
 from scara_ident.effects import Member
 from scara_ident.effects.position import Spring
+from scara_ident.effects.presliding import Presliding
 from scara_ident.estimation.joint_rows import JointRows
+from tests.diagnosis.made import exact_runs, step_beside
 
 BLOCKS, ROWS = 100, 12
 LENGTH = BLOCKS * ROWS
@@ -71,3 +74,16 @@ def test_what_is_mostly_noise_is_not_believed_however_sure_the_rest_is(
     said = noise_objection(step, decision)
     assert (said is None) == believed
     assert believed or "the noise of the positions makes it" in said
+
+
+@pytest.mark.parametrize(("steps", "hidden"), [(0.4, True), (5.0, False)])
+def test_what_turns_within_a_step_of_the_encoder_is_not_believed(steps: float, hidden: bool):
+    """Presliding over 0.4 steps mended the sign of friction that the steps spoil, and was believed (UR5, 12 and 15 bits)."""
+    encoder = 2.0 * np.pi / 2**13
+    runs = [replace(run, position=encoder * np.round(run.position / encoder)) for run in exact_runs()]
+    step = step_beside(runs)
+    (decision,) = step.judge([Candidate(Presliding(), Member(1, (steps * encoder,)))])
+    said = noise_objection(step, decision)
+    assert ("less than a step of the encoder, 0.00077 rad" in (said or "")) == hidden
+    (other,) = step.judge([Candidate(Spring(), Member(1))])
+    assert "step" not in (noise_objection(step, other) or "")
