@@ -298,7 +298,9 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
     """Return the decisions on effects that remove little of a remainder most of which stays, with why."""
     # Not to believe an effect less is asked than to say that something is left: it may stand for what is too small, too.
     left = found.repeating | ({found.unexplained.joint} if found.unexplained else set())
-    if not left or not found.fit_after:
+    # Of one motion alone, what the model lacks is the same in every recording, and no other motion says otherwise.
+    alone = len(found.training.data.trajectories) == 1 < len(found.training.data.recordings)
+    if not (left or alone) or not found.fit_after:
         return []
     search = found.search
     joints = search.base.robot.joints
@@ -328,11 +330,12 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
             share = max(0.0, removed / repeats)
             why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"
             proxies.append(decision.refused(why))
-        elif decision.label in labels and found.unexplained and owner in (None, found.unexplained.joint):
+        elif decision.label in labels and (alone or (found.unexplained and owner in (None, found.unexplained.joint))):
             place = labels.index(decision.label)
             p_value = examine_moments(search.step.without(place), search.chosen[place]).p_value
-            if p_value * search.tried > criteria.family_error:
-                why = f"what is left repeats: with repetitions of a motion counted once p = {p_value:.1e}"
+            if p_value * search.tried > (criteria.moments_error if alone else criteria.family_error):
+                doubt = "there is one motion only" if alone else "what is left repeats"
+                why = f"{doubt}: with repetitions of a motion counted once p = {p_value:.1e}"
                 proxies.append(decision.refused(why))
     return proxies
 
