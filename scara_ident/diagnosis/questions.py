@@ -20,6 +20,7 @@ from scara_ident.diagnosis.shape import shape_over
 from scara_ident.effects import EFFECTS, Effect, Member
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation.bands import needed_rows
+from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.motion.low_pass import noise_share
 
 Kind = Literal["rivals", "unexplained", "below_limit", "parameter"]
@@ -345,7 +346,9 @@ def noise_density(diagnosis: Diagnosis) -> Array:
 
     Squares of what is left over those that white noise would leave, which the low-pass thins, the times at rest fade and the
     columns take a part of; times by how much blocks of time scatter more than white residuals would, for all joints alike,
-    as few blocks tell it badly of one. What effects that are worth a look explain is no noise: it is what is asked for.
+    as few blocks tell it badly of one. Without what the noise of the positions leaves: differentiated twice it is at the end
+    of the band, where motions have little torque. What effects that are worth a look explain is no noise: it is what is
+    asked for.
     """
     search, after = diagnosis.search, diagnosis.after
     step, observations = search.step, diagnosis.training_after
@@ -354,7 +357,8 @@ def noise_density(diagnosis: Diagnosis) -> Array:
     model = fitted_model(step.observations, columns, after.weights, 1)
     parts = [part for part in step.observations.data.stretches if part.usable]
     rate = min(part.rate for part in parts)
-    level, thinned, samples = np.full(len(model.joints), np.nan), 0.0, 0.0
+    level, thinned, count = np.full(len(model.joints), np.nan), 0.0, 0
+    made = noise_torque(observations, after.value) ** 2
     taken = needed_rows(after.model)
     for rows in columns[len(search.chosen) :]:
         for j, own in rows.items():
@@ -365,15 +369,17 @@ def noise_density(diagnosis: Diagnosis) -> Array:
             for part in parts
         )
         if white > taken[j] and weight > 0.0:
-            level[j] = float(error @ error) / (weight**2 * (white - taken[j]))
-            thinned, samples = thinned + white, samples + sum(part.steps[j] * len(part.kept[j]) for part in parts)
+            squares = float(error @ error) / weight**2
+            of_positions = made[j] * sum(part.steps[j] * len(part.kept[j]) for part in parts)
+            # Each is known to a share of ``sqrt(2 / white)``: less than twice the error of their difference is not told from it.
+            level[j] = max(squares - of_positions, min(1.0, 4.0 / np.sqrt(white)) * squares) / (white - taken[j])
+            thinned, count = thinned + white, count + len(error)
     size = np.sqrt(np.clip(np.diag(after.information.inverse()), 0.0, None))
-    count = sum(own.table.shape[1] for own in observations.joints)
     plain = np.sqrt(after.information.residual_sum(after.value) / max(1, count)) * size
     known = (plain > 0.0) & np.isfinite(after.std) & ~after.undetermined
-    if not (np.any(known) and samples):
+    if not (np.any(known) and count):
         return level / rate
-    scatter = float(np.median((after.std[known] / plain[known]) ** 2)) * thinned / samples
+    scatter = float(np.median((after.std[known] / plain[known]) ** 2)) * thinned / count
     # A variance told by so many blocks is this far off by chance, one standard deviation.
     return level * max(1.0, scatter / float(1.0 + np.sqrt(2.0 / len(model.owner)))) / rate
 
