@@ -15,6 +15,7 @@ from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import needed
 from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.diagnosis.noise_check import less_noise
 from scara_ident.diagnosis.selection_step import fitted_model
 from scara_ident.diagnosis.shape import shape_over
 from scara_ident.effects import EFFECTS, Effect, Member
@@ -225,10 +226,13 @@ def _remainder(diagnosis: Diagnosis) -> Iterator[Question]:
 
 
 def _worth_a_look(diagnosis: Diagnosis) -> Iterator[Question]:
-    scene = diagnosis.search.scene
-    known = {item.label(scene) for item in diagnosis.search.chosen}
-    for decision in (item.decision for item in diagnosis.tentative if item.decision is not None):
+    step = diagnosis.search.step
+    known = {item.label(step.scene) for item in step.chosen}
+    found = [item.decision for item in diagnosis.tentative if item.decision is not None]
+    for before, decision in zip(found, less_noise(step, found), strict=True):
         suspect = _as_found(decision)
+        if decision is not before and decision.examination.p_value > step.criteria.significant:
+            continue
         if _moves(decision.candidate) and decision.label not in known and np.any(suspect.value):
             known.add(decision.label)
             experiment = decision.candidate.effect.experiment
@@ -287,7 +291,11 @@ def _others(diagnosis: Diagnosis) -> list[Decision]:
         rank = (_odds(own), -_limit(own.examination, diagnosis))
         if possible(own, diagnosis) and (own.label not in best or rank > best[own.label][0]):
             best[own.label] = rank, own
-    return [item for _, item in best.values()]
+    less = (
+        _mirrored(item) if not possible(item, diagnosis) else item
+        for item in less_noise(search.step, [item for _, item in best.values()])
+    )
+    return [item for item in less if possible(item, diagnosis)]
 
 
 def _mirrored(decision: Decision) -> Decision:

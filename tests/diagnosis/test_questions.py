@@ -18,6 +18,7 @@ from scara_ident.diagnosis.questions import (
     questions,
     suspects_in_model,
 )
+from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.errors import UsageError
 from scara_ident.files import plain
 from scara_ident.simulation import simulate, virtual_arm
@@ -97,14 +98,19 @@ def test_slow_noise_counts_as_blocks_of_time_show_it():
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_what_the_noise_of_positions_makes_is_no_noise_of_the_torque(seed: int):
-    # Encoders of 300 steps a turn: within 20 Hz they make as much of what is left as the torque's noise.
+def test_what_the_noise_of_positions_makes_neither_ranks_first_nor_counts_as_noise_of_the_torque(seed: int):
+    # Encoders of 300 steps a turn: within 20 Hz they make as much of what is left as the torque's noise, and lags of the links.
     arm = replace(virtual_arm(), torque_noise=3.0 * np.array(NOISE), encoder_steps=np.array([300.0, 300.0]))
     motion = multisine("small", 1, 8.0, 1.0)
     runs = [simulate(arm, motion, seed=seed, repetition=k, rate=250.0).recording for k in (1, 2)]
-    found = diagnose(arm.robot, runs, bands=(20.0, 20.0), catalogue=())
+    found = diagnose(arm.robot, runs, bands=(20.0, 20.0), catalogue=(JointElasticity(),))
     # The difference of two variances that are known to a tenth each, the larger of them twice as large.
     assert noise_density(found) == pytest.approx(arm.torque_noise**2 / 250.0, rel=0.4)
+    assert min(item.examination.p_value for item in found.search.decisions) < 1e-5
+    suspects = [item for question in questions(found) for item in question.suspects]
+    assert {item.label for item in suspects} == {"joint_elasticity of joint1", "joint_elasticity of joint2"}
+    # Before it was taken off, as many as there can be.
+    assert max(item.odds for item in suspects) < 0.25 * MOST_ODDS
 
 
 def test_of_members_of_which_nothing_is_known_that_which_takes_fewest_standard_errors_is_asked_for():
