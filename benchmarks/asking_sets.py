@@ -19,8 +19,9 @@ from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.correction import corrected
 from scara_ident.diagnosis.fitted_model import FittedModel
-from scara_ident.diagnosis.questions import Question, Suspect, noise_density, suspects_in_model
+from scara_ident.diagnosis.questions import Question, Suspect, suspects_in_model
 from scara_ident.diagnosis.selection_step import fitted_model
+from scara_ident.diagnosis.torque_noise import noise_density
 from scara_ident.estimation.observations import observe
 from scara_ident.excitation import Design, Effort, Limits, design_excitation, limits_of
 from scara_ident.excitation.promise import sure_of

@@ -27,7 +27,6 @@ from scara_ident.diagnosis.questions import (
     Question,
     Suspect,
     all_suspects,
-    noise_density,
     question_of,
     questions,
     suspect_of,
@@ -35,6 +34,7 @@ from scara_ident.diagnosis.questions import (
 )
 from scara_ident.diagnosis.search import scene_of
 from scara_ident.diagnosis.shape import shape_over
+from scara_ident.diagnosis.torque_noise import noise_density
 from scara_ident.diagnosis.unknowns import sides
 from scara_ident.effects import Member, Scene
 from scara_ident.errors import ScaraIdentError

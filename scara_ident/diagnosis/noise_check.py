@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from scara_ident.diagnosis.candidate_tests import Examination, coefficients
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
 from scara_ident.motion.position_noise import noise_sizes
 
 
@@ -32,13 +34,12 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     unresolved = step.columns.unresolved_for(decision.candidate.member.joint) or within_a_step(step, decision.candidate)
     if unresolved is not None:
         return unresolved
-    (own,) = step.noisier.columns.rows(step.noisier.scene, [decision.candidate])
-    left = without_noise(found, *coefficients(step.noisier.model, own, criteria))
-    share = float(left @ found.products @ left) / float(found.value @ found.products @ found.value)
+    (left,) = _each_without_noise(step, [decision])
+    share = _share(found, left)
     if share >= 1.0:
         # What is no smaller without the noise was not made by it.
         return None
-    p_value = significance(found.tested - found.value + left, found.covariance, found.freedom, found.products)
+    p_value = _left_of(found, left).p_value
     sure = p_value * step.tried <= criteria.family_error and decision.gain * share >= criteria.least_gain
     if sure and share >= criteria.least_without_noise:
         return None
@@ -55,6 +56,48 @@ def within_a_step(step: SelectionStep, candidate: Candidate) -> str | None:
     if way >= max(sizes, default=0.0):
         return None
     return f"it turns on {way:.2g} {unit}, less than a step of the encoder, {max(sizes):.2g} {unit}"
+
+
+def less_noise(step: SelectionStep, decisions: Sequence[Decision]) -> list[Decision]:
+    """Return decisions with what is left beside a model once the share of the positions' noise is taken off, where it is less.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The model.
+    decisions : sequence of Decision
+    """
+    if not decisions or max(noise_shares(step.observations.data), default=0.0) < NEGLIGIBLE:
+        return list(decisions)
+    judged, result = step.judge([item.candidate for item in decisions]), []
+    for item, now, left in zip(decisions, judged, _each_without_noise(step, judged), strict=True):
+        found, share = now.examination, _share(now.examination, left)
+        less = replace(now, examination=_left_of(found, left), gain=share * now.gain, why=item.why)
+        result.append(less if share < 1.0 else item)
+    return result
+
+
+def _each_without_noise(step: SelectionStep, decisions: Sequence[Decision]) -> list[Array]:
+    """Return `without_noise` of each, examined beside a model."""
+    noisier = step.noisier
+    rows = noisier.columns.rows(noisier.scene, [item.candidate for item in decisions])
+    return [
+        without_noise(item.examination, *coefficients(noisier.model, own, step.criteria))
+        for item, own in zip(decisions, rows, strict=True)
+    ]
+
+
+def _share(found: Examination, left: Array) -> float:
+    """Return the share of what a candidate removes that is left with other coefficients; 1 of nothing."""
+    whole = float(found.value @ found.products @ found.value)
+    return float(left @ found.products @ left) / whole if whole > 0.0 else 1.0
+
+
+def _left_of(found: Examination, left: Array) -> Examination:
+    """Return what is said of a candidate with the coefficients that are left of it."""
+    tested = found.tested - found.value + left
+    p_value = significance(tested, found.covariance, found.freedom, found.products)
+    return replace(found, value=left, tested=tested, p_value=p_value)
 
 
 def without_noise(found: Examination, value: Array, products: Array) -> Array:

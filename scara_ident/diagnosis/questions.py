@@ -9,18 +9,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import needed
 from scara_ident.diagnosis.diagnose import Diagnosis
-from scara_ident.diagnosis.selection_step import fitted_model
+from scara_ident.diagnosis.noise_check import less_noise
 from scara_ident.diagnosis.shape import shape_over
 from scara_ident.effects import EFFECTS, Effect, Member
 from scara_ident.errors import ScaraIdentError
-from scara_ident.estimation.bands import needed_rows
-from scara_ident.motion.low_pass import noise_share
 
 Kind = Literal["rivals", "unexplained", "below_limit", "parameter"]
 # Rivals of one effect, and candidates that these recordings would hardly have shown: of each family, in all, and by name.
@@ -224,10 +221,14 @@ def _remainder(diagnosis: Diagnosis) -> Iterator[Question]:
 
 
 def _worth_a_look(diagnosis: Diagnosis) -> Iterator[Question]:
-    scene = diagnosis.search.scene
-    known = {item.label(scene) for item in diagnosis.search.chosen}
-    for decision in (item.decision for item in diagnosis.tentative if item.decision is not None):
+    step = diagnosis.search.step
+    known = {item.label(step.scene) for item in step.chosen}
+    found = [item.decision for item in diagnosis.tentative if item.decision is not None]
+    for before, decision in zip(found, less_noise(step, found), strict=True):
         suspect = _as_found(decision)
+        if decision is not before and decision.examination.p_value > step.criteria.significant:
+            # What the noise leaves of it is one of many that may be below the limit.
+            continue
         if _moves(decision.candidate) and decision.label not in known and np.any(suspect.value):
             known.add(decision.label)
             experiment = decision.candidate.effect.experiment
@@ -282,15 +283,22 @@ def _others(diagnosis: Diagnosis) -> list[Decision]:
         open_ = item.label not in known and not item.accepted and not item.candidate.corrects_data
         if not (open_ and _moves(item.candidate) and np.isfinite(item.examination.covariance).all()):
             continue
-        own = item if possible(item, diagnosis) else _mirrored(item)
+        own = _of_either_sign(item, diagnosis)
         rank = (_odds(own), -_limit(own.examination, diagnosis))
         if possible(own, diagnosis) and (own.label not in best or rank > best[own.label][0]):
             best[own.label] = rank, own
-    return [item for _, item in best.values()]
+    less = less_noise(search.step, [item for _, item in best.values()])
+    signed = (_of_either_sign(item, diagnosis) for item in less)
+    return [item for item in signed if possible(item, diagnosis)]
 
 
-def _mirrored(decision: Decision) -> Decision:
-    """Return an effect of the other sign, which what is found of nothing has as often; it speaks for no effect."""
+def _of_either_sign(decision: Decision, diagnosis: Diagnosis) -> Decision:
+    """Return an effect that no arm can have with the other sign, which what is found of nothing has as often.
+
+    It then speaks for no effect.
+    """
+    if possible(decision, diagnosis):
+        return decision
     found = decision.examination
     return replace(decision, examination=replace(found, value=-found.value, p_value=1.0))
 
@@ -338,44 +346,6 @@ def _limit(found: Examination, diagnosis: Diagnosis) -> float:
     """Return the standard errors that coefficients would have to have to be significant."""
     chance = diagnosis.search.step.criteria.family_error / diagnosis.search.tried
     return needed(len(found.value), found.freedom, chance) if np.isfinite(found.freedom) else np.inf
-
-
-def noise_density(diagnosis: Diagnosis) -> Array:
-    """Return the noise of each joint that an estimate sees, (N m)^2 s, shape (n,).
-
-    Squares of what is left over those that white noise would leave, which the low-pass thins, the times at rest fade and the
-    columns take a part of; times by how much blocks of time scatter more than white residuals would, for all joints alike,
-    as few blocks tell it badly of one. What effects that are worth a look explain is no noise: it is what is asked for.
-    """
-    search, after = diagnosis.search, diagnosis.after
-    step, observations = search.step, diagnosis.training_after
-    maybe = [item.decision.candidate for item in diagnosis.tentative if item.decision is not None]
-    columns = step.columns.rows(search.scene, [*search.chosen, *maybe])
-    model = fitted_model(step.observations, columns, after.weights, 1)
-    parts = [part for part in step.observations.data.stretches if part.usable]
-    rate = min(part.rate for part in parts)
-    level, thinned, samples = np.full(len(model.joints), np.nan), 0.0, 0.0
-    taken = needed_rows(after.model)
-    for rows in columns[len(search.chosen) :]:
-        for j, own in rows.items():
-            taken[j] += len(own) / len(rows)
-    for j, (error, weight) in enumerate(zip(model.residual, after.weights, strict=True)):
-        white = sum(
-            part.steps[j] * noise_share(part.rate, part.bands[j]) * np.sum(part.fade[j, part.kept[j]] ** 2)
-            for part in parts
-        )
-        if white > taken[j] and weight > 0.0:
-            level[j] = float(error @ error) / (weight**2 * (white - taken[j]))
-            thinned, samples = thinned + white, samples + sum(part.steps[j] * len(part.kept[j]) for part in parts)
-    size = np.sqrt(np.clip(np.diag(after.information.inverse()), 0.0, None))
-    count = sum(own.table.shape[1] for own in observations.joints)
-    plain = np.sqrt(after.information.residual_sum(after.value) / max(1, count)) * size
-    known = (plain > 0.0) & np.isfinite(after.std) & ~after.undetermined
-    if not (np.any(known) and samples):
-        return level / rate
-    scatter = float(np.median((after.std[known] / plain[known]) ** 2)) * thinned / samples
-    # A variance told by so many blocks is this far off by chance, one standard deviation.
-    return level * max(1.0, scatter / float(1.0 + np.sqrt(2.0 / len(model.owner)))) / rate
 
 
 def all_suspects(asked: Sequence[Question]) -> tuple[Suspect, ...]:

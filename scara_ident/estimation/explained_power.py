@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array, runs_of
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import informations, kept_rows
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Stretch, motion_of, torque_of
-from scara_ident.motion.prepared import LONGEST_WIDENING, PreparedData, PreparedStretch, fading
+from scara_ident.motion.prepared import LONGEST_WIDENING, Bands, PreparedData, PreparedStretch, fading
 from scara_ident.motion.thinning import thinned
 from scara_ident.threads import side_by_side
 
@@ -58,12 +59,11 @@ class Spectra:
     def __init__(self, model: TorqueModel, data: PreparedData, edges: Array) -> None:
         self.model, self.data, self.edges = model, data, edges
         self.parts = [part.stretch for part in data.stretches]
-        self.fades = side_by_side(_moving_weight, data.at((FIRST_BAND,) * model.robot.n).stretches)
+        slow = data.at((FIRST_BAND,) * model.robot.n).stretches
+        self.fades = side_by_side(lambda part: moving_weight(part.rest, part.rate, part.bands), slow)
 
         def recorded(part: Stretch, fade: Array) -> Array:
-            torque = torque_of(part)
-            mean = np.sum(fade * torque, axis=1) / np.maximum(np.sum(fade, axis=1), 1.0)
-            return binned_power(fade * (torque - mean[:, None]), part.rate, edges)
+            return moving_power(torque_of(part), fade, part.rate, edges)
 
         self.torque = np.sum(side_by_side(recorded, self.parts, self.fades), axis=0)
 
@@ -100,20 +100,29 @@ class Spectra:
         )
 
 
-def _moving_weight(part: PreparedStretch) -> Array:
+def moving_weight(rest: NDArray[np.bool_], rate: float, bands: Bands) -> Array:
     """Return the weight of every sample, shape (n, N), 0 in a standstill: friction is anything there, and no fit sees it.
 
     A reversal is shorter than a period of the band, and counts: noise turns the sign of friction there, which ends a band.
+
+    Parameters
+    ----------
+    rest : ndarray of bool, shape (n, N)
+        Where joints are at rest.
+    rate : float
+        Samples per second.
+    bands : tuple of float or None
+        Hz.
     """
-    rest = np.zeros_like(part.rest)
+    still = np.zeros_like(rest)
     # Where a joint begins and ends to move friction is hard to tell, and fits see it: of a standstill twice their fade counts
     # with that.
-    margin = round(2.0 * LONGEST_WIDENING * part.rate)
-    for inner, row in zip(rest, part.rest, strict=True):
+    margin = round(2.0 * LONGEST_WIDENING * rate)
+    for inner, row in zip(still, rest, strict=True):
         for start, stop in runs_of(row):
-            if stop - start >= part.rate / FIRST_BAND:
+            if stop - start >= rate / FIRST_BAND:
                 inner[start + margin : stop - margin] = True
-    return fading(rest, part.rate, part.bands)
+    return fading(still, rate, bands)
 
 
 def thinned_to(data: PreparedData, rate: float) -> PreparedData:
@@ -151,6 +160,12 @@ def bin_edges(parts: Sequence[Stretch]) -> Array:
     highest = 0.5 * max(part.rate for part in parts)
     count = max(2, int(np.ceil(BINS_PER_OCTAVE * np.log2(highest / lowest))))
     return np.concatenate([[0.0], np.geomspace(1.5 * lowest, highest, count)])
+
+
+def moving_power(torque: Array, fade: Array, rate: float, edges: Array) -> Array:
+    """Return `binned_power` of torques (n, N) less their means, with weights of samples (n, N)."""
+    mean = np.sum(fade * torque, axis=1) / np.maximum(np.sum(fade, axis=1), 1.0)
+    return binned_power(fade * (torque - mean[:, None]), rate, edges)
 
 
 def binned_power(signals: Array, rate: float, edges: Array) -> Array:

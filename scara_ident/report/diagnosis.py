@@ -13,7 +13,8 @@ from scara_ident.diagnosis.effect_parameters import RotorInertia
 from scara_ident.diagnosis.evidence import Evidence, least_found
 from scara_ident.diagnosis.model_selection import Unexplained, rms_of
 from scara_ident.diagnosis.next_steps import next_steps
-from scara_ident.diagnosis.questions import noise_density, suspects_in_model
+from scara_ident.diagnosis.questions import suspects_in_model
+from scara_ident.diagnosis.torque_noise import noise_density
 from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations

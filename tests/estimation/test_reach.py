@@ -33,9 +33,26 @@ def test_the_band_of_a_motion_that_is_not_recorded_yet_is_foreseen(model: Torque
     now = max(choose_bands(model, prepare([slow, replace(fast, name="fast_1")])).bands)
     assert now > 1.5 * max(fit.bands)
     assert fast.effort is not None
-    foreseen = reach_of(model, data, value).reached(fast.effort, RATE)
+    foreseen = reach_of(model, data, value).reached(fast.effort, np.ones(fast.effort.shape), RATE)
     # Bins are a third of an octave wide.
     assert 0.7 * now < foreseen < 1.5 * now
+
+
+def test_torque_that_is_no_motion_s_or_faster_than_noise_allows_widens_no_band(model: TorqueModel):
+    """Of a swing, once with a tremble that the rate of its narrow band cannot show, once with friction at rest, either way."""
+    slow = pendulum(model, 12.0, 0.02)
+    data = prepare([slow], choose_bands(model, prepare([slow])).bands)
+    reach = reach_of(model, data, ols(observe(model, data)).value)
+    (part,) = data.stretches
+    torque, v = part.torque, part.motion.v
+    bands, _ = reach.foreseen(torque, v, RATE)
+    assert max(bands) < 20.0
+    trembling = torque + 0.02 * np.sin(2.0 * np.pi * 120.0 * part.motion.time)
+    assert reach.foreseen(trembling, v, RATE)[0] == pytest.approx(bands)
+    still = np.array([[1.0], [0.0]])
+    sign = np.random.default_rng(1).choice([-1.0, 1.0], torque.shape[1])
+    resting = reach.foreseen(np.array([torque[0], torque[1] + 0.2 * sign]), still * v, RATE)[0]
+    assert resting == pytest.approx(reach.foreseen(still * torque, still * v, RATE)[0])
 
 
 def test_the_times_at_rest_of_a_motion_that_is_not_recorded_yet_are_foreseen(model: TorqueModel):
