@@ -9,7 +9,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision, hopeless
-from scara_ident.diagnosis.audit import outdone, unsettled
+from scara_ident.diagnosis.audit import outdone, superfluous, suspected, unsettled
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.evidence import coloured_shares
@@ -25,6 +25,9 @@ from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
+
+# Of what is suspected, and others may stand for.
+TOO_LITTLE = "{0.label} would remove {0.gain:.0%} of what is left, but the recordings hold too little of it to tell it from others"
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,8 @@ class Outcome:
         Joints on which more repeats than noise, however small beside the torque, or of however few moments.
     demoted : tuple of Decision
         On effects that were found and are not believed, with why.
+    suspected : tuple of Decision
+        On what would be let in beside those that are, did the recordings hold enough of it, with why it is not.
     """
 
     search: Search
@@ -85,6 +90,7 @@ class Outcome:
     small: tuple[float, ...]
     repeating: frozenset[str]
     demoted: tuple[Decision, ...] = ()
+    suspected: tuple[Decision, ...] = ()
 
 
 def select_model(task: SearchTask, observations: Observations, *, free: bool) -> Outcome:
@@ -240,8 +246,7 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
     demoted: dict[str, Decision] = {}
     left = task.progress
     for _ in range(task.criteria.most_demotions):
-        proxies = [*_proxies(found, task.criteria), *unsettled(found.search, found.after.weights)]
-        proxies += outdone(found.search, found.after.weights, tuple(demoted.values()))
+        proxies = [*_proxies(found, task.criteria), *_unstable(found, tuple(demoted.values()))]
         if not proxies:
             break
         demoted |= {item.label: item for item in reversed(proxies)}
@@ -249,13 +254,16 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
         found = _searched(replace(task, progress=now), columns, tuple(demoted), found.search)
     else:
         # No further search, but nothing is believed that does not stand.
-        while unstable := [
-            *unsettled(found.search, found.after.weights),
-            *outdone(found.search, found.after.weights, tuple(demoted.values())),
-        ]:
+        while unstable := _unstable(found, tuple(demoted.values())):
             demoted |= {item.label: item for item in unstable}
             found = _outcome(task, found.search.without([item.label for item in unstable]))
-    return replace(found, demoted=tuple(demoted.values()))
+    short = [item.refused(TOO_LITTLE.format(item)) for item in suspected(found.search, found.after.weights)]
+    return replace(found, demoted=tuple(demoted.values()), suspected=tuple(short))
+
+
+def _unstable(found: Outcome, demoted: Sequence[Decision]) -> list[Decision]:
+    search, weights = found.search, found.after.weights
+    return [*unsettled(search, weights), *superfluous(search, weights), *outdone(search, weights, demoted)]
 
 
 def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:

@@ -78,6 +78,8 @@ class Search:
         On the best member of every family at the end, rejected ones included.
     first : Scene
         At the base model's estimate, which the columns of all candidates were made at.
+    doubtful : tuple of Candidate
+        What those that stayed may stand for, see `Effect.doubtful`.
     """
 
     step: SelectionStep
@@ -87,6 +89,7 @@ class Search:
     correction: Correction | None
     decisions: tuple[Decision, ...]
     first: Scene
+    doubtful: tuple[Candidate, ...]
 
     @property
     def scene(self) -> Scene:
@@ -239,7 +242,9 @@ def search(
     labels = {item.label(scene) for item in kept}
     stayed = [item for item in steps if item.decision.label in labels or item.decision.candidate.corrects_data]
     final = SelectionStep(scene, columns, kept, weights, tried, criteria)
-    return Search(final, uncorrected, start, tuple(stayed), correction, tuple(decisions), first)
+    others = [Candidate(effect, member) for effect in task.catalogue for member in effect.doubtful(first)]
+    doubtful = tuple(item for item in others if item.label(scene) not in labels)
+    return Search(final, uncorrected, start, tuple(stayed), correction, tuple(decisions), first, doubtful)
 
 
 def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Scene:

@@ -7,18 +7,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.audit import outdone, uncertain, unsettled
+from scara_ident.diagnosis.audit import outdone, superfluous, suspected, uncertain, unsettled
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.diagnosis.effect_parameters import Coefficients
-from scara_ident.effects import Member
+from scara_ident.effects import Coefficient, Effect, Member
 from scara_ident.effects.friction import AsymmetricFriction
+from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.position import Spring
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, searched, with_torque
 from tests.estimation.test_run_variation import runs
+
+
+def spring(motion):
+    return 0.3 * (motion.q[0] - 1.57)
 
 
 def examined(freedom: float, size: int) -> Examination:
@@ -63,13 +68,13 @@ def test_a_spring_of_the_arm_stands():
     assert [item.label(found.scene) for item in found.chosen] == ["spring of joint2"]
     assert unsettled(found, found.step.weights) == []
     # Nor does anything do as well; but beside the spring itself, were it not believed, what stands for it falls.
-    (spring,) = (item.decision for item in found.steps)
+    (held,) = (item.decision for item in found.steps)
     assert outdone(found, found.step.weights, ()) == []
     (other,) = found.step.without(0).judge([Candidate(AsymmetricFriction(), Member(1))])
-    assert other.examination.held_out < CRITERIA.least_share * spring.examination.held_out
+    assert other.examination.held_out < CRITERIA.least_share * held.examination.held_out
     assert outdone(found, found.step.weights, (other,)) == []
     proxy = replace(found, step=replace(found.step, chosen=(other.candidate,)))
-    (fallen,) = outdone(proxy, found.step.weights, (other.refused(""), spring.refused("")))
+    (fallen,) = outdone(proxy, found.step.weights, (other.refused(""), held.refused("")))
     assert (fallen.label, fallen.accepted, fallen.tentative) == (other.label, False, True)
     assert fallen.why == "spring of joint2, which is not believed, does as well in its place"
 
@@ -86,3 +91,52 @@ def test_where_the_best_is_refused_the_next_best_is_tried():
     made = with_torque(runs(np.random.default_rng(8), (0.0, 0.0, 0.0, 0.004)), 1, lambda motion: 0.01 * motion.q[1])
     result = diagnose(load_robot(), made, bands=BANDS)
     assert [(item.effect, item.joint) for item in result.effects] == [("spring", "joint2")]
+
+
+class Wave(Effect):
+    """A torque once per turn, of which no recording holds enough to be believed."""
+
+    name = "wave"
+    summary = "a wave"
+    coefficients = (Coefficient("height", "N m", "height of a wave"),)
+
+    def members(self, scene):
+        return ()
+
+    def doubtful(self, scene):
+        return (Member(0), Member(1))
+
+    def signal_columns(self, signals, member):
+        return [np.sin(signals.motion.q[member.place] - (1.57, 0.0)[member.place])]
+
+
+def test_what_recordings_hold_too_little_of_refuses_what_stands_for_it():
+    for torque, superseded in ((lambda motion: 0.3 * np.sin(motion.q[0] - 1.57), True), (spring, False)):
+        found = searched(with_torque(exact_runs(), 0, torque), Spring(), Wave())
+        assert [item.label(found.scene) for item in found.chosen] == ["spring of joint1"]
+        assert [item.label for item in suspected(found, found.step.weights)] == ["wave of joint1"] * superseded
+        refused = superfluous(found, found.step.weights)
+        assert [(item.label, item.tentative) for item in refused] == [("spring of joint1", True)] * superseded
+        assert all(item.why.startswith("a wave, of which") for item in refused)
+
+
+def test_an_effect_beside_it_stays():
+    # Friction of one direction is no wave, though one is there too.
+    both = with_torque(exact_runs(), 0, lambda motion: 0.3 * np.sin(motion.q[0] - 1.57) + 0.05 * np.abs(motion.v[0]))
+    found = searched(both, AsymmetricFriction(), Wave())
+    assert [item.label for item in suspected(found, found.step.weights)] == ["wave of joint1"]
+    assert superfluous(found, found.step.weights) == []
+
+
+def test_a_ripple_of_too_few_periods_is_told_and_not_believed():
+    # Once per turn of a joint whose gear is not known, of which the motion has 0.6 turns: a spring takes its place.
+    robot = replace(load_robot(), reduction=np.ones(2))
+    made = with_torque(exact_runs(), 0, lambda motion: 0.3 * np.sin(motion.q[0] - 1.57))
+    result = diagnose(robot, made, bands=BANDS, catalogue=(Spring(), TorqueRipple()))
+    assert result.effects == () and result.verdict == "unexplained"
+    assert [item.joint for item in result.evidence if "hold too little of it" in item.why] == ["joint1"]
+    told = {item.effect: item.why for item in result.tentative}
+    assert set(told) == {"torque_ripple", "spring"}
+    assert told["spring"].startswith("a torque ripple of 1 periods per motor turn, of which")
+    straight = diagnose(robot, with_torque(exact_runs(), 0, spring), bands=BANDS, catalogue=(Spring(), TorqueRipple()))
+    assert [(item.effect, item.confounded_with) for item in straight.effects] == [("spring", ())]
