@@ -12,9 +12,10 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters
+from scara_ident.diagnosis.moments import examine_moments
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.search import Search
-from scara_ident.diagnosis.selection_step import best_of_each
+from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 from scara_ident.diagnosis.variation_check import variation_objection
 
 
@@ -45,9 +46,20 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         why = why or (small and f"within its uncertainty {small}")
         why = why or noise_objection(beside, decision)
         why = why or variation_objection(beside, decision, step.criteria.least_gain)
+        why = why or _repeated(beside, decision)
         if why is not None:
             result.append(decision.refused(why))
     return result
+
+
+def _repeated(step: SelectionStep, decision: Decision) -> str | None:
+    """Say so where only repetitions make an effect significant that leaves something, which may repeat with it."""
+    if decision.gain >= step.criteria.nearly_all:
+        return None
+    p_value = examine_moments(step, decision.candidate).p_value
+    if p_value <= step.criteria.significant:
+        return None
+    return f"what a model lacks repeats with the motion: with repetitions counted once p = {p_value:.1e}"
 
 
 def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[Decision]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from scara_ident.diagnosis.audit import outdone, superfluous, suspected, uncertain, unsettled
 from scara_ident.diagnosis.candidate_tests import Examination
@@ -140,3 +141,18 @@ def test_a_ripple_of_too_few_periods_is_told_and_not_believed():
     assert told["spring"].startswith("a torque ripple of 1 periods per motor turn, of which")
     straight = diagnose(robot, with_torque(exact_runs(), 0, spring), bands=BANDS, catalogue=(Spring(), TorqueRipple()))
     assert [(item.effect, item.confounded_with) for item in straight.effects] == [("spring", ())]
+
+
+def test_what_one_motion_repeats_is_no_effect():
+    # Of five runs of one motion, which lacks a little of no shape: by chance that is a spring's, with p = 2e-10.
+    lacking = gaussian_filter1d(np.random.default_rng(7).standard_normal(3000), 12)
+    lacking *= 0.02 / np.std(lacking)
+    for stiffness, stands in ((0.0, False), (0.05, True)):
+        made = with_torque(
+            exact_runs(1, 5), 0, lambda motion, size=stiffness: size * motion.q[0] + lacking[: motion.samples]
+        )
+        found = searched(made, Spring())
+        assert [item.label(found.scene) for item in found.chosen] == ["spring of joint1"]
+        refused = unsettled(found, found.step.weights)
+        assert (refused == []) is stands
+        assert all("with repetitions counted once" in item.why for item in refused)
