@@ -12,8 +12,10 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters
+from scara_ident.diagnosis.moments import examine_moments
 from scara_ident.diagnosis.noise_check import noise_objection, within_a_step
 from scara_ident.diagnosis.search import Search
+from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 from scara_ident.diagnosis.variation_check import variation_objection
 
 
@@ -44,9 +46,27 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         why = why or (small and f"within its uncertainty {small}")
         why = why or noise_objection(beside, decision)
         why = why or variation_objection(beside, decision, step.criteria.least_gain)
+        why = why or _repeated(beside, decision)
         if why is not None:
             result.append(decision.refused(why))
     return result
+
+
+def _repeated(step: SelectionStep, decision: Decision) -> str | None:
+    """Say so where only repetitions make an effect significant: what a model lacks repeats with the motion as well."""
+    data, criteria = step.observations.data, step.criteria
+    motions = len(data.trajectories)
+    if motions == len(data.recordings):
+        return None
+    # Of one motion alone, no other says otherwise. Else what hardly leaves anything stands for nothing that repeats.
+    if motions > 1 and decision.gain >= criteria.nearly_all:
+        return None
+    p_value = examine_moments(step, decision.candidate).p_value
+    if p_value <= (
+        criteria.significant if motions > 1 else min(criteria.significant, criteria.moments_error / step.tried)
+    ):
+        return None
+    return f"what a model lacks repeats with the motion: with repetitions counted once p = {p_value:.1e}"
 
 
 def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[Decision]:
@@ -74,6 +94,43 @@ def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[
         best = max(others, key=lambda item: item.examination.held_out)
         if best.examination.held_out >= enough:
             result.append(own.refused(f"{best.label}, which is not believed, does as well in its place"))
+    return result
+
+
+def suspected(found: Search, weights: Array) -> list[Decision]:
+    """Return the decisions on what would be let in beside the effects found, did the recordings hold enough of it.
+
+    Parameters
+    ----------
+    found : Search
+    weights : ndarray, shape (n,)
+        See `unsettled`.
+    """
+    step = replace(found.step, weights=weights, tried=found.tried + len(found.doubtful))
+    best = best_of_each([item for item in step.judge(found.doubtful) if item.accepted])
+    return [item for item in best.values() if not (noise_objection(step, item) or variation_objection(step, item))]
+
+
+def superfluous(found: Search, weights: Array) -> list[Decision]:
+    """Return the decisions on effects in whose place one that is suspected explains more, so that they add nothing, with why.
+
+    Parameters
+    ----------
+    found : Search
+    weights : ndarray, shape (n,)
+        See `unsettled`.
+    """
+    step, result = replace(found.step, weights=weights), []
+    for other in suspected(found, weights) if step.chosen else ():
+        what = other.candidate.effect.description(step.scene, other.candidate.member)
+        with_it = replace(step, chosen=(*step.chosen, other.candidate))
+        for place, candidate in enumerate(step.chosen):
+            own, rival = step.without(place).judge([candidate, other.candidate])
+            (left,) = with_it.without(place).judge([candidate])
+            if rival.examination.held_out > own.examination.held_out and not left.accepted:
+                result.append(
+                    own.refused(f"{what}, of which the recordings hold too little, explains more in its place")
+                )
     return result
 
 

@@ -46,7 +46,9 @@ class Confounder:
     value: tuple[float, ...]
 
 
-def confounders(step: SelectionStep, decisions: Sequence[Decision], first: Scene) -> list[tuple[Confounder, ...]]:
+def confounders(
+    step: SelectionStep, decisions: Sequence[Decision], first: Scene, doubtful: Sequence[Candidate] = ()
+) -> list[tuple[Confounder, ...]]:
     """Return for each chosen effect those that these recordings cannot tell from it.
 
     Parameters
@@ -57,13 +59,15 @@ def confounders(step: SelectionStep, decisions: Sequence[Decision], first: Scene
         On the candidates that were tried beside it.
     first : Scene
         Where the columns of all of them are at hand.
+    doubtful : sequence of Candidate, optional
+        See `Effect.doubtful`.
     """
     pool = [decision.candidate for decision in decisions]
-    return [_confounders_of(step.without(k), candidate, pool, first) for k, candidate in enumerate(step.chosen)]
+    return [_confounders_of(step.without(k), item, pool, first, doubtful) for k, item in enumerate(step.chosen)]
 
 
 def _confounders_of(
-    step: SelectionStep, found: Candidate, pool: Sequence[Candidate], first: Scene
+    step: SelectionStep, found: Candidate, pool: Sequence[Candidate], first: Scene, doubtful: Sequence[Candidate]
 ) -> tuple[Confounder, ...]:
     # A rival is asked for once, not in every round of a search, and need not be believed itself: how many others were tried
     # says nothing of whether these two can be told apart. One of the whole arm need not remove as much as all joints leave.
@@ -78,7 +82,7 @@ def _confounders_of(
     # no test.
     saved = own.examination.held_out
     least = criteria.near_confounder * saved
-    enough = list(dict.fromkeys([*pool, *twins]))
+    enough = list(dict.fromkeys([*pool, *twins, *doubtful]))
     # By the columns at hand first: most come nowhere near, and need no others.
     for columns, asked in ((first, LEAST_AT_FIRST * least), (scene, least)):
         found_gains = held_out_gains(step.model, step.rows(columns, enough), criteria)
@@ -88,7 +92,11 @@ def _confounders_of(
     # What is chosen by a fit is compared by one: its grid points lose most of it.
     fitted = fitted_beside(replace(step, criteria=of_one), to_fit, 0.0, None)
     near = [item for item in judged if item.accepted and item.examination.held_out > least]
-    near = step.refine([item for item in near if not item.candidate.effect.fitted_first])
+    # Refined, what is doubtful would do what anything does over so little of it.
+    refined = step.refine(
+        [item for item in near if not (item.candidate.effect.fitted_first or item.candidate in doubtful)]
+    )
+    near = [*refined, *(item for item in near if item.candidate in doubtful)]
     others = []
     for beside, decision in [*((step, item) for item in near), *fitted]:
         better = decision.examination.held_out >= saved

@@ -247,7 +247,8 @@ def diagnose(
     readings = direct_readings(found, families, criteria.rotor_inertia_std)
     effects = found_effects(found, step, parameters, readings)
     notes += not_found(readings, effects)
-    notes += [f"{item.label} is not counted: {item.why}" for item in outcome.demoted]
+    refused = (*outcome.demoted, *outcome.suspected)
+    notes += [f"{item.label} is not counted: {item.why}" for item in refused]
     drift = clock_drift(after.value, outcome.training)
     notes += [] if drift is None else [drift]
     if after.variation is not None:
@@ -270,7 +271,7 @@ def diagnose(
     log_notes(_LOG, notes)
     undisturbed = without_stretches(validation_after, in_held_out)
     shown = held_out_evidence(
-        evidence(found, outcome.residuals, outcome.fit_after, outcome.small, criteria),
+        evidence(found, outcome.residuals, outcome.fit_after, outcome.small, outcome.suspected, criteria),
         rms_of(after.value, outcome.training),
         rms_of(after.value, undisturbed),
         unsure,
@@ -289,7 +290,7 @@ def diagnose(
         outcome.fit_before,
         outcome.fit_after,
         tuple(effects),
-        tentative_effects(found, outcome.demoted, {(item.effect, item.joint) for item in effects}),
+        tentative_effects(found, refused, {(item.effect, item.joint) for item in effects}),
         shown,
         aliases(base),
         outcome.unexplained,

@@ -61,6 +61,7 @@ def evidence(
     residuals: Residuals,
     fit: Sequence[LackOfFit],
     small: Sequence[float],
+    suspected: Sequence[Decision] = (),
     criteria: SelectionCriteria = CRITERIA,
 ) -> tuple[Evidence, ...]:
     """Return for each joint whether what is left was shown to be noise.
@@ -74,15 +75,17 @@ def evidence(
         From repetitions; empty without.
     small : sequence of float
         What may repeat on each joint all the same, as filters and encoders leave as much, N m or N.
+    suspected : sequence of Decision, optional
+        On effects that explain some of it and are not believed.
     criteria : SelectionCriteria, optional
     """
     limits = detection_limits(found, criteria)
     coloured = coloured_shares(residuals)
     repeated = {item.joint: item for item in fit}
-    unresolved = found.step.columns.unresolved
+    doubts = {item.candidate.member.joint: item.why for item in suspected} | found.step.columns.unresolved
     return tuple(
-        Evidence(joint, False, "", unresolved[j], float(limits[j]))
-        if j in unresolved
+        Evidence(joint, False, "", doubts[j], float(limits[j]))
+        if j in doubts
         else _of_joint(joint, repeated.get(joint), float(coloured[j]), float(limits[j]), small[j], criteria)
         for j, joint in enumerate(found.scene.robot.joints)
     )

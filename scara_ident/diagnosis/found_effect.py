@@ -94,7 +94,7 @@ def found_effects(
 ) -> list[FoundEffect]:
     """Return the effects that came in, in that order, with their parameters and what cannot be told from them."""
     scene = found.scene
-    groups = confounders(step, found.decisions, found.first) if found.chosen else []
+    groups = confounders(step, found.decisions, found.first, found.doubtful) if found.chosen else []
     labels = [item.label(scene) for item in found.chosen]
     results = []
     before = rms_of(found.start.value, found.uncorrected)

@@ -9,7 +9,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision, hopeless
-from scara_ident.diagnosis.audit import outdone, unsettled
+from scara_ident.diagnosis.audit import outdone, superfluous, suspected, unsettled
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.evidence import coloured_shares
@@ -28,6 +28,9 @@ from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.motion.prepared import PreparedData
+
+# Of what is suspected, and others may stand for.
+TOO_LITTLE = "{0.label} would remove {0.gain:.0%} of what is left, but the recordings hold too little of it to tell it from others"
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,8 @@ class Outcome:
         Joints on which more repeats than noise, however small beside the torque, or of however few moments.
     demoted : tuple of Decision
         On effects that were found and are not believed, with why.
+    suspected : tuple of Decision
+        On what would be let in beside those that are, did the recordings hold enough of it, with why it is not.
     """
 
     search: Search
@@ -88,6 +93,7 @@ class Outcome:
     small: tuple[float, ...]
     repeating: frozenset[str]
     demoted: tuple[Decision, ...] = ()
+    suspected: tuple[Decision, ...] = ()
 
 
 def select_model(task: SearchTask, observations: Observations, *, free: bool) -> Outcome:
@@ -276,8 +282,7 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
     demoted: dict[str, Decision] = {}
     left = task.progress
     for _ in range(task.criteria.most_demotions):
-        proxies = [*_proxies(found, task.criteria), *unsettled(found.search, found.after.weights)]
-        proxies += outdone(found.search, found.after.weights, tuple(demoted.values()))
+        proxies = [*_proxies(found, task.criteria), *_unstable(found, tuple(demoted.values()))]
         if not proxies:
             break
         demoted |= {item.label: item for item in reversed(proxies)}
@@ -285,22 +290,23 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
         found = _searched(replace(task, progress=now), columns, tuple(demoted), found.search)
     else:
         # No further search, but nothing is believed that does not stand.
-        while unstable := [
-            *unsettled(found.search, found.after.weights),
-            *outdone(found.search, found.after.weights, tuple(demoted.values())),
-        ]:
+        while unstable := _unstable(found, tuple(demoted.values())):
             demoted |= {item.label: item for item in unstable}
             found = _outcome(task, found.search.without([item.label for item in unstable]))
-    return replace(found, demoted=tuple(demoted.values()))
+    short = [item.refused(TOO_LITTLE.format(item)) for item in suspected(found.search, found.after.weights)]
+    return replace(found, demoted=tuple(demoted.values()), suspected=tuple(short))
+
+
+def _unstable(found: Outcome, demoted: Sequence[Decision]) -> list[Decision]:
+    search, weights = found.search, found.after.weights
+    return [*unsettled(search, weights), *superfluous(search, weights), *outdone(search, weights, demoted)]
 
 
 def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
     """Return the decisions on effects that remove little of a remainder most of which stays, with why."""
     # Not to believe an effect less is asked than to say that something is left: it may stand for what is too small, too.
     left = found.repeating | ({found.unexplained.joint} if found.unexplained else set())
-    # Of one motion alone, what the model lacks is the same in every recording, and no other motion says otherwise.
-    alone = len(found.training.data.trajectories) == 1 < len(found.training.data.recordings)
-    if not (left or alone) or not found.fit_after:
+    if not left or not found.fit_after:
         return []
     search = found.search
     joints = search.base.robot.joints
@@ -330,12 +336,11 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
             share = max(0.0, removed / repeats)
             why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"
             proxies.append(decision.refused(why))
-        elif decision.label in labels and (alone or (found.unexplained and owner in (None, found.unexplained.joint))):
+        elif decision.label in labels and found.unexplained and owner in (None, found.unexplained.joint):
             place = labels.index(decision.label)
             p_value = examine_moments(search.step.without(place), search.chosen[place]).p_value
-            if p_value * search.tried > (criteria.moments_error if alone else criteria.family_error):
-                doubt = "there is one motion only" if alone else "what is left repeats"
-                why = f"{doubt}: with repetitions of a motion counted once p = {p_value:.1e}"
+            if p_value * search.tried > criteria.family_error:
+                why = f"what is left repeats: with repetitions of a motion counted once p = {p_value:.1e}"
                 proxies.append(decision.refused(why))
     return proxies
 

@@ -78,6 +78,8 @@ class Search:
         On the best member of every family at the end, rejected ones included.
     first : Scene
         At the base model's estimate, which the columns of all candidates were made at.
+    doubtful : tuple of Candidate
+        What those that stayed may stand for, see `Effect.doubtful`.
     """
 
     step: SelectionStep
@@ -87,6 +89,7 @@ class Search:
     correction: Correction | None
     decisions: tuple[Decision, ...]
     first: Scene
+    doubtful: tuple[Candidate, ...]
 
     @property
     def scene(self) -> Scene:
@@ -239,7 +242,9 @@ def search(
     labels = {item.label(scene) for item in kept}
     stayed = [item for item in steps if item.decision.label in labels or item.decision.candidate.corrects_data]
     final = SelectionStep(scene, columns, kept, weights, tried, criteria)
-    return Search(final, uncorrected, start, tuple(stayed), correction, tuple(decisions), first)
+    others = [Candidate(effect, member) for effect in task.catalogue for member in effect.doubtful(first)]
+    doubtful = tuple(item for item in others if item.label(scene) not in labels)
+    return Search(final, uncorrected, start, tuple(stayed), correction, tuple(decisions), first, doubtful)
 
 
 def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Scene:
@@ -364,16 +369,13 @@ def _worth_fitting(
     points: Sequence[Decision], enough: float, tried: int, criteria: SelectionCriteria
 ) -> list[Decision]:
     """Return the best points of those that promise so much gain and what they may stand for, the most promising first."""
-    # A fit is dear: only what chance would not bring among so many is worth one. Of a resonance with little damping a grid
-    # point loses most, or is unsure where it removes most, as its waves are others in every run; a point beside it, or the
-    # same of another joint, may be sure.
-    sure = {
-        item.candidate.effect.name for item in points if item.gain > 0.0 and item.examination.p_value * tried <= 1.0
-    }
+    # A fit is dear. Of a resonance with little damping a grid point loses most, or is unsure where it removes most, as its
+    # waves are others in every run; a point beside it, or the same of another joint, may be more than chance would bring.
+    sure = {x.candidate.effect.name for x in points if x.gain > 0.0 and x.examination.p_value * tried <= 1.0}
     best = [item for item in best_of_each(points).values() if item.candidate.effect.name in sure]
-    worth = {item.candidate.effect.name for item in best if item.gain >= enough}
-    best = [item for item in best if item.candidate.effect.name in worth]
-    return sorted(best, key=lambda item: -item.gain)[: criteria.most_fitted]
+    large = {item.candidate.effect.name for item in best if item.gain >= enough}
+    worth = [item for item in best if item.candidate.effect.name in large]
+    return sorted(worth, key=lambda item: -item.gain)[: criteria.most_fitted]
 
 
 def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:

@@ -175,6 +175,10 @@ class Effect(ABC):
         """Return the members worth trying on this robot and these recordings."""
         return tuple(Member(j, values) for j in self.joints(scene) for values in self.scan(scene, j))
 
+    def doubtful(self, scene: Scene) -> tuple[Member, ...]:
+        """Return members that others may stand for, but of which these recordings hold too little to believe them."""
+        return ()
+
     def words(self, scene: Scene, member: Member) -> dict[str, Any]:
         """Return what `summary` and `coefficients` may name: joints, their units, nonlinear parameters."""
         robot = scene.robot

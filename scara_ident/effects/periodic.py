@@ -43,9 +43,20 @@ class PerMotorTurn(Sinusoid):
 
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return the orders with enough periods in the travel that lie within the band while the joint is slow."""
+        return ((x,) for x in self._in_band(scene, joint) if x >= PERIODS_COVERED * _order_resolution(scene, joint))
+
+    def doubtful(self, scene: Scene) -> tuple[Member, ...]:
+        """Return those with too few periods in the travel."""
+        return tuple(
+            Member(j, (x,))
+            for j in self.joints(scene)
+            for x in self._in_band(scene, j)
+            if x < PERIODS_COVERED * _order_resolution(scene, j)
+        )
+
+    def _in_band(self, scene: Scene, joint: int) -> Iterable[float]:
         turns_per_second = abs(float(scene.robot.reduction[joint])) * float(scene.speed[joint]) / (2.0 * np.pi)
-        least = PERIODS_COVERED * _order_resolution(scene, joint)
-        return ((x,) for x in self.orders if x >= least and SLOW_SHARE * x * turns_per_second <= scene.band)
+        return (x for x in self.orders if SLOW_SHARE * x * turns_per_second <= scene.band)
 
     def resolution(self, scene: Scene, member: Member) -> tuple[float, ...]:
         """Return one over the motor turns covered."""

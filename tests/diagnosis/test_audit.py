@@ -6,20 +6,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from scara_ident.diagnosis import audit
-from scara_ident.diagnosis.audit import outdone, uncertain, unsettled
+from scara_ident.diagnosis.audit import outdone, superfluous, suspected, uncertain, unsettled
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.diagnosis.effect_parameters import Coefficients
-from scara_ident.effects import Member
+from scara_ident.effects import Coefficient, Effect, Member
 from scara_ident.effects.friction import AsymmetricFriction
+from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.position import Spring
 from scara_ident.robot.robot import load_robot
-from tests.diagnosis.made import BANDS, exact_runs, searched, with_torque
+from tests.diagnosis.made import BANDS, exact_runs, searched, step_beside, with_torque
 from tests.estimation.test_run_variation import runs
+
+
+def spring(motion):
+    return 0.3 * (motion.q[0] - 1.57)
 
 
 def examined(freedom: float, size: int) -> Examination:
@@ -64,18 +70,18 @@ def test_a_spring_of_the_arm_stands(monkeypatch: pytest.MonkeyPatch):
     assert [item.label(found.scene) for item in found.chosen] == ["spring of joint2"]
     assert unsettled(found, found.step.weights) == []
     # Nor does anything do as well; but beside the spring itself, were it not believed, what stands for it falls.
-    (spring,) = (item.decision for item in found.steps)
+    (held,) = (item.decision for item in found.steps)
     assert outdone(found, found.step.weights, ()) == []
     (other,) = found.step.without(0).judge([Candidate(AsymmetricFriction(), Member(1))])
-    assert other.examination.held_out < CRITERIA.least_share * spring.examination.held_out
+    assert other.examination.held_out < CRITERIA.least_share * held.examination.held_out
     assert outdone(found, found.step.weights, (other,)) == []
     proxy = replace(found, step=replace(found.step, chosen=(other.candidate,)))
-    (fallen,) = outdone(proxy, found.step.weights, (other.refused(""), spring.refused("")))
+    (fallen,) = outdone(proxy, found.step.weights, (other.refused(""), held.refused("")))
     assert (fallen.label, fallen.accepted, fallen.tentative) == (other.label, False, True)
     assert fallen.why == "spring of joint2, which is not believed, does as well in its place"
     # What turns within a step of the encoder is no rival: nothing real was refused.
     monkeypatch.setattr(audit, "within_a_step", lambda step, candidate: "less than a step")
-    assert outdone(proxy, found.step.weights, (spring.refused(""),)) == []
+    assert outdone(proxy, found.step.weights, (held.refused(""),)) == []
 
 
 def test_without_effects_there_is_nothing_to_look_at():
@@ -90,3 +96,84 @@ def test_where_the_best_is_refused_the_next_best_is_tried():
     made = with_torque(runs(np.random.default_rng(8), (0.0, 0.0, 0.0, 0.004)), 1, lambda motion: 0.01 * motion.q[1])
     result = diagnose(load_robot(), made, bands=BANDS)
     assert [(item.effect, item.joint) for item in result.effects] == [("spring", "joint2")]
+
+
+class Wave(Effect):
+    """A torque once per turn, of which no recording holds enough to be believed."""
+
+    name = "wave"
+    summary = "a wave"
+    coefficients = (Coefficient("height", "N m", "height of a wave"),)
+
+    def members(self, scene):
+        return ()
+
+    def doubtful(self, scene):
+        return (Member(0), Member(1))
+
+    def signal_columns(self, signals, member):
+        return [np.sin(signals.motion.q[member.place] - (1.57, 0.0)[member.place])]
+
+
+def test_what_recordings_hold_too_little_of_refuses_what_stands_for_it():
+    for torque, superseded in ((lambda motion: 0.3 * np.sin(motion.q[0] - 1.57), True), (spring, False)):
+        found = searched(with_torque(exact_runs(), 0, torque), Spring(), Wave())
+        assert [item.label(found.scene) for item in found.chosen] == ["spring of joint1"]
+        assert [item.label for item in suspected(found, found.step.weights)] == ["wave of joint1"] * superseded
+        refused = superfluous(found, found.step.weights)
+        assert [(item.label, item.tentative) for item in refused] == [("spring of joint1", True)] * superseded
+        assert all(item.why.startswith("a wave, of which") for item in refused)
+
+
+def test_an_effect_beside_it_stays():
+    # Friction of one direction is no wave, though one is there too.
+    both = with_torque(exact_runs(), 0, lambda motion: 0.3 * np.sin(motion.q[0] - 1.57) + 0.05 * np.abs(motion.v[0]))
+    found = searched(both, AsymmetricFriction(), Wave())
+    assert [item.label for item in suspected(found, found.step.weights)] == ["wave of joint1"]
+    assert superfluous(found, found.step.weights) == []
+
+
+def test_a_ripple_of_too_few_periods_is_told_and_not_believed():
+    # Once per turn of a joint whose gear is not known, of which the motion has 0.6 turns: a spring takes its place.
+    robot = replace(load_robot(), reduction=np.ones(2))
+    made = with_torque(exact_runs(), 0, lambda motion: 0.3 * np.sin(motion.q[0] - 1.57))
+    result = diagnose(robot, made, bands=BANDS, catalogue=(Spring(), TorqueRipple()))
+    assert result.effects == () and result.verdict == "unexplained"
+    assert [item.joint for item in result.evidence if "hold too little of it" in item.why] == ["joint1"]
+    told = {item.effect: item.why for item in result.tentative}
+    assert set(told) == {"torque_ripple", "spring"}
+    assert told["spring"].startswith("a torque ripple of 1 periods per motor turn, of which")
+    straight = diagnose(robot, with_torque(exact_runs(), 0, spring), bands=BANDS, catalogue=(Spring(), TorqueRipple()))
+    assert [(item.effect, item.confounded_with) for item in straight.effects] == [("spring", ())]
+
+
+def test_what_one_motion_repeats_is_no_effect():
+    # Of five runs of one motion, which lacks a little of no shape: by chance that is a spring's, with p = 2e-10.
+    lacking = gaussian_filter1d(np.random.default_rng(7).standard_normal(3000), 12)
+    lacking *= 0.02 / np.std(lacking)
+    for stiffness, stands in ((0.0, False), (0.05, True)):
+        made = with_torque(
+            exact_runs(1, 5), 0, lambda motion, size=stiffness: size * motion.q[0] + lacking[: motion.samples]
+        )
+        found = searched(made, Spring())
+        assert [item.label(found.scene) for item in found.chosen] == ["spring of joint1"]
+        refused = unsettled(found, found.step.weights)
+        assert (refused == []) is stands
+        assert all("with repetitions counted once" in item.why for item in refused)
+
+
+@pytest.mark.parametrize(
+    ("motions", "gain", "least"), [(1, 0.5, 5e-4), (1, 0.99, 5e-4), (2, 0.5, 0.01), (2, 0.99, 1.0)]
+)
+def test_of_one_motion_more_is_asked_of_what_repeats(
+    motions: int, gain: float, least: float, monkeypatch: pytest.MonkeyPatch
+):
+    """No other motion says otherwise, so that all that were tried count, and one that leaves hardly anything counts too."""
+    step = replace(step_beside(exact_runs(motions, 3)), tried=100)
+    (decision,) = step.judge([Candidate(Spring(), Member(1))])
+    for p_value, doubted in ((0.9 * least, False), (min(1.0, 1.1 * least), least < 1.0)):
+        once = replace(decision.examination, p_value=p_value)
+        monkeypatch.setattr(audit, "examine_moments", lambda step, candidate, once=once: once)
+        assert (audit._repeated(step, replace(decision, gain=gain)) is not None) == doubted
+    # Without repetitions there is nothing to count once.
+    assert audit._repeated(step_beside(exact_runs(3, 1)), replace(decision, gain=0.5)) is None

@@ -12,9 +12,10 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.confounding import confounders
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.selection_step import observed
-from scara_ident.effects import Coefficient, Effect, Member
+from scara_ident.effects import Coefficient, Effect, Member, NonlinearParameter
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.position import Spring
+from scara_ident.effects.sinusoid import Sinusoid, sine_and_cosine
 from scara_ident.estimation.least_squares import value_and_weights
 from tests.diagnosis.made import Bent, Bump, exact_runs, runs_with_a_spring, searched, step_beside, with_torque
 
@@ -80,6 +81,37 @@ def test_an_effect_of_another_kind_is_no_rival():
 def test_two_effects_at_once_are_not_rivals_of_each_other():
     both = groups(1.9, lambda motion: spring(motion) + 0.03 * np.abs(motion.v[0]))
     assert both == {"spring of joint1": {}, "asymmetric_friction of joint1": {}}
+
+
+class Wave(Sinusoid):
+    """A sine of so many periods per turn, of which no recording holds enough to be believed."""
+
+    name = "wave"
+    summary = "a wave"
+    coefficients = sine_and_cosine("wave_{part}", "{part} of a wave")
+    nonlinear = (NonlinearParameter("order", "1", 0.05, 9.0, False),)
+
+    def members(self, scene):
+        return ()
+
+    def doubtful(self, scene):
+        return (Member(0, (1.0,)),)
+
+    def signal_columns(self, signals, member):
+        turn = member.nonlinear[0] * signals.motion.q[0]
+        return [np.sin(turn), np.cos(turn)]
+
+    def resolution(self, scene, member):
+        return (1.0,)
+
+
+def test_what_recordings_hold_too_little_of_is_named_as_it_is():
+    # Over 3.8 rad the sine of the angle is no spring; refined, its order would fall until it is one.
+    for size, rivals in ((0.3, ["wave of joint1"]), (1.9, [])):
+        result = searched(with_torque(exact_runs(size=size), 0, spring), Spring(), Wave())
+        (others,) = confounders(result.step, result.decisions, result.first, result.doubtful)
+        assert [item.label for item in others] == rivals
+        assert all(item.candidate.member.nonlinear == (1.0,) for item in others)
 
 
 def test_what_runs_differ_by_does_not_tell_which_of_two_is_there():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scara_ident.effects import Member, SpectralLine
-from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
+from scara_ident.effects.periodic import ORDERS, EncoderEccentricity, TorqueRipple, Vibration
 from scara_ident.model.model import build_model
 from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import Motion
@@ -72,6 +72,19 @@ def test_an_eccentric_encoder_changes_the_torque_to_first_order(kind: str, tmp_p
     told = EncoderEccentricity().parameters(scene, Member(j, (order,)), value, 1e-16 * np.eye(2))
     assert told["amplitude"].value == pytest.approx(size)
     assert told["amplitude"].unit == ("m" if robot.prismatic[j] else "rad")
+
+
+def test_orders_of_which_the_travel_holds_too_few_periods_are_doubtful():
+    # 2 rad of the motor of one joint hold 0.32 turns, of the other 32; fast joints leave the highest orders out.
+    scene = scene_of(replace(load_robot(), reduction=np.array([1.0, 100.0])))
+    assert TorqueRipple().members(scene) == tuple(
+        Member(j, (x,)) for j, orders in ((0, (8.0, 12.0)), (1, ORDERS)) for x in orders
+    )
+    assert TorqueRipple().doubtful(scene) == tuple(Member(0, (x,)) for x in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
+    assert EncoderEccentricity().doubtful(scene) == (Member(0, (1.0,)), Member(0, (2.0,)))
+    fast = replace(scene, speed=np.array([2.0, 2.0]) * 200.0)
+    assert TorqueRipple().doubtful(fast) == tuple(Member(0, (x,)) for x in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
+    assert len(TorqueRipple().members(fast)) < len(TorqueRipple().members(scene))
 
 
 def test_lines_that_alias_into_a_band_are_left_out():
