@@ -344,7 +344,8 @@ def fitted_beside(
         With the step at the estimate that goes with the candidate.
     """
     criteria = step.criteria
-    worth = _worth_fitting(candidates, max(criteria.least_gain, criteria.near_best * best), step.tried, criteria)
+    enough = max(criteria.least_gain, criteria.near_best * best)
+    worth = _worth_fitting(candidates, enough, step.tried, criteria.most_fitted)
     begins = {item.label: (step.scene, item.candidate) for item in worth}
     if known is not None:
         # Found in another band: from there it is near.
@@ -365,17 +366,15 @@ def fitted_beside(
     return found
 
 
-def _worth_fitting(
-    points: Sequence[Decision], enough: float, tried: int, criteria: SelectionCriteria
-) -> list[Decision]:
+def _worth_fitting(points: Sequence[Decision], enough: float, tried: int, most: int) -> list[Decision]:
     """Return the best points of those that promise so much gain and what they may stand for, the most promising first."""
     # A fit is dear. Of a resonance with little damping a grid point loses most, or is unsure where it removes most, as its
     # waves are others in every run; a point beside it, or the same of another joint, may be more than chance would bring.
     sure = {x.candidate.effect.name for x in points if x.gain > 0.0 and x.examination.p_value * tried <= 1.0}
     best = [item for item in best_of_each(points).values() if item.candidate.effect.name in sure]
     large = {item.candidate.effect.name for item in best if item.gain >= enough}
-    worth = [item for item in best if item.candidate.effect.name in large]
-    return sorted(worth, key=lambda item: -item.gain)[: criteria.most_fitted]
+    best.sort(key=lambda item: -item.gain)
+    return [item for item in best if item.candidate.effect.name in large][:most]
 
 
 def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:
