@@ -140,18 +140,22 @@ def _sizes(item: Binned, earlier: Sequence[Binned], segment: Segment) -> tuple[A
 def _local(segment: Segment) -> bool:
     """Whether it is short, and a joint that shows it is seen before and after it."""
     item = segment.binned
-    length = (segment.stop - segment.start) * item.width
     beside, seen = round(BESIDE / item.width), SEEN / item.width
     # Rests do not count.
     moves = np.logical_not(np.isfinite(item.still[0]))
     shown = np.maximum(item.known, _slow(item))[segment.score >= 1.0]
     before = np.sum(shown[:, : segment.start][:, moves[: segment.start]][:, -beside:], axis=1)
     after = np.sum(shown[:, segment.stop :][:, moves[segment.stop :]][:, :beside], axis=1)
-    whole = item.left.shape[1] * item.width
     inside = beside <= segment.start and segment.stop + beside <= item.left.shape[1]
     sure = inside and float(np.max(segment.score)) >= SURE
     seen_beside = sure or bool(np.any((before >= seen) & (after >= seen)))
-    return length <= max(LONGEST, LONGEST_SHARE * whole) and seen_beside
+    return not _lasts(item, segment.ends) and seen_beside
+
+
+def _lasts(item: Binned, ends: Ends) -> bool:
+    """Whether it lasts too long for an event."""
+    whole = item.left.shape[1] * item.width
+    return bool((ends.stop - ends.start) * item.width > max(LONGEST, LONGEST_SHARE * whole))
 
 
 def _novel(segment: Segment, stretches: Sequence[Binned], shown: NDArray[np.bool_]) -> bool:
@@ -322,7 +326,19 @@ def _segments(
             near = score[:, max(0, place - length // 2) : place + max(1, long - length // 2)]
             if near.shape[1]:
                 share = np.fmax(share, np.nanmax(np.nan_to_num(near, nan=0.0), axis=1))
-        ends = event_ends(relative, trust, still, free, window, share >= min(AT_ENDS, best), item.width, expected)
+
+        def ends_by(joints: NDArray[np.bool_], window: slice = window) -> Ends:
+            return event_ends(relative, trust, still, free, window, joints, item.width, expected)
+
+        helping = share >= min(AT_ENDS, best)
+        ends = ends_by(helping)
+        taken_up = slice(min(ends.start, place), max(ends.stop, place + long))
+        if _lasts(item, ends):
+            # Of one joint more may be left for longer, as where a push has spoilt its friction.
+            short = [j for j in np.flatnonzero(helping) if not _lasts(item, ends_by(np.arange(n) == j))]
+            if short:
+                share = np.where(np.isin(np.arange(n), short), share, 0.0)
+                ends = ends_by(share > 0.0)
         pad = max(1, round(0.1 / item.width))
-        free[max(0, min(ends.start, place) - pad) : max(ends.stop, place + long) + pad] = False
+        free[max(0, taken_up.start - pad) : taken_up.stop + pad] = False
         yield Segment(item, ends, share)
