@@ -34,15 +34,20 @@ def examined(base: np.ndarray, tried: np.ndarray, torque: np.ndarray) -> Examina
     return examine(model, [{0: tried[None]}])[0]
 
 
-@pytest.mark.parametrize("true", [0.0, 0.4])
-def test_what_the_noise_makes_is_taken_off_and_what_the_arm_does_is_left(true: float):
-    # The base column holds noise, the candidate's the same noise magnified, as derivatives of one position do.
+def with_noise_once_and_twice(true: float, torque_noise: float) -> tuple[Examination, Examination]:
+    """A candidate of that size; the base column holds noise, the candidate's the same magnified, as derivatives of a position do."""
     rng = np.random.default_rng(4)
     smooth, other = lfilter([1.0], [1.0, -0.9], rng.standard_normal((2, LENGTH)), axis=1)
-    torque = 2.0 * smooth + true * other + 0.1 * rng.standard_normal(LENGTH)
+    torque = 2.0 * smooth + true * other + torque_noise * rng.standard_normal(LENGTH)
     noise, again = 0.3 * rng.standard_normal((2, LENGTH))
     once = examined(smooth + noise, other + 3.0 * noise, torque)
     twice = examined(smooth + noise + again, other + 3.0 * (noise + again), torque)
+    return once, twice
+
+
+@pytest.mark.parametrize("true", [0.0, 0.4])
+def test_what_the_noise_makes_is_taken_off_and_what_the_arm_does_is_left(true: float):
+    once, twice = with_noise_once_and_twice(true, 0.1)
     assert abs(once.value[0] - true) > 0.05
     assert once.p_value < 1e-12
     left = without_noise(once, twice.value, twice.products)
@@ -56,12 +61,7 @@ def test_what_is_mostly_noise_is_not_believed_however_sure_the_rest_is(
     true: float, believed: bool, monkeypatch: pytest.MonkeyPatch
 ):
     """An elastic elbow stood for a wrist's: a tenth of it was left without the noise, with p = 1e-20."""
-    rng = np.random.default_rng(4)
-    smooth, other = lfilter([1.0], [1.0, -0.9], rng.standard_normal((2, LENGTH)), axis=1)
-    torque = 2.0 * smooth + true * other + 0.02 * rng.standard_normal(LENGTH)
-    noise, again = 0.3 * rng.standard_normal((2, LENGTH))
-    once = examined(smooth + noise, other + 3.0 * noise, torque)
-    twice = examined(smooth + noise + again, other + 3.0 * (noise + again), torque)
+    once, twice = with_noise_once_and_twice(true, 0.02)
     rows = SimpleNamespace(rows=lambda scene, candidates: [None])
     noisier = SimpleNamespace(columns=rows, scene=None, model=None)
     columns = SimpleNamespace(unresolved_for=lambda joint: None)
