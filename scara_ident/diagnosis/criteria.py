@@ -109,6 +109,16 @@ class SelectionCriteria:
         "of the squared torque",
         "what an effect must keep without the noise of the positions: noise of many rows is as sure as an effect",
     )
+    lower_band: float = _criterion(
+        0.35,
+        "of the band",
+        "in which what is the same at all frequencies is looked for again",
+    )
+    lower_change: float = _criterion(
+        0.5,
+        "of its size",
+        "by which it is another one there: a column of first order says too little of a long delay at high frequencies",
+    )
     # What is left over.
     remainder: float = _criterion(
         0.08,

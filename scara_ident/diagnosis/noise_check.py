@@ -9,7 +9,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
-from scara_ident.diagnosis.candidate_tests import Examination, coefficients
+from scara_ident.diagnosis.candidate_tests import Examination, coefficients, examine
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.selection_step import SelectionStep
@@ -32,6 +32,7 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     """
     found, criteria = decision.examination, step.criteria
     unresolved = step.columns.unresolved_for(decision.candidate.member.joint) or within_a_step(step, decision.candidate)
+    unresolved = unresolved or _gone_further_down(step, decision)
     if unresolved is not None:
         return unresolved
     (left,) = _each_without_noise(step, [decision])
@@ -56,6 +57,30 @@ def within_a_step(step: SelectionStep, candidate: Candidate) -> str | None:
     if way >= max(sizes, default=0.0):
         return None
     return f"it turns on {way:.2g} {unit}, less than a step of the encoder, {max(sizes):.2g} {unit}"
+
+
+def _gone_further_down(step: SelectionStep, decision: Decision) -> str | None:
+    """Say so where a coefficient that is the same at all frequencies is another one in the lower part of the band.
+
+    What a controller answers the noise of positions with is in the torque, as that noise is in the column, and grows with
+    frequency; as does what a clearance or another link does, which is no multiple of the column.
+    """
+    candidate, criteria, whole = decision.candidate, step.criteria, decision.examination
+    if not candidate.effect.same_at_all_frequencies or candidate.corrects_data or step.scene.band <= 0.0:
+        return None
+    share = criteria.lower_band
+    narrower = tuple(share * (band or step.scene.band) for band in step.observations.data.bands)
+    below = replace(step, columns=step.columns.at(narrower), variation=None)
+    found = examine(below.model, below.rows(below.scene, [candidate]), criteria)[0]
+    apart, spread = found.value - whole.value, found.covariance + whole.covariance
+    p_value = significance(apart, spread, min(found.freedom, whole.freedom), found.products)
+    if p_value > criteria.significant or np.max(np.abs(apart)) < criteria.lower_change * np.max(np.abs(whole.value)):
+        return None
+    name, unit = candidate.effect.coefficients[0].name, candidate.effect.coefficients[0].unit
+    return (
+        f"{name} would be {whole.value[0]:.2g} {unit}, but {found.value[0]:.2g} {unit} below {max(narrower):.2g} Hz "
+        f"(p = {p_value:.1e}), where one that is there is the same"
+    )
 
 
 def less_noise(step: SelectionStep, decisions: Sequence[Decision]) -> list[Decision]:

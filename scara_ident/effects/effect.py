@@ -94,6 +94,8 @@ class Effect(ABC):
         Whether it is judged at the estimate fitted with it only: its columns at the estimate without it are poor ones.
     by_recording : bool
         Whether it acts in some recordings and not in others; see `in_recordings`.
+    same_at_all_frequencies : bool
+        Whether its coefficient is the same in any part of the band, so that another one there says that it is not it.
     of_state : bool
         Whether the columns at a sample follow from position, velocity and acceleration there, by numpy's arithmetic, sin,
         cos, exp, abs and sign alone, so that code for a controller can have them.
@@ -118,6 +120,7 @@ class Effect(ABC):
     follows_estimate: ClassVar[bool] = False
     fitted_first: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
+    same_at_all_frequencies: ClassVar[bool] = False
     of_state: ClassVar[bool] = False
     seeded_by: ClassVar[Literal["order", "frequency"] | None] = None
     watched: ClassVar[bool] = False

@@ -115,6 +115,7 @@ class TimeDelay(Effect):
     summary = "effort that is recorded later than position"
     coefficients = (Coefficient("delay", "s", "delay of the effort of {joint} behind position"),)
     follows_estimate = True
+    same_at_all_frequencies = True
     view = View("torque rate")
     experiment = "run the same path at two speeds: a delay's error grows with the third power of speed"
 

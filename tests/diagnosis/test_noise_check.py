@@ -18,9 +18,11 @@ from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.noise_check import noise_objection, without_noise
 from scara_ident.effects import Member
+from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
 from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.recording.recording import Recording
 from tests.diagnosis.made import exact_runs, step_beside
 
 BLOCKS, ROWS = 100, 12
@@ -87,3 +89,32 @@ def test_what_turns_within_a_step_of_the_encoder_is_not_believed(steps: float, h
     assert ("less than a step of the encoder, 0.00077 rad" in (said or "")) == hidden
     (other,) = step.judge([Candidate(Spring(), Member(1))])
     assert "step" not in (noise_objection(step, other) or "")
+
+
+def answering(runs: list[Recording], gain: float, size: float) -> list[Recording]:
+    """The runs with noise in the second joint's positions, and a controller's answer to it in that joint's torque."""
+    rng, made = np.random.default_rng(5), []
+    for run in runs:
+        noise = size * rng.standard_normal(len(run.time))
+        position, effort = run.position.copy(), run.effort.copy()
+        position[1] += noise
+        effort[1] -= gain * np.gradient(noise, run.time)
+        made.append(replace(run, position=position, effort=effort))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("recorded", "there"),
+    [
+        pytest.param(lambda: [shifted(run, -0.008, [1]) for run in exact_runs()], True, id="late"),
+        pytest.param(lambda: answering(list(exact_runs()), 2.0, 3e-4), False, id="answered"),
+    ],
+)
+def test_a_delay_is_about_the_same_in_the_lower_part_of_the_band(recorded, there: bool):
+    """What a controller answered coarse encoders with was two wrists' torque 6 and 10 ms before their motion (UR5)."""
+    step = step_beside(recorded())
+    (decision,) = step.judge([Candidate(TimeDelay(), Member(1))])
+    assert decision.accepted
+    said = noise_objection(step, decision)
+    assert (said is None) == there
+    assert there or ("Hz" in said and "where one that is there is the same" in said)
