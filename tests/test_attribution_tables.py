@@ -1,0 +1,40 @@
+"""What the tables of the attribution benchmark count."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
+
+
+@pytest.fixture
+def tables(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    return pytest.importorskip("attribution_tables", reason="benchmarks are not part of an installed package")
+
+
+def item(days: list[int], **variation: float) -> dict:
+    runs = [{"day": day, "held_out": False} for day in days] + [{"day": 9, "held_out": True}]
+    varied = dict.fromkeys(("friction", "scale", "offset", "delay"), 0.0) | variation
+    told = {"inertial": [0.5, 3.0], "friction": [1.0], "offset": []}
+    return {"conditions": {"variation": varied, "runs": runs}, "true": [], "found": [], "coverage": told}
+
+
+@pytest.mark.parametrize(
+    ("days", "variation", "knowable"),
+    [
+        ([0], {}, True),
+        ([0, 0], {"scale": 0.02}, False),
+        ([0, 1], {"scale": 0.02}, True),
+        ([0], {"friction": 0.06}, False),
+        ([0, 0], {"friction": 0.06}, True),
+        ([0], {"offset": 0.02, "delay": 0.005}, True),
+    ],
+)
+def test_std_are_asked_of_what_recordings_can_know(tables: ModuleType, days, variation, knowable: bool) -> None:
+    made = item(days, **variation)
+    assert tables.knowable(made) == knowable
+    assert tables.covered([made]) == ("66.7%" if knowable else "-")
