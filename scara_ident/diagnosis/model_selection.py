@@ -75,7 +75,7 @@ class Outcome:
     small : tuple of float
         What is too small on each joint to be called a remainder, where one is significant; 0 elsewhere. N m or N.
     repeating : frozenset of str
-        Joints on which more repeats than noise, however small beside the torque, or of however few moments.
+        Joints on which more repeats than noise, however small beside the torque, of however few moments or frequencies.
     demoted : tuple of Decision
         On effects that were found and are not believed, with why.
     suspected : tuple of Decision
@@ -223,7 +223,8 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     # What is spread evenly over frequency is no motion's doing even where it repeats: an encoder's steps do, and what a
     # controller makes of them.
     coloured = dict(zip(joints, coloured_shares(left) > criteria.least_colour, strict=True))
-    standing_out = [fit for fit in fit_after if coloured[fit.joint] and _above_noise(fit, criteria)]
+    above = [fit for fit in fit_after if _above_noise(fit, criteria)]
+    standing_out = [fit for fit in above if coloured[fit.joint]]
     repeating = [fit for fit in standing_out if fit.p_value < criteria.significant]
     depending = [
         item for item in dependences if item.p_value < criteria.significant and item.explained > least[item.joint]
@@ -237,7 +238,8 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     repeating = [fit for fit in repeating if fit.missing > least_rms[fit.joint]]
     depending = [item for item in depending if item.rms > least_rms[item.joint]]
     unexplained = _unexplained(repeating, depending, criteria)
-    names = frozenset(fit.joint for fit in standing_out)
+    # An effect may stand for that all the same.
+    names = frozenset(fit.joint for fit in above if coloured[fit.joint] or fit.p_value < criteria.significant)
     fit_before = fit_after if left is before else lack_of_fit(before)
     return Outcome(
         found, after, training, left, fit_before, fit_after, dependences, unexplained, tuple(small.tolist()), names

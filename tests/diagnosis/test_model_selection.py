@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from numpy.testing import assert_array_equal
 from scara_ident.diagnosis import model_selection
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.evidence import coloured_shares
 from scara_ident.diagnosis.lack_of_fit import lack_of_fit
 from scara_ident.diagnosis.model_selection import (
     Outcome,
@@ -168,6 +170,24 @@ def test_nothing_is_demoted_where_the_rest_is_noise() -> None:
     for joint, after in zip(lack_of_fit(outcome.residuals), outcome.fit_after, strict=True):
         assert joint == after
     assert_array_equal(outcome.training.model.names, outcome.search.model.names)
+
+
+def test_an_effect_may_stand_for_what_repeats_at_all_frequencies_alike() -> None:
+    """Encoders of 12 bits left 0.058 N m in every repetition, beside 0.026 of noise; a ripple that removed 7 % was believed."""
+    runs = []
+    for run in exact_runs(2, 3):
+        rng = np.random.default_rng([1, ord(run.name[0])])
+        effort = run.effort.copy()
+        effort[0] += 0.1 * rng.standard_normal(effort.shape[1]) + 0.015 * (run.position[0] - 1.57)
+        runs.append(replace(run, effort=effort))
+    once = searched(runs, Spring(), bands=(11.0, 11.0))
+    assert found(SimpleNamespace(search=once)) == {"spring of joint1"}
+    outcome = selected(runs, Spring(), bands=(11.0, 11.0), free=False)
+    assert coloured_shares(outcome.residuals)[0] < CRITERIA.least_colour
+    assert outcome.repeating == {"joint1"}
+    assert found(outcome) == set()
+    (demoted,) = outcome.demoted
+    assert "of what repeats, and most of the rest stays unexplained" in demoted.why
 
 
 def test_where_something_stays_unexplained_repetitions_of_a_motion_count_once() -> None:
