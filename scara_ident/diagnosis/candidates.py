@@ -80,7 +80,7 @@ class CandidateColumns:
     observations: Observations
     _rows: dict[Key, Rows] = field(default_factory=dict, repr=False)
     _raw: dict[Key, tuple[Rows, ...]] = field(default_factory=dict, repr=False)
-    _signals: dict[Motion, Signals] = field(default_factory=dict, repr=False)
+    _signals: dict[Motion, Signals] = field(default_factory=dict, init=False, repr=False)
     _at: dict[tuple[float | None, ...], CandidateColumns] = field(default_factory=dict, init=False, repr=False)
 
     def at(self, bands: Bands) -> CandidateColumns:
@@ -110,7 +110,7 @@ class CandidateColumns:
 
     def beside(self, observations: Observations) -> CandidateColumns:
         """Return the same columns beside other torques on the same motion."""
-        return CandidateColumns(observations, self._rows, self._raw, self._signals)
+        return CandidateColumns(observations, self._rows, self._raw)
 
     def rows(self, scene: Scene, candidates: Sequence[Candidate]) -> list[Rows]:
         """Return the columns of candidates within the bands, on the rows of each joint that they act on."""
@@ -168,10 +168,18 @@ class CandidateColumns:
     def _signals_of(self, scene: Scene, part: PreparedStretch) -> Signals:
         """Return the signals of a stretch; those of the last estimate are kept with all that was made of them."""
         held = self._signals.get(part.motion)
-        if held is None or held.scene is not scene:
-            held = Signals(scene, part.motion) if held is None else held.at(scene)
-            self._signals[part.motion] = held
+        if held is None:
+            held = Signals(scene, part.motion)
+            # A scene knows those of the motions that it was made from, not with what has been corrected since.
+            held.__dict__["columns"] = self._at_hand[part.motion]
+        elif held.scene is not scene:
+            held = held.at(scene)
+        self._signals[part.motion] = held
         return held
+
+    @cached_property
+    def _at_hand(self) -> dict[Motion, tuple[Array, ...]]:
+        return columns_at_hand(self.observations)
 
     def forget_all_but(self, *scenes: Scene) -> None:
         """Forget columns that follow other estimates than those of some scenes."""

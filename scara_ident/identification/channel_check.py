@@ -183,7 +183,7 @@ def _read_as(data: PreparedData, signal: Signal, joints: Sequence[int], exchange
         position = turned(part.stretch.position, "position" in signal)
         torque = turned(part.torque, "effort" in signal)
         if "position" not in signal:
-            return replace(part, stretch=replace(part.stretch, torque=torque, _thinned={}))
+            return part.with_torque_of(replace(part.stretch, torque=torque, _thinned={}))
         return PreparedStretch(
             replace(part.stretch, position=position, torque=torque, _filtered={}, _thinned={}), part.bands
         )

@@ -82,6 +82,13 @@ class PreparedStretch:
         """Number of samples N."""
         return len(self.stretch.time)
 
+    def with_torque_of(self, stretch: Stretch) -> PreparedStretch:
+        """Return it with a stretch that differs by its torque alone; what the motion decides is shared."""
+        shared = {name: made for name, made in self.__dict__.items() if name not in ("stretch", "smooth_torque")}
+        found = replace(self, stretch=stretch)
+        found.__dict__.update(shared, motion=replace(self.motion, torque=stretch.torque))
+        return found
+
     @made_once
     def motion(self) -> Motion:
         """Filtered position, velocity and acceleration on the whole time grid."""
@@ -135,12 +142,7 @@ class PreparedStretch:
     @made_once
     def kept(self) -> tuple[NDArray[np.intp], ...]:
         """Samples whose rows are kept, joint by joint."""
-        first, last = self.blocks[0], self.blocks[-1]
-        found = []
-        for rest, step in zip(self.rest, self.steps, strict=True):
-            places = np.arange(0, self.samples, step)
-            found.append(places[~rest[places] & (places >= first) & (places < last)])
-        return tuple(found)
+        return tuple(step * np.flatnonzero(own[::step]) for own, step in zip(self.used, self.steps, strict=True))
 
     def block_starts(self, joint: int) -> NDArray[np.intp]:
         """Return where each block begins among the kept rows of a joint, shape (blocks + 1,)."""
@@ -220,7 +222,7 @@ class PreparedRecording:
 
     def with_effort_of(self, recording: Recording) -> PreparedRecording:
         """Return it with the effort of another recording of the same samples; the motion is shared."""
-        parts = (replace(part, stretch=with_effort_of(part.stretch, recording)) for part in self.stretches)
+        parts = (part.with_torque_of(with_effort_of(part.stretch, recording)) for part in self.stretches)
         return PreparedRecording(recording, tuple(parts))
 
 
@@ -336,8 +338,13 @@ def rest_speeds(stretch: Stretch, motion: Motion, bands: Sequence[float | None])
 
 def slower(v: Array, speeds: Array, rate: float, bands: Sequence[float | None]) -> NDArray[np.bool_]:
     """Return where each joint is slower than a speed for some samples, shape (n, N), widened as `standstill`."""
-    slow = zip(np.abs(v) <= speeds[:, None], bands, strict=True)
-    return np.array([_runs_longer_than(own, 1, _widening(REST_WIDEN, rate, band)) for own, band in slow])
+    found = np.zeros(v.shape, dtype=bool)
+    for own, slow, band in zip(found, np.abs(v) <= speeds[:, None], bands, strict=True):
+        widen = _widening(REST_WIDEN, rate, band)
+        for start, stop in runs_of(slow):
+            if stop - start > 1:
+                own[max(0, start - widen) : stop + widen] = True
+    return found
 
 
 def fading(rest: NDArray[np.bool_], rate: float, bands: Sequence[float | None]) -> Array:
@@ -388,12 +395,3 @@ def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | N
     gain = 2.0 * np.pi * float(np.sqrt(reach**3 / (3.0 * removed))) / 0.6745
     small = 2 * np.count_nonzero(gain * rest <= least) > len(rest)
     return least if small else max(least, gain * median(rest))
-
-
-def _runs_longer_than(mask: NDArray[np.bool_], length: int, widen: int) -> NDArray[np.bool_]:
-    """Keep the runs of True that are longer than ``length`` and widen them by ``widen`` on both sides."""
-    result = np.zeros_like(mask)
-    for start, stop in runs_of(mask):
-        if stop - start > length:
-            result[max(0, start - widen) : stop + widen] = True
-    return result

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,8 @@ from scara_ident.diagnosis.model_selection import rms_of
 from scara_ident.effects import Member
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.estimation import wls
+from scara_ident.model.model import TorqueModel
+from scara_ident.motion.motion import Motion
 from tests.diagnosis.made import exact_runs, observed, step_beside
 
 
@@ -22,8 +26,27 @@ def test_corrected_torque_is_that_of_the_recording_corrected():
     for part, old, run in zip(mended.stretches, data.stretches, late, strict=True):
         whole = candidate.effect.corrected(run, candidate.member, np.array([0.004]))
         assert np.array_equal(part.torque, whole.effort)
-        assert part.motion.q is not old.motion.q
-        assert np.array_equal(part.motion.a, old.motion.a)
+        assert part.motion.torque is part.torque
+        # The motion is the same, and so is all that it decides.
+        assert all(getattr(part.motion, name) is getattr(old.motion, name) for name in ("q", "v", "a"))
+        assert all(getattr(part, name) is getattr(old, name) for name in ("rest", "fade", "kept", "blocks"))
+
+
+def test_no_column_of_the_model_is_made_again_beside_another_torque(monkeypatch: pytest.MonkeyPatch):
+    candidate = Candidate(TimeDelay(), Member(None))
+    step = step_beside([shifted(run, -0.025) for run in exact_runs()[:2]])
+    made: list[Motion] = []
+    joint_columns = TorqueModel.joint_columns
+
+    def columns(model, motion, *into):
+        made.append(motion)
+        return joint_columns(model, motion, *into)
+
+    monkeypatch.setattr(TorqueModel, "joint_columns", columns)
+    own, value = taken_out(step, candidate)
+    assert value[0] == pytest.approx(0.025, abs=2e-4)
+    own.rows(replace(step.scene, value=1.01 * step.scene.value), [candidate])
+    assert not made
 
 
 def test_a_long_delay_is_taken_out_until_nothing_is_left():
