@@ -26,5 +26,7 @@ def medians(values: Array) -> Array:
 
 def runs_of(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return where flags, (M,), are set one after the other: the first place, and the one after the last."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    between = np.zeros(len(flags) + 2, dtype=bool)
+    between[1:-1] = flags
+    edges = np.flatnonzero(between[1:] != between[:-1])
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
