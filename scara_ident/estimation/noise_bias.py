@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import chain
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from scara_ident.threads import side_by_side
 NEGLIGIBLE = 1e-4
 # Standard deviations by which the noise moves a parameter before that is said.
 SPOKEN_OF = 1.0
+
+# Of observations the last parameters that `noise_torque` was asked for, and what it found.
+_LAST: WeakKeyDictionary[Observations, tuple[Array, Array]] = WeakKeyDictionary()
 
 
 def noise_bias(observations: Observations, weights: Array, value: Array) -> Array | None:
@@ -48,11 +52,20 @@ def noise_bias(observations: Observations, weights: Array, value: Array) -> Arra
 def noise_torque(observations: Observations, value: Array) -> Array:
     """Return the rms that the noise of positions makes in the torque that parameters predict, within the bands, shape (n,).
 
+    That of the last parameters is kept, for more than one ask for it, and cannot be written to.
+
     Parameters
     ----------
     observations : Observations
     value : ndarray, shape (p,)
     """
+    known = _LAST.get(observations)
+    if known is None or not np.array_equal(known[0], value):
+        known = _LAST[observations] = value.copy(), _noise_torque(observations, value)
+    return known[1]
+
+
+def _noise_torque(observations: Observations, value: Array) -> Array:
     model, data = observations.model, noisier(observations.data)
 
     def of_motion(part: PreparedStretch) -> Array:
@@ -67,7 +80,9 @@ def noise_torque(observations: Observations, value: Array) -> Array:
             made = part.smooth(joint, after - before)[part.used[joint]]
             square[joint] += float(made @ made)
             count[joint] += len(made)
-    return np.sqrt(square / np.maximum(count, 1.0))
+    result = np.asarray(np.sqrt(square / np.maximum(count, 1.0)))
+    result.flags.writeable = False
+    return result
 
 
 def noise_shares(data: PreparedData) -> list[float]:

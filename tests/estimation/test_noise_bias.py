@@ -64,6 +64,17 @@ def test_the_torque_that_the_noise_makes_is_that_of_the_steps():
     assert noise_torque(rough, value) == pytest.approx([np.sqrt(np.mean(row**2)) for row in differs], rel=0.3)
 
 
+def test_the_torque_that_the_noise_makes_is_made_once_for_the_same_parameters():
+    seen = observed(coarse(13)[:2], WIDE)
+    value = wls(seen).value
+    first = noise_torque(seen, value)
+    assert noise_torque(seen, value.copy()) is first
+    other = noise_torque(seen, 1.5 * value)
+    assert other == pytest.approx(1.5 * first)
+    with pytest.raises(ValueError, match="read-only"):
+        other[0] = 0.0
+
+
 def test_where_nothing_is_moved_nothing_is_said():
     assert bias_sentence(("a", "b"), np.array([0.1, 0.0]), np.array([1.0, 1.0])) is None
 
