@@ -111,7 +111,7 @@ def suspected(found: Search, weights: Array) -> list[Decision]:
     return [item for item in best.values() if not (noise_objection(step, item) or variation_objection(step, item))]
 
 
-def superfluous(found: Search, weights: Array) -> list[Decision]:
+def superfluous(found: Search, weights: Array, others: Sequence[Decision]) -> list[Decision]:
     """Return the decisions on effects in whose place one that is suspected explains more, so that they add nothing, with why.
 
     Parameters
@@ -119,9 +119,11 @@ def superfluous(found: Search, weights: Array) -> list[Decision]:
     found : Search
     weights : ndarray, shape (n,)
         See `unsettled`.
+    others : sequence of Decision
+        Of what is suspected, see `suspected`.
     """
     step, result = replace(found.step, weights=weights), []
-    for other in suspected(found, weights) if step.chosen else ():
+    for other in others:
         what = other.candidate.effect.description(step.scene, other.candidate.member)
         with_it = replace(step, chosen=(*step.chosen, other.candidate))
         for place, candidate in enumerate(step.chosen):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from scara_ident.diagnosis.work import first, next_of, search_and_rest
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.bands import HIGHEST_BAND, choose_bands
 from scara_ident.estimation.explained_power import EXPLAINED, sample
-from scara_ident.estimation.least_squares import value_and_weights
+from scara_ident.estimation.least_squares import told_value_and_weights, value_and_weights
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.residuals import Residuals
@@ -95,6 +96,11 @@ class Outcome:
     demoted: tuple[Decision, ...] = ()
     suspected: tuple[Decision, ...] = ()
 
+    @cached_property
+    def hinted(self) -> Sequence[Decision]:
+        """What is suspected beside the effects that stayed, asked for more than once."""
+        return suspected(self.search, self.after.weights)
+
 
 def select_model(task: SearchTask, observations: Observations, *, free: bool) -> Outcome:
     """Search for what a model lacks in the band where that can be told.
@@ -163,12 +169,12 @@ def _band_beyond(task: SearchTask, found: Search) -> float:
         return 0.0
     # One repetition of each motion shows what is large enough.
     columns = CandidateColumns(observe(task.model, sample(found.data.at((band,) * len(found.bands)))))
-    start = wls(columns.observations)
-    scene = replace(scene_of(task.model, start.value, columns.observations), armatures=found.scene.armatures)
+    value, weights = told_value_and_weights(columns.observations)
+    scene = replace(scene_of(task.model, value, columns.observations), armatures=found.scene.armatures)
     members = [Candidate(effect, item) for effect in task.catalogue for item in effect.members(scene)]
     # What the band at hand holds was tried there.
     needing = [item for item in members if item.effect.band(item.member) > _widest(found.data)]
-    step = SelectionStep(scene, columns, found.chosen, start.weights, found.tried + len(needing), task.criteria)
+    step = SelectionStep(scene, columns, found.chosen, weights, found.tried + len(needing), task.criteria)
     # The band was left where the motion explains less than half: so much of what is seen further up must be this effect.
     seen = [item for item in step.judge(needing) if item.accepted and item.gain >= task.criteria.near_best * EXPLAINED]
     fitted = [(own, item) for own, item in fitted_beside(step, seen, 0.0, None) if item.accepted]
@@ -295,13 +301,17 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
         while unstable := _unstable(found, tuple(demoted.values())):
             demoted |= {item.label: item for item in unstable}
             found = _outcome(task, found.search.without([item.label for item in unstable]))
-    short = [item.refused(TOO_LITTLE.format(item)) for item in suspected(found.search, found.after.weights)]
+    short = [item.refused(TOO_LITTLE.format(item)) for item in found.hinted]
     return replace(found, demoted=tuple(demoted.values()), suspected=tuple(short))
 
 
 def _unstable(found: Outcome, demoted: Sequence[Decision]) -> list[Decision]:
     search, weights = found.search, found.after.weights
-    return [*unsettled(search, weights), *superfluous(search, weights), *outdone(search, weights, demoted)]
+    return [
+        *unsettled(search, weights),
+        *superfluous(search, weights, found.hinted),
+        *outdone(search, weights, demoted),
+    ]
 
 
 def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:

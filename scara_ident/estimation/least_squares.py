@@ -133,6 +133,16 @@ def value_and_weights(observations: Observations) -> tuple[Array, Array]:
         return weighted(joints, weights).solve().value, weights
 
 
+@one_blas_thread()
+def told_value_and_weights(observations: Observations) -> tuple[Array, Array]:
+    """Return the same with what data leave open of the torque within the arm's limits at zero, as `wls` leaves it."""
+    value, weights = value_and_weights(observations)
+    told = told_directions(observations, value)
+    if told is not None:
+        value = told.kept @ told.within(weighted(_joints(observations), weights)).solve().value
+    return value, weights
+
+
 def _joints(observations: Observations) -> tuple[Information, ...]:
     """All rows of each joint."""
     if not observations.blocks:

@@ -119,8 +119,9 @@ def test_what_recordings_hold_too_little_of_refuses_what_stands_for_it():
     for torque, superseded in ((lambda motion: 0.3 * np.sin(motion.q[0] - 1.57), True), (spring, False)):
         found = searched(with_torque(exact_runs(), 0, torque), Spring(), Wave())
         assert [item.label(found.scene) for item in found.chosen] == ["spring of joint1"]
-        assert [item.label for item in suspected(found, found.step.weights)] == ["wave of joint1"] * superseded
-        refused = superfluous(found, found.step.weights)
+        others = suspected(found, found.step.weights)
+        assert [item.label for item in others] == ["wave of joint1"] * superseded
+        refused = superfluous(found, found.step.weights, others)
         assert [(item.label, item.tentative) for item in refused] == [("spring of joint1", True)] * superseded
         assert all(item.why.startswith("a wave, of which") for item in refused)
 
@@ -129,8 +130,9 @@ def test_an_effect_beside_it_stays():
     # Friction of one direction is no wave, though one is there too.
     both = with_torque(exact_runs(), 0, lambda motion: 0.3 * np.sin(motion.q[0] - 1.57) + 0.05 * np.abs(motion.v[0]))
     found = searched(both, AsymmetricFriction(), Wave())
-    assert [item.label for item in suspected(found, found.step.weights)] == ["wave of joint1"]
-    assert superfluous(found, found.step.weights) == []
+    others = suspected(found, found.step.weights)
+    assert [item.label for item in others] == ["wave of joint1"]
+    assert superfluous(found, found.step.weights, others) == []
 
 
 def test_a_ripple_of_too_few_periods_is_told_and_not_believed():

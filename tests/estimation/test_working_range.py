@@ -9,7 +9,7 @@ import pytest
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import weighted
-from scara_ident.estimation.least_squares import ols, wls
+from scara_ident.estimation.least_squares import ols, told_value_and_weights, wls
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.working_range import believable, told_directions
 from scara_ident.model.model import build_model
@@ -61,6 +61,14 @@ def test_a_joint_that_hardly_moves_does_not_make_absurd_predictions(robot: Robot
         assert np.any(estimate.undetermined)
         assert np.all(np.isinf(estimate.std[estimate.undetermined]))
         assert np.all(np.isfinite(estimate.std[~estimate.undetermined]))
+
+
+def test_parameters_without_a_covariance_are_those_with_one(robot: Robot):
+    for seed, size in ((1, (1.0, 1.0)), (2, (0.2, 2e-4))):
+        found = observations(robot, seed, size)
+        value, weights = told_value_and_weights(found)
+        np.testing.assert_array_equal(value, wls(found).value)
+        np.testing.assert_array_equal(weights, wls(found).weights)
 
 
 def test_directions_left_open_are_at_zero(robot: Robot):
