@@ -25,7 +25,7 @@ Key = tuple[Effect, Member, Hashable]
 # Columns that pass the low-pass together: enough for two threads, and little memory.
 AT_ONCE = 32
 # Candidates whose columns take longer to make than another process to begin.
-WORTH_A_PROCESS = 50
+WORTH_A_PROCESS = 25
 
 
 @dataclass(frozen=True)
