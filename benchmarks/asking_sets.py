@@ -126,22 +126,32 @@ def seen(found: Diagnosis, first: Diagnosis, question: Question, runs: Sequence[
     return float(np.median([apart(item, None) for item in question.suspects]))
 
 
+def right_one(label: str, truth: Effect) -> bool:
+    """Return whether a label is that of the effect."""
+    places = () if truth.joint is None else (f"{truth.name} of {truth.joint}",)
+    return label in (truth.name, *places) or (truth.joint is None and label.startswith(f"{truth.name} of "))
+
+
+def question_of_truth(asked: Sequence[Question], truth: Effect) -> Question | None:
+    """Return what is asked about the effect that is there: of rivals all, else that effect alone; None where nothing is."""
+    for item in asked:
+        own = [suspect for suspect in item.suspects if right_one(suspect.label, truth)]
+        if own:
+            return item if item.kind == "rivals" else replace(item, text=own[0].label, suspects=(own[0],))
+    return None
+
+
 def said(first: Diagnosis, design: Design, truth: Effect, quiet: Sequence[Recording]) -> bool | None:
     """Return whether the motion was said to tell the effect that is there; None where nothing was asked of it.
 
     Of what may be below the limit, by its true size, which recordings without noise have.
     """
-    places = () if truth.joint is None else (f"{truth.name} of {truth.joint}",)
-
-    def right_one(label: str) -> bool:
-        return label in (truth.name, *places) or (truth.joint is None and label.startswith(f"{truth.name} of "))
-
-    asked = [item for item in design.tells if any(right_one(own.label) for own in item.question.suspects)]
+    asked = [item for item in design.tells if any(right_one(own.label, truth) for own in item.question.suspects)]
     if not asked or asked[0].question.kind == "rivals":
         return asked[0].settled if asked else None
     inquiry = inquire(first)
     scene, suspects = inquiry.scene, asked[0].question.suspects
-    own = next(item for item in suspects if right_one(item.label))
+    own = next(item for item in suspects if right_one(item.label, truth))
     columns = CandidateColumns(observe(scene.model, usable_in_bands(scene.model, quiet, (), first.search.bands)[0]))
     model = fitted_model(columns.observations, [], first.after.weights, 4)
     (found,) = examine(model, columns.rows(scene, [own.candidate]))
@@ -231,20 +241,24 @@ def one_set(
     quiet = [record(silent, followed, truth, number) for followed in (motion, as_reference(design))]
     result["said"] = said(first, design, truth, quiet)
     result["unshown"] = [label for item in design.tells for label in item.unshown]
-    more = {}
+    told = next((item for item in design.tells if item.question.suspects), None)
+    if told is not None:
+        result["kind"], result["promised"] = told.question.kind, [told.before, told.after]
+    sought = question_of_truth(asked, truth)
+    more, result["apart"] = {}, {}
     for way in WAYS:
         followed = motions[way]()
         more[way] = record(arm, followed, truth, number, 3)
         found = diagnose(arm.robot, [*begun, more[way]])
         result[way] = right(found, truth)
         result[f"found_{way}"], result[f"why_{way}"] = found_effects(found), _why(found, truth)
-        if way == "tell":
-            told = next((item for item in design.tells if item.question.suspects), None)
-            if told is not None:
-                result["kind"], result["promised"] = told.question.kind, [told.before, told.after]
-                again = [record(arm, followed, truth, number, run) for run in range(4, 3 + DRAWS)]
-                again = [replace(run, name=more[way].name) for run in again]
-                result["seen"] = [seen(found, first, told.question, [*begun, run]) for run in (more[way], *again)]
+        again = [record(arm, followed, truth, number, run) for run in range(4, 3 + DRAWS)]
+        runs = [more[way], *(replace(run, name=more[way].name) for run in again)]
+        if way == "tell" and told is not None:
+            result["seen"] = [seen(found, first, told.question, [*begun, run]) for run in runs]
+        if sought is not None:
+            each = np.array([seen(found, first, sought, [*begun, run]) for run in runs])
+            result["apart"][way] = float(np.mean(each**-2.0) ** -0.5)
     if not quick and not any(result[way] for way in WAYS):
         # Each as a trajectory of its own.
         runs = [replace(run, name=f"{way}_1") for way, run in more.items()]

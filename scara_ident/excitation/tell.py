@@ -20,6 +20,7 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.answerability import Inquiry
 from scara_ident.diagnosis.belief import believed, known_blocks
 from scara_ident.diagnosis.questions import Question
+from scara_ident.estimation.information import Information
 from scara_ident.excitation.curves import Basis
 from scara_ident.excitation.interior_point import Minimum
 from scara_ident.excitation.limits import InfeasibleLimits
@@ -29,6 +30,7 @@ from scara_ident.excitation.search import (
     BOUND,
     COARSE,
     FINE,
+    UNSEEN,
     Effort,
     Found,
     Progress,
@@ -117,7 +119,10 @@ class _Judge:
     rate: float
 
     def cost(self, x: Array) -> float:
-        """Return minus the weighted sum of the logarithms of what questions gain, up to what is enough."""
+        """Return minus the weighted sum of the logarithms of what questions gain, up to what is enough.
+
+        Where something may be below the limit, with that of what nobody thought of.
+        """
         (basis,) = self.task.bases
         rows = all_rows(self.each, [motion_of(basis, self.task.posture, x[0], self.rate)], self.known)
         sure = believed(self.each, rows)
@@ -127,7 +132,19 @@ class _Judge:
         rest = [item.kind != "below_limit" for item in self.each.questions]
         if any(rest):
             sizes[rest] = self.each.sigmas(rows.information, [*compress(self.each.questions, rest)]) / SURE
-        return -float(self.weights @ np.log((1.0 + sizes**2) / (1.0 + (sizes / ENOUGH) ** 2)))
+        told = float(self.weights @ np.log((1.0 + sizes**2) / (1.0 + (sizes / ENOUGH) ** 2)))
+        return -told - (0.0 if all(rest) else WEIGHTS["below_limit"] * self.of_the_rest(rows.information))
+
+    def of_the_rest(self, rows: Information) -> float:
+        """Return the mean logarithm of the squares that tell a parameter of the model.
+
+        What is below the limit may be none of what is asked for: effects of joints that hardly moved are not even tried, and
+        nonlinear parameters of the others are those that noise left. Both show where the whole workspace is seen, so that the
+        log determinant counts as much as all that is asked for: DT-optimality (Atkinson 2008).
+        """
+        count = len(self.inquiry.scene.model.columns)
+        size = np.abs(np.diag(rows.factor)[:count])
+        return float(2.0 * np.mean(np.log(np.maximum(size, UNSEEN * np.max(size)))))
 
     @cached_property
     def known(self) -> KnownBlocks:

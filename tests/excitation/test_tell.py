@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -73,6 +75,18 @@ def test_the_motion_tells_as_much_as_that_of_the_largest_log_determinant_of_what
     design = design_excitation(model, duration=6.0, harmonics=6, tell=inquiry, limits=whole, effort=EFFORT)
     of = [[item.after for item in told(inquiry, [own.motion(rate=200.0)])] for own in (design, plain)]
     assert np.mean(np.log(of[0])) > np.mean(np.log(of[1])) - 0.05
+
+
+def test_a_motion_for_what_may_be_below_the_limit_tells_of_what_nobody_thought_of_too():
+    found = open_diagnosis()
+    model, (spring, _) = found.before.model, questions(found)[0].suspects
+    # So large that any motion tells it.
+    large = replace(spring, value=tuple(1e3 * x for x in spring.value))
+    inquiry = inquire(found, [Question("below_limit", spring.label, (large,))])
+    whole = limits_of(model.robot, share=1.0)
+    plain = design_excitation(model, duration=6.0, harmonics=6, limits=whole, effort=EFFORT)
+    design = design_excitation(model, duration=6.0, harmonics=6, tell=inquiry, limits=whole, effort=EFFORT)
+    assert design.log_det > plain.log_det - 0.1 * len(model.names)
 
 
 def test_goals_that_exclude_each_other_are_said(asked):
