@@ -7,7 +7,8 @@ same limits, and of the motion of the largest log determinant. An effect is name
 its joint, and nothing is confounded with it. Beside that the separation that was promised of the first question and that
 which recordings show, by the scatter of blocks of time: in one recording of the motion, and by the mean variance of five with
 other noise, as one variance of a dozen blocks is itself a fifth to a third off; beside the model that was asked, with what was
-found by then taken out of the torque. And whether it was said before that the motion would tell the effect that is there: whether
+found by then taken out of the torque. Beside these, where the effect that is there is asked for, the separation of it alone
+after each of the three motions (``apart``). And whether it was said before that the motion would tell the effect that is there: whether
 the motion was said to find one of its size. Where no motion named the effect, one is designed for it alone,
 of the size that all recordings together show: how many times as large as the diagnosis needs it is then expected
 (``best``), and whether it is named after it (``best_right``). A set where neither comes about is not to be settled.
@@ -63,6 +64,11 @@ def show(rows: Sequence[dict[str, Any]]) -> None:
         print(
             f"{len(none)} sets that no motion settles; of these said before: {sum(row.get('said') is False for row in none)}"
         )
+        for way in WAYS[1:]:
+            ahead, behind = (sum(row[a] and not row[b] for row in opened) for a, b in (("tell", way), (way, "tell")))
+            times = [row["apart"]["tell"] / row["apart"][way] for row in opened if row.get("apart")]
+            farther = f"; {np.median(times):.2f} times as far from none in the median of {len(times)}" if times else ""
+            print(f"named after --tell and not after {way}: {ahead}, the other way round {behind}{farther}")
         known = [row for row in opened if row.get("promised", (0.0, 0.0))[1] > 0.0]
         if known:
             each = np.array([row["seen"] for row in known]) / np.array([row["promised"][1:] for row in known])
