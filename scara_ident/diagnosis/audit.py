@@ -58,13 +58,11 @@ def _repeated(step: SelectionStep, decision: Decision) -> str | None:
     motions = len(data.trajectories)
     if motions == len(data.recordings):
         return None
-    # Of one motion alone, no other says otherwise. Else what hardly leaves anything stands for nothing that repeats.
+    # Of one motion alone, no other says otherwise: it counts as recorded once. Else what hardly leaves anything stands for nothing that repeats.
     if motions > 1 and decision.gain >= criteria.nearly_all:
         return None
     p_value = examine_moments(step, decision.candidate).p_value
-    if p_value <= (
-        criteria.significant if motions > 1 else min(criteria.significant, criteria.moments_error / step.tried)
-    ):
+    if p_value <= (criteria.significant if motions > 1 else criteria.family_error / step.tried):
         return None
     return f"what a model lacks repeats with the motion: with repetitions counted once p = {p_value:.1e}"
 

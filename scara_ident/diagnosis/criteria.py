@@ -88,11 +88,6 @@ class SelectionCriteria:
     least_line_periods: float = _criterion(
         6.0, "periods in a recording", "a slower line in time is not told from the motion's own harmonics"
     )
-    moments_error: float = _criterion(
-        0.05,
-        "probability",
-        "that chance brings, among all candidates tried, what stays of an effect with repetitions of the only motion counted once",
-    )
     # Searching.
     most_effects: int = _criterion(6, "effects", "more at once are not believed")
     near_best: float = _criterion(

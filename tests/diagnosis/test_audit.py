@@ -165,7 +165,7 @@ def test_what_one_motion_repeats_is_no_effect():
 
 
 @pytest.mark.parametrize(
-    ("motions", "gain", "least"), [(1, 0.5, 5e-4), (1, 0.99, 5e-4), (2, 0.5, 0.01), (2, 0.99, 1.0)]
+    ("motions", "gain", "least"), [(1, 0.5, 2e-5), (1, 0.99, 2e-5), (2, 0.5, 0.01), (2, 0.99, 1.0)]
 )
 def test_of_one_motion_more_is_asked_of_what_repeats(
     motions: int, gain: float, least: float, monkeypatch: pytest.MonkeyPatch
