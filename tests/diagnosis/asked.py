@@ -16,7 +16,7 @@ from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import ReferenceMotion, parse_effect, simulate, virtual_arm
 from tests.diagnosis.made import BANDS, NOISE, multisine
 
-SPRING = "spring:joint1:stiffness=0.05"
+SPRING = "spring:joint1:stiffness=0.08"
 PAIR = "spring of joint1 or base_tilt"
 
 
