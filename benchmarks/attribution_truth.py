@@ -140,6 +140,8 @@ def _compared(result: Diagnosis, made: VirtualSet, was: Item) -> Item:
         "late": _late(made),
         "strength": strength(told["training"]["before"], oracle and oracle["training"]),
         "strengths": [strength(errors, oracle["training"]) for errors in without],
+        "strongest": [strongest(errors, oracle["training"]) for errors in without],
+        "limits": {joint: item["detection_limit"] for joint, item in told["evidence"].items()},
         "coverage": coverage(told["parameters"], true_parameters(made, was), [effect.name for effect in made.effects]),
     }
 
@@ -287,10 +289,20 @@ def strength(before: dict[str, float | None], oracle: dict[str, float] | None) -
     This, and not the effect's parameter, is its size under conditions that differ from set to set: both are of the
     training recordings within the band worked in.
     """
-    if not oracle:
-        return None
-    excess = [(error / oracle[joint]) ** 2 - 1.0 for joint, error in before.items() if error and oracle.get(joint)]
-    return float(np.sqrt(max(0.0, *excess))) if excess else None
+    excess = _excess(before, oracle)
+    return float(np.sqrt(max(0.0, *excess.values()))) if excess else None
+
+
+def strongest(before: dict[str, float | None], oracle: dict[str, float] | None) -> str | None:
+    """Return the joint where an effect shows most."""
+    excess = _excess(before, oracle)
+    return max(excess, key=lambda joint: excess[joint]) if excess else None
+
+
+def _excess(before: dict[str, float | None], oracle: dict[str, float] | None) -> dict[str, float]:
+    """Return for each joint the mean square of what the effects add, over that of what the true model leaves."""
+    oracle = oracle or {}
+    return {joint: (error / oracle[joint]) ** 2 - 1.0 for joint, error in before.items() if error and oracle.get(joint)}
 
 
 def true_parameters(made: VirtualSet, was: Item) -> list[Item]:

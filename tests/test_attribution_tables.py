@@ -38,3 +38,25 @@ def test_std_are_asked_of_what_recordings_can_know(tables: ModuleType, days, var
     made = item(days, **variation)
     assert tables.knowable(made) == knowable
     assert tables.covered([made]) == ("66.7%" if knowable else "-")
+
+
+@pytest.mark.parametrize(
+    ("sizes", "limits", "above"),
+    [
+        ([0.6], {"elbow": 0.3}, False),
+        ([0.7], {"elbow": 0.3}, True),
+        ([0.7], {"elbow": None}, False),
+        ([9.0], {"elbow": 1.0}, False),
+        ([0.7, 0.6], {"elbow": 0.3}, False),
+        ([], {"elbow": 0.3}, False),
+    ],
+)
+def test_published_limits_are_those_of_the_joint_where_an_effect_shows(tables: ModuleType, sizes, limits, above) -> None:
+    made = {"true": [{}] * len(sizes), "strengths": sizes, "strongest": ["elbow"] * len(sizes), "limits": limits}
+    assert tables.above_published(made) == above
+
+
+def test_the_interval_of_a_share_counts_sets_and_not_parameters(tables: ModuleType) -> None:
+    low, high = tables._interval([[0.0] * 30, [3.0] * 10] * 4)
+    assert low < 0.6 and high > 0.85
+    assert tables._interval([[0.0], [-1.0]]) == (1.0, 1.0)
