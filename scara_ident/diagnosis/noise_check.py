@@ -66,7 +66,7 @@ def _gone_further_down(step: SelectionStep, decision: Decision) -> str | None:
     frequency; as does what a clearance or another link does, which is no multiple of the column.
     """
     candidate, criteria, whole = decision.candidate, step.criteria, decision.examination
-    if not candidate.effect.same_at_all_frequencies or candidate.corrects_data or step.scene.band <= 0.0:
+    if not candidate.effect.same_at_all_frequencies:
         return None
     share = criteria.lower_band
     narrower = tuple(share * (band or step.scene.band) for band in step.observations.data.bands)

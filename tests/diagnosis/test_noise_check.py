@@ -91,29 +91,35 @@ def test_what_turns_within_a_step_of_the_encoder_is_not_believed(steps: float, h
     assert "step" not in (noise_objection(step, other) or "")
 
 
-def answering(runs: list[Recording], gain: float, size: float) -> list[Recording]:
-    """The runs with noise in the second joint's positions, and a controller's answer to it in that joint's torque."""
+def answering(runs: list[Recording], gains: dict[int, float], size: float) -> list[Recording]:
+    """The runs with noise in the positions of joints, and a controller's answer to it in these joints' torque."""
     rng, made = np.random.default_rng(5), []
     for run in runs:
-        noise = size * rng.standard_normal(len(run.time))
         position, effort = run.position.copy(), run.effort.copy()
-        position[1] += noise
-        effort[1] -= gain * np.gradient(noise, run.time)
+        for joint, gain in gains.items():
+            noise = size * rng.standard_normal(len(run.time))
+            position[joint] += noise
+            effort[joint] -= gain * np.gradient(noise, run.time)
         made.append(replace(run, position=position, effort=effort))
     return made
 
 
 @pytest.mark.parametrize(
-    ("recorded", "there"),
+    ("recorded", "joint", "there"),
     [
-        pytest.param(lambda: [shifted(run, -0.008, [1]) for run in exact_runs()], True, id="late"),
-        pytest.param(lambda: answering(list(exact_runs()), 2.0, 3e-4), False, id="answered"),
+        pytest.param(lambda: [shifted(run, -0.008, [1]) for run in exact_runs()], 1, True, id="late"),
+        pytest.param(lambda: answering(list(exact_runs()), {1: 2.0}, 3e-4), 1, False, id="answered"),
+        pytest.param(lambda: [shifted(run, -0.008) for run in exact_runs()], None, True, id="all late"),
+        pytest.param(lambda: answering(list(exact_runs()), {0: 60.0, 1: 2.0}, 3e-4), None, False, id="all answered"),
     ],
 )
-def test_a_delay_is_about_the_same_in_the_lower_part_of_the_band(recorded, there: bool):
-    """What a controller answered coarse encoders with was two wrists' torque 6 and 10 ms before their motion (UR5)."""
+def test_a_delay_is_about_the_same_in_the_lower_part_of_the_band(recorded, joint: int | None, there: bool):
+    """What a controller answered coarse encoders with was two wrists' torque 6 and 10 ms before their motion (UR5).
+
+    On another UR5 it was all joints' torque 14 ms before; below 2.4 Hz it was 0.2 ms after, as sure to 0.9.
+    """
     step = step_beside(recorded())
-    (decision,) = step.judge([Candidate(TimeDelay(), Member(1))])
+    (decision,) = step.judge([Candidate(TimeDelay(), Member(joint))])
     assert decision.accepted
     said = noise_objection(step, decision)
     assert (said is None) == there
