@@ -51,7 +51,9 @@ def test_std_are_asked_of_what_recordings_can_know(tables: ModuleType, days, var
         ([], {"elbow": 0.3}, False),
     ],
 )
-def test_published_limits_are_those_of_the_joint_where_an_effect_shows(tables: ModuleType, sizes, limits, above) -> None:
+def test_published_limits_are_those_of_the_joint_where_an_effect_shows(
+    tables: ModuleType, sizes, limits, above
+) -> None:
     made = {"true": [{}] * len(sizes), "strengths": sizes, "strongest": ["elbow"] * len(sizes), "limits": limits}
     assert tables.above_published(made) == above
 

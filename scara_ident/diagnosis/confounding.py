@@ -5,19 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from scara_ident.diagnosis.acceptance import Decision
-from scara_ident.diagnosis.candidate_tests import held_out_gains
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.noise_check import noise_left
-from scara_ident.diagnosis.search import fitted_beside
-from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
+from scara_ident.diagnosis.choice import fitted_beside
+from scara_ident.diagnosis.exchange import near_in_place, same
+from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.variation_check import counted
 from scara_ident.effects import Scene
-
-# Columns that follow the base model's estimate instead of the last one gain at least this share of what they would.
-LEAST_AT_FIRST = 0.5
 
 
 @dataclass(frozen=True)
@@ -81,17 +75,11 @@ def _confounders_of(
     # Of all joints together: candidates of different joints are compared. Those that remove too little, most of them, need
     # no test.
     saved = own.examination.held_out
-    least = criteria.near_confounder * saved
-    enough = list(dict.fromkeys([*pool, *twins, *doubtful]))
-    # By the columns at hand first: most come nowhere near, and need no others.
-    for columns, asked in ((first, LEAST_AT_FIRST * least), (scene, least)):
-        found_gains = held_out_gains(step.model, step.rows(columns, enough), criteria)
-        enough = [item for item, gain in zip(enough, found_gains, strict=True) if gain > asked]
-    judged = list(best_of_each(step.judge(enough)).values())
+    judged = near_in_place(step, own, list(dict.fromkeys([*pool, *twins, *doubtful])), first)
     to_fit = [item for item in judged if item.candidate.effect.fitted_first]
     # What is chosen by a fit is compared by one: its grid points lose most of it.
     fitted = fitted_beside(replace(step, criteria=of_one), to_fit, 0.0, None)
-    near = [item for item in judged if item.accepted and item.examination.held_out > least]
+    near = [item for item in judged if item.accepted and item.examination.held_out > criteria.near_confounder * saved]
     # Refined, what is doubtful would do what anything does over so little of it.
     refined = step.refine(
         [item for item in near if not (item.candidate.effect.fitted_first or item.candidate in doubtful)]
@@ -101,20 +89,9 @@ def _confounders_of(
     for beside, decision in [*((step, item) for item in near), *fitted]:
         better = decision.examination.held_out >= saved
         able = better or decision.examination.held_out >= criteria.least_share * saved
-        if decision.accepted and able and (better or _same((step, own), (beside, decision))):
+        if decision.accepted and able and (better or same((step, own), (beside, decision))):
             candidate = decision.candidate
             name, joint = candidate.effect.name, candidate.joint(scene)
             value = tuple(float(x) for x in decision.examination.value)
             others.append(Confounder(decision.label, name, joint, decision.gain, own.gain, candidate, value))
     return tuple(sorted(others, key=lambda item: -item.gain))
-
-
-def _same(own: tuple[SelectionStep, Decision], other: tuple[SelectionStep, Decision]) -> bool:
-    """Whether the errors of two models, each a candidate beside a step, differ by no more than chance or noise makes."""
-    worse = other[1].examination.left - own[1].examination.left
-    difference, least = float(np.sum(worse)), own[0].criteria.alike * float(np.sqrt(len(worse) * np.var(worse)))
-    if abs(difference) < least:
-        return True
-    # The noise of the positions is in the columns of one more than in those of the other.
-    grown, own_grown = (noise_left(step, decision.candidate) for step, decision in (other, own))
-    return abs(difference - grown + own_grown) < least

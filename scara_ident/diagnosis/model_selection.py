@@ -12,13 +12,14 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision, hopeless
 from scara_ident.diagnosis.audit import outdone, superfluous, suspected, unsettled
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.choice import fitted_beside
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.evidence import coloured_shares
 from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
 from scara_ident.diagnosis.moments import examine_moments
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.screening import Dependence, screen
-from scara_ident.diagnosis.search import Search, SearchTask, fitted_beside, scene_of, search
+from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search
 from scara_ident.diagnosis.selection_step import SelectionStep, observed, observed_at_every_sample
 from scara_ident.diagnosis.work import first, next_of, search_and_rest
 from scara_ident.estimation import Estimate, wls

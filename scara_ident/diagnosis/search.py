@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,14 +10,13 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
+from scara_ident.diagnosis.choice import choose
 from scara_ident.diagnosis.correction import Correction, taken_out
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
-from scara_ident.diagnosis.effect_parameters import parameters_beside
+from scara_ident.diagnosis.exchange import best_exchange
 from scara_ident.diagnosis.lines import line_candidates
-from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.nonlinear_fit import tune
-from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, model_with, observed, points_of_lines
-from scara_ident.diagnosis.variation_check import best_first, variation_objection
+from scara_ident.diagnosis.selection_step import SelectionStep, model_with, observed
 from scara_ident.diagnosis.work import after_rounds
 from scara_ident.effects import Effect, Scene
 from scara_ident.effects.catalogue import available_effects
@@ -197,7 +196,7 @@ def search(
     steps: list[Step] = []
     correction: Correction | None = None
     weights, value = start.weights, start.value
-    rounds = 0
+    rounds = exchanges = 0
     while True:
         words = f"trying {len(candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else "")
         task.progress(words, after_rounds(rounds))
@@ -209,12 +208,20 @@ def search(
         seeds = line_candidates(scene, residuals, task.catalogue, criteria)
         taken = {*without, *(item.label(scene) for item in chosen)}
         decisions += step.judge([item for item in seeds if item.label(scene) not in taken])
-        if len(steps) >= criteria.most_effects:
-            break
-        winner, refused, scene = _choose(step, decisions, known)
+        winner, refused = None, {}
+        if len(steps) < criteria.most_effects:
+            winner, refused, scene = choose(step, decisions, known and known.step)
         decisions = [item for item in decisions if item.label not in refused] + list(refused.values())
         if winner is None:
-            break
+            # At most as often as effects came in: each exchange explains more than all before.
+            swap = best_exchange(step, everything, first, (*without, *refused)) if exchanges < len(steps) else None
+            if swap is None:
+                break
+            exchanges += 1
+            winner, scene, gone = swap.decision, swap.scene, chosen[swap.place].label(scene)
+            chosen = tuple(item for item in chosen if item.label(scene) != gone)
+            steps = [item for item in steps if item.decision.label != gone]
+            candidates += [item for item in everything if item.label(scene) == gone]
         candidate, found = winner.candidate, winner.examination
         if candidate.corrects_data:
             columns, value = taken_out(SelectionStep(scene, columns, chosen, weights, tried, criteria), candidate)
@@ -264,129 +271,6 @@ def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Sc
     band = max((band for band in data.bands if band is not None), default=HIGHEST_CUT * slowest)
     scene = Scene(model, value, longest, slowest, band, travel, speed, start, columns=columns_at_hand(observations))
     return replace(scene, armatures=guessed_armatures(scene))
-
-
-def _choose(
-    step: SelectionStep, decisions: Sequence[Decision], known: Search | None
-) -> tuple[Decision | None, dict[str, Decision], Scene]:
-    """Refine the best families; return the best acceptable member that is sound, those better that are not, and its scene."""
-    criteria = step.criteria
-    # Families of one name each: which of them is better is seen once they are refined.
-    by_family: dict[Effect, list[Decision]] = {}
-    for item in decisions:
-        by_family.setdefault(item.candidate.effect, []).append(item)
-    best = [item for family in by_family.values() for item in best_of_each(family).values()]
-    first = [item for item in decisions if item.candidate.effect.fitted_first]
-    accepted = [item for item in best if item.accepted and not item.candidate.effect.fitted_first]
-    found = fitted_beside(step, first, max((item.gain for item in accepted), default=0.0), known)
-    refused = {item.label: item for _, item in found if not item.accepted}
-    accepted += _sure_once_refined(step, best, max((item.examination.held_out for item in accepted), default=0.0))
-    open_ = [(step, item) for item in accepted] + [(own, item) for own, item in found if item.accepted]
-    open_.sort(key=lambda pair: -pair[1].examination.held_out)
-    # Where the best are refused, the next best may still be sound.
-    while open_:
-        enough = criteria.near_best * open_[0][1].examination.held_out
-        leaders = [pair for pair in open_ if pair[1].examination.held_out >= enough][: criteria.most_refined]
-        refined = step.refine([item for own, item in leaders if own is step])
-        sure = [item.candidate for item in refined if item.accepted]
-        refined += step.judge(
-            [replace(item, effect=full) for item in sure if (full := item.effect.in_full()) is not None]
-        )
-        pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in leaders if pair[0] is not step]
-        for own, decision in best_first(pairs):
-            why = _insignificant(own, decision.candidate) or noise_objection(own, decision)
-            why = why or variation_objection(own, decision)
-            if why is None:
-                return decision, refused, own.scene
-            refused[decision.label] = decision.refused(why)
-        open_ = open_[len(leaders) :]
-    return None, refused, step.scene
-
-
-def _sure_once_refined(step: SelectionStep, best: Sequence[Decision], enough: float) -> list[Decision]:
-    """Return those worth a look that are sure beside their grid point, which may lose most of their significance.
-
-    Every point on the way there is one more that was tried.
-    """
-    criteria = step.criteria
-    worth = [
-        item
-        for item in best
-        if item.tentative
-        and item.candidate.effect.nonlinear
-        and not item.candidate.effect.fitted_first
-        and item.examination.held_out >= criteria.near_best * enough
-    ]
-    worth.sort(key=lambda item: -item.examination.held_out)
-    worth = worth[: criteria.most_refined]
-    points = sum(points_of_lines(item.candidate) for item in worth)
-    return [item for item in replace(step, tried=step.tried + points).refine(worth) if item.accepted]
-
-
-def fitted_beside(
-    step: SelectionStep, candidates: Sequence[Decision], best: float, known: Search | None
-) -> list[tuple[SelectionStep, Decision]]:
-    """Fit those of some candidates that promise something, all else with them, and judge them there.
-
-    Parameters
-    ----------
-    step : SelectionStep
-    candidates : sequence of Decision
-        Grid points of families that are fitted first.
-    best : float
-        Largest gain among the other families.
-    known : Search or None
-        See `search`.
-
-    Returns
-    -------
-    list of (SelectionStep, Decision)
-        With the step at the estimate that goes with the candidate.
-    """
-    criteria = step.criteria
-    enough = max(criteria.least_gain, criteria.near_best * best)
-    worth = _worth_fitting(candidates, enough, step.tried, criteria.most_fitted)
-    begins = {item.label: (step.scene, item.candidate) for item in worth}
-    if known is not None:
-        # Found in another band: from there it is near.
-        scene = replace(step.scene, value=known.scene.value, armatures=known.scene.armatures)
-        labels = {item.label for item in candidates}
-        begins |= {item.label(scene): (scene, item) for item in known.chosen if item.label(scene) in labels}
-    found = []
-    for scene, candidate in begins.values():
-        everything = (*step.chosen, candidate)
-        scene, chosen = tune(scene, step.columns, step.weights, everything, criteria.rotor_inertia_std, coarse=True)
-        # Beside the others as they are fitted with it.
-        own = replace(step, scene=scene, chosen=chosen[:-1])
-        (decision,) = own.judge([chosen[-1]])
-        before, left = float(np.sum(step.model.squares)), float(np.sum(decision.examination.left))
-        if decision.accepted and before - left < criteria.least_gain * before / scene.robot.n:
-            decision = replace(decision, accepted=False, why="takes the place of an effect in the model")
-        found.append((own, decision))
-    return found
-
-
-def _worth_fitting(points: Sequence[Decision], enough: float, tried: int, most: int) -> list[Decision]:
-    """Return the best points of those that promise so much gain and what they may stand for, the most promising first."""
-    # A fit is dear. Of a resonance with little damping a grid point loses most, or is unsure where it removes most, as its
-    # waves are others in every run; a point beside it, or the same of another joint, may be more than chance would bring.
-    sure = {x.candidate.effect.name for x in points if x.gain > 0.0 and x.examination.p_value * tried <= 1.0}
-    best = [item for item in best_of_each(points).values() if item.candidate.effect.name in sure]
-    large = {item.candidate.effect.name for item in best if item.gain >= enough}
-    best.sort(key=lambda item: -item.gain)
-    return [item for item in best if item.candidate.effect.name in large][:most]
-
-
-def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:
-    """Say so where the size of an effect is within its uncertainty, that of its nonlinear parameters included."""
-    if not candidate.effect.nonlinear:
-        return None
-    nonlinear = {parameter.name for parameter in candidate.effect.nonlinear}
-    found = parameters_beside(step, candidate)
-    sizes = [parameter for name, parameter in found.items() if name not in nonlinear and name != "phase"]
-    if any(abs(parameter.value) > step.criteria.least_size * parameter.std for parameter in sizes):
-        return None
-    return "its size is within its uncertainty once its other parameters are free"
 
 
 def _backward(step: SelectionStep) -> tuple[Candidate, ...]:

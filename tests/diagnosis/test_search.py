@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
-from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.model_selection import rms_of
 from scara_ident.diagnosis.search import (
     SearchTask,
     _backward,
-    _sure_once_refined,
-    _worth_fitting,
     columns_at_hand,
-    fitted_beside,
     scene_of,
     search,
 )
@@ -88,24 +82,6 @@ def test_the_error_falls_with_every_step_to_that_of_the_clean_recordings():
     assert sizes[0] > 2.0 * sizes[1] > 2.0 * sizes[2]
     clean = searched(exact_runs(), *SMALL)
     assert errors[1] == pytest.approx(rms_of(clean.start.value, clean.uncorrected), rel=0.02)
-
-
-def test_what_is_sure_only_beside_its_grid_point_is_refined_before_it_is_refused():
-    def dip(motion):
-        return 0.1 * np.sign(motion.v[0]) * np.exp(-((motion.v[0] / 0.43) ** 2))
-
-    step = step_beside(with_torque(exact_runs(), 0, dip))
-    members = [item for item in Stribeck().members(step.scene) if item.joint == 0]
-    grid = max(step.judge([Candidate(Stribeck(), item) for item in members]), key=lambda item: item.gain)
-    (fine,) = step.refine([grid])
-    between = np.sqrt(grid.examination.p_value * fine.examination.p_value)
-    strict = replace(step, tried=int(step.criteria.family_error / between))
-    (refused,) = strict.judge([grid.candidate])
-    assert refused.tentative and not refused.accepted
-    (found,) = _sure_once_refined(strict, [refused], 0.0)
-    assert found.accepted and found.candidate.member.nonlinear[0] == pytest.approx(0.43, rel=0.1)
-    # Where something else removes much more it is not its turn.
-    assert _sure_once_refined(strict, [refused], 2.0) == []
 
 
 class BumpAndSlope(Bump):
@@ -216,46 +192,3 @@ def test_the_scene_is_how_far_the_recordings_reach():
     for part in seen.data.stretches:
         for held, made in zip(columns_at_hand(seen)[part.motion], MODEL.joint_columns(part.motion), strict=True):
             assert np.array_equal(held, made)
-
-
-def point(label: str, gain: float, p_value: float):
-    """Return a decision on a grid point of a family of one letter on a joint."""
-    effect = SimpleNamespace(effect=SimpleNamespace(name=label[0]))
-    examination = SimpleNamespace(p_value=p_value)
-    return SimpleNamespace(candidate=effect, label=label, gain=gain, examination=examination, accepted=False)
-
-
-def test_what_an_effect_may_stand_for_on_another_joint_is_fitted_beside_it():
-    """An elastic second joint was believed where the first was, whose grid point chance might have brought."""
-
-    other, first, faint = point("a1", 0.16, 3e-9), point("a2", 0.13, 0.13), point("a3", 0.05, 0.13)
-    beside = point("b1", 0.15, 0.13)
-    assert _worth_fitting([faint, first, beside, other], 0.1, 100, CRITERIA.most_fitted) == [other, first]
-    # It may gain next to nothing there, and most once it is fitted.
-    assert _worth_fitting([faint, beside, other], 0.1, 100, CRITERIA.most_fitted) == [other, faint]
-    # Alone it is not worth a fit.
-    assert _worth_fitting([first, beside], 0.1, 100, CRITERIA.most_fitted) == []
-
-
-def test_a_resonance_that_one_grid_point_shows_large_and_another_sure_is_fitted():
-    """At 20,000 N m/rad, with little damping, the point that removed most was unsure, and a sure one removed too little."""
-    large, sure, other = point("a1", 0.091, 0.033), point("a1", 0.027, 1.4e-4), point("a2", 0.005, 0.13)
-    assert _worth_fitting([sure, other, large], CRITERIA.least_gain, 116, CRITERIA.most_fitted) == [large, other]
-    # Sure of the other joint alone, for which it may stand.
-    sure = point("a2", 0.027, 1.4e-4)
-    assert _worth_fitting([large, sure], CRITERIA.least_gain, 116, CRITERIA.most_fitted) == [large, sure]
-    # A point that makes things worse is sure of nothing, and none may be large enough.
-    assert _worth_fitting([large, point("a1", -0.1, 1e-9)], CRITERIA.least_gain, 116, CRITERIA.most_fitted) == []
-    assert _worth_fitting([sure, other], CRITERIA.least_gain, 116, CRITERIA.most_fitted) == []
-
-
-def test_what_takes_the_place_of_an_effect_in_the_model_does_not_come_in(monkeypatch):
-    """An elastic first joint was dropped again for the second, fitted with it so that it explained nothing any more."""
-    held, spoilt = Candidate(Spring(), Member(1)), Candidate(Stribeck(), Member(0, (0.3,)))
-    step = step_beside(with_torque(exact_runs(), 1, spring), [held])
-    (promised,) = replace(step, chosen=()).judge([held])
-    monkeypatch.setattr(sys.modules[search.__module__], "tune", lambda scene, *_, **__: (scene, (spoilt, held)))
-    ((own, decision),) = fitted_beside(step, [promised], 0.0, None)
-    assert own.chosen == (spoilt,)
-    assert decision.gain > 0.5
-    assert (decision.accepted, decision.why) == (False, "takes the place of an effect in the model")

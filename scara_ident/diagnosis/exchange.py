@@ -1,0 +1,140 @@
+"""Exchanging an effect for one that explains more in its place: what came in early was fitted without what came later."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.candidate_tests import held_out_gains
+from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.choice import fitted_beside, insignificant
+from scara_ident.diagnosis.noise_check import noise_left, noise_objection
+from scara_ident.diagnosis.nonlinear_fit import tune
+from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
+from scara_ident.diagnosis.variation_check import variation_objection
+from scara_ident.effects import Scene
+
+# Columns that follow the base model's estimate instead of the last one gain at least this share of what they would.
+LEAST_AT_FIRST = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Exchange:
+    """An effect in the place of another.
+
+    Attributes
+    ----------
+    place : int
+        Of the effect that goes, among those chosen.
+    decision : Decision
+        On the effect that comes.
+    scene : Scene
+        To go on with.
+    saved : float
+        Weighted squared residual that it leaves less.
+    """
+
+    place: int
+    decision: Decision
+    scene: Scene
+    saved: float
+
+
+def best_exchange(
+    step: SelectionStep, pool: Sequence[Candidate], first: Scene, refused: Collection[str] = ()
+) -> Exchange | None:
+    """Return the exchange that explains most more, all else fitted with it; None where none explains more than chance does.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The model with all that came in.
+    pool : sequence of Candidate
+        All that may come.
+    first : Scene
+        Where the columns of the pool are at hand.
+    refused : collection of str, optional
+        Labels of what is not to be tried.
+    """
+    found = []
+    held = {item.label(step.scene) for item in step.chosen} | set(refused)
+    able = [item for item in pool if not item.corrects_data and item.label(step.scene) not in held]
+    for place, item in enumerate(step.chosen):
+        beside = step.without(place)
+        (own,) = beside.judge([item])
+        for other, decision in _fitted_rivals(beside, own, able, first):
+            saved = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
+            if saved > 0.0 and not same((beside, own), (other, decision)) and _objection(other, decision) is None:
+                found.append(Exchange(place, decision, other.scene, saved))
+    return max(found, key=lambda each: each.saved, default=None)
+
+
+def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate], first: Scene) -> list[Decision]:
+    """Return the best grid point of each of those that remove nearly as much in the place of an effect.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The model without the effect.
+    found : Decision
+        On the effect beside it.
+    pool : sequence of Candidate
+    first : Scene
+        Where the columns of the pool are at hand.
+    """
+    criteria, effect = step.criteria, found.candidate.effect
+    least = criteria.near_confounder * found.examination.held_out
+
+    def enough(candidates: list[Candidate], columns: Scene, asked: float) -> list[Candidate]:
+        gained = held_out_gains(step.model, step.rows(columns, candidates), criteria)
+        return [item for item, gain in zip(candidates, gained, strict=True) if gain > asked]
+
+    # By the columns at hand first: most come nowhere near, and need no others. But what the effect itself would do on
+    # another joint depends on the model as it does here.
+    alike = [item for item in pool if item.effect.name == effect.name]
+    others = enough([item for item in pool if item.effect.name != effect.name], first, LEAST_AT_FIRST * least)
+    return list(best_of_each(step.judge(enough([*alike, *others], step.scene, least))).values())
+
+
+def same(own: tuple[SelectionStep, Decision], other: tuple[SelectionStep, Decision]) -> bool:
+    """Whether the errors of two models, each a candidate beside a step, differ by no more than chance or noise makes."""
+    worse = other[1].examination.left - own[1].examination.left
+    difference, least = float(np.sum(worse)), own[0].criteria.alike * float(np.sqrt(len(worse) * np.var(worse)))
+    if abs(difference) < least:
+        return True
+    # The noise of the positions is in the columns of one more than in those of the other.
+    grown, own_grown = (noise_left(step, decision.candidate) for step, decision in (other, own))
+    return abs(difference - grown + own_grown) < least
+
+
+def _fitted_rivals(
+    beside: SelectionStep, own: Decision, pool: Sequence[Candidate], first: Scene
+) -> list[tuple[SelectionStep, Decision]]:
+    """Return those that come near an effect in its place once they are refined, with all else fitted with them."""
+    criteria = beside.criteria
+    near = near_in_place(beside, own, pool, first)
+    by_fit = fitted_beside(beside, [item for item in near if item.candidate.effect.fitted_first], 0.0, None)
+    rest = [item for item in near if item.accepted and not item.candidate.effect.fitted_first]
+    rest.sort(key=lambda item: -item.examination.held_out)
+    enough = criteria.least_share * own.examination.held_out
+    refined = [item for item in beside.refine(rest[: criteria.most_refined]) if item.examination.held_out >= enough]
+    found = [pair for pair in by_fit if pair[1].accepted]
+    for item in refined:
+        everything = (*beside.chosen, item.candidate)
+        scene, chosen = tune(beside.scene, beside.columns, beside.weights, everything, criteria.rotor_inertia_std)
+        other = replace(beside, scene=scene, chosen=chosen[:-1])
+        (decision,) = other.judge([chosen[-1]])
+        if decision.accepted:
+            found.append((other, decision))
+    return found
+
+
+def _objection(step: SelectionStep, decision: Decision) -> str | None:
+    return (
+        insignificant(step, decision.candidate)
+        or noise_objection(step, decision)
+        or variation_objection(step, decision)
+    )
