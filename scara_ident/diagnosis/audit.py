@@ -56,7 +56,7 @@ def _repeated(step: SelectionStep, decision: Decision) -> str | None:
     """Say so where only repetitions make an effect significant: what a model lacks repeats with the motion as well."""
     data, criteria = step.observations.data, step.criteria
     motions = len(data.trajectories)
-    if motions == len(data.recordings):
+    if motions == len(data.recordings) and not any(data.motions.periods):
         return None
     # Of one motion alone, no other says otherwise: it counts as recorded once. Else what hardly leaves anything stands for nothing that repeats.
     if motions > 1 and decision.gain >= criteria.nearly_all:

@@ -8,16 +8,34 @@ aggregate variables on micro units").
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.diagnosis.candidate_tests import Examination, examine
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.fitted_model import FittedModel
-from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.diagnosis.selection_step import SelectionStep, moments_of
 from scara_ident.estimation.joint_rows import JointRows
 
 
+def moments_told(step: SelectionStep) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Return which moments of which motions the blocks are of.
+
+    Returns
+    -------
+    tuple of ndarray of int
+        Of each moment the place of its motion among the trajectories and its number there, shape (moments, 2), and its first
+        block, shape (moments,); the place of each block's moment, shape (blocks,).
+    """
+    data = step.observations.data
+    names = data.trajectories
+    motion = np.array([names.index(label) for label in data.labels])[step.model.owner]
+    number = moments_of(data)[step.filled]
+    moments, first, place = np.unique(np.column_stack([motion, number]), axis=0, return_index=True, return_inverse=True)
+    return moments, first, place.reshape(-1)
+
+
 def examine_moments(step: SelectionStep, candidate: Candidate) -> Examination:
-    """Examine a candidate with the blocks of one moment of a motion, in all its repetitions, as one.
+    """Examine a candidate with the blocks of one moment of a motion, in all its repetitions and periods, as one.
 
     Parameters
     ----------
@@ -25,13 +43,9 @@ def examine_moments(step: SelectionStep, candidate: Candidate) -> Examination:
         The model that it is tried beside.
     candidate : Candidate
     """
-    model, data = step.model, step.observations.data
+    model = step.model
     (own,) = step.rows(step.scene, [candidate])
-    names = data.trajectories
-    motion = np.array([names.index(label) for label in data.labels])[model.owner]
-    number = step.filled - np.searchsorted(step.observations.owner, model.owner)
-    moments, first, place = np.unique(np.column_stack([motion, number]), axis=0, return_index=True, return_inverse=True)
-    place = place.reshape(-1)
+    moments, first, place = moments_told(step)
     rows, joints = {}, []
     for joint, item in enumerate(model.joints):
         lengths = np.diff(item.starts)

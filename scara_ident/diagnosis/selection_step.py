@@ -145,7 +145,8 @@ def fitted_model(observations: Observations, chosen: Sequence[Rows], weights: Ar
         for rows in joints
     )
     parameters = observations.parameters + sum(len(next(iter(rows.values()))) for rows in chosen)
-    return FittedModel(joints, parameters, owner, folds_of(observations.data, owner, parts), weights)
+    fold = folds_of(observations.data, owner, filled, parts)
+    return FittedModel(joints, parameters, owner, fold, weights)
 
 
 def model_with(scene: Scene, chosen: Sequence[Candidate]) -> TorqueModel:
@@ -184,16 +185,47 @@ def observed_at_every_sample(step: SelectionStep) -> Observations:
     return replace(observed(step), raw=tuple(raws))
 
 
-def folds_of(data: PreparedData, owner: NDArray[np.intp], parts: int) -> NDArray[np.intp]:
+def moments_of(data: PreparedData) -> NDArray[np.intp]:
+    """Return which moment of its recording's motion each block is, shape (blocks,): the same in all periods that repeat it."""
+    found = []
+    for item, periods in zip(data.recordings, data.motions.periods, strict=True):
+        numbers: list[NDArray[np.intp]] = []
+        blocks = sum(len(part.blocks) - 1 for part in item.stretches if part.usable)
+        for part in (part for part in item.stretches if part.usable):
+            own = np.arange(len(part.blocks) - 1) + sum(map(len, numbers))
+            if periods is not None and part.stretch is item.longest.stretch:
+                middle = 0.5 * (part.blocks[1:] + part.blocks[:-1])
+                starts = np.array(periods.starts)
+                since = middle - starts[np.maximum(np.searchsorted(starts, middle, side="right") - 1, 0)]
+                length = (part.blocks[-1] - part.blocks[0]) / len(own)
+                # Other numbers than those of the blocks before and after.
+                phase = blocks + (since / length).astype(np.intp)
+                own = np.where((since >= 0.0) & (since < periods.length), phase, own)
+            numbers.append(own)
+        found.append(np.concatenate([np.zeros(0, dtype=np.intp), *numbers]))
+    return np.concatenate(found)
+
+
+def folds_of(data: PreparedData, owner: NDArray[np.intp], filled: NDArray[np.intp], parts: int) -> NDArray[np.intp]:
     """Return the fold of each block: its trajectory, or which of so many parts of the only one.
 
     Repetitions are parted alike: what one shows of a moment of the motion, the others only repeat.
+
+    Parameters
+    ----------
+    data : PreparedData
+    owner, filled : ndarray of int, shape (blocks,)
+        Recording of each block, and its place among all blocks.
+    parts : int
     """
     names = data.trajectories
     if len(names) == 1:
-        count = np.bincount(owner)
-        first = np.cumsum(count) - count
-        return np.asarray((np.arange(len(owner)) - first[owner]) * parts // np.maximum(1, count[owner]), dtype=np.intp)
+        fold, moments = np.zeros(len(owner), dtype=np.intp), moments_of(data)[filled]
+        for recording in np.unique(owner):
+            own = owner == recording
+            place = np.unique(moments[own], return_inverse=True)[1].reshape(-1)
+            fold[own] = place * parts // (place.max() + 1)
+        return fold
     place = np.array([names.index(label) for label in data.labels], dtype=np.intp)
     return np.asarray(place[owner], dtype=np.intp)
 

@@ -243,17 +243,16 @@ class PreparedData(Frozen):
 
     @property
     def motions(self) -> Trajectories:
-        """Which recordings have the same motion, found once for all bands."""
+        """Which recordings have the same motion, found once for all bands; of a part, as in the whole."""
+        if self._part_of is not None:
+            return self._part_of[0].motions.of(self._part_of[1])
         self._motions[:] = self._motions or [trajectories_of([item.longest.stretch for item in self.recordings])]
         return self._motions[0]
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Trajectory of each recording: the same for repetitions of one motion; of a part, as in the whole."""
-        if self._part_of is None:
-            return self.motions.labels
-        labels = self._part_of[0].labels
-        return tuple(labels[k] for k in self._part_of[1])
+        """Trajectory of each recording: the same for repetitions of one motion."""
+        return self.motions.labels
 
     @property
     def trajectories(self) -> tuple[str, ...]:

@@ -14,6 +14,8 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.motion.motion import Stretch
+from scara_ident.motion.periods import Periods, periods_of
+from scara_ident.threads import side_by_side
 
 # Repetitions start within this many seconds of each other after alignment; more is another motion.
 LARGEST_SHIFT = 1.0
@@ -41,10 +43,17 @@ class Trajectories:
         Of each recording; the same for repetitions of one motion.
     notes : tuple of str
         Where names and motions contradict each other.
+    periods : tuple of (Periods or None)
+        Where each recording repeats its own motion; None where it does not.
     """
 
     labels: tuple[str, ...]
     notes: tuple[str, ...]
+    periods: tuple[Periods | None, ...]
+
+    def of(self, places: Sequence[int]) -> Trajectories:
+        """Return those of some of the recordings, called as among all."""
+        return Trajectories(tuple(self.labels[k] for k in places), (), tuple(self.periods[k] for k in places))
 
 
 def trajectories_of(stretches: Sequence[Stretch]) -> Trajectories:
@@ -87,7 +96,7 @@ def trajectories_of(stretches: Sequence[Stretch]) -> Trajectories:
         if motions > 1:
             runs = _listed(sorted(stretches[k].name for k in place))
             notes.append(f"{runs} are {motions} different motions, so not all of them repetitions of {name}")
-    return Trajectories(tuple(labels), tuple(notes))
+    return Trajectories(tuple(labels), tuple(notes), tuple(side_by_side(periods_of, stretches)))
 
 
 def _common(names: Iterable[str]) -> str:

@@ -116,6 +116,19 @@ def exact_runs(trajectories: int = 2, repetitions: int = 2, size: float = 1.9) -
     return tuple(made)
 
 
+@lru_cache(maxsize=4)
+def periodic_run(periods: int = 3, seconds: float = 6.0) -> Recording:
+    """One run of a motion that comes again, as `exact_runs` made."""
+    robot = load_robot()
+    truth = table5_parameters("OJD")
+    friction = [(*truth[5 + 4 * j : 9 + 4 * j], 0.0) for j in range(2)]
+    motion = multisine("P", 3, seconds).at(np.arange(round(seconds * RATE)) / RATE)
+    signals = [np.tile(item, periods) for item in (motion.position, motion.velocity, motion.acceleration)]
+    torque = recorded_torque(robot, *signals, friction)
+    time = np.arange(signals[0].shape[1]) / RATE
+    return noisy(recording(robot, "P_1", time, signals[0], torque), np.random.default_rng(7), NOISE)
+
+
 def with_torque(recordings: Sequence[Recording], joint: int, added) -> list[Recording]:
     """Add ``added(motion)`` to the effort of a joint."""
     made = []

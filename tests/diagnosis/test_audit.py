@@ -20,7 +20,7 @@ from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.position import Spring
 from scara_ident.robot.robot import load_robot
-from tests.diagnosis.made import BANDS, exact_runs, searched, step_beside, with_torque
+from tests.diagnosis.made import BANDS, exact_runs, periodic_run, searched, step_beside, with_torque
 from tests.estimation.test_run_variation import runs
 
 
@@ -179,3 +179,17 @@ def test_of_one_motion_more_is_asked_of_what_repeats(
         assert (audit._repeated(step, replace(decision, gain=gain)) is not None) == doubted
     # Without repetitions there is nothing to count once.
     assert audit._repeated(step_beside(exact_runs(3, 1)), replace(decision, gain=0.5)) is None
+
+
+def test_periods_of_the_only_recording_are_repetitions_too():
+    """A Stribeck friction of p = 5e-6 was believed of four periods in one file (UR5)."""
+    run = periodic_run(4)
+    lacking = gaussian_filter1d(np.random.default_rng(7).standard_normal(1500), 12)
+    lacking = np.tile(0.02 / np.std(lacking) * lacking, 4)
+    for stiffness, stands in ((0.0, False), (0.1, True)):
+        (made,) = with_torque([run], 0, lambda motion, size=stiffness: size * motion.q[0] + lacking[: motion.samples])
+        found = searched([made], Spring())
+        assert [item.label(found.scene) for item in found.chosen] == ["spring of joint1"]
+        refused = unsettled(found, found.step.weights)
+        assert (refused == []) is stands
+        assert all("with repetitions counted once" in item.why for item in refused)

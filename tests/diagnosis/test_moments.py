@@ -11,7 +11,7 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.moments import examine_moments
 from scara_ident.effects import Member
 from scara_ident.effects.position import Spring
-from tests.diagnosis.made import exact_runs, step_beside
+from tests.diagnosis.made import exact_runs, periodic_run, step_beside
 
 SPRING = Candidate(Spring(), Member(0))
 
@@ -33,3 +33,12 @@ def test_where_no_motion_is_repeated_nothing_changes():
     step = step_beside([exact_runs()[0], exact_runs()[2]])
     (alone,) = step.judge([SPRING])
     assert examine_moments(step, SPRING).p_value == pytest.approx(alone.examination.p_value, rel=1e-6)
+
+
+def test_of_the_periods_of_a_run_as_much_is_told_as_of_fewer():
+    three, five = (step_beside([periodic_run(count)]) for count in (3, 5))
+    (alone,), (many,) = three.judge([SPRING]), five.judge([SPRING])
+    once = [examine_moments(step, SPRING).freedom for step in (three, five)]
+    assert many.examination.freedom > 1.4 * alone.examination.freedom
+    assert once[1] == pytest.approx(once[0], rel=0.3)
+    assert max(once) < 0.7 * alone.examination.freedom

@@ -13,6 +13,7 @@ from scara_ident.diagnosis.selection_step import (
     best_of_each,
     folds_of,
     model_with,
+    moments_of,
     observed_at_every_sample,
 )
 from scara_ident.diagnosis.selection_step import observed as observed_with
@@ -24,7 +25,7 @@ from scara_ident.estimation import wls
 from scara_ident.estimation.information import weighted
 from scara_ident.estimation.observations import observe
 from scara_ident.motion.prepared import prepare
-from tests.diagnosis.made import BANDS, exact_runs, observed, step_beside, with_torque
+from tests.diagnosis.made import BANDS, exact_runs, observed, periodic_run, step_beside, with_torque
 
 VELOCITY = 0.43
 CHOSEN = (Candidate(Spring(), Member(0)), Candidate(TransmissionLoss(), Member(1, (0.1,))))
@@ -138,26 +139,41 @@ def test_trajectories_are_the_folds():
     seen = observed(exact_runs())
     assert_array_equal(np.unique(seen.owner), range(4))
     assert np.all(np.diff(seen.owner) >= 0)
-    assert_array_equal(folds_of(seen.data, seen.owner, 4), seen.owner // 2)
+    assert_array_equal(folds_of(seen.data, seen.owner, np.arange(len(seen.owner)), 4), seen.owner // 2)
 
 
 def test_parts_of_the_only_trajectory_are_its_folds():
     seen = observed(exact_runs()[:1])
-    fold = folds_of(seen.data, seen.owner, 4)
+    fold = folds_of(seen.data, seen.owner, np.arange(len(seen.owner)), 4)
     assert_array_equal(np.unique(fold), range(4))
     assert np.all(np.diff(fold) >= 0)
     assert np.ptp(np.bincount(fold)) <= 1
     # Fewer blocks than parts leave parts empty, not folds out of range.
-    assert folds_of(seen.data, seen.owner[:2], 4).max() < 4
+    assert folds_of(seen.data, seen.owner[:2], np.arange(2), 4).max() < 4
 
 
 def test_repetitions_of_the_only_trajectory_are_parted_alike():
     # Else what one shows is held out by showing it again, and an effect that stands for the motion itself is believed.
     seen = observed(exact_runs()[:2])
-    fold = folds_of(seen.data, seen.owner, 4)
+    fold = folds_of(seen.data, seen.owner, np.arange(len(seen.owner)), 4)
     first, second = fold[seen.owner == 0], fold[seen.owner == 1]
     assert_array_equal(np.unique(first), range(4))
     assert_array_equal(first, second)
+
+
+def test_periods_of_the_only_recording_are_parted_alike():
+    """A false effect of a UR5 was shown to every period by the other three (one file, 23 s of a motion of 5.8 s)."""
+    seen = observed([periodic_run()])
+    moments = moments_of(seen.data)
+    assert len(moments) == len(seen.owner)
+    assert len(np.unique(moments)) < 0.4 * len(moments)
+    fold = folds_of(seen.data, seen.owner, np.arange(len(seen.owner)), 4)
+    assert_array_equal(np.unique(fold), range(4))
+    for moment in np.unique(moments):
+        assert len(np.unique(fold[moments == moment])) == 1
+    # Without periods each block is a moment of its own.
+    seen = observed(exact_runs()[:2])
+    assert_array_equal(moments_of(seen.data), np.tile(np.arange(len(seen.owner) // 2), 2))
 
 
 def test_blocks_without_any_row_are_left_out():
