@@ -11,6 +11,7 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import held_out_gains
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.choice import fitted_beside, insignificant
+from scara_ident.diagnosis.moments import moments_told
 from scara_ident.diagnosis.noise_check import noise_left, noise_objection
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
@@ -46,7 +47,7 @@ class Exchange:
 def best_exchange(
     step: SelectionStep, pool: Sequence[Candidate], first: Scene, refused: Collection[str] = ()
 ) -> Exchange | None:
-    """Return the exchange that explains most more, all else fitted with it; None where none explains more than chance does.
+    """Return the exchange that explains most more, or as much with fewer effects, all else fitted with it; None where none does.
 
     Parameters
     ----------
@@ -67,9 +68,23 @@ def best_exchange(
         (own,) = beside.judge([item])
         for other, decision in _fitted_rivals(beside, own, able, first):
             saved = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
-            if saved > 0.0 and not same((beside, own), (other, decision)) and _objection(other, decision) is None:
+            alike = same((beside, own), (other, decision))
+            # What does as well with fewer others is the better explanation of the two.
+            better = _fewer(step, other, decision) if alike else saved > 0.0
+            if better and _objection(other, decision) is None:
                 found.append(Exchange(place, decision, other.scene, saved))
     return max(found, key=lambda each: each.saved, default=None)
+
+
+def needed(step: SelectionStep) -> tuple[Candidate, ...]:
+    """Drop, one at a time, effects that the others have made superfluous."""
+    while len(step.chosen) > 1:
+        decisions = [step.without(k).judge([item])[0] for k, item in enumerate(step.chosen)]
+        weakest = min(range(len(decisions)), key=lambda k: decisions[k].gain)
+        if decisions[weakest].accepted:
+            break
+        step = step.without(weakest)
+    return step.chosen
 
 
 def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate], first: Scene) -> list[Decision]:
@@ -100,8 +115,11 @@ def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate
 
 
 def same(own: tuple[SelectionStep, Decision], other: tuple[SelectionStep, Decision]) -> bool:
-    """Whether the errors of two models, each a candidate beside a step, differ by no more than chance or noise makes."""
-    worse = other[1].examination.left - own[1].examination.left
+    """Whether the errors of two models, each a candidate beside a step, differ by no more than chance or noise makes.
+
+    What either lacks is the same in every repetition of a motion: these count as one.
+    """
+    worse = np.bincount(moments_told(own[0])[2], other[1].examination.left - own[1].examination.left)
     difference, least = float(np.sum(worse)), own[0].criteria.alike * float(np.sqrt(len(worse) * np.var(worse)))
     if abs(difference) < least:
         return True
@@ -130,6 +148,14 @@ def _fitted_rivals(
         if decision.accepted:
             found.append((other, decision))
     return found
+
+
+def _fewer(step: SelectionStep, other: SelectionStep, decision: Decision) -> bool:
+    """Whether fewer effects are needed with another in the place of one than without it."""
+    if len(step.chosen) < 3:
+        # Of two, the other one is needed beside one that does as well.
+        return False
+    return len(needed(replace(other, chosen=(*other.chosen, decision.candidate)))) < len(needed(step))
 
 
 def _objection(step: SelectionStep, decision: Decision) -> str | None:

@@ -13,7 +13,7 @@ from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, column
 from scara_ident.diagnosis.choice import choose
 from scara_ident.diagnosis.correction import Correction, taken_out
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
-from scara_ident.diagnosis.exchange import best_exchange
+from scara_ident.diagnosis.exchange import best_exchange, needed
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep, model_with, observed
@@ -208,9 +208,9 @@ def search(
         seeds = line_candidates(scene, residuals, task.catalogue, criteria)
         taken = {*without, *(item.label(scene) for item in chosen)}
         decisions += step.judge([item for item in seeds if item.label(scene) not in taken])
-        winner, refused = None, {}
+        winner, refused = None, dict[str, Decision]()
         if len(steps) < criteria.most_effects:
-            winner, refused, scene = choose(step, decisions, known and known.step)
+            winner, refused, scene = choose(step, decisions, None if known is None else known.step)
         decisions = [item for item in decisions if item.label not in refused] + list(refused.values())
         if winner is None:
             # At most as often as effects came in: each exchange explains more than all before.
@@ -244,7 +244,7 @@ def search(
             SelectionStep(scene, columns, chosen, weights, tried, criteria), correction.candidate
         )
         correction = replace(correction, value=value + correction.value)
-    kept = _backward(SelectionStep(scene, columns, chosen, weights, tried, criteria))
+    kept = needed(SelectionStep(scene, columns, chosen, weights, tried, criteria))
     scene, kept = tune(scene, columns, weights, kept, criteria.rotor_inertia_std)
     labels = {item.label(scene) for item in kept}
     stayed = [item for item in steps if item.decision.label in labels or item.decision.candidate.corrects_data]
@@ -271,14 +271,3 @@ def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Sc
     band = max((band for band in data.bands if band is not None), default=HIGHEST_CUT * slowest)
     scene = Scene(model, value, longest, slowest, band, travel, speed, start, columns=columns_at_hand(observations))
     return replace(scene, armatures=guessed_armatures(scene))
-
-
-def _backward(step: SelectionStep) -> tuple[Candidate, ...]:
-    """Drop, one at a time, effects that the others have made superfluous."""
-    while len(step.chosen) > 1:
-        decisions = [step.without(k).judge([item])[0] for k, item in enumerate(step.chosen)]
-        weakest = min(range(len(decisions)), key=lambda k: decisions[k].gain)
-        if decisions[weakest].accepted:
-            break
-        step = step.without(weakest)
-    return step.chosen

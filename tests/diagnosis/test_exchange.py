@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.exchange import best_exchange, near_in_place, same
+from scara_ident.diagnosis.exchange import best_exchange, near_in_place, needed, same
 from scara_ident.effects import Member
-from scara_ident.effects.friction import AsymmetricFriction
+from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay
 from scara_ident.effects.position import Spring
 from tests.diagnosis.made import Bent, Bump, exact_runs, searched, step_beside, with_torque
@@ -87,3 +87,43 @@ def test_another_place_of_the_same_effect_is_asked_by_the_columns_of_the_model_a
     (near,) = near_in_place(step, own, [*grid, SPRING], first)
     assert near.candidate.member.nonlinear == (1.0,)
     assert [items for scene, items in asked if scene is first] == [[SPRING]]
+
+
+def test_an_effect_that_the_others_make_superfluous_is_dropped(runs):
+    """Backwards every effect is judged beside the others; one that nothing was planted for does not stay."""
+    extra = Candidate(Stribeck(), Member(0, (0.5,)))
+    assert needed(step_beside(runs, (SPRING, extra, ASYMMETRIC))) == (SPRING, ASYMMETRIC)
+
+
+class Shape(Spring):
+    """A torque of another shape for each name."""
+
+    def __init__(self, name, shape):
+        self.name, self.shape = name, shape
+
+    def __hash__(self):
+        return hash(self.name)
+
+    def __eq__(self, other):
+        return isinstance(other, Shape) and self.name == other.name
+
+    def signal_columns(self, signals, member):
+        return [self.shape(signals.motion)]
+
+
+def test_what_does_as_well_with_fewer_others_takes_the_place():
+    """A spring and a torque read too large were believed to be a counterbalance and four other effects (UR5)."""
+    runs = with_torque(exact_runs(), 0, lambda motion: 0.1 * (motion.q[0] - 1.57))
+    wrong = Candidate(Shape("wrong", lambda motion: motion.q[0] - 1.57 - 1.5 * np.sin(5.0 * motion.q[0])), Member(0))
+    mends = Candidate(Shape("mends", lambda motion: np.sin(5.0 * motion.q[0])), Member(0))
+    other = Candidate(Shape("other", lambda motion: np.cos(3.0 * motion.q[1])), Member(1))
+    runs = with_torque(runs, 1, lambda motion: 0.05 * np.cos(3.0 * motion.q[1]))
+    step = step_beside(runs, [wrong, mends, other])
+    beside = step.without(0)
+    own, spring = beside.judge([wrong, SPRING])
+    assert same((beside, own), (beside, spring))
+    assert len(needed(step)) == 3
+    found = best_exchange(step, [SPRING], step.scene)
+    assert (found.place, found.decision.label) == (0, "spring of joint1")
+    # Beside two that are both needed with either, it would change nothing.
+    assert best_exchange(step_beside(runs, [wrong, mends]), [SPRING], step.scene) is None

@@ -11,7 +11,6 @@ from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.model_selection import rms_of
 from scara_ident.diagnosis.search import (
     SearchTask,
-    _backward,
     columns_at_hand,
     scene_of,
     search,
@@ -166,15 +165,6 @@ def test_a_search_on_columns_that_are_known_finds_the_same():
     again = search(SearchTask(MODEL, SMALL), columns)
     assert again.chosen == first.chosen
     assert np.array_equal(again.scene.value, first.scene.value)
-
-
-def test_an_effect_that_the_others_make_superfluous_is_dropped():
-    """Backwards every effect is judged beside the others; one that nothing was planted for does not stay."""
-    runs = with_torque(with_torque(exact_runs(), 1, spring), 0, asymmetry)
-    extra = Candidate(Stribeck(), Member(0, (0.5,)))
-    step = step_beside(runs, (Candidate(Spring(), Member(1)), extra, Candidate(AsymmetricFriction(), Member(0))))
-    kept = _backward(step)
-    assert kept == (step.chosen[0], step.chosen[2])
 
 
 def test_the_scene_is_how_far_the_recordings_reach():
