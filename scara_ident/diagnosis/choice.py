@@ -9,6 +9,7 @@ import numpy as np
 
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.correction import taken_out
 from scara_ident.diagnosis.effect_parameters import parameters_beside
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.nonlinear_fit import tune
@@ -61,7 +62,7 @@ def choose(
         pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in leaders if pair[0] is not step]
         for own, decision in best_first(pairs):
             why = insignificant(own, decision.candidate) or noise_objection(own, decision)
-            why = why or variation_objection(own, decision)
+            why = why or variation_objection(own, decision) or _left_again(own, decision)
             if why is None:
                 return decision, refused, own.scene
             refused[decision.label] = decision.refused(why)
@@ -141,6 +142,18 @@ def _worth_fitting(points: Sequence[Decision], enough: float, tried: int, most: 
     large = {item.candidate.effect.name for item in best if item.gain >= enough}
     best.sort(key=lambda item: -item.gain)
     return [item for item in best if item.candidate.effect.name in large][:most]
+
+
+def _left_again(step: SelectionStep, decision: Decision) -> str | None:
+    """Say so where much of a correction is left once it was made: of a delay that is there it is a term of third order."""
+    candidate, first = decision.candidate, decision.examination.value
+    if not candidate.corrects_data:
+        return None
+    _, whole = taken_out(step, candidate)
+    if np.max(np.abs(whole - first)) <= step.criteria.lower_change * np.max(np.abs(first)):
+        return None
+    name, unit = candidate.effect.coefficients[0].name, candidate.effect.coefficients[0].unit
+    return f"{name} would be {first[0]:.2g} {unit}, but {whole[0]:.2g} {unit} until nothing of it is left in the data"
 
 
 def insignificant(step: SelectionStep, candidate: Candidate) -> str | None:
