@@ -127,6 +127,12 @@ class SelectionCriteria:
         "sampling, filters and friction about a reversal leave as much",
         "docs/diagnosis.md",
     )
+    least_remainder_of_runs: float = _criterion(
+        0.02,
+        "of the joint's torque",
+        "the same where runs differ: what is of second order in their differences repeats too",
+        "docs/diagnosis.md",
+    )
     remainder_of_runs: float = _criterion(
         0.2,
         "share of squared residual",

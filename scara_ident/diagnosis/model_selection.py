@@ -221,11 +221,14 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
         left = training.residuals(after.value)
     joints, criteria = task.model.robot.joints, task.criteria
     least = dict.fromkeys(joints, criteria.remainder)
+    least_share = dict.fromkeys(joints, criteria.least_remainder)
     if after.variation:
         # What a run differs by from the others is no remainder of the model; of second order something of it is left.
         deviations = after.variation.deviations(training, after.value)
         left = Residuals(left.data, tuple(a + b for a, b in zip(left.predicted, deviations, strict=True)))
-        least |= dict.fromkeys(after.variation.sizes(task.model.robot), criteria.remainder_of_runs)
+        differing = after.variation.sizes(task.model.robot)
+        least |= dict.fromkeys(differing, criteria.remainder_of_runs)
+        least_share |= dict.fromkeys(differing, criteria.least_remainder_of_runs)
     fit_after, dependences = lack_of_fit(left), screen(task.model, left, criteria)
     # What is spread evenly over frequency is no motion's doing even where it repeats: an encoder's steps do, and what a
     # controller makes of them.
@@ -240,7 +243,7 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     if depending or any(fit.p_value < criteria.significant for fit in fit_after):
         # What the positions' noise does to the columns may repeat too; and what is small beside the torque is not called one.
         torque = [item.torque_rms if item.rows else 0.0 for item in training.by_joint]
-        small = np.maximum(noise_torque(training, after.value), criteria.least_remainder * np.array(torque))
+        small = np.maximum(noise_torque(training, after.value), np.array(list(least_share.values())) * torque)
     least_rms = dict(zip(joints, small.tolist(), strict=True))
     repeating = [fit for fit in repeating if fit.missing > least_rms[fit.joint]]
     depending = [item for item in depending if item.rms > least_rms[item.joint]]
@@ -337,6 +340,9 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
         if decision.label in labels:
             # Beside all others, of which those that came later may have removed what was left when it came in.
             fitted = observed(search.step.without(labels.index(decision.label)))
+            old_rms, new_rms = rms_of(value_and_weights(fitted)[0], fitted), whole
+        elif decision.candidate.corrects_data:
+            fitted = observed(replace(search.step, columns=search.step.columns.beside(search.uncorrected)))
             old_rms, new_rms = rms_of(value_and_weights(fitted)[0], fitted), whole
         owner = decision.candidate.joint(search.scene)
         repeats = removed = 0.0

@@ -17,6 +17,7 @@ from scara_ident.estimation.run_variation import (
     ASSUMED_DELAY,
     ASSUMED_FRICTION,
     ASSUMED_OFFSET,
+    ASSUMED_SCALE,
     LEAST_RUNS,
     RunVariation,
     assumed_variation,
@@ -56,7 +57,8 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
         again = examine_rows(beside.model, rows[0], again)
     why = "runs differ from one another by as much: with that counted as noise"
     if len(step.observations.data.recordings) < LEAST_RUNS:
-        each = f"friction by some {ASSUMED_FRICTION:.0%}, an offset by {ASSUMED_OFFSET:.0%} of its torque, a delay by "
+        scale = f"all torque by {ASSUMED_SCALE:.0%}, " if decision.candidate.effect.by_recording else ""
+        each = f"friction by some {ASSUMED_FRICTION:.0%}, {scale}an offset by {ASSUMED_OFFSET:.0%} of its torque, a delay by "
         why = f"{each}{ASSUMED_DELAY * 1e3:g} ms: runs that differ so may do as much: with that counted as noise"
     if again.p_value * step.tried > step.criteria.family_error:
         return f"{why} p = {again.p_value:.1e}"
@@ -127,7 +129,8 @@ def _variation_beside(step: SelectionStep, decision: Decision) -> RunVariation:
     if not decision.candidate.effect.by_recording:
         value = np.concatenate([found.model_value, found.value])
         added = [*chosen, *step.columns.rows(step.scene, [decision.candidate])]
-    told = len(step.observations.data.recordings) >= LEAST_RUNS
-    return (run_variation if told else assumed_variation)(
-        step.observations, with_columns(step.observations, added), value
-    )
+    joints = with_columns(step.observations, added)
+    if len(step.observations.data.recordings) >= LEAST_RUNS:
+        return run_variation(step.observations, joints, value)
+    scale = ASSUMED_SCALE if decision.candidate.effect.by_recording else 0.0
+    return assumed_variation(step.observations, joints, value, scale)

@@ -32,6 +32,8 @@ LEAST_RUNS = 3
 # friction and of the joint's rms torque, and s: what a gear does as it warms, a sensor between days, and few samples of a
 # slow recorder. A torque scale of its own would hide one that differs between joints.
 ASSUMED_FRICTION, ASSUMED_OFFSET, ASSUMED_DELAY = 0.05, 0.02, 0.003
+# Share of all torque, asked of what acts in some recordings only: days differ by it, and of it a load is made.
+ASSUMED_SCALE = 0.02
 # Of differences below this share of the torque nothing is said in words.
 SPOKEN_OF = 0.01
 # Directions of a run below this share of the largest are not told apart.
@@ -223,13 +225,17 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
     return RunVariation(tuple(None if item is None else next(estimated) for item in sums))
 
 
-def assumed_variation(observations: Observations, joints: Sequence[JointRows], value: Array) -> RunVariation:
+def assumed_variation(
+    observations: Observations, joints: Sequence[JointRows], value: Array, scale: float = 0.0
+) -> RunVariation:
     """Return how runs would differ had each friction, an offset and a delay of its own, where they are too few to say so.
 
     Parameters
     ----------
     observations, joints, value
         See `run_variation`.
+    scale : float, optional
+        Share of all torque by which they would differ too.
     """
     runs = len(observations.data.recordings)
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
@@ -242,7 +248,7 @@ def assumed_variation(observations: Observations, joints: Sequence[JointRows], v
         noise = float(np.sqrt(np.mean((rows.table[-1] - value[rows.columns] @ rows.table[:-1]) ** 2)))
         directions = _directions(observations, joint, rows, value)
         offset = ASSUMED_OFFSET * float(np.sqrt(np.mean(directions[KINDS.index("torque scale")] ** 2)))
-        std = np.array([ASSUMED_FRICTION, 0.0, offset, ASSUMED_DELAY])
+        std = np.array([ASSUMED_FRICTION, scale, offset, ASSUMED_DELAY])
         told = noise > 0.0 and bool(np.any(directions[std > 0.0]))
         item = JointVariation(directions, std, np.zeros((runs, len(KINDS))), noise, rows.starts[firsts])
         found.append(item if told else None)

@@ -19,6 +19,7 @@ from scara_ident.diagnosis.model_selection import (
     Unexplained,
     _asked_band,
     _band_beyond,
+    _outcome,
     _promised_band,
     _proxies,
     rms_of,
@@ -30,6 +31,7 @@ from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.effects import CATALOGUE
 from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.friction import AsymmetricFriction, FrictionCoupling
+from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.periodic import Vibration
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
@@ -204,6 +206,29 @@ def test_where_something_stays_unexplained_repetitions_of_a_motion_count_once() 
     assert "with repetitions of a motion counted once" in proxy.why
     assert _proxies(left, CRITERIA) == []
     assert _proxies(replace(left, search=search, unexplained=None), CRITERIA) == []
+
+
+class Waves(Spring):
+    """A torque over the angle that is no spring's."""
+
+    name = "waves"
+
+    def signal_columns(self, signals, member):
+        return [np.sin(3.0 * signals.motion.q[0])]
+
+
+def test_what_a_delay_removes_is_asked_beside_what_came_in_after_it() -> None:
+    """A delay of 6 ms came in before a bent torque sensor of three times its size, and was taken for a part of that (UR5)."""
+    runs = with_torque(exact_runs(2, 3), 0, lambda motion: 1.5 * np.sin(3.0 * motion.q[0]))
+    late = [shifted(run, 0.006) for run in runs]
+    once = searched(late, Waves(), TimeDelay(), bands=(11.0, 11.0))
+    (delay,) = [item for item in once.steps if item.decision.candidate.corrects_data]
+    (wave,) = [item for item in once.steps if item is not delay]
+    before, after = rms_of(once.start.value, once.uncorrected), wave.rms
+    # As though the delay had come in first, beside a torque that most of what repeats is.
+    first = replace(delay, rms=tuple(np.sqrt(0.9 * b**2 + 0.1 * a**2) for b, a in zip(before, after, strict=True)))
+    outcome = _outcome(SearchTask(MODEL), replace(once, steps=(first, wave)))
+    assert _proxies(replace(outcome, repeating=frozenset({"joint1", "joint2"})), CRITERIA) == []
 
 
 def test_the_rms_of_a_joint_is_that_of_its_rows() -> None:
