@@ -170,7 +170,7 @@ def smooth_pull(motion):
 
 @pytest.mark.parametrize(("size", "turn", "found", "other", "named"), [
     (0.02, 2.0**12, Pull(), SmoothPull(), True),
-    (0.05, np.inf, SmoothPull(), Pull(), False),
+    (0.07, np.inf, SmoothPull(), Pull(), False),
 ])  # fmt: skip
 def test_the_noise_of_the_positions_does_not_tell_which_of_two_is_there(size, turn, found, other, named):
     runs = with_torque(exact_runs(), 0, lambda motion: size * smooth_pull(motion))
