@@ -41,6 +41,24 @@ def test_a_payload_of_some_runs_is_asked_beside_what_runs_differ_by_without_it()
     assert "runs differ" in why
 
 
+@pytest.mark.parametrize(("scale", "mass", "stands"), [(1.03, 0.0, False), (1.0, 3.0, True)])
+def test_a_payload_of_one_of_two_runs_is_more_than_another_days_torque(scale: float, mass: float, stands: bool):
+    """3.6 kg that nobody had held were believed of two runs on days whose torques differ (SCARA03)."""
+    first, second = runs(np.random.default_rng(6), (0.0,) * 4, 2)
+    effect = PayloadOfRecordings()
+    member = effect.in_recordings(step_beside([first, second]).scene, Member(None), frozenset([second.name]))
+    step = step_beside([first, second])
+    (columns,) = step.columns.raw(step.scene, [Candidate(effect, member)])
+    # A point at the tool, a third of a metre out: mass, first moments, moment of inertia.
+    loaded = np.array([mass * np.array([1.0, 0.33, 0.0, 0.11]) @ columns[1][joint] for joint in range(2)])
+    made = step_beside([first, replace(second, effort=scale * second.effort + loaded)])
+    (decision,) = made.judge([Candidate(effect, member)])
+    assert decision.examination.p_value < 1e-3
+    why = variation_objection(made, decision)
+    assert (why is None) == stands
+    assert stands or "all torque by 2%" in why
+
+
 def test_what_differs_from_run_to_run_is_no_effect():
     # A spring of another stiffness and sign in every run.
     made = runs(np.random.default_rng(2), (0.0, 0.0, 0.05, 0.0))

@@ -15,6 +15,7 @@ from scara_ident.estimation.run_variation import (
     ASSUMED_DELAY,
     ASSUMED_FRICTION,
     ASSUMED_OFFSET,
+    ASSUMED_SCALE,
     KINDS,
     assumed_variation,
     run_variation,
@@ -99,6 +100,9 @@ def test_of_two_runs_friction_an_offset_and_a_delay_of_their_own_are_taken_to_be
     assert item is not None
     offset = ASSUMED_OFFSET * np.sqrt(np.mean(item.directions[1] ** 2))
     assert_allclose(item.std, [ASSUMED_FRICTION, 0.0, offset, ASSUMED_DELAY])
+    of_days = assumed_variation(seen, seen.joints, wls(seen).value, ASSUMED_SCALE).joints[0]
+    assert of_days is not None
+    assert_allclose(of_days.std, [ASSUMED_FRICTION, ASSUMED_SCALE, offset, ASSUMED_DELAY])
     # More friction and another offset in the second run say nothing; noise says as much as ever.
     second = np.arange(item.directions.shape[1]) >= item.bounds[1]
     told = np.vstack([item.directions[[0, 2]] * second, np.random.default_rng(1).standard_normal((1, len(second)))])
