@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -63,6 +64,7 @@ def best_exchange(
     found = []
     held = {item.label(step.scene) for item in step.chosen} | set(refused)
     able = [item for item in pool if not item.corrects_data and item.label(step.scene) not in held]
+    count = cache(lambda: len(needed(step)))
     for place, item in enumerate(step.chosen):
         beside = step.without(place)
         (own,) = beside.judge([item])
@@ -70,7 +72,7 @@ def best_exchange(
             saved = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
             alike = same((beside, own), (other, decision))
             # What does as well with fewer others is the better explanation of the two.
-            better = _fewer(step, other, decision) if alike else saved > 0.0
+            better = _fewer(count, other, decision) if alike else saved > 0.0
             if better and _objection(other, decision) is None:
                 found.append(Exchange(place, decision, other.scene, saved))
     return max(found, key=lambda each: each.saved, default=None)
@@ -150,12 +152,10 @@ def _fitted_rivals(
     return found
 
 
-def _fewer(step: SelectionStep, other: SelectionStep, decision: Decision) -> bool:
-    """Whether fewer effects are needed with another in the place of one than without it."""
-    if len(step.chosen) < 3:
-        # Of two, the other one is needed beside one that does as well.
-        return False
-    return len(needed(replace(other, chosen=(*other.chosen, decision.candidate)))) < len(needed(step))
+def _fewer(count: Callable[[], int], other: SelectionStep, decision: Decision) -> bool:
+    """Whether fewer effects than a count are needed with another in the place of one."""
+    # Of two, the other one is needed beside one that does as well.
+    return len(other.chosen) > 1 and len(needed(replace(other, chosen=(*other.chosen, decision.candidate)))) < count()
 
 
 def _objection(step: SelectionStep, decision: Decision) -> str | None:

@@ -213,7 +213,7 @@ def search(
             winner, refused, scene = choose(step, decisions, None if known is None else known.step)
         decisions = [item for item in decisions if item.label not in refused] + list(refused.values())
         if winner is None:
-            # At most as often as effects came in: each exchange explains more than all before.
+            # Each explains more than what it replaces, or as much with fewer: there is an end, and this is one in any case.
             swap = best_exchange(step, everything, first, (*without, *refused)) if exchanges < len(steps) else None
             if swap is None:
                 break
