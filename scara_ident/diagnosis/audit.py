@@ -58,7 +58,8 @@ def _repeated(step: SelectionStep, decision: Decision) -> str | None:
     motions = len(data.trajectories)
     if motions == len(data.recordings) and not any(data.motions.periods):
         return None
-    # Of one motion alone, no other says otherwise: it counts as recorded once. Else what hardly leaves anything stands for nothing that repeats.
+    # Of one motion alone, no other says otherwise: it counts as recorded once. Else what hardly leaves anything stands for
+    # nothing that repeats.
     if motions > 1 and decision.gain >= criteria.nearly_all:
         return None
     p_value = examine_moments(step, decision.candidate).p_value

@@ -61,8 +61,7 @@ def choose(
         )
         pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in leaders if pair[0] is not step]
         for own, decision in best_first(pairs):
-            why = insignificant(own, decision.candidate) or noise_objection(own, decision)
-            why = why or variation_objection(own, decision) or _left_again(own, decision)
+            why = objection(own, decision)
             if why is None:
                 return decision, refused, own.scene
             refused[decision.label] = decision.refused(why)
@@ -121,16 +120,47 @@ def fitted_beside(
         begins |= {item.label(scene): (scene, item) for item in known.chosen if item.label(scene) in labels}
     found = []
     for scene, candidate in begins.values():
-        everything = (*step.chosen, candidate)
-        scene, chosen = tune(scene, step.columns, step.weights, everything, criteria.rotor_inertia_std, coarse=True)
-        # Beside the others as they are fitted with it.
-        own = replace(step, scene=scene, chosen=chosen[:-1])
-        (decision,) = own.judge([chosen[-1]])
+        own, decision = fitted_with(replace(step, scene=scene), candidate, coarse=True)
         before, left = float(np.sum(step.model.squares)), float(np.sum(decision.examination.left))
-        if decision.accepted and before - left < criteria.least_gain * before / scene.robot.n:
+        if decision.accepted and before - left < criteria.least_gain * before / step.scene.robot.n:
             decision = replace(decision, accepted=False, why="takes the place of an effect in the model")
         found.append((own, decision))
     return found
+
+
+def fitted_with(step: SelectionStep, candidate: Candidate, *, coarse: bool = False) -> tuple[SelectionStep, Decision]:
+    """Fit a candidate with all else, and judge it beside the others as they are fitted with it.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The model without it.
+    candidate : Candidate
+    coarse : bool, optional
+        See `scara_ident.diagnosis.nonlinear_fit.tune`.
+    """
+    everything, std = (*step.chosen, candidate), step.criteria.rotor_inertia_std
+    scene, chosen = tune(step.scene, step.columns, step.weights, everything, std, coarse=coarse)
+    own = replace(step, scene=scene, chosen=chosen[:-1])
+    (decision,) = own.judge([chosen[-1]])
+    return own, decision
+
+
+def objection(step: SelectionStep, decision: Decision) -> str | None:
+    """Say why a candidate that its tests let in does not come in all the same; None where it does.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The model that it was tried beside.
+    decision : Decision
+    """
+    return (
+        _insignificant(step, decision.candidate)
+        or noise_objection(step, decision)
+        or variation_objection(step, decision)
+        or _left_again(step, decision)
+    )
 
 
 def _worth_fitting(points: Sequence[Decision], enough: float, tried: int, most: int) -> list[Decision]:
@@ -156,7 +186,7 @@ def _left_again(step: SelectionStep, decision: Decision) -> str | None:
     return f"{name} would be {first[0]:.2g} {unit}, but {whole[0]:.2g} {unit} until nothing of it is left in the data"
 
 
-def insignificant(step: SelectionStep, candidate: Candidate) -> str | None:
+def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:
     """Say so where the size of an effect is within its uncertainty, that of its nonlinear parameters included."""
     if not candidate.effect.nonlinear:
         return None

@@ -112,7 +112,7 @@ class SelectionCriteria:
     lower_change: float = _criterion(
         0.5,
         "of its size",
-        "by which it is another one there: a column of first order says too little of a long delay at high frequencies",
+        "by which it is another one there, or once it was taken out of the data: a column of first order says too little of a long delay",
     )
     # What is left over.
     remainder: float = _criterion(

@@ -11,12 +11,10 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import held_out_gains
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.choice import fitted_beside, insignificant
+from scara_ident.diagnosis.choice import fitted_beside, fitted_with, objection
 from scara_ident.diagnosis.moments import moments_told
-from scara_ident.diagnosis.noise_check import noise_left, noise_objection
-from scara_ident.diagnosis.nonlinear_fit import tune
+from scara_ident.diagnosis.noise_check import noise_left
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
-from scara_ident.diagnosis.variation_check import variation_objection
 from scara_ident.effects import Scene
 
 # Columns that follow the base model's estimate instead of the last one gain at least this share of what they would.
@@ -73,7 +71,7 @@ def best_exchange(
             alike = same((beside, own), (other, decision))
             # What does as well with fewer others is the better explanation of the two.
             better = _fewer(count, other, decision) if alike else saved > 0.0
-            if better and _objection(other, decision) is None:
+            if better and objection(other, decision) is None:
                 found.append(Exchange(place, decision, other.scene, saved))
     return max(found, key=lambda each: each.saved, default=None)
 
@@ -141,26 +139,11 @@ def _fitted_rivals(
     rest.sort(key=lambda item: -item.examination.held_out)
     enough = criteria.least_share * own.examination.held_out
     refined = [item for item in beside.refine(rest[: criteria.most_refined]) if item.examination.held_out >= enough]
-    found = [pair for pair in by_fit if pair[1].accepted]
-    for item in refined:
-        everything = (*beside.chosen, item.candidate)
-        scene, chosen = tune(beside.scene, beside.columns, beside.weights, everything, criteria.rotor_inertia_std)
-        other = replace(beside, scene=scene, chosen=chosen[:-1])
-        (decision,) = other.judge([chosen[-1]])
-        if decision.accepted:
-            found.append((other, decision))
-    return found
+    fitted = [*by_fit, *(fitted_with(beside, item.candidate) for item in refined)]
+    return [pair for pair in fitted if pair[1].accepted]
 
 
 def _fewer(count: Callable[[], int], other: SelectionStep, decision: Decision) -> bool:
     """Whether fewer effects than a count are needed with another in the place of one."""
     # Of two, the other one is needed beside one that does as well.
     return len(other.chosen) > 1 and len(needed(replace(other, chosen=(*other.chosen, decision.candidate)))) < count()
-
-
-def _objection(step: SelectionStep, decision: Decision) -> str | None:
-    return (
-        insignificant(step, decision.candidate)
-        or noise_objection(step, decision)
-        or variation_objection(step, decision)
-    )

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.motion.motion import Stretch
 
-# Positions a period apart that differ by more than this share of their range are not the same motion.
+# Aligned positions that differ by more than this share of their range are not the same motion.
 SAME_MOTION = 0.01
 # Less than this much of their range apart, on average, positions may be near each other because little time is between.
 NEAR = 0.1
 # A joint's range counts as at least this share of the widest joint's: one that stands still has only noise for a range.
 LEAST_RANGE = 0.01
-# Hz at which positions are laid on themselves.
-RATE = 100.0
+# Hz at which positions are laid on each other.
+FINE_RATE = 100.0
 # Share of its last period that a recording may lack.
 CUT = 0.02
 # Distances in time that are looked at closely, the shortest first, and s about each of them.
@@ -51,9 +51,8 @@ def periods_of(stretch: Stretch) -> Periods | None:
     stretch : Stretch
         Uniformly sampled.
     """
-    rate = min(RATE, stretch.rate)
-    time = np.arange(stretch.time[0], stretch.time[-1], 1.0 / rate)
-    position = np.array([np.interp(time, stretch.time, row) for row in stretch.position])
+    rate = min(FINE_RATE, stretch.rate)
+    position = at_rate(stretch, rate)
     spread = np.ptp(position, axis=1)
     if not np.any(spread > 0.0):
         return None
@@ -68,6 +67,12 @@ def periods_of(stretch: Stretch) -> Periods | None:
             length = min(int(lag * stretch.rate / rate), len(stretch.time) - int(starts[-1]))
             return Periods(tuple(starts.tolist()), length)
     return None
+
+
+def at_rate(stretch: Stretch, rate: float) -> Array:
+    """Return positions at a common rate, shape (n, N), whatever they were sampled at."""
+    time = np.arange(stretch.time[0], stretch.time[-1], 1.0 / rate)
+    return np.array([np.interp(time, stretch.time, row) for row in stretch.position])
 
 
 def _lags(position: Array) -> list[int]:

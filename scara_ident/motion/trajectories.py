@@ -14,22 +14,18 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.motion.motion import Stretch
-from scara_ident.motion.periods import Periods, periods_of
+from scara_ident.motion.periods import FINE_RATE, LEAST_RANGE, SAME_MOTION, Periods, at_rate, periods_of
 from scara_ident.threads import side_by_side
 
 # Repetitions start within this many seconds of each other after alignment; more is another motion.
 LARGEST_SHIFT = 1.0
-# Aligned positions that differ by more than this share of their range are not the same motion.
-SAME_MOTION = 0.01
 # Sample rates that differ by more than this share are not compared sample by sample.
 SAME_RATE = 1e-3
-# A joint's range counts as at least this share of the widest joint's: one that stands still has only noise for a range.
-LEAST_RANGE = 0.01
 # A run shorter than this share of another says too little of whether it is its motion.
 LEAST_LENGTH = 0.5
-# Motions are told apart at this many samples per second, and most of them at fewer already, where a shift is known to half
-# a sample only and so much of their range is no difference yet.
-FINE_RATE, COARSE_RATE = 100.0, 10.0
+# Most motions are told apart at so few samples per second already, where a shift is known to half a sample only and so much
+# of their range is no difference yet.
+COARSE_RATE = 10.0
 COARSELY_SAME = 0.1
 
 
@@ -111,7 +107,7 @@ def _listed(names: Sequence[str], most: int = 4) -> str:
 
 def _groups(stretches: Sequence[Stretch]) -> list[list[int]]:
     """Return the places of the recordings of each motion."""
-    coarse = [_at_rate(stretch, COARSE_RATE) for stretch in stretches]
+    coarse = [at_rate(stretch, COARSE_RATE) for stretch in stretches]
     fine: dict[int, Array] = {}
     group = list(range(len(stretches)))
     for k in range(1, len(stretches)):
@@ -120,17 +116,11 @@ def _groups(stretches: Sequence[Stretch]) -> list[list[int]]:
                 continue
             for place in (i, k):
                 if place not in fine:
-                    fine[place] = _at_rate(stretches[place], FINE_RATE)
+                    fine[place] = at_rate(stretches[place], FINE_RATE)
             if alignment(fine[i], fine[k], round(LARGEST_SHIFT * FINE_RATE)) is not None:
                 old = group[k]
                 group = [group[i] if own == old else own for own in group]
     return [[k for k, own in enumerate(group) if own == head] for head in dict.fromkeys(group)]
-
-
-def _at_rate(stretch: Stretch, rate: float) -> Array:
-    """Return positions at a common rate, shape (n, N), whatever they were sampled at."""
-    time = np.arange(stretch.time[0], stretch.time[-1], 1.0 / rate)
-    return np.array([np.interp(time, stretch.time, row) for row in stretch.position])
 
 
 def _alike(one: Array, other: Array) -> bool:
