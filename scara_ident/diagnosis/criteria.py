@@ -142,6 +142,12 @@ class SelectionCriteria:
     remainder_to_noise: float = _criterion(
         1.0, "of the noise", "a repeatable remainder larger than the noise is one whatever it depends on"
     )
+    colour_of_remainder: float = _criterion(
+        0.5,
+        "share of the residual's power",
+        "above white noise where it repeats: coarse encoders repeat too, and leave a third where bands are narrow or motions short",
+        "docs/diagnosis.md",
+    )
     significant: float = _criterion(
         0.01, "probability", "that noise alone repeats so much, or does as well as what is worth a look", "F test"
     )

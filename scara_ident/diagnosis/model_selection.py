@@ -232,9 +232,9 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     fit_after, dependences = lack_of_fit(left), screen(task.model, left, criteria)
     # What is spread evenly over frequency is no motion's doing even where it repeats: an encoder's steps do, and what a
     # controller makes of them.
-    coloured = dict(zip(joints, coloured_shares(left) > criteria.least_colour, strict=True))
+    coloured = dict(zip(joints, coloured_shares(left).tolist(), strict=True))
     above = [fit for fit in fit_after if _above_noise(fit, criteria)]
-    standing_out = [fit for fit in above if coloured[fit.joint]]
+    standing_out = [fit for fit in above if coloured[fit.joint] > criteria.colour_of_remainder]
     repeating = [fit for fit in standing_out if fit.p_value < criteria.significant]
     depending = [
         item for item in dependences if item.p_value < criteria.significant and item.explained > least[item.joint]
@@ -249,7 +249,9 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     depending = [item for item in depending if item.rms > least_rms[item.joint]]
     unexplained = _unexplained(repeating, depending, criteria)
     # An effect may stand for that all the same.
-    names = frozenset(fit.joint for fit in above if coloured[fit.joint] or fit.p_value < criteria.significant)
+    names = frozenset(
+        fit.joint for fit in above if coloured[fit.joint] > criteria.least_colour or fit.p_value < criteria.significant
+    )
     fit_before = fit_after if left is before else lack_of_fit(before)
     return Outcome(
         found, after, training, left, fit_before, fit_after, dependences, unexplained, tuple(small.tolist()), names
