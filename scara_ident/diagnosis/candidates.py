@@ -169,9 +169,8 @@ class CandidateColumns:
         """Return the signals of a stretch; those of the last estimate are kept with all that was made of them."""
         held = self._signals.get(part.motion)
         if held is None:
-            held = Signals(scene, part.motion)
-            # A scene knows those of the motions that it was made from, not with what has been corrected since.
-            held.__dict__["columns"] = self._at_hand[part.motion]
+            # A scene knows the columns of the motions that it was made from, not with what has been corrected since.
+            held = Signals(scene, part.motion).with_made(columns=self._at_hand[part.motion])
         elif held.scene is not scene:
             held = held.at(scene)
         self._signals[part.motion] = held

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,11 +99,14 @@ class Signals:
 
     def at(self, scene: Scene) -> Signals:
         """Return the signals at another estimate of the same base model; what does not follow from it is shared."""
-        found = Signals(scene, self.motion)
         same = scene.value is self.scene.value
-        for name in ("time", "sign", "columns", "motor_turns", *(("predicted", "rigid") if same else ())):
-            if name in self.__dict__:
-                found.__dict__[name] = self.__dict__[name]
+        kept = ("time", "sign", "columns", "motor_turns", *(("predicted", "rigid") if same else ()))
+        return Signals(scene, self.motion).with_made(**{k: self.__dict__[k] for k in kept if k in self.__dict__})
+
+    def with_made(self, **made: Any) -> Signals:
+        """Return the same signals, of which some, by their names here, are made already."""
+        found = copy(self)
+        found.__dict__.update(made)
         return found
 
     @cached_property

@@ -135,7 +135,6 @@ def _rigid(term: RigidBody, value: Array, q: Array, v: Array, a: Array, gravity:
 
 def _signals(scene: Scene, motion: Motion) -> Signals:
     """Return signals whose predicted torques are recorded, as effects need them."""
-    signals = Signals(scene, motion)
     rigid = scene.model.rigid_body
     own = scene.value[scene.model.place(rigid)]
     q, v, a = (part[:, 0] for part in (motion.q, motion.v, motion.a))
@@ -143,9 +142,7 @@ def _signals(scene: Scene, motion: Motion) -> Signals:
     others = (
         _torque(term, scene.value[scene.model.place(term)], motion) for term in scene.model.terms if term is not rigid
     )
-    signals.__dict__["rigid"] = torque[:, None]
-    signals.__dict__["predicted"] = sum(others, torque)[:, None]
-    return signals
+    return Signals(scene, motion).with_made(rigid=torque[:, None], predicted=sum(others, torque)[:, None])
 
 
 def _rows(term: Term) -> list[Array]:
