@@ -13,10 +13,11 @@ from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters
 from scara_ident.diagnosis.moments import examine_moments
-from scara_ident.diagnosis.noise_check import noise_objection, within_a_step
+from scara_ident.diagnosis.noise_check import made_by_noise, noise_objection, within_a_step
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 from scara_ident.diagnosis.variation_check import variation_objection
+from scara_ident.estimation.run_variation import LEAST_RUNS
 
 
 def unsettled(found: Search, weights: Array) -> list[Decision]:
@@ -108,6 +109,34 @@ def suspected(found: Search, weights: Array) -> list[Decision]:
     step = replace(found.step, weights=weights, tried=found.tried + len(found.doubtful))
     best = best_of_each([item for item in step.judge(found.doubtful) if item.accepted])
     return [item for item in best.values() if not (noise_objection(step, item) or variation_objection(step, item))]
+
+
+def left_open(found: Search, weights: Array) -> list[Decision]:
+    """Return the decisions on what is not believed, though it is no noise, with that in words.
+
+    Beside the effects found it would remove as much as is asked and is worth a look, and neither the noise of the positions
+    makes it nor what runs were seen to differ by: what is left is not shown to be noise, whatever it looks like.
+
+    Parameters
+    ----------
+    found : Search
+    weights : ndarray, shape (n,)
+        See `unsettled`.
+    """
+    step = replace(found.step, weights=weights)
+    differing = len(step.observations.data.recordings) >= LEAST_RUNS
+    result = []
+    for item in best_of_each(found.decisions).values():
+        p_value = item.examination.p_value * found.tried
+        if not item.tentative or p_value > step.criteria.significant:
+            continue
+        if within_a_step(step, item.candidate) or made_by_noise(step, item):
+            continue
+        if not (differing and variation_objection(step, item)):
+            result.append(
+                item.refused(f"{item.label} would remove {item.gain:.0%} of it (p = {p_value:.1e}): {item.why}")
+            )
+    return result
 
 
 def superfluous(found: Search, weights: Array, others: Sequence[Decision]) -> list[Decision]:

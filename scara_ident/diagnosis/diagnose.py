@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.audit import left_open
 from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.correction import corrected
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
@@ -270,8 +271,9 @@ def diagnose(
     notes += [event.sentence(robot) for event in events]
     log_notes(_LOG, notes)
     undisturbed = without_stretches(validation_after, in_held_out)
+    doubtful = (*outcome.suspected, *left_open(found, after.weights))
     shown = held_out_evidence(
-        evidence(found, outcome.residuals, outcome.fit_after, outcome.small, outcome.suspected, criteria),
+        evidence(found, outcome.residuals, outcome.fit_after, outcome.small, doubtful, criteria),
         rms_of(after.value, outcome.training),
         rms_of(after.value, undisturbed),
         unsure,

@@ -82,7 +82,11 @@ def evidence(
     limits = detection_limits(found, criteria)
     coloured = coloured_shares(residuals)
     repeated = {item.joint: item for item in fit}
-    doubts = {item.candidate.member.joint: item.why for item in suspected} | found.step.columns.unresolved
+    doubts = dict(found.step.columns.unresolved)
+    for item in suspected:
+        own = item.candidate.member.joint
+        for j in range(found.scene.robot.n) if own is None else (own,):
+            doubts.setdefault(j, item.why)
     return tuple(
         Evidence(joint, False, "", doubts[j], float(limits[j]))
         if j in doubts

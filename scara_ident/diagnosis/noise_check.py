@@ -30,11 +30,19 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     decision : Decision
         That lets it in.
     """
-    found, criteria = decision.examination, step.criteria
     unresolved = step.columns.unresolved_for(decision.candidate.member.joint) or within_a_step(step, decision.candidate)
-    unresolved = unresolved or _gone_further_down(step, decision)
-    if unresolved is not None:
-        return unresolved
+    return unresolved or _gone_further_down(step, decision) or made_by_noise(step, decision)
+
+
+def made_by_noise(step: SelectionStep, decision: Decision) -> str | None:
+    """Say so where little of an effect is left, or little that is sure, with the noise of the positions taken off.
+
+    Parameters
+    ----------
+    step, decision
+        See `noise_objection`.
+    """
+    found, criteria = decision.examination, step.criteria
     (left,) = _each_without_noise(step, [decision])
     share = _share(found, left)
     if share >= 1.0:

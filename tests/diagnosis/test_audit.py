@@ -193,3 +193,28 @@ def test_periods_of_the_only_recording_are_repetitions_too():
         refused = unsettled(found, found.step.weights)
         assert (refused == []) is stands
         assert all("with repetitions counted once" in item.why for item in refused)
+
+
+class Roughness(Effect):
+    """Teeth of a gear so fine that their torque looks like noise, whatever the motion."""
+
+    name = "roughness"
+    summary = "fine teeth"
+    coefficients = (Coefficient("height", "N m", "height of the teeth"),)
+
+    def signal_columns(self, signals, member):
+        return [np.sin(400.0 * signals.motion.q[member.place])]
+
+
+# More votes than there are refuse whatever it is.
+@pytest.mark.parametrize(("votes", "verdict"), [(2.0, "undecided"), (CRITERIA.least_votes, "explained")])
+def test_what_looks_like_noise_and_is_not_believed_is_not_shown_to_be_noise(votes: float, verdict: str):
+    """A delay of all joints that removed 38 % at p = 6.5e-8 was refused for another reason, and the rest called `complete`."""
+    made = with_torque(exact_runs(3, 1), 0, lambda motion: 0.012 * np.sin(400.0 * motion.q[0]))
+    criteria = replace(CRITERIA, least_votes=votes)
+    result = diagnose(load_robot(), made, bands=(30.0, 30.0), catalogue=(Roughness(),), criteria=criteria)
+
+    assert result.verdict == verdict
+    if verdict == "undecided":
+        (doubted,) = [item for item in result.evidence if not item.shown]
+        assert doubted.joint == "joint1" and doubted.why.startswith("roughness of joint1 would remove ")

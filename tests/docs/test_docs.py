@@ -238,6 +238,8 @@ def test_the_diagnosis_page_lists_every_alias_and_the_limits_of_the_program() ->
         f"significant if they removed {100 * CRITERIA.least_power:g} % of",
         f"at most {CRITERIA.worse_held_out:g} times that of the training",
         f"explain by over {100 * CRITERIA.remainder_of_runs:g} % of the squared residual (else {100 * CRITERIA.remainder:g} %)",
+        f"removes as much as is asked with p at most {100 * CRITERIA.significant:g} % over all tried",
+        f"stands out by at least {100 * CRITERIA.colour_of_remainder:g} %",
         f"At most {CRITERIA.most_effects} effects",
         f"at least {100 * CRITERIA.least_share:g} % of what it removes",
     ):
