@@ -13,7 +13,7 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, merge, weighted
 from scara_ident.estimation.noise_bias import noise_bias
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_variation import run_variation
+from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation, run_variation
 from scara_ident.estimation.working_range import told_directions
 from scara_ident.threads import one_blas_thread, side_by_side
 
@@ -88,11 +88,14 @@ def least_squares(
     variation, spread = side_by_side(
         lambda work: work(),
         [
-            lambda: run_variation(observations, observations.joints, value),
+            lambda: run_variation(observations, observations.joints, value, of_two=True),
             lambda: block_covariance(inverse, value, observations.joints, observations.owner, weights),
         ],
     )
     covariance = spread.matrix + variation.covariance(inverse, observations.joints, weights)
+    if len(observations.data.recordings) < LEAST_RUNS:
+        # What else two runs might differ by is not told, and nothing is said of it.
+        variation = RunVariation((None,) * len(observations.joints))
     bias = None
     if told is not None:
         covariance += told.prior

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.estimation.days import same_day, widening
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.variance_components import components, expected
@@ -25,6 +26,7 @@ from scara_ident.robot.robot import Robot
 from scara_ident.threads import side_by_side
 
 KINDS = ("friction", "torque scale", "offset", "delay")
+OFFSET = KINDS.index("offset")
 
 # With fewer recordings than this none can be told from the parameters.
 LEAST_RUNS = 3
@@ -56,6 +58,8 @@ class JointVariation:
         Standard deviation of one row.
     bounds : ndarray of int, shape (runs + 1,)
         Where the rows of each run begin.
+    unsure : ndarray, shape (runs, kinds)
+        Variance of what each run lies off by.
     """
 
     directions: Array
@@ -63,6 +67,7 @@ class JointVariation:
     of_run: Array
     noise: float
     bounds: NDArray[np.intp]
+    unsure: Array
 
     @cached_property
     def shrinking(self) -> tuple[tuple[Array, Array], ...]:
@@ -173,19 +178,39 @@ class RunVariation:
             The rows that it was estimated from.
         weights : ndarray, shape (n,)
         """
-        from scipy.special import stdtrit
-
-        total = np.zeros_like(inverse)
+        total, days = np.zeros_like(inverse), self.days
         for item, rows, weight in zip(self.joints, joints, weights, strict=True):
             if item is None:
                 continue
-            for start, stop in zip(item.bounds[:-1], item.bounds[1:], strict=True):
-                pull = rows.table[:-1, start:stop] @ (item.std[:, None] * item.directions[:, start:stop]).T
-                # Of few runs the scatter is known badly; two of these standard deviations cover 95 % all the same.
-                wider = 0.5 * float(stdtrit(len(item.of_run) - 1, 0.975))
-                moved = wider * weight**2 * inverse[:, rows.columns] @ pull
-                total += moved @ moved.T
+            pulls = np.array(
+                [
+                    weight**2
+                    * inverse[:, rows.columns]
+                    @ rows.table[:-1, start:stop]
+                    @ item.directions[:, start:stop].T
+                    for start, stop in zip(item.bounds[:-1], item.bounds[1:], strict=True)
+                ]
+            )
+            for kind, std in enumerate(item.std):
+                each = pulls[:, :, kind]
+                if kind == OFFSET and std > 0.0 and days is not None:
+                    # Runs of one day share an offset, and are one draw of it.
+                    each = np.array([np.sum(each[days == day], axis=0) for day in np.unique(days)])
+                    means = [np.mean(item.of_run[days == day, kind]) for day in np.unique(days)]
+                    std = float(np.std(means, ddof=1))
+                moved = widening(len(each)) * std * each
+                total += moved.T @ moved
         return total
+
+    @cached_property
+    def days(self) -> NDArray[np.intp] | None:
+        """Which runs share their offsets on all joints, see `same_day`."""
+        told = [item for item in self.joints if item is not None and item.std[OFFSET] > 0.0]
+        if not told:
+            return None
+        return same_day(
+            np.array([item.of_run[:, OFFSET] for item in told]), np.array([item.unsure[:, OFFSET] for item in told])
+        )
 
 
 def unit_of_kind(robot: Robot, joint: str, kind: str) -> str:
@@ -194,7 +219,9 @@ def unit_of_kind(robot: Robot, joint: str, kind: str) -> str:
     return units[KINDS.index(kind)]
 
 
-def run_variation(observations: Observations, joints: Sequence[JointRows], value: Array) -> RunVariation:
+def run_variation(
+    observations: Observations, joints: Sequence[JointRows], value: Array, *, of_two: bool = False
+) -> RunVariation:
     """Estimate how runs differ.
 
     Parameters
@@ -205,10 +232,12 @@ def run_variation(observations: Observations, joints: Sequence[JointRows], value
         Its rows, with those of further columns.
     value : ndarray, shape (p,)
         Parameters of all these columns.
+    of_two : bool, optional
+        Whether the offsets of two runs are told too: by two, other differences may be the parameters'.
     """
     runs = len(observations.data.recordings)
     # Where blocks are triangular factors the rows are not beside the samples that the directions are made of.
-    if runs < LEAST_RUNS or any(rows.sizes is not None for rows in joints):
+    if runs < (2 if of_two else LEAST_RUNS) or any(rows.sizes is not None for rows in joints):
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
     # Made once, and not in two threads.
@@ -250,7 +279,8 @@ def assumed_variation(
         offset = ASSUMED_OFFSET * float(np.sqrt(np.mean(directions[KINDS.index("torque scale")] ** 2)))
         std = np.array([ASSUMED_FRICTION, scale, offset, ASSUMED_DELAY])
         told = noise > 0.0 and bool(np.any(directions[std > 0.0]))
-        item = JointVariation(directions, std, np.zeros((runs, len(KINDS))), noise, rows.starts[firsts])
+        nothing = np.zeros((runs, len(KINDS)))
+        item = JointVariation(directions, std, nothing, noise, rows.starts[firsts], nothing)
         found.append(item if told else None)
     return RunVariation(tuple(found))
 
@@ -324,14 +354,18 @@ def _estimated(joints: Sequence[_Sums]) -> list[JointVariation | None]:
     """Return how runs differ on each of some joints."""
     products, aims = np.array([item.products for item in joints]), np.array([item.aims for item in joints])
     runs = aims.shape[1]
-    variances = components(products, aims, np.array([item.back > 0.0 for item in joints]))
-    means, _ = expected(products, aims, variances)
+    told = np.array([item.back > 0.0 for item in joints])
+    if runs < LEAST_RUNS:
+        told &= np.arange(len(KINDS)) == OFFSET
+    variances = components(products, aims, told)
+    means, unsure = expected(products, aims, variances)
     found: list[JointVariation | None] = []
-    for item, variance, mean in zip(joints, variances, means, strict=True):
+    for item, variance, mean, spread in zip(joints, variances, means, unsure, strict=True):
         # Parameters are fitted to all runs, so that these lie about their own mean.
         std = np.sqrt(variance * runs / (runs - 1.0)) * item.back
         some = bool(np.any(variance))
-        found.append(JointVariation(item.directions, std, mean * item.back, item.noise, item.bounds) if some else None)
+        of_run, own = mean * item.back, spread * item.back**2
+        found.append(JointVariation(item.directions, std, of_run, item.noise, item.bounds, own) if some else None)
     return found
 
 

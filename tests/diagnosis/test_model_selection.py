@@ -146,7 +146,7 @@ def _always_off(outcome: Outcome, joint: int, size: float | None) -> JointVariat
     # A row stands for so many samples, and is as much longer.
     direction = np.full((1, rows.table.shape[1]), np.sqrt(np.sum(rows.counts) / rows.table.shape[1]))
     signs = np.where(np.arange(runs) % 2, -1.0, 1.0)
-    return JointVariation(direction, np.ones(1), size * signs[:, None], 1.0, bounds)
+    return JointVariation(direction, np.ones(1), size * signs[:, None], 1.0, bounds, np.zeros((len(signs), 1)))
 
 
 def test_nothing_is_demoted_where_the_rest_is_noise() -> None:

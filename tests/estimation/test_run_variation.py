@@ -84,6 +84,20 @@ def test_two_standard_deviations_cover_the_parameters_of_runs_that_differ():
     assert np.mean(alone) < 0.9
 
 
+@pytest.mark.parametrize(("count", "days"), [(6, 2), (6, 3), (2, 2)])
+def test_two_standard_deviations_cover_the_offsets_of_runs_of_few_days(count: int, days: int):
+    """Of two days offsets were 61 % within two, of three 89 %: their runs were taken for as many draws of a zero."""
+    seen = []
+    for seed in range(10):
+        rng = np.random.default_rng([seed, count, days])
+        zero = 0.05 * rng.standard_normal((days, 2, 1))
+        made = runs(rng, (0.0,) * 4, count=count, seconds=6.0)
+        of_day = [replace(run, effort=run.effort + zero[k * days // count]) for k, run in enumerate(made)]
+        seen.append(np.abs(errors(wls(observed(of_day)))[-2:]) < 2.0)
+    # Of 20 all but 4 with less than 1 %, were each covered as promised.
+    assert np.sum(seen) >= 17
+
+
 def test_where_runs_do_not_differ_nothing_is_found():
     found = [wls(observed(runs(np.random.default_rng(seed), (0.0, 0.0, 0.0, 0.0)))).variation for seed in range(4)]
     assert not any(found)

@@ -125,7 +125,7 @@ def test_the_weights_are_said(result, content):
 
 def test_how_runs_differ_is_said(result):
     std = np.array([0.06, 0.0, 0.0, 0.0])
-    item = JointVariation(np.ones((4, 6)), std, np.zeros((3, 4)), 0.01, np.array([0, 2, 4, 6]))
+    item = JointVariation(np.ones((4, 6)), std, np.zeros((3, 4)), 0.01, np.array([0, 2, 4, 6]), np.zeros((3, 4)))
     estimate = replace(result.estimate, variation=RunVariation((item, None)))
     found = identification_dict(replace(result, estimate=estimate))
     assert found["run_variation"] == {"joint1": {"friction": 0.06}}

@@ -16,7 +16,7 @@ def differing() -> RunVariation:
     """Friction of joint 2 by 6 % and its offset by 0.02 N m in three runs."""
     std = np.array([0.06, 0.0, 0.02, 0.0])
     of_run = np.outer([1.0, -1.0, 0.5], std)
-    item = JointVariation(np.ones((4, 9)), std, of_run, 0.01, np.array([0, 3, 6, 9]))
+    item = JointVariation(np.ones((4, 9)), std, of_run, 0.01, np.array([0, 3, 6, 9]), 0.0 * of_run)
     return RunVariation((None, item))
 
 

@@ -1,0 +1,49 @@
+"""Which recordings are of one day, by the zeros of their torque sensors, and what so few days tell."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+
+# Of days whose runs are all of one so few have two that lie further apart, by chance.
+APART = 0.01
+
+
+def same_day(offsets: Array, unsure: Array) -> NDArray[np.intp] | None:
+    """Return which runs share their offsets on all joints within their uncertainty.
+
+    The zero of a sensor is of the day, and the runs of two days tell but two draws of it, however many they are. Days are
+    clusters in which any two runs lie no further apart than chance leaves them (complete linkage; chi-squared).
+
+    Parameters
+    ----------
+    offsets : ndarray, shape (n, runs)
+        By how much each run lies off the mean on each joint.
+    unsure : ndarray, shape (n, runs)
+        The variance of that.
+
+    Returns
+    -------
+    ndarray of int, shape (runs,), or None
+        The day of each, from 1 on; None where all are of one, or no two.
+    """
+    from scipy.cluster.hierarchy import fcluster, linkage
+    from scipy.special import chdtri
+
+    joints, runs = offsets.shape
+    if runs < 3:
+        return None
+    first, second = np.triu_indices(runs, 1)
+    spread = np.maximum(unsure[:, first] + unsure[:, second], np.finfo(float).tiny)
+    apart = np.sum((offsets[:, first] - offsets[:, second]) ** 2 / spread, axis=0)
+    day = fcluster(linkage(apart, "complete"), float(chdtri(joints, APART / len(apart))), "distance").astype(np.intp)
+    return day if 1 < day.max() < runs else None
+
+
+def widening(draws: int) -> float:
+    """Return by how much a standard deviation of so few draws is widened, so that two of it cover 95 % all the same."""
+    from scipy.special import stdtrit
+
+    return 0.5 * float(stdtrit(draws - 1, 0.975))

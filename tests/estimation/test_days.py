@@ -1,0 +1,47 @@
+"""Runs of one day share the zero of their sensors, and few days tell little of where it is on average."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scara_ident.estimation.days import same_day, widening
+
+NOISE = 0.01
+
+
+def offsets(seed: int, days: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Offsets of two joints in runs of these days, far apart beside their noise, and its variance."""
+    rng = np.random.default_rng(seed)
+    zero = np.array([[0.3, -0.2], [-0.4, 0.1], [0.1, 0.5]])[days].T
+    return zero + NOISE * rng.standard_normal(zero.shape), np.full(zero.shape, NOISE**2)
+
+
+def partition(labels: np.ndarray) -> set[frozenset[int]]:
+    """The runs of each day, whatever the days are called."""
+    return {frozenset(np.flatnonzero(labels == day)) for day in labels}
+
+
+@given(st.integers(0, 20), st.permutations([0, 0, 1, 1, 1, 2]), st.floats(1e-6, 1e6))
+def test_days_are_told_in_any_order_and_unit(seed: int, days: list[int], unit: float):
+    off, unsure = offsets(seed % 3, days)
+    told = same_day(unit * off, unit**2 * unsure)
+    assert told is not None
+    assert partition(told) == partition(np.array(days))
+
+
+@pytest.mark.parametrize("days", [[0, 0, 0, 0], [0, 1, 2], [0, 1]])
+def test_nothing_is_said_where_all_are_of_one_day_or_no_two(days: list[int]):
+    assert same_day(*offsets(0, days)) is None
+
+
+def test_what_is_unsure_keeps_no_days_apart():
+    off, unsure = offsets(0, [0, 0, 1, 1])
+    assert same_day(off, 1e4 * unsure) is None
+
+
+@pytest.mark.parametrize(("draws", "wider"), [(2, 6.353), (3, 2.151), (9, 1.153), (10**6, 0.98)])
+def test_few_draws_are_widened_as_students_t_asks(draws: int, wider: float):
+    assert widening(draws) == pytest.approx(wider, abs=1e-3)
