@@ -9,13 +9,16 @@ from scara_ident.arrays import Array
 
 # Of days whose runs are all of one so few have two that lie further apart, by chance.
 APART = 0.01
+# Of two draws of their own so many lie so near each other by chance.
+NEAR = 0.05
 
 
-def same_day(offsets: Array, unsure: Array) -> NDArray[np.intp] | None:
-    """Return which runs share their offsets on all joints within their uncertainty.
+def same_day(offsets: Array, unsure: Array, std: Array) -> NDArray[np.intp] | None:
+    """Return which runs share their offsets on all joints.
 
     The zero of a sensor is of the day, and the runs of two days tell but two draws of it, however many they are. Days are
-    clusters in which any two runs lie no further apart than chance leaves them (complete linkage; chi-squared).
+    clusters in which any two runs lie no further apart than their uncertainty leaves them, or nearer than draws of their
+    own would (complete linkage; chi-squared): what a run's friction does looks like an offset, too.
 
     Parameters
     ----------
@@ -23,6 +26,8 @@ def same_day(offsets: Array, unsure: Array) -> NDArray[np.intp] | None:
         By how much each run lies off the mean on each joint.
     unsure : ndarray, shape (n, runs)
         The variance of that.
+    std : ndarray, shape (n,)
+        Standard deviation between runs.
 
     Returns
     -------
@@ -36,9 +41,10 @@ def same_day(offsets: Array, unsure: Array) -> NDArray[np.intp] | None:
     if runs < 3:
         return None
     first, second = np.triu_indices(runs, 1)
-    spread = np.maximum(unsure[:, first] + unsure[:, second], np.finfo(float).tiny)
-    apart = np.sum((offsets[:, first] - offsets[:, second]) ** 2 / spread, axis=0)
-    day = fcluster(linkage(apart, "complete"), float(chdtri(joints, APART / len(apart))), "distance").astype(np.intp)
+    chance = float(chdtri(joints, APART / len(first))) * (unsure[:, first] + unsure[:, second])
+    near = float(chdtri(joints, 1.0 - NEAR)) * 2.0 * std[:, None] ** 2
+    apart = np.sum((offsets[:, first] - offsets[:, second]) ** 2 / (chance + near), axis=0)
+    day = fcluster(linkage(apart, "complete"), 1.0, "distance").astype(np.intp)
     return day if 1 < day.max() < runs else None
 
 

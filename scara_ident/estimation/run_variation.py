@@ -208,9 +208,9 @@ class RunVariation:
         told = [item for item in self.joints if item is not None and item.std[OFFSET] > 0.0]
         if not told:
             return None
-        return same_day(
-            np.array([item.of_run[:, OFFSET] for item in told]), np.array([item.unsure[:, OFFSET] for item in told])
-        )
+        offsets = np.array([item.of_run[:, OFFSET] for item in told])
+        unsure = np.array([item.unsure[:, OFFSET] for item in told])
+        return same_day(offsets, unsure, np.array([item.std[OFFSET] for item in told]))
 
 
 def unit_of_kind(robot: Robot, joint: str, kind: str) -> str:
