@@ -182,17 +182,11 @@ class RunVariation:
         for item, rows, weight in zip(self.joints, joints, weights, strict=True):
             if item is None:
                 continue
-            pulls = np.array(
-                [
-                    weight**2
-                    * inverse[:, rows.columns]
-                    @ rows.table[:-1, start:stop]
-                    @ item.directions[:, start:stop].T
-                    for start, stop in zip(item.bounds[:-1], item.bounds[1:], strict=True)
-                ]
-            )
+            bounds = zip(item.bounds[:-1], item.bounds[1:], strict=True)
+            pulls = [rows.table[:-1, start:stop] @ item.directions[:, start:stop].T for start, stop in bounds]
+            moving = weight**2 * inverse[:, rows.columns] @ np.array(pulls)
             for kind, std in enumerate(item.std):
-                each = pulls[:, :, kind]
+                each = moving[:, :, kind]
                 if kind == OFFSET and std > 0.0 and days is not None:
                     # Runs of one day share an offset, and are one draw of it.
                     each = np.array([np.sum(each[days == day], axis=0) for day in np.unique(days)])
