@@ -230,8 +230,9 @@ def run_variation(
         Whether the offsets of two runs are told too: by two, other differences may be the parameters'.
     """
     runs = len(observations.data.recordings)
-    # Where blocks are triangular factors the rows are not beside the samples that the directions are made of.
-    if runs < (2 if of_two else LEAST_RUNS) or any(rows.sizes is not None for rows in joints):
+    # Where blocks are triangular factors, or no samples are kept, the rows are not beside those that directions are made of.
+    few = runs < (2 if of_two else LEAST_RUNS)
+    if few or not observations.raw or any(rows.sizes is not None for rows in joints):
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
     # Made once, and not in two threads.

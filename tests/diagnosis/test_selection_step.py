@@ -122,8 +122,9 @@ def test_weights_of_the_fit_make_joints_equal():
     assert plain[0] > 3.0 * plain[1]
 
 
-def test_observations_with_effects_are_those_of_the_model_that_has_them():
-    step = step_beside(exact_runs()[:2], CHOSEN)
+@pytest.mark.parametrize("runs", [2, 4])
+def test_observations_with_effects_are_those_of_the_model_that_has_them(runs: int):
+    step = step_beside(exact_runs()[:runs], CHOSEN)
     wide = observe(model_with(step.scene, CHOSEN), step.observations.data)
     found = observed_at_every_sample(step)
     assert found.model.names == wide.model.names
