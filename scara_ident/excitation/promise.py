@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
@@ -55,22 +55,30 @@ class Told:
         Standard errors between the answers, without and with it.
     shown : tuple of Shown
         Of effects that may be below the limit, each.
+    untried : tuple of Suspect
+        Rivals of which the motion still holds too little for the diagnosis to try them, see `Effect.doubtful`.
     """
 
     question: Question
     before: float
     after: float
     shown: tuple[Shown, ...] = ()
+    untried: tuple[Suspect, ...] = ()
+
+    @property
+    def hidden(self) -> tuple[Suspect, ...]:
+        """Effects that would not be found if they are there, those below the limit as large as they may just be."""
+        return (*(item.suspect for item in self.shown if item.times < 1.0), *self.untried)
 
     @property
     def unshown(self) -> tuple[str, ...]:
-        """Of effects of a size that the recordings at hand would just have shown, those that would not be found."""
-        return tuple(item.suspect.label for item in self.shown if item.times < 1.0)
+        """Labels of `hidden`."""
+        return tuple(item.label for item in self.hidden)
 
     @property
     def settled(self) -> bool:
-        """Whether the diagnosis is expected to be sure of the answer afterwards."""
-        return not self.unshown if self.question.kind == "below_limit" else self.after >= SURE
+        """Whether the diagnosis is expected to be sure of the answer afterwards, whichever is true."""
+        return not self.hidden and (self.question.kind == "below_limit" or self.after >= SURE)
 
     @property
     def words(self) -> str:
@@ -86,8 +94,8 @@ class Told:
         """Say what the motion does not tell, and what would; nothing where it tells all."""
         if self.settled:
             return ""
-        unshown = [item.suspect for item in self.shown if item.times < 1.0][:MOST_NAMED]
-        more = f" and {len(self.unshown) - len(unshown)} more" if len(self.unshown) > len(unshown) else ""
+        unshown = self.hidden[:MOST_NAMED]
+        more = f" and {len(self.hidden) - len(unshown)} more" if len(self.hidden) > len(unshown) else ""
         which = ", ".join(item.label for item in unshown) or self.question.text
         experiments = dict.fromkeys(item.candidate.effect.experiment for item in unshown)
         what = "; ".join(experiments) if len(self.question.suspects) > 1 and unshown else self.question.experiment
@@ -118,12 +126,21 @@ def told(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[Told, ...]:
     """Return what motions tell of every question, beside what is known."""
     rows = all_rows(inquiry, motions)
     times, after = believed(inquiry, rows), inquiry.sigmas(rows.information)
-    found = []
+    scene, found = _moved(inquiry.scene, motions), []
     for item, one, other in zip(inquiry.questions, inquiry.sigmas(), after, strict=True):
         asked = item.suspects if item.kind == "below_limit" else ()
         shown = (Shown(own, times[own.label], _least(inquiry.scene, own, times[own.label])) for own in asked)
-        found.append(Told(item, float(one), float(other), tuple(shown)))
+        rivals = item.suspects if item.kind == "rivals" else ()
+        untried = tuple(own for own in rivals if own.candidate.member in own.candidate.effect.doubtful(scene))
+        found.append(Told(item, float(one), float(other), tuple(shown), untried))
     return tuple(found)
+
+
+def _moved(scene: Scene, motions: Sequence[Motion]) -> Scene:
+    """Return a scene that reaches as far and as fast as motions do besides."""
+    travel = [scene.travel, *(np.ptp(item.q, axis=1) for item in motions)]
+    speed = [scene.speed, *(np.max(np.abs(item.v), axis=1) for item in motions)]
+    return replace(scene, travel=np.max(travel, axis=0), speed=np.max(speed, axis=0))
 
 
 def _least(scene: Scene, suspect: Suspect, times: float) -> Mapping[str, Parameter]:

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from scara_ident.diagnosis.answerability import inquire, known_rows
-from scara_ident.diagnosis.candidates import CandidateColumns
-from scara_ident.diagnosis.questions import Question, questions
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.questions import Question, Suspect, questions
+from scara_ident.effects import Member
+from scara_ident.effects.periodic import PERIODS_COVERED, TorqueRipple
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.observations import observe
-from scara_ident.excitation.promise import rows_in_blocks, told
+from scara_ident.excitation.promise import SURE, rows_in_blocks, told
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.motion.motion import Motion
 from tests.diagnosis.asked import open_diagnosis, small_runs
 from tests.diagnosis.made import BANDS, multisine
 
 
-def wide_motion() -> Motion:
-    """A motion through the workspace at its full speed."""
-    made = multisine("wide", 3, 6.0)
+def wide_motion(share: float = 1.0) -> Motion:
+    """A motion through the workspace at its full speed, or through a share of it."""
+    made = multisine("wide", 3, 6.0, share)
     signals = (made.position[:, :-1], made.velocity[:, :-1], made.acceleration[:, :-1])
     return Motion("wide", "wide", made.time[:-1], *signals, None, 1.0 / float(made.time[1]))
 
@@ -75,3 +78,24 @@ def test_the_least_that_would_be_found_is_as_large_as_needed():
     assert shown((limit.value,))[1].times == pytest.approx(1.0)
     smaller, _ = shown((0.9 * limit.value,))
     assert smaller.unshown == ("spring of joint1",) and not smaller.settled
+
+
+class Slow(TorqueRipple):
+    """A ripple with few periods in a motion of the joint."""
+
+    name = "slow"
+    orders = (0.1,)
+
+
+def test_a_rival_of_which_the_motion_holds_too_few_periods_to_be_tried_is_named():
+    found, small, wide = open_diagnosis(), wide_motion(0.1), wide_motion()
+    ripple = Suspect(Candidate(Slow(), Member(0, Slow.orders)), "ripple of joint1", (0.05, 0.0))
+    asked = Question("rivals", "spring or ripple", (questions(found)[0].suspects[0], ripple))
+    inquiry = inquire(found, [asked])
+    per_turn = abs(float(inquiry.scene.robot.reduction[0])) * Slow.orders[0] / (2.0 * np.pi)
+    reach = max(float(inquiry.scene.travel[0]), float(np.ptp(small.q[0])))
+    assert per_turn * reach < PERIODS_COVERED < per_turn * np.ptp(wide.q[0])
+    (near,), (far,) = told(inquiry, [small]), told(inquiry, [wide])
+    assert near.unshown == ("ripple of joint1",) and not near.settled
+    assert near.instead == f"Would not tell: ripple of joint1. What would: {Slow.experiment}."
+    assert far.unshown == () and far.settled == (far.after >= SURE)
