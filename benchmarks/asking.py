@@ -9,9 +9,9 @@ which recordings show, by the scatter of blocks of time: in one recording of the
 other noise, as one variance of a dozen blocks is itself a fifth to a third off; beside the model that was asked, with what was
 found by then taken out of the torque. Beside these, where the effect that is there is asked for, the separation of it alone
 after each of the three motions (``apart``). And whether it was said before that the motion would tell the effect that is there: whether
-the motion was said to find one of its size. Where no motion named the effect, one is designed for it alone,
-of the size that all recordings together show: how many times as large as the diagnosis needs it is then expected
-(``best``), and whether it is named after it (``best_right``). A set where neither comes about is not to be settled.
+the motion was said to find one of its size. And a fourth motion is designed for the effect that is there alone, of the size
+that all recordings together show, which nobody could ask for: ``best``. How many times as large as the diagnosis needs it the
+effect is then expected to be is ``times``. What no motion names, and is not expected to be after that one, is not to be settled.
 
 With ``--tight`` all three motions keep to a cell about the place of the first, at a reduced speed, of which most of what
 any motion tells is cut off.
@@ -49,7 +49,7 @@ def show(rows: Sequence[dict[str, Any]]) -> None:
         pairs = [("all", opened)]
         pairs += [("some motion names it", [row for row in opened if _named(row)])]
         pairs += [
-            ("expected of the best motion", [row for row in opened if _named(row) or row.get("best", 0.0) >= 1.0])
+            ("expected of the best motion", [row for row in opened if _named(row) or row.get("times", 0.0) >= 1.0])
         ]
         pairs += [
             (f"said before to {words} it", [row for row in opened if row.get("said") is answer])
@@ -69,6 +69,14 @@ def show(rows: Sequence[dict[str, Any]]) -> None:
             times = [row["apart"]["tell"] / row["apart"][way] for row in opened if row.get("apart")]
             farther = f"; {np.median(times):.2f} times as far from none in the median of {len(times)}" if times else ""
             print(f"named after --tell and not after {way}: {ahead}, the other way round {behind}{farther}")
+        whole = [row for row in opened if "best" in row]
+        if whole:
+            print(f"of {len(whole)} with a motion for the effect that is there alone:", end=" ")
+            print(", ".join(f"{sum(row[way] for row in whole)} after {way}" for way in ("best", *WAYS)))
+        for way in WAYS:
+            times = [row["apart"]["best"] / row["apart"][way] for row in whole if "best" in row.get("apart", {})]
+            if times:
+                print(f"best {np.median(times):.2f} times as far from none as {way} in the median of {len(times)}")
         known = [row for row in opened if row.get("promised", (0.0, 0.0))[1] > 0.0]
         if known:
             each = np.array([row["seen"] for row in known]) / np.array([row["promised"][1:] for row in known])
@@ -81,7 +89,7 @@ def show(rows: Sequence[dict[str, Any]]) -> None:
 
 
 def _named(row: dict[str, Any]) -> bool:
-    return any(row[way] for way in WAYS) or row.get("best_right", False)
+    return any(row[way] for way in WAYS) or row.get("best", False)
 
 
 def show_bumps(rows: Sequence[dict[str, Any]]) -> None:

@@ -246,8 +246,8 @@ def one_set(
         result["kind"], result["promised"] = told.question.kind, [told.before, told.after]
     sought = question_of_truth(asked, truth)
     more, result["apart"] = {}, {}
-    for way in WAYS:
-        followed = motions[way]()
+
+    def follow(way: str, followed: ReferenceMotion) -> None:
         more[way] = record(arm, followed, truth, number, 3)
         found = diagnose(arm.robot, [*begun, more[way]])
         result[way] = right(found, truth)
@@ -259,24 +259,27 @@ def one_set(
         if sought is not None:
             each = np.array([seen(found, first, sought, [*begun, run]) for run in runs])
             result["apart"][way] = float(np.mean(each**-2.0) ** -0.5)
-    if not quick and not any(result[way] for way in WAYS):
+
+    for way in WAYS:
+        follow(way, motions[way]())
+    if not quick:
         # Each as a trajectory of its own.
         runs = [replace(run, name=f"{way}_1") for way, run in more.items()]
-        result |= best(first, diagnose(arm.robot, [*begun, *runs]), arm, limits, begun, truth, number, seconds)
+        result["times"], motion = best(first, diagnose(arm.robot, [*begun, *runs]), limits, truth, seconds)
+        if motion is None:
+            result["best"] = False
+        else:
+            follow("best", motion)
     return result
 
 
 def best(
-    first: Diagnosis,
-    whole: Diagnosis,
-    arm: VirtualArm,
-    limits: Limits,
-    begun: Sequence[Recording],
-    truth: Effect,
-    number: int,
-    seconds: float,
-) -> dict[str, Any]:
-    """Return what a motion designed for the effect that is there alone tells of it, its size taken from all recordings."""
+    first: Diagnosis, whole: Diagnosis, limits: Limits, truth: Effect, seconds: float
+) -> tuple[float, ReferenceMotion | None]:
+    """Return the motion designed for the effect that is there alone, its size taken from all recordings; None where they show none.
+
+    Before it, how many times as large as the diagnosis needs it the effect is then expected to be.
+    """
     scene = whole.search.scene
     own = [
         item
@@ -290,14 +293,13 @@ def best(
         held = max(own, key=lambda item: item.examination.gain)
         suspects = [Suspect(held.candidate, held.label, tuple(float(x) for x in held.examination.value))]
     if not suspects or not any(suspects[0].value):
-        return {"best": 0.0, "best_right": False}
+        return 0.0, None
     question = Question("below_limit", suspects[0].label, (suspects[0],))
     inquiry = replace(inquire(first, [question]), noise=noise_density(whole), bands=whole.search.bands)
     inquiry = knowing(inquiry, first.search.step.columns, widening=True)
     design = design_excitation(first.before.model, duration=seconds, tell=inquiry, limits=limits, effort=EFFORT)
     (times,) = sure_of(inquiry, [design.motion()]).values()
-    found = diagnose(arm.robot, [*begun, record(arm, as_reference(design), truth, number, 3)])
-    return {"best": times, "best_right": right(found, truth), "best_why": _why(found, truth)}
+    return times, as_reference(design)
 
 
 def _why(diagnosis: Diagnosis, truth: Effect) -> str:
