@@ -16,6 +16,7 @@ from scara_ident.motion.motion import Motion
 from scara_ident.motion.position_noise import noisier, unresolved_joints
 from scara_ident.motion.prepared import Bands, PreparedStretch
 from scara_ident.processes import halved
+from scara_ident.threads import side_by_side
 
 # Columns of a candidate, shape (k, N) on the N rows of each joint that it acts on.
 Rows = dict[int, Array]
@@ -124,13 +125,20 @@ class CandidateColumns:
 
     def slopes(self, scene: Scene, candidate: Candidate) -> tuple[Array, ...]:
         """Return a tied candidate's `Effect.slopes` within the bands, shape (p + 1 + s, N) on the N rows of each joint."""
+        effect, member = candidate.effect, candidate.member
+        tie = effect.tie(scene, member)
+        assert tie is not None
+
+        def on_stretch(part: PreparedStretch) -> list[Array]:
+            found = []
+            for joint, (places, rows) in enumerate(effect.slopes(self._signals_of(scene, part), member)):
+                own = np.zeros((len(tie.slopes), len(part.kept[joint])))
+                own[places] = part.rows(joint, rows)
+                found.append(own)
+            return found
+
         parts = [part for part in self.observations.data.stretches if part.usable]
-        found: list[list[Array]] = [[] for _ in self.observations.joints]
-        for part in parts:
-            slopes = candidate.effect.slopes(self._signals_of(scene, part), candidate.member)
-            for joint, own in enumerate(slopes):
-                found[joint].append(part.rows(joint, own))
-        return tuple(np.concatenate(own, axis=1) for own in found)
+        return tuple(np.concatenate(own, axis=1) for own in zip(*side_by_side(on_stretch, parts), strict=True))
 
     def predicted(self, scene: Scene, chosen: Sequence[Candidate], value: Array) -> tuple[Array, ...]:
         """Return the torque that the base model with effects predicts on every stretch, shape (n, N) each."""

@@ -276,12 +276,13 @@ class Effect(ABC):
         """Return what the only coefficient is by the nonlinear parameters; None where it is free."""
         return None
 
-    def slopes(self, signals: Signals, member: Member) -> Array:
-        """Return the derivatives of a tied member's torque, its coefficient held, by what `Tie.slopes` names.
+    def slopes(self, signals: Signals, member: Member) -> Iterable[tuple[NDArray[np.intp], Array]]:
+        """Give of each joint the derivatives of a tied member's torque, its coefficient held, by what `Tie.slopes` names.
 
-        Returns
-        -------
-        ndarray, shape (n, p + 1 + s, N)
+        Yields
+        ------
+        tuple of (ndarray of int, shape (k,), ndarray, shape (k, N))
+            Places among the ``p + 1 + s`` of `Tie.slopes`, and the derivatives by these; all others are zero.
         """
         raise NotImplementedError(f"{self.name} is tied and has no slopes")
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
@@ -107,8 +108,8 @@ class JointElasticity(BehindGear):
         bodies = np.append(usual_link_inertia_slopes(scene, member.place), -1.0)
         return Tie(compliance, -compliance * np.append(bodies / inertia, [2.0 / member.nonlinear[0], 0.0]))
 
-    def slopes(self, signals: Signals, member: Member) -> Array:
-        """Return the derivatives with the compliance as it is."""
+    def slopes(self, signals: Signals, member: Member) -> Iterable[tuple[NDArray[np.intp], Array]]:
+        """Give the derivatives with the compliance as it is."""
         return TwoMasses(signals, member.place, *member.nonlinear).slopes()
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
@@ -184,8 +185,8 @@ class Backlash(BehindGear):
         bodies = len(scene.model.rigid_body.columns)
         return Tie(member.nonlinear[0], np.append(np.zeros(bodies + 1), 1.0))
 
-    def slopes(self, signals: Signals, member: Member) -> Array:
-        """Return the derivatives with the width that multiplies the column as it is."""
+    def slopes(self, signals: Signals, member: Member) -> Iterable[tuple[NDArray[np.intp], Array]]:
+        """Give the derivatives with the width that multiplies the column as it is."""
         return FreeLink(signals, member.place, *member.nonlinear).slopes()
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:

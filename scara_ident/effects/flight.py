@@ -7,10 +7,12 @@ without bouncing (Nordin and Gutman, Automatica 38(10), 2002).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.links import (
@@ -18,11 +20,13 @@ from scara_ident.effects.links import (
     behind,
     held_link_inertia,
     lagging,
-    rigid_columns,
+    lagging_slopes,
+    rigid_rows,
     shared,
     usual_link_inertia,
 )
 from scara_ident.effects.signals import Signals
+from scara_ident.model.terms import joint_rows
 from scara_ident.motion.low_pass import HIGHEST_CUT, differentiate
 from scara_ident.motion.motion import Motion
 
@@ -78,33 +82,36 @@ class FreeLink:
         """Torque of all joints per width, recorded side, shape (n, N)."""
         return lagging(self.signals, self.joint, self.lag)
 
-    def slopes(self) -> Array:
-        """Return the derivatives of width times `change`, the width that multiplies it held, shape (n, p + 2, N).
+    def slopes(self) -> Iterator[tuple[NDArray[np.intp], Array]]:
+        """Give of each joint the derivatives of width times `change`, the width that multiplies it held, see `Effect.slopes`.
 
         They are by the parameters of the rigid bodies, by the armature where these do not tell it, and by the width.
         """
         scene, motion, j = self.signals.scene, self.signals.motion, self.joint
         place, flights = self._flown
-        columns, scale = rigid_columns(self.signals), scene.robot.row_scale[j]
-        p = columns.shape[1]
-        rotor = np.append(scene.armature_slopes(j), 1.0)[:, None]
-        load, inertia = -rotor * motion.a[j], -rotor * np.ones(motion.samples)
-        load[:p] += columns[j] / scale
-        inertia[:p] += self._inertia_columns
+        term, scale = scene.model.rigid_body, scene.robot.row_scale[j]
+        own, p = np.flatnonzero(term.pattern[j]), term.pattern.shape[1]
+        rotor = np.append(scene.armature_slopes(j), 1.0)
+        acting = np.union1d(own, np.append(np.flatnonzero(rotor), [p + 1]))
+        bodies, turning = acting[:-1], rotor[acting[:-1], None]
+        at = np.searchsorted(bodies, own)
+        load, inertia = -turning * motion.a[j], -turning * np.ones(motion.samples)
+        load[at] += rigid_rows(self.signals)[j] / scale
+        inertia[at] += self._inertia_columns
         inertia[:, self._inertia <= LEAST_INERTIA * self.usual] = 0.0
         drifts = (load - self._drift * inertia) / self._inertia
-        moved = np.zeros((p + 2, motion.samples))
+        moved = np.zeros((len(acting), motion.samples))
         for flight in flights:
-            own = slice(flight.first, flight.stop)
-            moved[:-1, own] = _apart(drifts[:, own], flight.since * self._step, self._step, from_none=False)
-            moved[-1, own] = 0.5 * flight.side - place[own]
-        lags = self._differentiated(moved)
-        lag = tuple(self.width * part for part in self.lag)
-        result = np.array([lagging(self.signals, j, (lags[0][k], lags[1][k], lags[2][k])) for k in range(p + 2)])
-        result = result.transpose(1, 0, 2)
-        result[:, :p] += scene.model.rigid_body.regressor(behind(motion, j, (lag[0], lag[1], lag[2]))) - columns
-        result[j, : p + 1] += scale * rotor * lag[2]
-        return np.asarray(result)
+            flown = slice(flight.first, flight.stop)
+            moved[:-1, flown] = _apart(drifts[:, flown], flight.since * self._step, self._step, from_none=False)
+            moved[-1, flown] = 0.5 * flight.side - place[flown]
+        x, first, second = (self.width * part for part in self.lag)
+        behind_it = joint_rows(term, behind(motion, j, (x, first, second)))
+        each = lagging_slopes(self.signals, j, behind_it, acting, self._differentiated(moved))
+        for joint, (places, rows) in enumerate(each):
+            if joint == j:
+                rows[np.searchsorted(places, bodies)] += scale * turning * second
+            yield places, rows
 
     @property
     def _step(self) -> float:
@@ -116,15 +123,15 @@ class FreeLink:
 
     @cached_property
     def _inertia_columns(self) -> Array:
-        """Inertia that the joint moves with its rotor per parameter of the rigid bodies, shape (p, N)."""
+        """Inertia that the joint moves with its rotor per parameter of the rigid bodies that act on it, shape (k, N)."""
         scene, motion, j = self.signals.scene, self.signals.motion, self.joint
 
         def made() -> Array:
             pushed = motion.a.copy()
             pushed[j] += 1.0
             moved = Motion(motion.name, motion.trajectory, motion.time, motion.q, motion.v, pushed, None, motion.rate)
-            change = scene.model.rigid_body.regressor(moved) - rigid_columns(self.signals)
-            return np.asarray(change[j] / scene.robot.row_scale[j])
+            change = joint_rows(scene.model.rigid_body, moved)[j] - rigid_rows(self.signals)[j]
+            return np.asarray(change / scene.robot.row_scale[j])
 
         return shared(motion, ("inertia", scene.model.rigid_body, j), made)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -30,6 +30,8 @@ SPEED_STEP = 1e-4
 LEAST_FOLDED = 0.02
 # A link's inertia stays above this share of its usual one, however folded, where the estimate is a poor one.
 LEAST_INERTIA = 0.1
+# Samples of many columns at once: what is made of them on the way stays in the processor's cache.
+CHUNK = 1024
 
 _SHARED: WeakKeyDictionary[Signals | Scene | Motion, dict[Hashable, Array]] = WeakKeyDictionary()
 
@@ -183,15 +185,12 @@ def _traced_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
     return found[0], found[1], found[2]
 
 
-def rigid_columns(signals: Signals) -> Array:
-    """Return the rigid bodies' columns at the recorded motion, which are at hand, shape (n, p, N)."""
-    model, motion = signals.scene.model, signals.motion
+def rigid_rows(signals: Signals) -> list[Array]:
+    """Return the rigid bodies' columns that act on each joint at the recorded motion, which are at hand, shape (k, N) each."""
+    model = signals.scene.model
     place = model.place(model.rigid_body)
-    result = np.zeros((len(model.active), place.stop - place.start, motion.samples))
-    for joint, (own, rows) in enumerate(zip(model.active, signals.columns, strict=True)):
-        rigid = (own >= place.start) & (own < place.stop)
-        result[joint, own[rigid] - place.start] = rows[rigid]
-    return result
+    bounds = (np.searchsorted(own, (place.start, place.stop)) for own in model.active)
+    return [rows[a:b] for rows, (a, b) in zip(signals.columns, bounds, strict=True)]
 
 
 def behind(motion: Motion, joint: int, lag: tuple[Array, Array, Array]) -> Motion:
@@ -223,6 +222,43 @@ def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Ar
     result = -(by_q * lag[0] + by_v * lag[1] + by_a * lag[2])
     result[joint] = own_lagging(signals, joint, lag)
     return np.asarray(result)
+
+
+def lagging_slopes(
+    signals: Signals, joint: int, bodies: Sequence[Array], acting: NDArray[np.intp], lags: tuple[Array, Array, Array]
+) -> Iterator[tuple[NDArray[np.intp], Array]]:
+    """Give of each joint the derivatives of the torque that a lag changes by parameters, those first that are the rigid bodies'.
+
+    Parameters
+    ----------
+    signals : Signals
+    joint : int
+        That whose link lags.
+    bodies : sequence of ndarray, shape (k, N)
+        Of each joint the rigid bodies' columns that act on it, at the motion of the links.
+    acting : ndarray of int, shape (m,)
+        Parameters that the lag depends on.
+    lags : tuple of ndarray, shape (m, N)
+        Derivatives of the lag by these, and of its first two derivatives.
+
+    Yields
+    ------
+    tuple of (ndarray of int, shape (l,), ndarray, shape (l, N))
+        The parameters in their order, and their derivatives; of all others they are zero.
+    """
+    scene, slopes = signals.scene, rigid_slopes(signals, joint)
+    for j, (moved, recorded) in enumerate(zip(bodies, rigid_rows(signals), strict=True)):
+        own = np.flatnonzero(scene.model.rigid_body.pattern[j])
+        places, count = np.union1d(own, acting), moved.shape[1]
+        rotor = scene.robot.row_scale[j] * scene.armature(j) if j == joint else 0.0
+        by_q, by_v, by_a = slopes[0][j], slopes[1][j], slopes[2][j] - rotor
+        at, result = np.searchsorted(places, acting), np.zeros((len(places), count))
+        for start in range(0, count, CHUNK):
+            some = slice(start, start + CHUNK)
+            x, first, second = (part[:, some] for part in lags)
+            result[at, some] = -(by_q[some] * x + by_v[some] * first + by_a[some] * second)
+        result[np.searchsorted(places, own)] += moved - recorded
+        yield places, result
 
 
 def own_lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Array:

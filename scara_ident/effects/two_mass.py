@@ -13,24 +13,27 @@ linear in x; so are its derivatives by the parameters of the rigid bodies.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.links import (
     behind,
     held_link_inertia,
     lagging,
+    lagging_slopes,
     own_lagging,
-    rigid_columns,
     rigid_slopes,
     rigid_torque,
     usual_link_inertia,
     usual_link_inertia_slopes,
 )
 from scara_ident.effects.signals import Signals
+from scara_ident.model.terms import joint_rows
 from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import Motion
 
@@ -144,8 +147,8 @@ class TwoMasses:
         result[j] += scene.robot.row_scale[j] * scene.armature(j) * self.lag[2]
         return np.asarray(result)
 
-    def slopes(self) -> Array:
-        """Return the derivatives of stiffness times `change`, over the stiffness, shape (n, p + 3, N).
+    def slopes(self) -> Iterator[tuple[NDArray[np.intp], Array]]:
+        """Give of each joint the derivatives of stiffness times `change`, over the stiffness, see `Effect.slopes`.
 
         They are by the parameters of the rigid bodies, by the armature where these do not tell it, by the frequency and by
         the damping ratio.
@@ -153,34 +156,39 @@ class TwoMasses:
         scene, motion, j = self.signals.scene, self.signals.motion, self.joint
         term, scale = scene.model.rigid_body, scene.robot.row_scale[j]
         moved, (x, first, second) = behind(motion, j, self.lag), self.lag
-        columns = term.regressor(moved)
-        p = columns.shape[1]
-        result = np.zeros((scene.robot.n, p + 3, motion.samples))
-        recorded = rigid_columns(self.signals)
-        result[:, :p] = columns - recorded
-        rotor = np.append(scene.armature_slopes(j), 1.0)[:, None]
-        usual = np.append(usual_link_inertia_slopes(scene, j), -1.0)[:, None]
+        bodies = joint_rows(term, moved)
+        own = np.flatnonzero(term.pattern[j])
+        p = term.pattern.shape[1]
+        rotor, usual, share = np.zeros((3, p + 3))
+        rotor[: p + 1] = *scene.armature_slopes(j), 1.0
+        usual[: p + 1] = *usual_link_inertia_slopes(scene, j), -1.0
+        share[: p + 1], share[p + 1] = usual[: p + 1] / self.inertia, 2.0 / self.frequency
+        acting = np.union1d(own, np.append(np.flatnonzero((rotor != 0.0) | (usual != 0.0)), [p + 1, p + 2]))
         omega, ratio = 2.0 * np.pi * self.frequency, self.damping_ratio
-        right = np.empty((p + 3, motion.samples))
-        right[: p + 1] = -rotor * moved.a[j] - usual * (omega**2 * x + 2.0 * ratio * omega * first)
-        right[:p] += columns[j] / scale
-        right[p + 1] = -4.0 * np.pi * self.inertia * (omega * x + ratio * first)
-        right[p + 2] = -2.0 * omega * self.inertia * first
+        right = -rotor[acting, None] * moved.a[j] - usual[acting, None] * (omega**2 * x + 2.0 * ratio * omega * first)
+        right[np.searchsorted(acting, own)] += bodies[j] / scale
+        right[-2] = -4.0 * np.pi * self.inertia * (omega * x + ratio * first)
+        right[-1] = -2.0 * omega * self.inertia * first
         lags = self.swing.solve(right)
-        result[j, : p + 1] += scale * rotor * second
-        for k in range(p + 3):
-            result[:, k] += lagging(self.signals, j, (lags[0][k], lags[1][k], lags[2][k]))
+        begun = None
         if self._initial is not None:
             # The swing at the beginning is fitted again whatever the parameters are.
-            begun = self._initial.count
-            whole = result[j, :, :begun].copy()
-            whole[:p] += recorded[j, :, :begun]
-            state = self._initial.state(whole, (x, first))
+            count = self._initial.count
+            whole = own_lagging(self.signals, j, (lags[0][:, :count], lags[1][:, :count], lags[2][:, :count]))
+            whole[np.searchsorted(acting, own)] += bodies[j][:, :count]
+            whole += scale * rotor[acting, None] * second[:count]
             free = self._initial.free
-            torque = np.array([lagging(self.signals, j, (free[0][k], free[1][k], free[2][k])) for k in range(2)])
-            result[..., :begun] -= np.einsum("kc,cjt->jkt", state, torque)
-        share = np.append(usual[:, 0] / self.inertia, [2.0 / self.frequency, 0.0])
-        return result + share[:, None] * self.change[:, None]
+            added = [lagging(self.signals, j, (free[0][k], free[1][k], free[2][k])) for k in range(2)]
+            begun = self._initial.state(whole, (x, first)), np.array(added)
+        for joint, (places, rows) in enumerate(lagging_slopes(self.signals, j, bodies, acting, lags)):
+            change = share[acting, None] * self.change[joint]
+            if joint == j:
+                change += scale * rotor[acting, None] * second
+            if begun is not None:
+                state, torque = begun
+                change[:, : torque.shape[-1]] -= state @ torque[:, joint]
+            rows[np.searchsorted(places, acting)] += change
+            yield places, rows
 
     def _torque(self, motion: Motion) -> Array:
         return rigid_torque(self.signals.scene, motion, motion.q, motion.v, motion.a)

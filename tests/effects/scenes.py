@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -109,3 +109,12 @@ def wandering(arm: VirtualArm, name: str, seed: int, duration: float = 8.0) -> R
         )
 
     return sampled(name, arm.robot, function, duration)
+
+
+def dense(slopes: Iterable[tuple[NDArray[np.intp], Array]], parameters: int) -> Array:
+    """Return slopes, given joint by joint with their places, as one array, shape (n, parameters, N)."""
+    found = []
+    for places, rows in slopes:
+        found.append(np.zeros((parameters, rows.shape[1])))
+        found[-1][places] = rows
+    return np.array(found)

@@ -3,7 +3,7 @@
 from scara_ident.model.terms.constraints import BrakingPolynomial, Constrained, Nonnegative, RealBodies, constraints_of
 from scara_ident.model.terms.friction import Friction, Offset
 from scara_ident.model.terms.rigid_body import RigidBody
-from scara_ident.model.terms.term import Column, Term
+from scara_ident.model.terms.term import Column, Term, joint_rows
 
 __all__ = [
     "BrakingPolynomial",
@@ -16,4 +16,5 @@ __all__ = [
     "RigidBody",
     "Term",
     "constraints_of",
+    "joint_rows",
 ]

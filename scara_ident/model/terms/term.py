@@ -90,14 +90,19 @@ class OfState(Protocol):
         ...
 
 
+def joint_rows(term: Term, motion: Motion) -> list[Array]:
+    """Return of each joint the columns of a term that act on it, shape (k, N) each, in the order of its `pattern`."""
+    rows = [np.empty((np.count_nonzero(row), motion.samples)) for row in term.pattern]
+    term.fill(motion, rows)
+    return rows
+
+
 class Filled:
     """A term whose dense regressor is made of what it fills in."""
 
     def regressor(self: Term, motion: Motion) -> Array:
         """Return the columns on a stretch of motion, shape (n, p, N), zero where the pattern says so."""
-        pattern = self.pattern
-        rows = [np.empty((np.count_nonzero(row), motion.samples)) for row in pattern]
-        self.fill(motion, rows)
+        pattern, rows = self.pattern, joint_rows(self, motion)
         result = np.zeros((*pattern.shape, motion.samples))
         for joint, row in enumerate(pattern):
             result[joint, row] = rows[joint]
