@@ -111,7 +111,7 @@ def suspected(found: Search, weights: Array) -> list[Decision]:
     return [item for item in best.values() if not (noise_objection(step, item) or variation_objection(step, item))]
 
 
-def left_open(found: Search, weights: Array) -> list[Decision]:
+def left_open(found: Search, weights: Array, demoted: Sequence[Decision] = ()) -> list[Decision]:
     """Return the decisions on what is not believed, though it is no noise, with that in words.
 
     Beside the effects found it would remove as much as is asked and is worth a look, and neither the noise of the positions
@@ -122,13 +122,20 @@ def left_open(found: Search, weights: Array) -> list[Decision]:
     found : Search
     weights : ndarray, shape (n,)
         See `unsettled`.
+    demoted : sequence of Decision, optional
+        On effects that the search had found and did without in the end; what came in since may have made them nothing.
     """
     step = replace(found.step, weights=weights)
     differing = len(step.observations.data.recordings) >= LEAST_RUNS
+    labels = {item.label(found.scene) for item in found.chosen}
+    gone = [item for item in demoted if item.label not in labels]
+    again = step.judge([item.candidate for item in gone])
+    open_ = [now.refused(item.why) for item, now in zip(gone, again, strict=True) if now.accepted or now.tentative]
+    others = {item.label: item for item in best_of_each(found.decisions).values() if item.tentative}
     result = []
-    for item in best_of_each(found.decisions).values():
+    for item in (others | {item.label: item for item in open_}).values():
         p_value = item.examination.p_value * found.tried
-        if not item.tentative or p_value > step.criteria.significant:
+        if p_value > step.criteria.significant:
             continue
         if within_a_step(step, item.candidate) or made_by_noise(step, item):
             continue

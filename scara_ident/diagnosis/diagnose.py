@@ -271,7 +271,7 @@ def diagnose(
     notes += [event.sentence(robot) for event in events]
     log_notes(_LOG, notes)
     undisturbed = without_stretches(validation_after, in_held_out)
-    doubtful = (*outcome.suspected, *left_open(found, after.weights))
+    doubtful = (*outcome.suspected, *left_open(found, after.weights, outcome.demoted))
     shown = held_out_evidence(
         evidence(found, outcome.residuals, outcome.fit_after, outcome.small, doubtful, criteria),
         rms_of(after.value, outcome.training),

@@ -9,7 +9,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from scara_ident.diagnosis import audit
-from scara_ident.diagnosis.audit import outdone, superfluous, suspected, uncertain, unsettled
+from scara_ident.diagnosis.audit import left_open, outdone, superfluous, suspected, uncertain, unsettled
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA
@@ -82,6 +82,20 @@ def test_a_spring_of_the_arm_stands(monkeypatch: pytest.MonkeyPatch):
     # What turns within a step of the encoder is no rival: nothing real was refused.
     monkeypatch.setattr(audit, "within_a_step", lambda step, candidate: "less than a step")
     assert outdone(proxy, found.step.weights, (held.refused(""),)) == []
+
+
+def test_what_was_found_and_refused_leaves_it_open(monkeypatch: pytest.MonkeyPatch):
+    found = searched(with_torque(exact_runs(), 1, lambda motion: 0.05 * motion.q[1]), Spring())
+    (held,) = (item.decision.refused("most of the rest stays") for item in found.steps)
+    without, weights = found.without([held.label]), found.step.weights
+    assert left_open(without, weights) == []
+    (open_,) = left_open(without, weights, (held,))
+    assert open_.label == held.label and not open_.accepted
+    assert open_.why.startswith("spring of joint2 would remove ") and open_.why.endswith(": most of the rest stays")
+    # In the model it is asked for no more, nor what the noise of the positions makes.
+    assert left_open(found, weights, (held,)) == []
+    monkeypatch.setattr(audit, "made_by_noise", lambda step, decision: True)
+    assert left_open(without, weights, (held,)) == []
 
 
 def test_without_effects_there_is_nothing_to_look_at():
