@@ -56,7 +56,7 @@ class Told:
     shown : tuple of Shown
         Of effects that may be below the limit, each.
     untried : tuple of Suspect
-        Rivals of which the motion still holds too little for the diagnosis to try them, see `Effect.doubtful`.
+        Effects of which the motion still holds too little for the diagnosis to try them, see `Effect.doubtful`.
     """
 
     question: Question
@@ -68,7 +68,7 @@ class Told:
     @property
     def hidden(self) -> tuple[Suspect, ...]:
         """Effects that would not be found if they are there, those below the limit as large as they may just be."""
-        return (*(item.suspect for item in self.shown if item.times < 1.0), *self.untried)
+        return (*self.untried, *(x.suspect for x in self.shown if x.times < 1.0 and x.suspect not in self.untried))
 
     @property
     def unshown(self) -> tuple[str, ...]:
@@ -130,8 +130,7 @@ def told(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[Told, ...]:
     for item, one, other in zip(inquiry.questions, inquiry.sigmas(), after, strict=True):
         asked = item.suspects if item.kind == "below_limit" else ()
         shown = (Shown(own, times[own.label], _least(inquiry.scene, own, times[own.label])) for own in asked)
-        rivals = item.suspects if item.kind == "rivals" else ()
-        untried = tuple(own for own in rivals if own.candidate.member in own.candidate.effect.doubtful(scene))
+        untried = tuple(own for own in item.suspects if own.candidate.member in own.candidate.effect.doubtful(scene))
         found.append(Told(item, float(one), float(other), tuple(shown), untried))
     return tuple(found)
 
