@@ -57,7 +57,7 @@ def _repeated(step: SelectionStep, decision: Decision) -> str | None:
     """Say so where only repetitions make an effect significant: what a model lacks repeats with the motion as well."""
     data, criteria = step.observations.data, step.criteria
     motions = len(data.trajectories)
-    if motions == len(data.recordings) and not any(data.motions.periods):
+    if motions == len(data.recordings) and not any(data.periods):
         return None
     # Of one motion alone, no other says otherwise: it counts as recorded once. Else what hardly leaves anything stands for
     # nothing that repeats.

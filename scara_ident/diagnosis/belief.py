@@ -27,7 +27,7 @@ from scara_ident.diagnosis.questions import Suspect, all_suspects
 from scara_ident.effects import Scene
 from scara_ident.estimation.information import Information, merge, triangular
 from scara_ident.estimation.joint_rows import JointRows
-from scara_ident.motion.prepared import Bands
+from scara_ident.motion.rest import Bands
 
 # Directions of a few columns below this share of the largest are not known without a fold.
 _RANK = 1e-9

@@ -14,7 +14,8 @@ from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.position_noise import noisier, unresolved_joints
-from scara_ident.motion.prepared import Bands, PreparedStretch
+from scara_ident.motion.prepared import PreparedStretch
+from scara_ident.motion.rest import Bands
 from scara_ident.processes import halved
 from scara_ident.threads import side_by_side
 

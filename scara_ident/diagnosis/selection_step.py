@@ -188,7 +188,7 @@ def observed_at_every_sample(step: SelectionStep) -> Observations:
 def moments_of(data: PreparedData) -> NDArray[np.intp]:
     """Return which moment of its recording's motion each block is, shape (blocks,): the same in all periods that repeat it."""
     found = []
-    for item, periods in zip(data.recordings, data.motions.periods, strict=True):
+    for item, periods in zip(data.recordings, data.periods, strict=True):
         numbers: list[NDArray[np.intp]] = []
         blocks = sum(len(part.blocks) - 1 for part in item.stretches if part.usable)
         for part in (part for part in item.stretches if part.usable):

@@ -20,7 +20,8 @@ from scara_ident.arrays import Array
 from scara_ident.effects.parameters import Parameter
 from scara_ident.effects.signals import Scene
 from scara_ident.motion.low_pass import differentiate
-from scara_ident.motion.prepared import PreparedRecording, PreparedStretch, position_cuts
+from scara_ident.motion.prepared import PreparedRecording, PreparedStretch
+from scara_ident.motion.rest import position_cuts
 
 # Share of a stretch's samples that the second encoder must have.
 KNOWN = 0.99

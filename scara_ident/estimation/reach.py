@@ -20,7 +20,8 @@ from scara_ident.estimation.explained_power import (
     thinned_to,
 )
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.prepared import REST_SHARE, PreparedData, fading, rest_speeds, slower
+from scara_ident.motion.prepared import PreparedData
+from scara_ident.motion.rest import REST_SHARE, fading, rest_speeds, slower
 
 
 @dataclass(frozen=True, eq=False)

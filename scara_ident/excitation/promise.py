@@ -15,7 +15,8 @@ from scara_ident.diagnosis.candidates import Candidate, Rows
 from scara_ident.diagnosis.questions import MOST_NAMED, Question, Suspect
 from scara_ident.effects import Parameter, Scene, Signals
 from scara_ident.motion.motion import Motion
-from scara_ident.motion.prepared import Bands, block_seconds
+from scara_ident.motion.prepared import block_seconds
+from scara_ident.motion.rest import Bands
 
 # Samples per second of a motion whose promise is given.
 FINE_RATE = 1000.0

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array, median, runs_of
-from scara_ident.motion.prepared import PreparedStretch, standstill
+from scara_ident.motion.prepared import PreparedStretch
+from scara_ident.motion.rest import standstill
 
 # Length of a bin, s.
 BIN = 0.04

@@ -15,15 +15,8 @@ import numpy as np
 from scara_ident.arrays import Array, median
 from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import Stretch
-from scara_ident.motion.prepared import (
-    REST_NOISE,
-    WIDE,
-    PreparedData,
-    PreparedRecording,
-    PreparedStretch,
-    position_cuts,
-    velocity_noise,
-)
+from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
+from scara_ident.motion.rest import REST_NOISE, WIDE, position_cuts, velocity_noise
 
 # Positions have steps where their changes are whole multiples of the least one, but for this much of it in the mean:
 # numbers of random size leave a quarter.

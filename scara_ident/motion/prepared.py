@@ -14,18 +14,16 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array, median, runs_of
+from scara_ident.arrays import Array
 from scara_ident.manners import Frozen
-from scara_ident.motion.low_pass import HIGHEST_CUT, ROWS_AT_ONCE, low_pass, low_pass_every
+from scara_ident.motion.low_pass import ROWS_AT_ONCE, low_pass, low_pass_every
 from scara_ident.motion.motion import Motion, Stretch, motion_of, stretches, torque_of, with_effort_of
+from scara_ident.motion.periods import Periods, periods_of
+from scara_ident.motion.rest import Bands, fading, position_cuts, standstill
 from scara_ident.motion.trajectories import Trajectories, trajectories_of
 from scara_ident.recording.recording import Recording
 from scara_ident.threads import made_once, side_by_side
 
-Bands = Sequence[float | None]
-
-# Positions pass a filter three times as wide as the band: inside the band it then changes them by under 2e-4.
-POSITION_BAND = 3.0
 # Rows per period of the band that are kept: the filter lets little through above 1.25 of its cut-off.
 ROWS_PER_PERIOD = 2.5
 # Periods of the band left out at both ends of a stretch, where the filter's continuation is a guess, and the least
@@ -34,17 +32,6 @@ END_PERIODS = 1.0
 END_SAMPLES = 20
 # A rate is known to rounding only; what is a whole number but for that is one.
 ROUNDING = 1e-9
-# A joint stands still where its speed stays below this share of its peak, or below this many standard deviations of its
-# velocity's noise: friction is then anything up to Coulomb's. The position's low-pass widens it by this many of its periods.
-REST_SHARE = 3e-3
-REST_NOISE = 5.0
-REST_WIDEN = 0.5
-# Both sides of the equation fade out towards rest over this many periods of the position's low-pass.
-FADE_PERIODS = 1.0
-# The noise of an unfiltered joint is what a filter at this share of the rate takes out.
-WIDE = 0.2
-# Neither is longer than this, s: in a narrow band too little would be left between turning points.
-LONGEST_WIDENING = 0.05
 # Blocks are long against the band's memory, so that scores of different blocks are nearly independent.
 BLOCK_PERIODS = 4.0
 BLOCK_SECONDS = 0.5
@@ -239,6 +226,7 @@ class PreparedData(Frozen):
     recordings: tuple[PreparedRecording, ...]
     bands: tuple[float | None, ...]
     _motions: list[Trajectories] = field(default_factory=list, repr=False)
+    _periods: list[tuple[Periods | None, ...]] = field(default_factory=list, repr=False)
     _part_of: tuple[PreparedData, tuple[int, ...]] | None = field(default=None, repr=False)
 
     @property
@@ -248,6 +236,16 @@ class PreparedData(Frozen):
             return self._part_of[0].motions.of(self._part_of[1])
         self._motions[:] = self._motions or [trajectories_of([item.longest.stretch for item in self.recordings])]
         return self._motions[0]
+
+    @property
+    def periods(self) -> tuple[Periods | None, ...]:
+        """Where each recording repeats its own motion, or None where it does not; found once for all bands."""
+        if self._part_of is not None:
+            whole, places = self._part_of
+            return tuple(whole.periods[k] for k in places)
+        stretches = [item.longest.stretch for item in self.recordings]
+        self._periods[:] = self._periods or [tuple(side_by_side(periods_of, stretches))]
+        return self._periods[0]
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -303,13 +301,6 @@ def prepare(recordings: Sequence[Recording], bands: Bands = ()) -> PreparedData:
     return PreparedData(tuple(made), made[0].bands if made else tuple(bands))
 
 
-def position_cuts(rate: float, bands: Bands) -> list[float | None]:
-    """Return the cut-offs of the positions that go with the bands; None where that is beyond half the rate."""
-    return [
-        None if band is None or POSITION_BAND * band > HIGHEST_CUT * rate else POSITION_BAND * band for band in bands
-    ]
-
-
 def block_seconds(bands: Sequence[float | None]) -> float:
     """Return how long blocks of time are, s."""
     slowest = min((band for band in bands if band is not None), default=np.inf)
@@ -319,78 +310,3 @@ def block_seconds(bands: Sequence[float | None]) -> float:
 def row_step(rate: float, band: float | None) -> int:
     """Return how many samples one row stands for in a band."""
     return 1 if band is None else max(1, int(rate / (ROWS_PER_PERIOD * band) * (1.0 + ROUNDING)))
-
-
-def standstill(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) -> NDArray[np.bool_]:
-    """Return where each joint stands still, shape (n, N), widened by the memory of the position's filter."""
-    return slower(motion.v, rest_speeds(stretch, motion, bands), stretch.rate, bands)
-
-
-def rest_speeds(stretch: Stretch, motion: Motion, bands: Sequence[float | None]) -> Array:
-    """Return the speeds below which noise may be what moves each joint, shape (n,)."""
-    least = REST_SHARE / REST_NOISE * np.max(np.abs(motion.v), axis=1)
-    # Those that are not filtered pass a wide filter together.
-    unfiltered = [j for j, cut in enumerate(position_cuts(stretch.rate, bands)) if cut is None]
-    stretch.filter_all(dict.fromkeys(unfiltered, WIDE * stretch.rate))
-    return REST_NOISE * np.array([velocity_noise(stretch, motion, j, bands[j], least[j]) for j in range(len(bands))])
-
-
-def slower(v: Array, speeds: Array, rate: float, bands: Sequence[float | None]) -> NDArray[np.bool_]:
-    """Return where each joint is slower than a speed for some samples, shape (n, N), widened as `standstill`."""
-    found = np.zeros(v.shape, dtype=bool)
-    for own, slow, band in zip(found, np.abs(v) <= speeds[:, None], bands, strict=True):
-        widen = _widening(REST_WIDEN, rate, band)
-        for start, stop in runs_of(slow):
-            if stop - start > 1:
-                own[max(0, start - widen) : stop + widen] = True
-    return found
-
-
-def fading(rest: NDArray[np.bool_], rate: float, bands: Sequence[float | None]) -> Array:
-    """Return the weight of every sample, shape (n, N): 0 at rest, 1 away from it, and between them without a step.
-
-    An equation that holds at every sample holds for both sides times any weight. With the weight zero where friction
-    is unknown, the low-pass carries nothing of it to the samples that are used.
-
-    Parameters
-    ----------
-    rest : ndarray of bool, shape (n, N)
-    rate : float
-        Samples per second.
-    bands : sequence of float or None, one per joint
-    """
-    result = np.ones(rest.shape)
-    for j, band in enumerate(bands):
-        ramp = _widening(FADE_PERIODS, rate, band)
-        rise = np.sin(0.5 * np.pi * np.arange(1, ramp + 1) / (ramp + 1)) ** 2
-        for start, stop in runs_of(rest[j]):
-            before, after = result[j, max(0, start - ramp) : start], result[j, stop : stop + ramp]
-            before *= rise[: len(before)][::-1]
-            after *= rise[: len(after)]
-            result[j, start:stop] = 0.0
-    return result
-
-
-def _widening(periods: float, rate: float, band: float | None) -> int:
-    return 1 if band is None else max(1, int(rate * min(periods / (POSITION_BAND * band), LONGEST_WIDENING)))
-
-
-def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | None, least: float) -> float:
-    """Return the standard deviation of the filtered velocity's noise, from what the filter took out, or the least given.
-
-    White position noise of density s/rate integrates to ``s (2 pi)^2 f^3 / 3`` in velocity up to f.
-    """
-    cut = reach = position_cuts(stretch.rate, [band])[0]
-    if cut is None or reach is None:
-        # Nothing was filtered; the noise is what a wide filter would take out. Within a wide band all of it is there.
-        cut = WIDE * stretch.rate
-        reach = cut if band is None else 0.5 * stretch.rate
-        smooth = stretch.filtered(joint, cut)[0]
-    else:
-        smooth = motion.q[joint]
-    rest = np.abs(stretch.position[joint] - smooth)
-    removed = max(0.5 * stretch.rate - cut, 0.05 * stretch.rate)
-    # The median ignores the moments at which real motion is faster than the filter.
-    gain = 2.0 * np.pi * float(np.sqrt(reach**3 / (3.0 * removed))) / 0.6745
-    small = 2 * np.count_nonzero(gain * rest <= least) > len(rest)
-    return least if small else max(least, gain * median(rest))

@@ -14,8 +14,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.motion.motion import Stretch
-from scara_ident.motion.periods import FINE_RATE, LEAST_RANGE, SAME_MOTION, Periods, at_rate, periods_of
-from scara_ident.threads import side_by_side
+from scara_ident.motion.periods import FINE_RATE, LEAST_RANGE, SAME_MOTION, at_rate
 
 # Repetitions start within this many seconds of each other after alignment; more is another motion.
 LARGEST_SHIFT = 1.0
@@ -39,17 +38,14 @@ class Trajectories:
         Of each recording; the same for repetitions of one motion.
     notes : tuple of str
         Where names and motions contradict each other.
-    periods : tuple of (Periods or None)
-        Where each recording repeats its own motion; None where it does not.
     """
 
     labels: tuple[str, ...]
     notes: tuple[str, ...]
-    periods: tuple[Periods | None, ...]
 
     def of(self, places: Sequence[int]) -> Trajectories:
         """Return those of some of the recordings, called as among all."""
-        return Trajectories(tuple(self.labels[k] for k in places), (), tuple(self.periods[k] for k in places))
+        return Trajectories(tuple(self.labels[k] for k in places), ())
 
 
 def trajectories_of(stretches: Sequence[Stretch]) -> Trajectories:
@@ -92,7 +88,7 @@ def trajectories_of(stretches: Sequence[Stretch]) -> Trajectories:
         if motions > 1:
             runs = _listed(sorted(stretches[k].name for k in place))
             notes.append(f"{runs} are {motions} different motions, so not all of them repetitions of {name}")
-    return Trajectories(tuple(labels), tuple(notes), tuple(side_by_side(periods_of, stretches)))
+    return Trajectories(tuple(labels), tuple(notes))
 
 
 def _common(names: Iterable[str]) -> str:

@@ -16,14 +16,8 @@ from scara_ident.identification.identify import identify
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import stretches
-from scara_ident.motion.prepared import (
-    BLOCK_SECONDS,
-    PreparedStretch,
-    fading,
-    position_cuts,
-    prepare,
-    row_step,
-)
+from scara_ident.motion.prepared import BLOCK_SECONDS, PreparedStretch, prepare, row_step
+from scara_ident.motion.rest import position_cuts
 from scara_ident.recording.audit import Finding
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
@@ -97,29 +91,6 @@ def test_rest_leaves_out_rows_of_its_joint_only(run: Recording):
     assert count[0][1] == count[1][1]
 
 
-def test_a_joint_that_stops_is_left_out_there_and_no_more(run: Recording):
-    position = run.position.copy()
-    position[1, 2000:3000] = position[1, 2000]
-    position[1, 3000:] += position[1, 2000] - position[1, 3000]
-    part = only(replace(run, position=position))
-    assert part.rest[1, 2100:2900].all()
-    assert part.rest[1].mean() < 0.35
-    assert not part.rest[0, 2100:2900].all()
-    assert not part.used[1, 2100:2900].any()
-
-
-def test_the_weight_is_zero_at_rest_one_away_from_it_and_has_no_step():
-    rest = np.zeros((2, 2000), dtype=bool)
-    rest[0, 700:800] = rest[0, 1000:1001] = rest[0, :5] = True
-    weight = fading(rest, RATE, (10.0, None))
-    assert np.all(weight[0][rest[0]] == 0.0)
-    assert np.all((weight[0][~rest[0]] > 0.0) & (weight[0][~rest[0]] <= 1.0))
-    ramp = RATE / (3.0 * 10.0)
-    assert weight[0][int(800 + ramp) + 1] == 1.0
-    assert np.max(np.abs(np.diff(weight[0]))) < 2.0 / ramp
-    assert np.all(weight[1] == 1.0)
-
-
 def test_what_happens_at_rest_does_not_reach_the_rows(run: Recording):
     """A torque that friction takes up at rest, whatever it is, leaves the equation where the joint moves as it was."""
     clean = only(run)
@@ -130,13 +101,6 @@ def test_what_happens_at_rest_does_not_reach_the_rows(run: Recording):
     for j in range(2):
         before, after = (clean.rows(j, item.torque[j : j + 1]) for item in (clean, shaken))
         assert_allclose(after, before, atol=1e-12)
-
-
-def test_positions_pass_a_wider_filter_than_rows_where_the_rate_allows(run: Recording):
-    assert position_cuts(1000.0, [10.0, None, 200.0]) == [30.0, None, None]
-    part = only(run, (4.0, 8.0))
-    for j, cut in enumerate((12.0, 24.0)):
-        assert_allclose(part.motion.q[j], low_pass(run.position[j], RATE, cut), atol=1e-13)
 
 
 def test_a_row_stands_for_two_and_a_half_per_period():
@@ -177,6 +141,8 @@ def test_recordings_are_prepared_in_their_order_and_known_by_their_trajectory(ro
     assert data.labels == ("b", "a", "b")
     assert data.of([2, 1]).labels == data.of([0, 2, 1]).of([1, 2]).labels == ("b", "a")
     assert data.at((6.0, 6.0)).motions is data.motions
+    assert data.at((6.0, 6.0)).periods is data.periods
+    assert data.of([2, 0]).periods == tuple(data.periods[k] for k in (2, 0))
     assert data.sources == tuple(runs)
     assert [item.name for item in data.of([2, 0]).recordings] == ["b_2", "b_1"]
     assert data.bands == BANDS
@@ -277,3 +243,9 @@ def test_clipped_torque_is_left_out_of_its_joint_and_nothing_else(robot: Robot) 
     # Nothing of the clipped torque passes the filter to rows that are kept.
     estimates = [identify(robot, [item], bands=BANDS).estimate for item in (whole, clipped)]
     assert_allclose(estimates[1].value, estimates[0].value, atol=4.0 * np.max(estimates[1].std))
+
+
+def test_an_identification_does_not_look_for_periods(monkeypatch: pytest.MonkeyPatch, robot: Robot, run: Recording):
+    """Only the tests of a diagnosis ask for them, and they take as long as a tenth of an identification."""
+    monkeypatch.setattr(scara_ident.motion.prepared, "periods_of", lambda _: pytest.fail("looked for periods"))
+    assert identify(robot, [run]).estimate.value.size

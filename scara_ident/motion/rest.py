@@ -1,0 +1,110 @@
+"""Where a joint stands still, so that friction is unknown, and how both sides of its equation fade out towards it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array, median, runs_of
+from scara_ident.motion.low_pass import HIGHEST_CUT
+from scara_ident.motion.motion import Motion, Stretch
+
+Bands = Sequence[float | None]
+
+# Positions pass a filter three times as wide as the band: inside the band it then changes them by under 2e-4.
+POSITION_BAND = 3.0
+# A joint stands still where its speed stays below this share of its peak, or below this many standard deviations of its
+# velocity's noise: friction is then anything up to Coulomb's. The position's low-pass widens it by this many of its periods.
+REST_SHARE = 3e-3
+REST_NOISE = 5.0
+REST_WIDEN = 0.5
+# Both sides of the equation fade out towards rest over this many periods of the position's low-pass.
+FADE_PERIODS = 1.0
+# The noise of an unfiltered joint is what a filter at this share of the rate takes out.
+WIDE = 0.2
+# Neither is longer than this, s: in a narrow band too little would be left between turning points.
+LONGEST_WIDENING = 0.05
+
+
+def position_cuts(rate: float, bands: Bands) -> list[float | None]:
+    """Return the cut-offs of the positions that go with the bands; None where that is beyond half the rate."""
+    return [
+        None if band is None or POSITION_BAND * band > HIGHEST_CUT * rate else POSITION_BAND * band for band in bands
+    ]
+
+
+def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.bool_]:
+    """Return where each joint stands still, shape (n, N), widened by the memory of the position's filter."""
+    return slower(motion.v, rest_speeds(stretch, motion, bands), stretch.rate, bands)
+
+
+def rest_speeds(stretch: Stretch, motion: Motion, bands: Bands) -> Array:
+    """Return the speeds below which noise may be what moves each joint, shape (n,)."""
+    least = REST_SHARE / REST_NOISE * np.max(np.abs(motion.v), axis=1)
+    # Those that are not filtered pass a wide filter together.
+    unfiltered = [j for j, cut in enumerate(position_cuts(stretch.rate, bands)) if cut is None]
+    stretch.filter_all(dict.fromkeys(unfiltered, WIDE * stretch.rate))
+    return REST_NOISE * np.array([velocity_noise(stretch, motion, j, bands[j], least[j]) for j in range(len(bands))])
+
+
+def slower(v: Array, speeds: Array, rate: float, bands: Bands) -> NDArray[np.bool_]:
+    """Return where each joint is slower than a speed for some samples, shape (n, N), widened as `standstill`."""
+    found = np.zeros(v.shape, dtype=bool)
+    for own, slow, band in zip(found, np.abs(v) <= speeds[:, None], bands, strict=True):
+        widen = _widening(REST_WIDEN, rate, band)
+        for start, stop in runs_of(slow):
+            if stop - start > 1:
+                own[max(0, start - widen) : stop + widen] = True
+    return found
+
+
+def fading(rest: NDArray[np.bool_], rate: float, bands: Bands) -> Array:
+    """Return the weight of every sample, shape (n, N): 0 at rest, 1 away from it, and between them without a step.
+
+    An equation that holds at every sample holds for both sides times any weight. With the weight zero where friction
+    is unknown, the low-pass carries nothing of it to the samples that are used.
+
+    Parameters
+    ----------
+    rest : ndarray of bool, shape (n, N)
+    rate : float
+        Samples per second.
+    bands : sequence of float or None, one per joint
+    """
+    result = np.ones(rest.shape)
+    for j, band in enumerate(bands):
+        ramp = _widening(FADE_PERIODS, rate, band)
+        rise = np.sin(0.5 * np.pi * np.arange(1, ramp + 1) / (ramp + 1)) ** 2
+        for start, stop in runs_of(rest[j]):
+            before, after = result[j, max(0, start - ramp) : start], result[j, stop : stop + ramp]
+            before *= rise[: len(before)][::-1]
+            after *= rise[: len(after)]
+            result[j, start:stop] = 0.0
+    return result
+
+
+def _widening(periods: float, rate: float, band: float | None) -> int:
+    return 1 if band is None else max(1, int(rate * min(periods / (POSITION_BAND * band), LONGEST_WIDENING)))
+
+
+def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | None, least: float) -> float:
+    """Return the standard deviation of the filtered velocity's noise, from what the filter took out, or the least given.
+
+    White position noise of density s/rate integrates to ``s (2 pi)^2 f^3 / 3`` in velocity up to f.
+    """
+    cut = reach = position_cuts(stretch.rate, [band])[0]
+    if cut is None or reach is None:
+        # Nothing was filtered; the noise is what a wide filter would take out. Within a wide band all of it is there.
+        cut = WIDE * stretch.rate
+        reach = cut if band is None else 0.5 * stretch.rate
+        smooth = stretch.filtered(joint, cut)[0]
+    else:
+        smooth = motion.q[joint]
+    rest = np.abs(stretch.position[joint] - smooth)
+    removed = max(0.5 * stretch.rate - cut, 0.05 * stretch.rate)
+    # The median ignores the moments at which real motion is faster than the filter.
+    gain = 2.0 * np.pi * float(np.sqrt(reach**3 / (3.0 * removed))) / 0.6745
+    small = 2 * np.count_nonzero(gain * rest <= least) > len(rest)
+    return least if small else max(least, gain * median(rest))

@@ -1,0 +1,59 @@
+"""Where a joint stands still, how its equation fades out towards that, and the filter of positions that decides both."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from scara_ident.motion.low_pass import low_pass
+from scara_ident.motion.prepared import PreparedStretch, prepare
+from scara_ident.motion.rest import fading, position_cuts
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import load_robot
+from tests.arms import PLANAR_2R, swing, write_urdf
+
+RATE = 500.0
+BANDS = (10.0, 10.0)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    return swing(load_robot(write_urdf(tmp_path_factory.mktemp("arm") / "arm.urdf", PLANAR_2R)))
+
+
+def only(recording: Recording, bands: tuple[float | None, ...] = BANDS) -> PreparedStretch:
+    (part,) = prepare([recording], bands).stretches
+    return part
+
+
+def test_a_joint_that_stops_is_left_out_there_and_no_more(run: Recording):
+    position = run.position.copy()
+    position[1, 2000:3000] = position[1, 2000]
+    position[1, 3000:] += position[1, 2000] - position[1, 3000]
+    part = only(replace(run, position=position))
+    assert part.rest[1, 2100:2900].all()
+    assert part.rest[1].mean() < 0.35
+    assert not part.rest[0, 2100:2900].all()
+    assert not part.used[1, 2100:2900].any()
+
+
+def test_the_weight_is_zero_at_rest_one_away_from_it_and_has_no_step():
+    rest = np.zeros((2, 2000), dtype=bool)
+    rest[0, 700:800] = rest[0, 1000:1001] = rest[0, :5] = True
+    weight = fading(rest, RATE, (10.0, None))
+    assert np.all(weight[0][rest[0]] == 0.0)
+    assert np.all((weight[0][~rest[0]] > 0.0) & (weight[0][~rest[0]] <= 1.0))
+    ramp = RATE / (3.0 * 10.0)
+    assert weight[0][int(800 + ramp) + 1] == 1.0
+    assert np.max(np.abs(np.diff(weight[0]))) < 2.0 / ramp
+    assert np.all(weight[1] == 1.0)
+
+
+def test_positions_pass_a_wider_filter_than_rows_where_the_rate_allows(run: Recording):
+    assert position_cuts(1000.0, [10.0, None, 200.0]) == [30.0, None, None]
+    part = only(run, (4.0, 8.0))
+    for j, cut in enumerate((12.0, 24.0)):
+        assert_allclose(part.motion.q[j], low_pass(run.position[j], RATE, cut), atol=1e-13)
