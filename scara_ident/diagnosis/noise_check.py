@@ -13,6 +13,7 @@ from scara_ident.diagnosis.candidate_tests import Examination, coefficients, exa
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.effects import Scene
 from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
 from scara_ident.motion.position_noise import noise_sizes
 
@@ -91,7 +92,7 @@ def _gone_further_down(step: SelectionStep, decision: Decision) -> str | None:
     )
 
 
-def less_noise(step: SelectionStep, decisions: Sequence[Decision]) -> list[Decision]:
+def less_noise(step: SelectionStep, decisions: Sequence[Decision], scene: Scene | None = None) -> list[Decision]:
     """Return decisions with what is left beside a model once the share of the positions' noise is taken off, where it is less.
 
     Parameters
@@ -99,21 +100,24 @@ def less_noise(step: SelectionStep, decisions: Sequence[Decision]) -> list[Decis
     step : SelectionStep
         The model.
     decisions : sequence of Decision
+    scene : Scene, optional
+        By whose columns they are judged; default: the step's.
     """
     if not decisions or max(noise_shares(step.observations.data), default=0.0) < NEGLIGIBLE:
         return list(decisions)
-    judged, result = step.judge([item.candidate for item in decisions]), []
-    for item, now, left in zip(decisions, judged, _each_without_noise(step, judged), strict=True):
+    judged, result = step.judge([item.candidate for item in decisions], scene), []
+    for item, now, left in zip(decisions, judged, _each_without_noise(step, judged, scene), strict=True):
         found, share = now.examination, _share(now.examination, left)
         less = replace(now, examination=_left_of(found, left), gain=share * now.gain, why=item.why)
         result.append(less if share < 1.0 else item)
     return result
 
 
-def _each_without_noise(step: SelectionStep, decisions: Sequence[Decision]) -> list[Array]:
-    """Return `without_noise` of each, examined beside a model."""
+def _each_without_noise(step: SelectionStep, decisions: Sequence[Decision], scene: Scene | None = None) -> list[Array]:
+    """Return `without_noise` of each, examined beside a model by the columns of a scene."""
     noisier = step.noisier
-    rows = noisier.columns.rows(noisier.scene, [item.candidate for item in decisions])
+    at = noisier.scene if scene is None else replace(scene, columns=noisier.scene.columns)
+    rows = noisier.columns.rows(at, [item.candidate for item in decisions])
     return [
         without_noise(item.examination, *coefficients(noisier.model, own, step.criteria))
         for item, own in zip(decisions, rows, strict=True)

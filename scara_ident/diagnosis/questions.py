@@ -287,7 +287,8 @@ def _others(diagnosis: Diagnosis) -> list[Decision]:
         rank = (_odds(own), -_limit(own.examination, diagnosis))
         if possible(own, diagnosis) and (own.label not in best or rank > best[own.label][0]):
             best[own.label] = rank, own
-    less = less_noise(search.step, [item for _, item in best.values()])
+    # By the columns that they were tried with, which are at hand.
+    less = less_noise(search.step, [item for _, item in best.values()], search.first)
     signed = (_of_either_sign(item, diagnosis) for item in less)
     return [item for item in signed if possible(item, diagnosis)]
 

@@ -34,12 +34,12 @@ def same_day(offsets: Array, unsure: Array, std: Array) -> NDArray[np.intp] | No
     ndarray of int, shape (runs,), or None
         The day of each, from 1 on; None where all are of one, or no two.
     """
-    from scipy.cluster.hierarchy import fcluster, linkage
-    from scipy.special import chdtri
-
     joints, runs = offsets.shape
     if runs < 3:
         return None
+    from scipy.cluster.hierarchy import fcluster, linkage
+    from scipy.special import chdtri
+
     first, second = np.triu_indices(runs, 1)
     chance = float(chdtri(joints, APART / len(first))) * (unsure[:, first] + unsure[:, second])
     near = float(chdtri(joints, 1.0 - NEAR)) * 2.0 * std[:, None] ** 2
