@@ -29,6 +29,9 @@ class Run:
 
 def run(checkout: Path, arguments: Sequence[str]) -> Run:
     """Run a command with the package of a checkout and the dependencies of this interpreter."""
+    if not (checkout / "scara_ident").is_dir():
+        # What is installed would be run in its place.
+        raise SystemExit(f"{checkout}: no checkout: it holds no folder scara_ident; see git worktree add")
     environment = os.environ | {"PYTHONPATH": str(checkout.resolve())}
     # Modules that are compiled again in every run are no user's, and more than a tenth of a short command.
     environment.pop("PYTHONDONTWRITEBYTECODE", None)

@@ -107,3 +107,8 @@ def test_errors_held_out_are_compared_joint_by_joint(compare):
     }
     assert compare.held_out_ratios(old, new) == [0.5, 1.0]
     assert compare.held_out_ratios(old, {"status": 1, "output": None}) == []
+
+
+def test_what_is_no_checkout_is_not_run_as_what_is_installed(compare, tmp_path):
+    with pytest.raises(SystemExit, match="no checkout"):
+        compare.run(tmp_path, ["--version"])
