@@ -19,9 +19,13 @@ SLOWER = (0.03, 0.08, 0.2)
 MOST_FEATURES, LEAST_GAIN, HARM, INFLUENCE = 6, 0.02, 0.5, 10.0
 # A trend is fitted to one of so many bins, of which there are so many for each of its columns, in so many rounds.
 THIN, LEAST_BINS, ROUNDS = 2, 10, 7
+# Numbers in the columns of the trends that are fitted together: more would leave the cache.
+TOGETHER = 2**15
 # Starts of that fit, and standard deviations at which Tukey's loss gives up when it chooses among what they end in: half of all may
 # be off (Rousseeuw and Yohai 1984).
 STARTS, HALF = 12, 1.548
+# Fits that are nearer to each other than so many standard deviations of what they leave end in the same.
+ALIKE = 0.02
 # Seconds of a recording below which its trend is an offset alone.
 LONG_ENOUGH = 10.0
 # What depends on the state is told by what is seen in other parts of about so long, s, than an event's own: hardly any event
@@ -31,49 +35,85 @@ PART = 3.0
 
 def without_trends(stretches: Sequence[Binned]) -> list[Binned]:
     """Take off what its own run has all along: an offset, a share of the load and of friction, and their drift."""
-    trends = [np.zeros_like(item.taken) for item in stretches]
-    for k in dict.fromkeys(item.recording for item in stretches):
-        own = [i for i, item in enumerate(stretches) if item.recording == k]
-        seconds = sum(stretches[i].left.shape[1] * stretches[i].width for i in own)
-        for j in range(len(stretches[0].left)):
-            speed = max(float(np.max(np.abs(stretches[i].state[1][j]))) for i in own) or 1.0
-            rows, left, known = [], [], []
-            for i in own:
-                v, load = stretches[i].state[1][j], stretches[i].state[3][j]
-                time = np.arange(len(v)) * stretches[i].width / max(seconds, 1.0)
-                sign = _turning(v, speed)
-                columns = [np.ones_like(v), sign, load, time, time * sign]
-                rows.append(np.array(columns[: 5 if seconds >= LONG_ENOUGH else 1]))
-                left.append(stretches[i].left[j])
-                known.append(stretches[i].known[j])
-            fitted = _robust_trend(rows, left, known)
-            for i, trend in zip(own, fitted, strict=True):
-                trends[i][j] = trend
-    return [item.without(trend) for item, trend in zip(stretches, trends, strict=True)]
+    runs: dict[int, list[Binned]] = {}
+    for item in stretches:
+        runs.setdefault(item.recording, []).append(item)
+    found = [_columns_of_trend(own) for own in runs.values()]
+    # Runs of one length together: of one, to call NumPy takes longer than what it does.
+    alike: dict[tuple[int, ...], list[int]] = {}
+    for k, (columns, _, _) in enumerate(found):
+        alike.setdefault(columns.shape, []).append(k)
+    trends: dict[int, Array] = {}
+    for shape, places in alike.items():
+        at_once = max(1, TOGETHER // int(np.prod(shape)))
+        for start in range(0, len(places), at_once):
+            some = places[start : start + at_once]
+            together = (np.concatenate(part) for part in zip(*(found[k] for k in some), strict=True))
+            trends.update(zip(some, np.split(_robust_trends(*together), len(some)), strict=True))
+    taken: dict[int, Array] = {}
+    for k, own in enumerate(runs.values()):
+        ends = np.cumsum([item.left.shape[1] for item in own])[:-1]
+        taken.update(zip(map(id, own), np.split(trends[k], ends, axis=1), strict=True))
+    return [item.without(taken[id(item)]) for item in stretches]
 
 
-def _robust_trend(rows: Sequence[Array], left: Sequence[Array], known: Sequence[Array]) -> list[Array]:
-    """Return what columns (k, M) explain of a residual by Tukey's weights of bins; nothing where there is too little."""
-    whole, target = np.concatenate(rows, axis=1), np.concatenate(left)[::THIN]
-    together, use = whole[:, ::THIN], np.concatenate(known)[::THIN] > FILLED
-    size = np.sqrt(np.mean(together**2, axis=1, keepdims=True))
+def _columns_of_trend(own: Sequence[Binned]) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return the columns of a run's trend, shape (n, k, M), the residual, and where it is known, (n, M) each."""
+    seconds = sum(item.left.shape[1] * item.width for item in own)
+    v, load = (np.concatenate([item.state[k] for item in own], axis=1) for k in (1, 3))
+    left = np.concatenate([item.left for item in own], axis=1)
+    known = np.concatenate([item.known for item in own], axis=1) > FILLED
+    time = np.concatenate([np.arange(item.left.shape[1]) * item.width for item in own]) / max(seconds, 1.0)
+    speed = np.max(np.abs(v), axis=1, keepdims=True)
+    sign = _turning(v, np.where(speed > 0.0, speed, 1.0))
+    columns = [np.ones_like(v), sign, load, np.broadcast_to(time, v.shape), time * sign]
+    return np.stack(columns[: 5 if seconds >= LONG_ENOUGH else 1], axis=1), left, known
+
+
+def _robust_trends(whole: Array, left: Array, known: NDArray[np.bool_]) -> Array:
+    """Return what columns (b, k, M) explain of residuals (b, M) by Tukey's weights of bins; nothing where there is too little."""
+    trends, least = np.zeros_like(left), LEAST_BINS * whole.shape[1]
+    enough = np.count_nonzero(known[:, ::THIN], axis=1) >= least
+    if not np.any(enough):
+        return trends
+    together, target, use = (part[enough][..., ::THIN] for part in (whole, left, known))
+    size = np.sqrt(np.mean(together**2, axis=2, keepdims=True))
     size = np.where(size > 0.0, size, 1.0)
-    if np.count_nonzero(use) < LEAST_BINS * len(together):
-        return [np.zeros_like(item) for item in left]
+    together, target = together / size * use[:, None], target * use
     # Begun by least squares of all, which holds what is so in a run's single turn back, and of all but each of some stretches,
     # so that what happens in one of them alone is seen not to be a trend: of all that these end in, what leaves least.
-    weight = np.concatenate([np.ones((1, len(use))), _but_one(len(use))])[:, use]
-    together, target = (together / size)[:, use], target[use]
-    products = np.concatenate([together, target[None]])[:, None] * together
+    starts = np.concatenate([np.ones((1, use.shape[1])), _but_one(use.shape[1])])
+    weight = np.broadcast_to(starts, (len(use), *starts.shape))
+    products = np.concatenate([together, target[:, None]], axis=1)[:, :, None] * together[:, None]
+    beyond, first = _half_above(use)[:, None], np.zeros(len(use), dtype=bool)
     for _ in range(ROUNDS):
         value = _solved(products, weight)
-        off = target - value @ together
-        scale = NORMAL * medians(np.abs(off))
-        if np.any(scale == 0.0):
-            break
-        weight = np.maximum(0.0, 1.0 - (off / (4.0 * scale[:, None])) ** 2) ** 2
-    value = value[_least(off, float(np.min(scale)))]
-    return np.split((value / size[:, 0]) @ whole, np.cumsum([len(item) for item in left])[:-1])
+        off = target[:, None] - value @ together
+        scale = NORMAL * medians(np.abs(off) + beyond)
+        exact = np.any(scale == 0.0, axis=1)
+        # Where all end in the same the first stands for them, whatever others that are fitted beside do.
+        first |= np.ptp(value, axis=1).max(axis=1) < ALIKE * np.min(scale, axis=1)
+        if np.all(first):
+            value, off, scale, weight = value[:, :1], off[:, :1], scale[:, :1], weight[:, :1]
+        bounded = _tukey(off, 4.0 * np.where(exact[:, None], 1.0, scale)) ** 2
+        weight = np.where(exact[:, None, None], weight, bounded) if np.any(exact) else bounded
+    best = np.where(first, 0, _least(off, np.min(scale, axis=1)))
+    value = np.take_along_axis(value, best[:, None, None], axis=1)
+    trends[enough] = ((value / size.transpose(0, 2, 1)) @ whole[enough])[:, 0]
+    return trends
+
+
+def _tukey(off: Array, bound: Array) -> Array:
+    """Return ``1 - (off / bound)^2``, 0 beyond the bound, for residuals (b, s, M) and bounds (b, s)."""
+    share = off * (1.0 / bound)[:, :, None]
+    share *= share
+    return np.asarray(np.maximum(np.subtract(1.0, share, out=share), 0.0, out=share))
+
+
+def _half_above(use: NDArray[np.bool_]) -> Array:
+    """Return infinities where bins (b, M) are not used, as many above as below, so that the median is that of the others."""
+    above = np.cumsum(~use, axis=1) % 2 == 0
+    return np.asarray(np.where(use, 0.0, np.where(above, np.inf, -np.inf)))
 
 
 def _but_one(count: int) -> Array:
@@ -86,23 +126,23 @@ def _but_one(count: int) -> Array:
 
 
 def _solved(products: Array, weight: Array) -> Array:
-    """Return weighted least squares, one for each of some weights (s, M), shape (s, k).
+    """Return weighted least squares of b problems, one for each of some weights (b, s, M), shape (b, s, k).
 
-    ``products``, (k + 1, k, M), are those of k columns, and then of the target, with the columns.
+    ``products``, (b, k + 1, k, M), are those of k columns, and then of the target, with the columns.
     """
-    count = products.shape[1]
-    sums = (weight @ products.reshape(-1, products.shape[2]).T).reshape(-1, count + 1, count)
-    normal = sums[:, :count]
-    ridge = 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] / count
-    return np.asarray(np.linalg.solve(normal + (ridge * np.eye(count) + 1e-300), sums[:, count, :, None])[:, :, 0])
+    problems, _, count, bins = products.shape
+    sums = weight @ products.reshape(problems, -1, bins).swapaxes(1, 2)
+    sums = sums.reshape(*sums.shape[:2], count + 1, count)
+    normal = sums[:, :, :count]
+    ridge = 1e-6 * np.trace(normal, axis1=2, axis2=3)[..., None, None] / count
+    return np.asarray(np.linalg.solve(normal + (ridge * np.eye(count) + 1e-300), sums[:, :, count, :, None])[..., 0])
 
 
-def _least(off: Array, scale: float) -> int:
-    """Return which of some residuals (s, M) Tukey's loss makes least."""
-    if scale == 0.0:
-        return int(np.argmin(np.sum(off**2, axis=1)))
-    inside = np.maximum(0.0, 1.0 - (off / (HALF * scale)) ** 2) ** 3
-    return int(np.argmax(np.sum(inside, axis=1)))
+def _least(off: Array, scale: Array) -> NDArray[np.intp]:
+    """Return which of some residuals (b, s, M) Tukey's loss makes least, or squares where the scale (b,) is 0; shape (b,)."""
+    exact = scale == 0.0
+    inside = np.sum(_tukey(off, HALF * np.where(exact, 1.0, scale)[:, None]) ** 3, axis=2)
+    return np.asarray(np.argmax(np.where(exact[:, None], -np.sum(off**2, axis=2), inside), axis=1))
 
 
 def without_states(stretches: Sequence[Binned]) -> list[Binned]:

@@ -17,6 +17,7 @@ from scara_ident.motion.spline import cubic_spline
 from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.long_file import cut_long
 from scara_ident.recording.recording import Recording
+from scara_ident.threads import LONG, THREADS, side_by_side, threads_for, works_alone
 
 # A time step that differs by less than this share from the median is not jitter.
 UNIFORM_TOLERANCE = 1e-3
@@ -109,11 +110,19 @@ class Stretch:
     def filter_all(self, cuts: Mapping[int, float | None]) -> None:
         """Low-pass positions of joints, each at its cut-off in Hz, those of one cut-off together."""
         missing = [item for item in cuts.items() if item not in self._filtered]
-        for cut in dict.fromkeys(cut for _, cut in missing):
-            joints = [joint for joint, own in missing if own == cut]
-            parts = differentiate(self.position[joints], self.rate, cut)
+        groups = [[joint for joint, own in missing if own == cut] for cut in dict.fromkeys(cut for _, cut in missing)]
+        if self.position.shape[1] >= LONG and not works_alone():
+            # Of one recording alone its joints are what two threads share.
+            groups = [group[k::THREADS] for group in groups for k in range(min(THREADS, len(group)))]
+
+        def of_some(joints: list[int]) -> tuple[Array, Array, Array]:
+            return differentiate(self.position[joints], self.rate, cuts[joints[0]])
+
+        with threads_for(self.position.shape[1]):
+            made = side_by_side(of_some, groups)
+        for joints, parts in zip(groups, made, strict=True):
             self._filtered.update(
-                {(joint, cut): own for joint, own in zip(joints, zip(*parts, strict=True), strict=True)}
+                {(joint, cuts[joint]): own for joint, own in zip(joints, zip(*parts, strict=True), strict=True)}
             )
 
 

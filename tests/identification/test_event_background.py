@@ -119,3 +119,27 @@ def test_a_state_that_one_recording_has_again_and_again_is_no_event_and_what_hap
     assert np.sqrt(np.mean(items[3].left[0, usual] ** 2)) > 0.1
     assert np.sqrt(np.mean(left[usual] ** 2)) < 0.05
     assert np.mean(left[152:173]) > 0.4
+
+
+def test_a_trend_is_the_same_whatever_other_runs_are_fitted_beside():
+    added = [np.zeros(part.samples) for part in STRETCHES]
+    added[1] += 0.3 * np.arange(len(added[1])) / len(added[1])
+    # One that others are not like: from its stretches fits begin that end elsewhere.
+    added[2][2000:2750] += 0.4
+    items = made(added)
+    together = without_trends(items)
+    for item, beside in zip(items, together, strict=True):
+        (alone,) = without_trends([item])
+        np.testing.assert_allclose(alone.taken, beside.taken, atol=1e-9)
+
+
+def test_the_trend_of_a_run_without_noise_is_what_it_is():
+    item = made([np.zeros(part.samples) for part in STRETCHES])[0]
+    # More than half of the bins are met exactly: what is left of them has no scale.
+    odd = np.zeros(item.taken.shape)
+    odd[:, 100:150] = 1.0
+    exact = replace(item, raw=np.repeat(0.2 + odd, item.size, axis=1), used=np.ones_like(item.used))
+    (after,) = without_trends([exact])
+    left = after.left - odd
+    assert np.sqrt(np.mean(left**2)) < 0.2
+    assert np.all(np.isfinite(after.left))
