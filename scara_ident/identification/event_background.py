@@ -40,16 +40,16 @@ def without_trends(stretches: Sequence[Binned]) -> list[Binned]:
         runs.setdefault(item.recording, []).append(item)
     found = [_columns_of_trend(own) for own in runs.values()]
     # Runs of one length together: of one, to call NumPy takes longer than what it does.
-    alike: dict[tuple[int, ...], list[int]] = {}
+    of_shape: dict[tuple[int, ...], list[int]] = {}
     for k, (columns, _, _) in enumerate(found):
-        alike.setdefault(columns.shape, []).append(k)
+        of_shape.setdefault(columns.shape, []).append(k)
     trends: dict[int, Array] = {}
-    for shape, places in alike.items():
-        at_once = max(1, TOGETHER // int(np.prod(shape)))
-        for start in range(0, len(places), at_once):
-            some = places[start : start + at_once]
-            together = (np.concatenate(part) for part in zip(*(found[k] for k in some), strict=True))
-            trends.update(zip(some, np.split(_robust_trends(*together), len(some)), strict=True))
+    for places in of_shape.values():
+        together = [np.concatenate(part) for part in zip(*(found[k] for k in places), strict=True)]
+        at_once = max(1, TOGETHER // together[0][0].size)
+        starts = range(0, len(together[0]), at_once)
+        parts = [_robust_trends(*(part[start : start + at_once] for part in together)) for start in starts]
+        trends.update(zip(places, np.split(np.concatenate(parts), len(places)), strict=True))
     taken: dict[int, Array] = {}
     for k, own in enumerate(runs.values()):
         ends = np.cumsum([item.left.shape[1] for item in own])[:-1]
