@@ -30,6 +30,8 @@ SHAPES, WIDTHS = np.linspace(-1.0, 0.5, 30), np.linspace(-5.0, 5.0, 31)
 PRIOR = 0.2
 # Laws less likely than this against all others are left out.
 LEAST_WEIGHT = 1e-6
+# Share of a level to which it is found.
+PRECISION = 1e-10
 HOUR = 3600.0
 
 
@@ -74,8 +76,9 @@ class Tail:
         low, high = self.start, self.start + float(np.max(self.width))
         while self.rate(high) > rate:
             low, high = high, self.start + 2.0 * (high - self.start)
-        # Halved until nothing is between: SciPy's root finders take a tenth of a second to load.
-        while low < (middle := 0.5 * (low + high)) < high:
+        # SciPy's root finders take a tenth of a second to load.
+        while high - low > PRECISION * max(abs(low), abs(high)):
+            middle = 0.5 * (low + high)
             low, high = (middle, high) if self.rate(middle) > rate else (low, middle)
         return high
 

@@ -228,9 +228,9 @@ def _features(state: Sequence[Array], joint: int) -> Array:
     speed = max(float(np.max(np.abs(v))), 1e-9)
     sign, own = _turning(v, speed), v / speed
     columns = [sign * np.exp(-np.abs(own) / slow) for slow in SLOWER]
-    columns += [np.tanh(2.0 * own), own, own**3, own * np.abs(own)]
+    columns += [np.tanh(2.0 * own), own, own * own * own, own * np.abs(own)]
     columns += [np.sin(2.0 * angle), np.cos(2.0 * angle), sign * np.sin(angle), sign * np.cos(angle)]
-    columns += [sign * np.abs(torque), torque, torque**3, sign * np.minimum(sign * torque, 0.0)]
+    columns += [sign * np.abs(torque), torque, torque * torque * torque, sign * np.minimum(sign * torque, 0.0)]
     return _of_unit_size(np.array(columns))
 
 
