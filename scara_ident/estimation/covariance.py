@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.joint_rows import JointRows, block_products
-from scara_ident.threads import THREADS, side_by_side
+from scara_ident.threads import side_by_side
 
 # With fewer blocks than this many per parameter the matrix of scores is too noisy to stand for itself.
 BLOCKS_PER_PARAMETER = 2.5
 # Leverage above which a block fixes a direction all but alone, so that its residual says nothing about it.
 FULL_LEVERAGE = 0.99
+# Norm of a block's leverages up to which a series takes a tenth of the time of an eigenvalue problem; at most 53 terms.
+SERIES = 0.5
 # Redundancy below which nothing is known of a joint's noise.
 NO_REDUNDANCY = 1e-9
 
@@ -105,15 +107,41 @@ def _scattered(joints: Sequence[_Scores], owner: NDArray[np.intp]) -> Array | No
     products = sum(joint.turn @ joint.products @ joint.turn.T for joint in joints)
     scores = sum(joint.scores @ joint.turn.T for joint in joints)
     # With H = half half', half' (1 - H)^-1/2 = (1 - half' half)^-1/2 half': the smaller of two symmetric problems.
-    halves = side_by_side(np.linalg.eigh, np.array_split(products, THREADS))
-    leverage, directions = (np.concatenate(parts) for parts in zip(*halves, strict=True))
-    if np.any(leverage[:, -1] > FULL_LEVERAGE):
+    reduced = inverse_root_times(products, scores)
+    if reduced is None:
         return None
-    turned = np.einsum("bji,bj->bi", directions, scores) / np.sqrt(1.0 - leverage)
-    reduced = np.einsum("bij,bj->bi", directions, turned)
     follows = owner[1:] == owner[:-1]
     cross = reduced[1:][follows].T @ reduced[:-1][follows]
     return np.asarray(reduced.T @ reduced + 0.5 * (cross + cross.T))
+
+
+def inverse_root_times(products: Array, scores: Array) -> Array | None:
+    """Return ``(1 - P)^-1/2 s`` of each block; None where the largest eigenvalue of a P is above `FULL_LEVERAGE`.
+
+    Parameters
+    ----------
+    products : ndarray, shape (blocks, r, r)
+        P, positive semidefinite.
+    scores : ndarray, shape (blocks, r)
+    """
+    # No eigenvalue is larger than this norm.
+    norms = np.sqrt(np.einsum("bij,bij->b", products, products))
+    weak, result = norms <= SERIES, np.empty_like(scores)
+    if not np.all(weak):
+        leverage, directions = np.linalg.eigh(products[~weak])
+        if np.any(leverage[:, -1] > FULL_LEVERAGE):
+            return None
+        turned = np.einsum("bji,bj->bi", directions, scores[~weak]) / np.sqrt(1.0 - leverage)
+        result[~weak] = np.einsum("bij,bj->bi", directions, turned)
+    # The binomial series, to where all that follows is rounding.
+    products, term = products[weak], scores[weak]
+    total, power, largest = term.copy(), 0, float(np.max(norms[weak], initial=0.0))
+    while largest**power > np.finfo(float).eps:
+        power += 1
+        term = (products @ term[:, :, None])[:, :, 0] * (1.0 - 0.5 / power)
+        total += term
+    result[weak] = total
+    return result
 
 
 def _pooled(joints: Sequence[_Scores], root: Array) -> Array:

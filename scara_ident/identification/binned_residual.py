@@ -128,14 +128,15 @@ class Binned:
 
 def bounded_noise(parts: Sequence[PreparedStretch], left: Sequence[Array], owner: Sequence[int]) -> dict[int, Array]:
     """Return for each recording the standard deviation of each joint's residual by its median, the larger of its and all's."""
-    used = [part.used for part in parts]
+    values = [
+        [row[use][:: max(1, len(row) // ENOUGH)] for row, use in zip(rows, part.used, strict=True)]
+        for rows, part in zip(left, parts, strict=True)
+    ]
 
     def scale(chosen: Sequence[int]) -> Array:
-        found = []
-        for j in range(len(left[0])):
-            values = np.concatenate([left[k][j][used[k][j]][:: max(1, len(left[k][j]) // ENOUGH)] for k in chosen])
-            found.append(NORMAL * median(np.abs(values)) if len(values) else 0.0)
-        return np.array(found)
+        of_joint = zip(*(values[k] for k in chosen), strict=True)
+        together = [np.abs(np.concatenate(own)) for own in of_joint]
+        return np.array([NORMAL * median(own) if len(own) else 0.0 for own in together])
 
     everything = scale(range(len(parts)))
     return {

@@ -93,8 +93,9 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int, wei
     if weight is None or weight.ndim == 1:
         # Put in that order once: to read both signal and weight out of order takes twice as long as one.
         sizes = np.broadcast_to(np.ascontiguousarray(sizes[:1]), sizes.shape)
-    # By phase, as the transform takes them; what no sample is written to stays zero.
-    buffer = np.zeros((min(ROWS_AT_ONCE, len(signal)), step, low))
+    # By phase, as the transform takes them; what no sample is written to is zero.
+    buffer = np.empty((min(ROWS_AT_ONCE, len(signal)), step, low))
+    buffer[:, :, :first] = buffer[:, :, first + whole // step :] = 0.0
     spectra = np.empty((*buffer.shape[:2], low // 2 + 1), dtype=complex)
     for begin in range(0, len(signal), ROWS_AT_ONCE):
         some = slice(begin, begin + ROWS_AT_ONCE)

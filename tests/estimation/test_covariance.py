@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from scara_ident.estimation import covariance
 from scara_ident.estimation.covariance import Covariance, block_covariance
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.joint_rows import JointRows
@@ -200,3 +201,20 @@ def test_it_is_the_sandwich_of_bias_reduced_scores_and_their_neighbours():
     found = block_covariance(inverse, value, joints, owner, weights)
     assert found.kind == "block"
     np.testing.assert_allclose(found.matrix, expected, rtol=1e-8, atol=1e-10 * np.max(np.abs(expected)))
+
+
+@pytest.mark.parametrize("strengths", [(0.01, 0.4), (0.3, 0.98), (0.6, 0.9)])
+def test_weak_and_strong_leverages_are_released_alike(strengths: tuple[float, float]):
+    rng = np.random.default_rng(11)
+    turns = np.linalg.qr(rng.standard_normal((40, 5, 5)))[0]
+    sizes = rng.uniform(*strengths, (40, 1)) * rng.uniform(0.0, 1.0, (40, 5))
+    products = (turns * sizes[:, None]) @ turns.transpose(0, 2, 1)
+    scores = rng.standard_normal((40, 5))
+    expected = np.einsum("bij,bj->bi", (turns / np.sqrt(1.0 - sizes)[:, None]) @ turns.transpose(0, 2, 1), scores)
+    found = covariance.inverse_root_times(products, scores)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13 * np.max(np.abs(expected)))
+
+
+def test_a_block_that_fixes_a_direction_alone_cannot_be_released():
+    products = np.array([np.diag([0.1, 0.0]), np.diag([0.995, 0.0])])
+    assert covariance.inverse_root_times(products, np.ones((2, 2))) is None
