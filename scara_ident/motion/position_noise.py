@@ -49,8 +49,11 @@ def encoder_step(position: Array) -> float | None:
         rad or m.
     """
     change = np.abs(np.diff(position))
+    largest = max(np.max(position, initial=0.0), -np.min(position, initial=0.0))
     # What rounding of a number in single precision leaves is no change.
-    change = change[change > 4.0 * np.finfo(np.float32).eps * np.max(np.abs(position), initial=0.0)]
+    changed = change > 4.0 * np.finfo(np.float32).eps * largest
+    # A joint that is never at rest is not copied.
+    change = change if np.all(changed) else change[changed]
     if len(change) < 4:
         return None
     least = float(np.min(change))
