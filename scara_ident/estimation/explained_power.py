@@ -63,17 +63,20 @@ class Spectra:
         self.model, self.data, self.edges = model, data, edges
         self.parts = [part.stretch for part in data.stretches]
         slow = data.at((FIRST_BAND,) * model.robot.n).stretches
-        self.fades = side_by_side(lambda part: moving_weight(part.rest, part.rate, part.bands), slow)
 
-        def recorded(part: Stretch, fade: Array) -> Array:
-            return moving_power(torque_of(part), fade, part.rate, edges)
-
-        self.torque = np.sum(side_by_side(recorded, self.parts, self.fades), axis=0)
-
-        def wide(part: Stretch) -> tuple[Array, ...]:
+        def wide(part: Stretch, _: PreparedStretch) -> tuple[Array, ...]:
             return model.joint_columns(motion_of(part, [WIDE_FILTER * part.rate] * model.robot.n))
 
-        self.columns = side_by_side(wide, self.parts)
+        def recorded(part: Stretch, slow: PreparedStretch) -> tuple[Array, Array]:
+            fade = moving_weight(slow.rest, slow.rate, slow.bands)
+            return fade, moving_power(torque_of(part), fade, part.rate, edges)
+
+        # Of a single recording too both threads have work; the columns take longer.
+        works = [wide] * len(slow) + [recorded] * len(slow)
+        made = side_by_side(lambda work, *parts: work(*parts), works, 2 * self.parts, 2 * list(slow))
+        self.columns = made[: len(slow)]
+        self.fades = [fade for fade, _ in made[len(slow) :]]
+        self.torque = np.sum([power for _, power in made[len(slow) :]], axis=0)
 
     def fit(self, bands: Array) -> Explained:
         """Fit parameters in bands, and say how far up they explain each joint's torque."""
