@@ -104,8 +104,8 @@ def _scores(rows: JointRows, weight: float, root: Array, value: Array) -> _Score
 
 def _scattered(joints: Sequence[_Scores], owner: NDArray[np.intp]) -> Array | None:
     """Scatter of the scores block by block; None where a block leaves no residual to judge a direction by."""
-    products = sum(joint.turn @ joint.products @ joint.turn.T for joint in joints)
-    scores = sum(joint.scores @ joint.turn.T for joint in joints)
+    products = np.asarray(sum(joint.turn @ joint.products @ joint.turn.T for joint in joints))
+    scores = np.asarray(sum(joint.scores @ joint.turn.T for joint in joints))
     # With H = half half', half' (1 - H)^-1/2 = (1 - half' half)^-1/2 half': the smaller of two symmetric problems.
     reduced = inverse_root_times(products, scores)
     if reduced is None:
