@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import partial
-from pickle import PicklingError
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 from scara_ident.threads import forget_threads, one_blas_thread, one_thread, works_alone
 
@@ -75,73 +72,6 @@ def beside(work: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
 
     with _forked(1, alone) as pool:
         yield pool.submit(_apply, None).result
-
-
-@contextmanager
-def made_ready(
-    prepare: Callable[[], None], work: Callable[[Item], Result]
-) -> Iterator[Callable[[Item], Callable[[], Result]]]:
-    """Make another process ready for some work; yields what sends it an item, once, and returns what waits for the result.
-
-    Where the system cannot fork, or what goes to or from the other process cannot be sent, the work is done here. Without any
-    item the process is ended with this.
-
-    Parameters
-    ----------
-    prepare : callable
-        Done at once. Where it fails, so may the work, which says why.
-    work : callable
-        Its result is sent to the caller, as is its error.
-    """
-    if not _may_fork():
-        yield lambda item: partial(work, item)
-        return
-    context = multiprocessing.get_context("fork")
-    here, there = context.Pipe()
-
-    def alone() -> None:
-        # Who interrupts the caller has this ended by it.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        here.close()
-        forget_threads()
-        with suppress(Exception):
-            prepare()
-        # Of what goes wrong on the way the caller sees that nothing comes.
-        with suppress(Exception):
-            item = there.recv()
-            told: tuple[Result | None, Exception | None]
-            try:
-                told = work(item), None
-            except Exception as error:
-                told = None, error
-            there.send(told)
-
-    def sent(item: Item) -> Callable[[], Result]:
-        try:
-            here.send(item)
-        except (PicklingError, TypeError, AttributeError, OSError):
-            return partial(work, item)
-
-        def told() -> Result:
-            try:
-                result, error = here.recv()
-            except (EOFError, OSError):
-                return work(item)
-            if error is not None:
-                raise error
-            return cast(Result, result)
-
-        return told
-
-    process = context.Process(target=alone, daemon=True)
-    process.start()
-    there.close()
-    try:
-        yield sent
-    finally:
-        process.kill()
-        process.join()
-        here.close()
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from threading import Thread
 import pytest
 
 from scara_ident import processes
-from scara_ident.processes import available_cores, beside, halved, made_ready, map_in_order, own_process
+from scara_ident.processes import available_cores, beside, halved, map_in_order, own_process
 from scara_ident.threads import one_thread, side_by_side
 
 
@@ -70,52 +70,6 @@ def test_without_fork_what_is_done_beside_is_done_here(monkeypatch: pytest.Monke
 def test_an_error_of_what_is_done_beside_reaches_who_waits():
     with pytest.raises(ZeroDivisionError), beside(lambda: 1 // 0) as result:
         result()
-
-
-ready: list[str] = []
-
-
-def and_how(item: int) -> tuple[int, int, list[str]]:
-    return 1 // item, os.getpid(), ready
-
-
-def test_what_was_made_ready_does_its_work_in_another_process():
-    with made_ready(lambda: ready.append("here"), and_how) as sent:
-        told = sent(1)
-        result, process, state = told()
-    assert (result, state) == (1, ["here"])
-    assert process != os.getpid()
-    assert not ready
-    assert not multiprocessing.active_children()
-
-
-def test_what_was_made_ready_in_vain_is_ended():
-    with made_ready(lambda: None, and_how):
-        assert multiprocessing.active_children()
-    assert not multiprocessing.active_children()
-
-
-def test_an_error_of_what_was_made_ready_reaches_who_waits_and_one_of_making_it_ready_does_not():
-    with made_ready(lambda: None, and_how) as sent, pytest.raises(ZeroDivisionError):
-        sent(0)()
-    with made_ready(lambda: and_how(0) and None, and_how) as sent:
-        assert sent(1)()[1] != os.getpid()
-
-
-def test_what_cannot_be_sent_or_is_not_answered_is_done_here():
-    with made_ready(lambda: None, lambda item: (os.getpid(), item())) as sent:
-        assert sent(lambda: 3)() == (os.getpid(), 3)
-    with made_ready(lambda: None, lambda item: lambda: item) as sent:
-        assert sent(4)()() == 4
-    own = os.getpid()
-    with made_ready(lambda: None, lambda item: os.getpid() if os.getpid() == own else os._exit(1)) as sent:
-        assert sent(5)() == own
-
-
-def test_without_fork_what_would_be_made_ready_is_done_here(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(processes.multiprocessing, "get_all_start_methods", lambda: ["spawn"])
-    with made_ready(lambda: ready.append("no"), and_how) as sent:
-        assert sent(1)() == (1, os.getpid(), [])
 
 
 def where(item: int) -> tuple[int, int]:

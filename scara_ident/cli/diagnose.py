@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
-from functools import partial
 from importlib import import_module
 from typing import Annotated
 
@@ -60,44 +58,41 @@ def diagnose(
         work("reading the recordings")
         with read_beside(arm, (*recordings, *(unloaded or ())), unloaded or (), validate or ()) as wanted:
             from scara_ident.diagnosis import diagnose as run
-            from scara_ident.diagnosis.next_steps import next_steps_beside
             from scara_ident.effects import effects_named
             from scara_ident.export.identified_model import identified_model
             from scara_ident.files import write_json, write_text
-            from scara_ident.processes import made_ready
+            from scara_ident.processes import beside
             from scara_ident.report.diagnosis import diagnosis_dict
             from scara_ident.report.diagnosis_markdown import diagnosis_markdown
             from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
             from scara_ident.report.html.page import page_template
             from scara_ident.report.told.diagnosis import tables
-            from scara_ident.report.use import ready_for_worth, worth_dict
+            from scara_ident.report.use import worth_dict
 
             if output is not None:
                 _ = page_template()
             (training, useless), (bare, _), (held_out, more) = wanted()
-        # The compiled arm takes a hundred megabytes, which go with its process; it is loaded while the search goes on.
-        with nullcontext() if output is None else made_ready(partial(ready_for_worth, arm), worth_dict) as worth_of:
-            result = run(
-                arm,
-                training,
-                model=model,
-                validation=held_out,
-                unloaded=[item.name for item in bare],
-                bands=None if band is None else [band] * arm.n,
-                catalogue=None if effects is None else effects_named(*_parted(effects)),
-                progress=work.part(READING_SHARE, 1.0),
-            )
-            if output is not None:
-                # What it holds is made once, for what is printed and for all files.
-                context = DiagnosisContext(result)
-            if worth_of is not None and result.effects:
+        result = run(
+            arm,
+            training,
+            model=model,
+            validation=held_out,
+            unloaded=[item.name for item in bare],
+            bands=None if band is None else [band] * arm.n,
+            catalogue=None if effects is None else effects_named(*_parted(effects)),
+            progress=work.part(READING_SHARE, 1.0),
+        )
+        if output is not None:
+            # What it holds is made once, for what is printed and for all files.
+            context = DiagnosisContext(result)
+            if result.effects:
                 work("what the effects cost", 1.0)
-                context = DiagnosisContext(result, worth_of(identified_model(result)))
-                # What draws is made ready meanwhile.
-                with next_steps_beside(result):
+                # The compiled arm takes a hundred megabytes, which go with its process; what draws is made ready meanwhile.
+                with beside(lambda: worth_dict(identified_model(result))) as told:
                     import_module("matplotlib.figure")
+                    context = DiagnosisContext(result, told)
                     context.make_ready()
-                _ = context.worth
+                    _ = context.worth
     content = diagnosis_dict(result) if output is None else context.content
     console = result_console(content, json)
     if verbose:

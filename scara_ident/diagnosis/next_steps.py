@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -13,7 +12,6 @@ from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.questions import HALF_THE_SPEED, Question, possible, questions
 from scara_ident.diagnosis.selection_step import best_of_each
-from scara_ident.processes import beside
 from scara_ident.threads import one_blas_thread
 
 # A motion that is designed to tell, s, and how that is asked for.
@@ -80,19 +78,6 @@ def next_steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
     if found is None:
         found = _FOUND[diagnosis] = _steps(diagnosis)
     return found
-
-
-@contextmanager
-def next_steps_beside(diagnosis: Diagnosis) -> Iterator[None]:
-    """Find what to do next in another process meanwhile, for `next_steps` to return after.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    """
-    with beside(lambda: next_steps(diagnosis)) as told:
-        yield
-        _FOUND[diagnosis] = told()
 
 
 @one_blas_thread()

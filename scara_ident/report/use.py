@@ -12,7 +12,6 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.export.identified_model import IdentifiedModel
 
 if TYPE_CHECKING:
-    from scara_ident.robot.robot import Robot
     from scara_ident.use import Use
     from scara_ident.use.worth import EffectWorth
 
@@ -52,16 +51,6 @@ def use_dict(result: Use) -> dict[str, Any]:
             for name, rows in result.rollouts.items()
         },
     }
-
-
-def ready_for_worth(robot: Robot) -> None:
-    """Load what `worth_dict` takes, which is most of its time."""
-    from scara_ident.simulation.defaults import virtual_arm
-    from scara_ident.simulation.first_run import load_kept
-    from scara_ident.use import worth
-
-    _ = worth
-    load_kept(virtual_arm(robot))
 
 
 def worth_dict(model: IdentifiedModel) -> dict[str, Any]:

@@ -35,18 +35,3 @@ def compiled_first(arm: VirtualArm, progress: Tell) -> Work:
     work(COMPILING)
     free_motion(arm, np.zeros(arm.robot.n), np.zeros(arm.robot.n), 1e-3)
     return work.part(SHARE, 1.0)
-
-
-def load_kept(arm: VirtualArm) -> None:
-    """Load the machine code of the loop where it is kept, which takes as long as many runs; nothing is compiled.
-
-    Parameters
-    ----------
-    arm : VirtualArm
-        Any.
-    """
-    from scara_ident.simulation.loop import at_once
-    from scara_ident.simulation.simulate import free_motion
-
-    if at_once():
-        free_motion(arm, np.zeros(arm.robot.n), np.zeros(arm.robot.n), 1e-3)

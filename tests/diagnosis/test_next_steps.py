@@ -10,7 +10,7 @@ import pytest
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.answerability import inquire
-from scara_ident.diagnosis.next_steps import ASKED_MOTION, capital, next_steps, next_steps_beside
+from scara_ident.diagnosis.next_steps import ASKED_MOTION, capital, next_steps
 from scara_ident.effects.position import Spring
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.robot.robot import load_robot
@@ -45,17 +45,6 @@ def test_they_are_found_once_for_the_file_the_report_and_the_story(monkeypatch):
     assert diagnosis_dict(fresh)["next"] == content["next"] and next_steps(fresh) is next_steps(fresh)
     # One inquiry holds all questions: the factor of the recordings' rows is made once.
     assert len(asked) == 1 and len(asked[0][1]) == sum("kind" in item for item in content["next"])
-
-
-def test_they_are_found_beside_as_they_are_here(monkeypatch):
-    beside, here = replace(open_diagnosis()), replace(open_diagnosis())
-    with next_steps_beside(beside):
-        pass
-    with monkeypatch.context() as patched:
-        patched.setattr(sys.modules[next_steps.__module__], "inquire", None)
-        found = next_steps(beside)
-    # As text, in which what is not a number is itself.
-    assert repr([item.entry() for item in found]) == repr([item.entry() for item in next_steps(here)])
 
 
 def test_what_no_motion_settles_names_the_experiment(lean):

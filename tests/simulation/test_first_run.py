@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-
 from scara_ident.simulation import first_run, loop
-from scara_ident.simulation.first_run import COMPILING, compiled_first, load_kept
-from scara_ident.simulation.simulate import free_motion
+from scara_ident.simulation.first_run import COMPILING, compiled_first
 from tests.results import Results
 
 
@@ -24,12 +21,3 @@ def test_where_it_was_compiled_nothing_is_said(results: Results):
     assert told == [("simulating", 0.5)]
     # One signature: what was compiled first is what every run uses.
     assert len(loop._track.signatures) == 1
-
-
-def test_what_is_kept_is_loaded_and_nothing_is_compiled(results: Results, monkeypatch):
-    runs: list[float] = []
-    monkeypatch.setattr(sys.modules[free_motion.__module__], "free_motion", lambda *each: runs.append(each[-1]))
-    load_kept(results.arm)
-    monkeypatch.setattr(loop, "at_once", lambda: False)
-    load_kept(results.arm)
-    assert len(runs) == 1

@@ -67,8 +67,8 @@ class DiagnosisContext(FittedContext):
 
     @one_blas_thread()
     def make_ready(self) -> None:
-        """Make what takes long and waits for nothing: what pictures are of."""
-        _ = self.chapters, self.groups
+        """Make what takes long and waits for nothing: what pictures are of, and what to do next."""
+        _ = self.chapters, self.groups, next_steps(self.diagnosis)
 
     @cached_property
     def content(self) -> dict[str, Any]:
