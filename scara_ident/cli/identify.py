@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Literal
 
 import typer
@@ -66,6 +67,7 @@ def identify(
     if output is not None:
         from scara_ident.export.identified_model import identified_model
         from scara_ident.export.robots import robot_files
+        from scara_ident.processes import all_beside
         from scara_ident.report.html.identification import IdentificationContext, identification_report
         from scara_ident.report.pictures import torque_picture
 
@@ -75,9 +77,14 @@ def identify(
         with writing(output) as (place, work):
             for name, text in models.items():
                 write_text(place / name, text)
-            work("drawing torque.png", 0.2)
-            torque_picture(place / "torque.png", context)
-            work("drawing report.html", 0.5)
-            identification_report(place / "report.html", context)
+            work("drawing torque.png and report.html", 0.2)
+            # Both show these.
+            _ = context.groups
+            all_beside(
+                [
+                    partial(torque_picture, place / "torque.png", context),
+                    partial(identification_report, place / "report.html", context),
+                ]
+            )
             write_json(place / "identification.json", content)
         console.written(output, "identification.json", "report.html", "torque.png", *models)

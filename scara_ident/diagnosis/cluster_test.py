@@ -231,8 +231,12 @@ def _least(freedom: Array) -> Array:
 def _without_blocks(into: Array, reach: Array, cross: Array, columns: Array) -> tuple[Array, Array, Array, Array]:
     """Return how a block's scores move the coefficients once it is left out, with its products, links and redundancy."""
     inside = _both_sides(into, columns + reach @ cross.transpose(0, 1, 3, 2))
-    strength, turn = np.linalg.eigh(np.eye(inside.shape[-1]) - inside)
-    release = (turn / np.maximum(strength, _LEAST_REDUNDANCY)[..., None, :]) @ turn.transpose(0, 1, 3, 2)
+    if inside.shape[-1] == 1:
+        strength = 1.0 - inside[..., 0]
+        release = 1.0 / np.maximum(strength, _LEAST_REDUNDANCY)[..., None]
+    else:
+        strength, turn = np.linalg.eigh(np.eye(inside.shape[-1]) - inside)
+        release = (turn / np.maximum(strength, _LEAST_REDUNDANCY)[..., None, :]) @ turn.transpose(0, 1, 3, 2)
     own = release @ inside
     links = np.concatenate([(release @ into.transpose(0, 2, 1)[:, None]) @ reach, own], axis=-1)
     return release, own, links, strength
@@ -367,17 +371,19 @@ def _if_white(neighbours: _Neighbours, alone: Array, links: Array, signs: Array)
     signs : ndarray, shape (m,)
     """
     paired = neighbours.pairs(links)
+    back, across = neighbours.back(paired), paired.transpose(0, 2, 1, 3)
+    signed = signs * across
     # A pair holds half of the square of either block.
-    expected = np.sum(alone, axis=1) + np.einsum("gpim,m,gpjm->gij", paired, signs, paired)
+    flat = (len(paired), paired.shape[2], -1)
+    expected = np.sum(alone, axis=1) + signed.reshape(flat) @ across.reshape(flat).transpose(0, 2, 1)
     size = np.diagonal(alone, axis1=2, axis2=3)
     diagonal = np.sqrt(0.5) * neighbours.pairs(size)
     norm = np.sum(diagonal**2, axis=1) + 0.5 * np.sum(size**2, axis=1)
-    norm += 2.0 * np.einsum("gbi,gbim,m,gbim->gi", size, neighbours.back(paired), signs, neighbours.back(paired))
-    across = paired.transpose(0, 2, 1, 3)
+    norm += 2.0 * np.sum(size * (back**2 @ signs), axis=1)
     if across.shape[2] < across.shape[3]:
-        norm += np.sum((across @ (signs * across).transpose(0, 1, 3, 2)) ** 2, axis=(2, 3))
+        norm += np.sum((across @ signed.transpose(0, 1, 3, 2)) ** 2, axis=(2, 3))
     else:
-        norm += np.einsum("m,gkmn,n->gk", signs, (across.transpose(0, 1, 3, 2) @ across) ** 2, signs)
+        norm += (across.transpose(0, 1, 3, 2) @ across) ** 2 @ signs @ signs
     trace = np.diagonal(expected, axis1=1, axis2=2)
     shown = (trace > 0.0) & (norm > 0.0)
     freedom = np.where(shown, trace**2 / np.where(shown, norm, 1.0), np.inf)

@@ -12,6 +12,7 @@ from scara_ident.diagnosis.exchange import near_in_place, same
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.variation_check import counted
 from scara_ident.effects import Scene
+from scara_ident.processes import halved
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,11 @@ def confounders(
         See `Effect.doubtful`.
     """
     pool = [decision.candidate for decision in decisions]
-    return [_confounders_of(step.without(k), item, pool, first, doubtful) for k, item in enumerate(step.chosen)]
+
+    def of_one(place: int) -> tuple[Confounder, ...]:
+        return _confounders_of(step.without(place), step.chosen[place], pool, first, doubtful)
+
+    return halved(of_one, range(len(step.chosen)), [1.0] * len(step.chosen))
 
 
 def _confounders_of(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.processes import map_in_order
+from scara_ident.processes import all_beside
 from scara_ident.report.drawing import draw
 from scara_ident.report.html.diagnosis import DiagnosisContext
 from scara_ident.report.html.identification import IdentificationContext
@@ -99,13 +99,8 @@ def diagnosis_pictures(
         # Loaded once, for all processes.
         import_module("matplotlib.figure")
 
-    work: list[Callable[[], None]] = [
-        *(partial(draw, folder / name, title, figures) for title, name, figures in parts),
-        *others,
-    ]
     # Matplotlib holds the interpreter's lock, so that threads would not help.
-    for _ in map_in_order(lambda k: work[k](), range(len(work))):
-        pass
+    all_beside([*(partial(draw, folder / name, title, figures) for title, name, figures in parts), *others])
     return found
 
 
