@@ -17,6 +17,8 @@ from scara_ident.diagnosis.noise_check import noise_left
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 from scara_ident.effects import Scene
 
+# Of what the effect removes, less than this share more or less is rounding: two models of one span leave the same.
+ROUNDING = 1e-9
 # Columns that follow the base model's estimate instead of the last one gain at least this share of what they would.
 LEAST_AT_FIRST = 0.5
 
@@ -66,8 +68,10 @@ def best_exchange(
     for place, item in enumerate(step.chosen):
         beside = step.without(place)
         (own,) = beside.judge([item])
+        least = ROUNDING * float(np.sum(beside.model.squares))
         for other, decision in _fitted_rivals(beside, own, able, first):
             saved = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
+            saved = saved if abs(saved) > least else 0.0
             alike = same((beside, own), (other, decision))
             # What does as well with fewer others is the better explanation of the two.
             better = _fewer(count, other, decision) if alike else saved > 0.0

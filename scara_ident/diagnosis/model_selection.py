@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,7 +21,7 @@ from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search
 from scara_ident.diagnosis.selection_step import SelectionStep, observed, observed_at_every_sample
-from scara_ident.diagnosis.work import first, next_of, search_and_rest
+from scara_ident.diagnosis.work import first, next_of
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.bands import HIGHEST_BAND, choose_bands
 from scara_ident.estimation.explained_power import EXPLAINED, sample
@@ -118,27 +118,28 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
     data = observations.data
     columns = CandidateColumns(observations)
     now, left = first(task.progress)
-    found, looked = _searched(replace(task, progress=now), columns, ()), False
+    found, looked = search(replace(task, progress=now), columns), False
     for _ in range(criteria.most_widenings if free else 0):
         left("choosing the band again")
         # What was missing had hidden how far up the motion explains the torque, and other effects with it.
-        explains = max(choose_bands(found.search.model, found.search.data).bands) if found.search.chosen else 0.0
-        asked = _asked_band(found.search)
-        promised = max(asked, _promised_band(found.search, criteria))
-        if not looked and max(explains, promised) < criteria.wider * _band(found):
-            looked, promised = True, _band_beyond(task, found.search)
+        explains = max(choose_bands(found.model, found.data).bands) if found.chosen else 0.0
+        asked = _asked_band(found)
+        promised = max(asked, _promised_band(found, criteria))
+        if not looked and max(explains, promised) < criteria.wider * _widest(found.data):
+            looked, promised = True, _band_beyond(task, found)
         wider = max(explains, promised)
-        if wider < criteria.wider * _band(found):
+        if wider < criteria.wider * _widest(found.data):
             break
         more = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands))))
         now, left = next_of(left)
-        again = _searched(replace(task, progress=now), more, (), found.search)
-        told = asked >= criteria.wider * _band(found) and _asked_band(again.search) > 0.0
-        if promised > explains and not told and not _new(again.search, found.search):
+        again = search(replace(task, progress=now), more, known=found)
+        told = asked >= criteria.wider * _widest(found.data) and _asked_band(again) > 0.0
+        if promised > explains and not told and not _new(again, found):
             # The motion says less of what is so far up, and there is nothing.
             break
         columns, found = more, again
-    return _without_proxies(replace(task, progress=left), columns, found)
+    left("testing what is left")
+    return _without_proxies(replace(task, progress=left), columns, _outcome(task, found))
 
 
 def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
@@ -200,15 +201,6 @@ def _new(found: Search, before: Search) -> bool:
     """Whether effects that need a wide band were found that were not before."""
     labels = {item.label(before.scene) for item in before.chosen}
     return any(item.effect.band(item.member) > 0.0 and item.label(found.scene) not in labels for item in found.chosen)
-
-
-def _searched(
-    task: SearchTask, columns: CandidateColumns, without: Collection[str], known: Search | None = None
-) -> Outcome:
-    now, tests = search_and_rest(task.progress)
-    found = search(replace(task, progress=now), columns, without=without, known=known)
-    tests("testing what is left")
-    return _outcome(task, found)
 
 
 def _outcome(task: SearchTask, found: Search) -> Outcome:
@@ -283,10 +275,6 @@ def _above_noise(fit: LackOfFit, criteria: SelectionCriteria) -> bool:
     return fit.missing > criteria.remainder_to_noise * fit.noise
 
 
-def _band(found: Outcome) -> float:
-    return _widest(found.search.data)
-
-
 def _widest(data: PreparedData) -> float:
     return max(band or np.inf for band in data.bands)
 
@@ -301,7 +289,8 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
             break
         demoted |= {item.label: item for item in reversed(proxies)}
         now, left = next_of(left)
-        found = _searched(replace(task, progress=now), columns, tuple(demoted), found.search)
+        again = search(replace(task, progress=now), columns, without=tuple(demoted), known=found.search)
+        found = _outcome(task, again)
     else:
         # No further search, but nothing is believed that does not stand.
         while unstable := _unstable(found, tuple(demoted.values())):

@@ -288,8 +288,8 @@ def _others(diagnosis: Diagnosis) -> list[Decision]:
         if possible(own, diagnosis) and (own.label not in best or rank > best[own.label][0]):
             best[own.label] = rank, own
     found = {label: item for label, (_, item) in best.items()}
-    # Of what hardly speaks for an effect there is little for the noise to take off.
-    speaking = [item for item in found.values() if item.examination.p_value <= search.step.criteria.significant]
+    # Where the recordings say nothing for an effect there is nothing for the noise to take off.
+    speaking = [item for item in found.values() if _odds(item) > 1.0]
     # By the columns that they were tried with, which are at hand.
     found |= {item.label: item for item in less_noise(search.step, speaking, search.first)}
     signed = (_of_either_sign(item, diagnosis) for item in found.values())

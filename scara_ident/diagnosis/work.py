@@ -8,8 +8,6 @@ from scara_ident.progress import Work
 _COLUMNS = 0.25
 # Share of what is left of a search that each round takes: how many follow is not known.
 _ROUND = 1.0 / 3.0
-# Share of a search with its tests of what is left that is the search.
-_SEARCH = 0.85
 # Shares of a diagnosis before which its search begins, where the band is chosen, and after which it compares what it found.
 _BAND, _SEARCHED = 0.12, 0.85
 # Share of all searches that the first takes; further ones are rare, and each takes half of what is left.
@@ -29,11 +27,6 @@ def first(work: Work) -> tuple[Work, Work]:
 def next_of(work: Work) -> tuple[Work, Work]:
     """Return the part of a further search, and what is left for others."""
     return work.part(0.0, 0.5), work.part(0.5, 1.0)
-
-
-def search_and_rest(work: Work) -> tuple[Work, Work]:
-    """Return the part of a search, and that of the tests of what it leaves."""
-    return work.part(0.0, _SEARCH), work.part(_SEARCH, 1.0)
 
 
 def after_rounds(rounds: int) -> float:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from scara_ident.diagnosis.work import after_rounds, first, next_of, search_and_rest, searching
+from scara_ident.diagnosis.work import after_rounds, first, next_of, searching
 from scara_ident.progress import Work
 
 
-@pytest.mark.parametrize("split", [first, next_of, search_and_rest])
+@pytest.mark.parametrize("split", [first, next_of])
 def test_parts_follow_each_other(split):
     work = Work(start=0.2, stop=0.7)
     one, other = split(work)
