@@ -50,13 +50,19 @@ def rest_speeds(stretch: Stretch, motion: Motion, bands: Bands) -> Array:
 
 
 def slower(v: Array, speeds: Array, rate: float, bands: Bands) -> NDArray[np.bool_]:
-    """Return where each joint is slower than a speed for some samples, shape (n, N), widened as `standstill`."""
+    """Return where each joint turns, or is slower than a speed for some samples, shape (n, N), widened as `standstill`.
+
+    However fast it turns: friction then jumps, and with it the acceleration, which the position's filter rounds off.
+    """
     found = np.zeros(v.shape, dtype=bool)
-    for own, slow, band in zip(found, np.abs(v) <= speeds[:, None], bands, strict=True):
+    turned = np.diff(np.signbit(v), axis=1)
+    for own, slow, turns, band in zip(found, np.abs(v) <= speeds[:, None], turned, bands, strict=True):
         widen = _widening(REST_WIDEN, rate, band)
         for start, stop in runs_of(slow):
             if stop - start > 1:
                 own[max(0, start - widen) : stop + widen] = True
+        for last in np.flatnonzero(turns):
+            own[max(0, last + 1 - widen) : last + 1 + widen] = True
     return found
 
 
