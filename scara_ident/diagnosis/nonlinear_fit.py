@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
@@ -116,9 +117,19 @@ class Linearised:
         return merge([Information(rows, 0.0), self.ties])
 
     def solve(self) -> tuple[Array, Array]:
-        """Return the best parameters, nonlinear ones as a change, and the white standard deviations of all."""
+        """Return the best parameters, nonlinear ones as a change, and the white standard deviations of all.
+
+        Those that would leave their bounds stay there, and all others are the best beside them.
+        """
+        best, std = self._solve(np.zeros(0, dtype=np.intp))
+        changes = best[self.linear :]
+        stuck = [item.moved(change) == item.value for item, change in zip(self.unknowns, changes, strict=True)]
+        return self._solve(self.linear + np.flatnonzero(stuck)) if any(stuck) else (best, std)
+
+    def _solve(self, held: NDArray[np.intp]) -> tuple[Array, Array]:
         rows = np.vstack([self.information.factor, self.prior.factor])
-        columns, target = rows[:, :-1], rows[:, -1]
+        columns, target = rows[:, :-1].copy(), rows[:, -1]
+        columns[:, held] = 0.0
         size = np.linalg.norm(columns, axis=0)
         size[size == 0.0] = 1.0
         left, singular, right = np.linalg.svd(columns / size, full_matrices=False)
@@ -326,8 +337,7 @@ def tune(
         if moved < SETTLED or arrived:
             break
         step, std = now.solve()
-        reach = [item.reach / max(abs(x), 1e-300) for item, x in zip(now.unknowns, step[now.linear :], strict=True)]
-        share = min([1.0, *reach])
+        share = min([1.0, *(item.share(x) for item, x in zip(now.unknowns, step[now.linear :], strict=True))])
         scene, chosen = _moved(best, step, share)
     assert best is not None
     return replace(best.scene, value=best.value[:size]), best.chosen

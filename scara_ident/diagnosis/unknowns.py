@@ -59,10 +59,11 @@ class Unknown:
             return ARMATURE_STEP
         return DERIVATIVE_STEP * (abs(self.value) if self.value else self.upper - self.lower)
 
-    @property
-    def reach(self) -> float:
-        """How far it may go at once."""
-        return LONGEST_STEP if self.owner is None else LONGEST_STEP * abs(self.value) if self.value else np.inf
+    def share(self, change: float) -> float:
+        """Return the share of a step that it may go at once, beyond which the linear model does not hold."""
+        reach = LONGEST_STEP if self.owner is None else LONGEST_STEP * abs(self.value) if self.value else np.inf
+        # Its bound stops it, and not all others with it.
+        return reach / max(abs(self.moved(change) - self.value), 1e-300)
 
     def moved(self, change: float) -> float:
         """Return its value after a step, within its bounds."""

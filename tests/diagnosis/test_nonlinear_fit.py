@@ -191,6 +191,21 @@ def test_the_solution_is_that_of_all_weighted_rows_with_those_of_the_priors() ->
     assert std[state.linear :] == pytest.approx(np.sqrt(state.variance * np.diag(inverse))[state.linear :], rel=1e-5)
 
 
+def test_beside_a_parameter_at_its_bound_all_others_are_the_best_without_it() -> None:
+    chosen = (Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.3,))))
+    free = linear(step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS))
+    place, last = free.linear + 1, free.unknowns[1]
+    away = np.sign(free.solve()[0][place])
+    ends = {"upper": last.value} if away > 0.0 else {"lower": last.value}
+    stuck = replace(free, unknowns=(free.unknowns[0], replace(last, **ends), *free.unknowns[2:]))
+    change, _ = stuck.solve()
+    rows = np.delete(np.vstack([free.information.factor, free.prior.factor]), place, axis=1)
+    scale = np.linalg.norm(rows[:, :-1], axis=0)
+    best = np.linalg.lstsq(rows[:, :-1] / scale, rows[:, -1], rcond=1e-9)[0] / scale
+    assert change[place] == 0.0
+    assert np.delete(change, place) == pytest.approx(best, rel=1e-6)
+
+
 def ur5_runs(armature: float):
     """Four motions of a UR5 with losses in its first two gears, friction, and rotors of which its URDF says nothing."""
     robot = load_robot("ur5")

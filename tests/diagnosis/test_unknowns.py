@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA
-from scara_ident.diagnosis.unknowns import LONGEST_STEP, unknowns_of
+from scara_ident.diagnosis.unknowns import LONGEST_STEP, Unknown, unknowns_of
 from scara_ident.effects import Member
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.links import largest_armature
@@ -29,5 +30,13 @@ def test_a_rotor_that_nobody_stated_has_a_wide_prior_within_what_the_estimate_le
     assert guessed.spread == np.log(GUESS_FACTOR)
     assert guessed.nominal == np.log(robot.rotor_guess.armature[0])
     assert guessed.upper <= np.log(largest_armature(scene, 0))
-    assert guessed.reach == LONGEST_STEP
+    assert guessed.share(-2.0 * LONGEST_STEP) == 0.5
     assert guessed.moved(100.0) == guessed.upper
+
+
+def test_a_bound_stops_a_parameter_and_not_all_others_with_it() -> None:
+    """A share of 0.005, its least, that wanted to fall by 0.106 cut the steps of all others to a fiftieth."""
+    inside, held = (Unknown(0, 0, value, 0.005, 0.9) for value in (0.006, 0.005))
+    assert inside.share(-0.106) == pytest.approx(LONGEST_STEP * 0.006 / 0.001)
+    assert held.share(-0.106) > 1.0
+    assert held.share(0.1) == pytest.approx(LONGEST_STEP * 0.005 / 0.1)
