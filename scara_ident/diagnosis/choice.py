@@ -37,7 +37,6 @@ def choose(
     tuple of (Decision or None, dict, Scene)
         The best acceptable member that is sound, those better that are not by their labels, and the scene to go on with.
     """
-    criteria = step.criteria
     # Families of one name each: which of them is better is seen once they are refined.
     by_family: dict[Effect, list[Decision]] = {}
     for item in decisions:
@@ -46,10 +45,29 @@ def choose(
     first = [item for item in decisions if item.candidate.effect.fitted_first]
     accepted = [item for item in best if item.accepted and not item.candidate.effect.fitted_first]
     found = fitted_beside(step, first, max((item.gain for item in accepted), default=0.0), known)
+    fitted = {item.label for _, item in found}
     refused = {item.label: item for _, item in found if not item.accepted}
     accepted += _sure_once_refined(step, best, max((item.examination.held_out for item in accepted), default=0.0))
     open_ = [(step, item) for item in accepted] + [(own, item) for own, item in found if item.accepted]
-    open_.sort(key=lambda pair: -pair[1].examination.held_out)
+    while True:
+        winner = _soundest(step, open_, refused)
+        if winner is not None:
+            return winner[1], refused, winner[0].scene
+        # What no fit was spent on would come in by its grid points: where nothing better does it is fitted after all.
+        found = fitted_beside(step, [item for item in first if item.accepted and item.label not in fitted], 0.0, None)
+        if not found:
+            return None, refused, step.scene
+        fitted |= {item.label for _, item in found}
+        refused |= {item.label: item for _, item in found if not item.accepted}
+        open_ = [(own, item) for own, item in found if item.accepted]
+
+
+def _soundest(
+    step: SelectionStep, open_: Sequence[tuple[SelectionStep, Decision]], refused: dict[str, Decision]
+) -> tuple[SelectionStep, Decision] | None:
+    """Return the best of some decisions to which nothing is objected, refined; those better are added to the refused."""
+    criteria = step.criteria
+    open_ = sorted(open_, key=lambda pair: -pair[1].examination.held_out)
     # Where the best are refused, the next best may still be sound.
     while open_:
         enough = criteria.near_best * open_[0][1].examination.held_out
@@ -63,10 +81,10 @@ def choose(
         for own, decision in best_first(pairs):
             why = objection(own, decision)
             if why is None:
-                return decision, refused, own.scene
+                return own, decision
             refused[decision.label] = decision.refused(why)
         open_ = open_[len(leaders) :]
-    return None, refused, step.scene
+    return None
 
 
 def _sure_once_refined(step: SelectionStep, best: Sequence[Decision], enough: float) -> list[Decision]:
