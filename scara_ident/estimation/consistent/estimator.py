@@ -122,7 +122,7 @@ def consistent(observations: Observations, *, options: ConsistentOptions | None 
         problem, observations.by_joint, parameter_prior=parameter_prior, standard_prior=standard_prior
     )
     x = nearest_arm(problem, information, found.x, standard_prior=standard_prior)
-    return _estimate(problem, observations, information, weights, "consistent", found, x, shapes)
+    return _estimate(problem, observations, information, weights, plain, found, x, shapes)
 
 
 def _estimate(
@@ -130,7 +130,7 @@ def _estimate(
     observations: Observations,
     information: Information,
     weights: Array,
-    method: str,
+    plain: Estimate,
     found: ConsistentSolution,
     x: Array,
     shapes: tuple[ShapeChoice, ...],
@@ -143,10 +143,19 @@ def _estimate(
     undetermined = information.solve().undetermined
     variation = run_variation(observations, observations.joints, value)
     covariance = spread.matrix + variation.covariance(inverse, observations.joints, weights)
+    bias = None
+    if plain.noise_bias is not None:
+        # As far as constraints let the noise of the positions move the estimate.
+        bias = inverse @ (plain.information.regressor_factor.T @ (plain.information.regressor_factor @ plain.noise_bias))
+        covariance += np.outer(bias, bias)
+    # What constraints leave a parameter less than that of is rounding: they hold it.
+    alone = _inverse_along(information, np.eye(len(value)), u.sizes(value))
+    held = np.diag(inverse) < DIGITS**2 * np.diag(alone)
+    covariance[held] = covariance[:, held] = 0.0
     covariance[np.diag_indices_from(covariance)] = np.where(undetermined, np.inf, np.diag(covariance))
     return ConsistentEstimate(
         model=observations.model,
-        method=method,
+        method="consistent",
         value=value,
         covariance=covariance,
         undetermined=undetermined,
@@ -159,6 +168,7 @@ def _estimate(
         shapes=shapes,
         notes=_notes(u, labels, value, covariance),
         variation=variation,
+        noise_bias=bias,
     )
 
 
