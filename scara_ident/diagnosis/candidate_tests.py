@@ -46,8 +46,6 @@ class Examination:
         that a fold which they cannot be fitted without does not speak against a candidate.
     fold_gains : tuple of float or None
         Per fold; None where the fold abstains.
-    contribution : float
-        Weighted sum of squares of what it adds.
     model_value : ndarray, shape (m,)
         The model's own parameters when the candidate is added.
     left : ndarray, shape (blocks,)
@@ -66,7 +64,6 @@ class Examination:
     gain: float
     held_out: float
     fold_gains: tuple[float | None, ...]
-    contribution: float
     model_value: Array
     left: Array
     products: Array
@@ -196,7 +193,6 @@ def _examinations(model: FittedModel, found: Products, criteria: SelectionCriter
                     0.0,
                     0.0,
                     (None,) * folds,
-                    0.0,
                     alone,
                     squares,
                     whole[g],
@@ -214,7 +210,6 @@ def _examinations(model: FittedModel, found: Products, criteria: SelectionCriter
                 (before - float(np.sum(after[g]))) / before,
                 float(np.sum(saved[voting[:, g], g])) / before,
                 tuple(float(gain) if votes else None for gain, votes in zip(gains[:, g], voting[:, g], strict=True)),
-                float(value[g] @ whole[g] @ value[g]),
                 own[:, g],
                 after[g],
                 whole[g],

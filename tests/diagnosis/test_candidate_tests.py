@@ -55,7 +55,7 @@ def test_a_textbook_test_would_call_correlated_noise_an_effect():
     assert low > 20
 
 
-def test_value_gain_and_contribution_are_those_of_the_joint_fit():
+def test_value_and_gain_are_those_of_the_joint_fit():
     rng = np.random.default_rng(2)
     columns = slow(rng, 6)
     torque = columns @ [1.0, -2.0, 0.5, 0.3, -0.2, 0.0] + rng.standard_normal(ROWS)
@@ -68,7 +68,6 @@ def test_value_gain_and_contribution_are_those_of_the_joint_fit():
         before = np.sum((torque - columns[:, :3] @ alone) ** 2)
         after = np.sum((torque - columns[:, [0, 1, 2, *group]] @ joined) ** 2)
         assert result.gain == pytest.approx(1.0 - after / before, rel=1e-6)
-        assert result.contribution == pytest.approx(before - after, rel=1e-6)
 
 
 @pytest.mark.parametrize("place", range(7))
@@ -274,7 +273,6 @@ def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
         float(1.0 - after / before),
         float(saved / before),
         tuple(gains),
-        float(before - after),
         own @ np.linalg.lstsq(own, torque, rcond=1e-12)[0],
         by_block(left**2),
         x.T @ x,
@@ -298,7 +296,7 @@ def test_it_is_what_all_rows_of_all_joints_say(seed: int):
         assert_allclose(item.p_value, dense.p_value, rtol=1e-7)
         assert item.freedom == pytest.approx(dense.freedom, rel=1e-7)
         assert item.outside == pytest.approx(dense.outside, rel=1e-9)
-        for name in ("gain", "held_out", "contribution"):
+        for name in ("gain", "held_out"):
             assert getattr(item, name) == pytest.approx(getattr(dense, name), rel=1e-9, abs=1e-9), name
         assert [gain is None for gain in item.fold_gains] == [gain is None for gain in dense.fold_gains]
         assert [x for x in item.fold_gains if x is not None] == pytest.approx(

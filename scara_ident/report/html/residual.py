@@ -19,7 +19,7 @@ Sets = Mapping[str, Sequence[Trace]]
 Variants = dict[tuple[int, ...], Drawing]
 
 
-def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None], prefix: str = "") -> list[Block]:
+def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None]) -> list[Block]:
     """Return the figures of the residual.
 
     Parameters
@@ -29,8 +29,6 @@ def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None], pre
         Such as the fitted and the held-out recordings; empty ones are left out.
     bands : sequence of float or None, one per joint
         Hz.
-    prefix : str, optional
-        Keeps the names of figures apart where there are several on a page.
     """
     sets = {name: traces for name, traces in sets.items() if traces}
     still = [joint for j, joint in enumerate(robot.joints) if not any(_turns(robot, s, j) for s in sets.values())]
@@ -46,9 +44,9 @@ def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None], pre
             "Blue: how many samples lie where. Vermillion: their mean over the signal, with two standard errors; where it leaves zero, "
             f"the model lacks something that depends on the signal.{motor}"
         ),
-        _signals_group(robot, sets, prefix),
+        _signals_group(robot, sets),
         Heading("By frequency, motor angle and lag"),
-        _spectra_group(robot, sets, bands, prefix),
+        _spectra_group(robot, sets, bands),
     ]
 
 
@@ -58,7 +56,7 @@ def _turns(robot: Robot, traces: Sequence[Trace], j: int) -> bool:
     return any(float(np.ptp(trace.motion.q[j])) >= span for trace in traces)
 
 
-def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None], prefix: str) -> Group:
+def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None]) -> Group:
     by_time: Variants = {}
     by_order: Variants = {}
     by_lag: Variants = {}
@@ -74,21 +72,21 @@ def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None], pref
                     found[j, s] = plot
     figures = [
         Figure(
-            f"{prefix}frequency",
+            "frequency",
             "Spectrum over frequency",
             "Amplitude density of recorded torque, which is the effort in the file times its gain, and of what is left of it, nothing filtered; the area reaches to the highest line of each bin. In the shade, beyond the band, the prediction carries the noise of the position.",
             by_time,
             (0, 1),
         ),
         Figure(
-            f"{prefix}order",
+            "order",
             "Spectrum over the motor's angle",
             f"What repeats with the motor's turn; noise alone crosses the dashed bound anywhere in 1 of 100 cases. {ORDER_WORDS}",
             by_order,
             (0, 1),
         ),
         Figure(
-            f"{prefix}lag",
+            "lag",
             "Autocorrelation",
             "Within the band, from the first lag on (at lag 0 it is 1); white residuals stay between the dashed bounds at 95 % of the lags.",
             by_lag,
@@ -96,7 +94,7 @@ def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None], pref
         ),
     ]
     kept = [figure for figure in figures if figure.variants]
-    return Group(f"{prefix}spectra-group", kept, _selectors(robot, sets), "two")
+    return Group("spectra-group", kept, _selectors(robot, sets), "two")
 
 
 def _selectors(robot: Robot, sets: Sets) -> tuple[Selector, Selector]:
@@ -142,7 +140,7 @@ def _lag_plot(traces: Sequence[Trace], j: int) -> Plot | None:
     return Plot("lag [s]", (Panel("correlation", layers, 220),))
 
 
-def _signals_group(robot: Robot, sets: Sets, prefix: str) -> Group:
+def _signals_group(robot: Robot, sets: Sets) -> Group:
     signals: tuple[tuple[str, str, Callable[[Trace, int], Array], Callable[[int], str]], ...] = (
         ("position", "Position", lambda trace, i: trace.motion.q[i], lambda i: f"position [{_length(robot, i)}]"),
         ("velocity", "Velocity", lambda trace, i: trace.motion.v[i], lambda i: f"velocity [{_length(robot, i)}/s]"),
@@ -163,9 +161,9 @@ def _signals_group(robot: Robot, sets: Sets, prefix: str) -> Group:
                 x = kept(traces, [signal(trace, i) for trace in traces], j)
                 variants[(j, s) if name == "time" else (j, s, i)] = scatter(x, y, label(i), robot.torque_unit(j))
         by = (0, 1) if name == "time" else (0, 1, 2)
-        figures.append(Figure(f"{prefix}against-{name}", title, "", variants, by, quiet=True))
+        figures.append(Figure(f"against-{name}", title, "", variants, by, quiet=True))
     selectors = (*_selectors(robot, sets), Selector("signals of", robot.joints))
-    return Group(f"{prefix}signals-group", figures, selectors, "three")
+    return Group("signals-group", figures, selectors, "three")
 
 
 def scatter(x: Array, y: Array, label: str, unit: str, height: int = 170, bins: int = MEAN_BINS) -> Plot:
