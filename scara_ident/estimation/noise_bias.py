@@ -16,6 +16,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import weighted
 from scara_ident.estimation.observations import Observations, informations
+from scara_ident.manners import listed
 from scara_ident.motion.position_noise import NoiseSizes, noise_sizes, noisier
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
 from scara_ident.threads import side_by_side
@@ -120,6 +121,5 @@ def bias_sentence(names: Sequence[str], bias: Array, std: Array) -> str | None:
     moved = [k for k in np.argsort(-np.abs(bias) / chance) if abs(bias[k]) > SPOKEN_OF * chance[k]]
     if not moved:
         return None
-    some = ", ".join(f"{names[k]} by about {bias[k]:.2g}" for k in moved[:6])
-    more = f" and {len(moved) - 6} more" if len(moved) > 6 else ""
-    return f"the noise of the positions biases {some}{more}; their standard deviations hold that"
+    said = listed([f"{names[k]} by about {bias[k]:.2g}" for k in moved], 6)
+    return f"the noise of the positions biases {said}; their standard deviations hold that"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, UsageError
-from scara_ident.manners import Frozen
+from scara_ident.manners import Frozen, several
 from scara_ident.robot.robot import Robot
 from scara_ident.simulation.plant import PlantDraft, empty_draft
 
@@ -119,7 +119,7 @@ class VirtualArm(Frozen):
                 raise RobotError(f"{self.robot.name}: {name} must not be negative")
 
     def _in_short(self) -> str:
-        return f"{self.robot.name}: {self.robot.n} joint{'' if self.robot.n == 1 else 's'}"
+        return f"{self.robot.name}: {several(self.robot.n, 'joint')}"
 
     @property
     def scale(self) -> Array:

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.manners import several
 from scara_ident.recording.audit.samples import (
     GAP_STEPS,
     IDLE_TRAVEL,
     Finding,
     Samples,
     joint_range,
-    several,
     speed_limit,
 )
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from scara_ident.manners import several
 from scara_ident.recording.audit.position import SPIKE_ROWS, SPIKE_SHARE
-from scara_ident.recording.audit.samples import Finding, Samples, several
+from scara_ident.recording.audit.samples import Finding, Samples
 
 # The counts of 32 bits end at 4e9; what a broken channel or a wrong type of number gives has up to 300 digits.
 LARGEST = 1e12
