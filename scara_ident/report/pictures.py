@@ -110,9 +110,8 @@ def effect_figures(context: DiagnosisContext) -> list[tuple[str, str, list[Seque
     found: list[tuple[str, str, list[Sequence[Figure]]]] = []
     with one_blas_thread():
         for effect, chapter in context.chapters:
-            title = effect.effect if effect.joint is None else f"{effect.effect} on {effect.joint}"
             rows: list[Sequence[Figure]] = [chapter_group(robot, chapter).figures, moment_group(robot, chapter).figures]
-            found.append((title, f"effect_{chapter.number}.png", rows))
+            found.append((effect.title, f"effect_{chapter.number}.png", rows))
         group = None if remainder is None else remainder_group(robot, remainder, context.sets["training"])
         if remainder is not None and group is not None:
             title = f"what no effect accounts for on {remainder.joint}"

@@ -11,17 +11,17 @@ import numpy as np
 from scara_ident.fleet import Fleet
 from scara_ident.fleet.changes import LEVEL
 from scara_ident.fleet.fleet import ArmReport
+from scara_ident.manners import several
 from scara_ident.report.html.blocks import (
     Block,
     Cell,
     Group,
+    Listing,
     Paragraph,
     Selector,
     Table,
     Tag,
     chance,
-    count,
-    listing,
     name,
     number,
     superscripts,
@@ -133,7 +133,7 @@ def _plots(fleet: Fleet, item: ArmReport, joint: str | None) -> list[Plot]:
 
 def _faults(fleet: Fleet) -> list[Block]:
     """What could not be used."""
-    return [listing(str(fault) for fault in fleet.faults)] if fleet.faults else []
+    return [Listing(tuple(str(fault) for fault in fleet.faults))] if fleet.faults else []
 
 
 def _scatter(fleet: Fleet) -> list[Block]:
@@ -179,14 +179,14 @@ def fleet_report(path: Path, fleet: Fleet) -> None:
         If the file cannot be written.
     """
     changed = [item for item in fleet.ranked if item.changes]
-    verdict = [f"{len(changed)} of {count(len(fleet.arms), 'arm')} changed by more than noise."]
+    verdict = [f"{len(changed)} of {several(len(fleet.arms), 'arm')} changed by more than noise."]
     verdict += [f"{item.arm}: {words}." for item in changed for words in item.sentences]
     if fleet.faults:
-        verdict.append(f"{count(len(fleet.faults), 'fault')}: see below.")
+        verdict.append(f"{several(len(fleet.faults), 'fault')}: see below.")
     dates = sum(len(item.history.dates) for item in fleet.arms if item.history is not None)
     Page(
         f"Fleet of {fleet.robot.name}",
-        f"{fleet.model.name} model; {count(len(fleet.arms), 'arm')}, {count(dates, 'date')} in all",
+        f"{fleet.model.name} model; {several(len(fleet.arms), 'arm')}, {several(dates, 'date')} in all",
         verdict,
         parts("fleet", SECTIONS, fleet),
         warn=bool(changed or fleet.faults),

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.identification.identify import Identification, undetermined
-from scara_ident.report.html.blocks import Block, Heading, Paragraph, count, estimator_words, information_words
+from scara_ident.manners import several
+from scara_ident.report.html.blocks import Block, Heading, Paragraph, estimator_words, information_words
 from scara_ident.report.html.events import events_blocks
 from scara_ident.report.html.friction import friction_group
 from scara_ident.report.html.page import Page, parts
@@ -154,7 +155,7 @@ def identification_report(path: Path, context: IdentificationContext) -> None:
     fitted, held_out = identification.training, identification.validation
     subtitle = (
         f"{identification.model.name} model, {len(identification.model.columns)} parameters, {estimator_words(identification.estimate.method)}; "
-        f"{count(len(fitted.data.recordings), 'recording')}, {fitted.samples} samples fitted, {count(len(held_out.data.recordings), 'recording')} held out"
+        f"{several(len(fitted.data.recordings), 'recording')}, {fitted.samples} samples fitted, {several(len(held_out.data.recordings), 'recording')} held out"
     )
     # How runs differ has a section of its own.
     variation = identification.estimate.variation

@@ -10,7 +10,20 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.report.bins import MEAN_BINS, binned_means, density, middle_range
 from scara_ident.report.html.blocks import Block, Group, Heading, Paragraph, Selector
-from scara_ident.report.plot import Band, Density, Drawing, Figure, Layer, Level, Line, Mark, Panel, Plot, Region
+from scara_ident.report.plot import (
+    Band,
+    Density,
+    Drawing,
+    Figure,
+    Layer,
+    Level,
+    Line,
+    Mark,
+    Panel,
+    Plot,
+    Region,
+    mean_layers,
+)
 from scara_ident.report.spectra import ORDER_WORDS, autocorrelation, orders, spectrum
 from scara_ident.report.traces import Trace, kept
 from scara_ident.robot.robot import Robot
@@ -142,9 +155,9 @@ def _lag_plot(traces: Sequence[Trace], j: int) -> Plot | None:
 
 def _signals_group(robot: Robot, sets: Sets) -> Group:
     signals: tuple[tuple[str, str, Callable[[Trace, int], Array], Callable[[int], str]], ...] = (
-        ("position", "Position", lambda trace, i: trace.motion.q[i], lambda i: f"position [{_length(robot, i)}]"),
-        ("velocity", "Velocity", lambda trace, i: trace.motion.v[i], lambda i: f"velocity [{_length(robot, i)}/s]"),
-        ("acceleration", "Acceleration", lambda trace, i: trace.motion.a[i], lambda i: f"acceleration [{_length(robot, i)}/s²]"),
+        ("position", "Position", lambda trace, i: trace.motion.q[i], lambda i: f"position [{robot.position_unit(i)}]"),
+        ("velocity", "Velocity", lambda trace, i: trace.motion.v[i], lambda i: f"velocity [{robot.position_unit(i)}/s]"),
+        ("acceleration", "Acceleration", lambda trace, i: trace.motion.a[i], lambda i: f"acceleration [{robot.position_unit(i)}/s²]"),
         ("load", "Load", lambda trace, i: trace.load[i], lambda i: f"links and rotors [{robot.torque_unit(i)}]"),
         ("time", "Time", lambda trace, i: trace.time, lambda i: "time since the start [s]"),
         ("motor", "Motor angle", lambda trace, i: np.mod(robot.reduction[i] * trace.motion.q[i], 2.0 * np.pi), lambda i: "within a motor turn [rad]"),
@@ -187,11 +200,6 @@ def scatter(x: Array, y: Array, label: str, unit: str, height: int = 170, bins: 
     means = binned_means(x, y, limits, bins)
     layers = (
         Density(density(x, y, limits, (-reach, reach)), limits, (-reach, reach), "blue", "samples"),
-        Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, "vermillion"),
-        Line(means.x, means.y, "vermillion", "mean ± 2 s.e.", 1.8),
+        *mean_layers(means, "vermillion", "mean ± 2 s.e."),
     )
     return Plot(label, (Panel(f"residual [{unit}]", layers, height, (-reach, reach)),), limits, small=True)
-
-
-def _length(robot: Robot, joint: int) -> str:
-    return "m" if robot.prismatic[joint] else "rad"
