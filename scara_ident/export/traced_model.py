@@ -107,25 +107,11 @@ def _symmetric(robot: Robot, columns: Sequence[Array]) -> tuple[tuple[Scalar, ..
     return tuple(tuple(entry(j, k) for k in range(robot.n)) for j in range(robot.n))
 
 
-def body_parameters_of(term: RigidBody, value: Array) -> tuple[Array, Array]:
-    """Return standard parameters that have the base parameters ``value``: each stands for the one that leads it.
-
-    Returns
-    -------
-    bodies : ndarray, shape (n, 10)
-        In the order of the robot's joints.
-    armature : ndarray, shape (n,)
-    """
-    n = term.robot.n
-    standard = np.zeros(11 * n)
-    standard[term.base.kept[term.kept]] = value
-    return standard[: 10 * n].reshape(n, 10), standard[10 * n :]
-
-
 def _rigid(term: RigidBody, value: Array, q: Array, v: Array, a: Array, gravity: pin.Motion) -> Array:
     """Return the torque of links and rotors, recorded side, shape (n,)."""
     robot: Robot = term.robot
-    bodies, armature = body_parameters_of(term, value)
+    n, standard = robot.n, term.standard(value)
+    bodies, armature = standard[: 10 * n].reshape(n, 10), standard[10 * n :]
     back = np.argsort(robot.order)
     torque = trace_torque(
         joint_geometry(robot.model), gravity, bodies[back], list(q[back]), list(v[back]), list(a[back])

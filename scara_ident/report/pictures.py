@@ -232,9 +232,7 @@ def _parameters(design: Design) -> Figure:
         other = np.divide(1.0, size, out=np.full(len(size), np.inf), where=size > 0.0)
         labels = ("all parameters estimated", "all others known")
     else:
-        variance = np.diag(design.prior.inverse()).copy()
-        variance[design.prior.solve().undetermined] = np.inf
-        other = np.sqrt(variance)
+        other = design.prior.std()
         labels = ("after", "before")
     places = np.arange(float(len(together)))
     layers: list[Layer] = [

@@ -15,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RobotError
+from scara_ident.errors import RobotError, UsageError
 from scara_ident.files import path_fault, real_path
 from scara_ident.manners import Frozen, several
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
@@ -122,6 +122,18 @@ class Robot(Frozen):
     def torque_limit(self) -> Array:
         """Effort limit on the side where effort is recorded, shape (n,)."""
         return self.effort_limit * np.abs(self.row_scale)
+
+    def joint_index(self, name: str) -> int:
+        """Return the place of a joint among `joints`.
+
+        Raises
+        ------
+        UsageError
+            If there is no such joint; the line lists those there are.
+        """
+        if name not in self.joints:
+            raise UsageError(f"{self.name} has no joint {name!r}; its joints are {', '.join(self.joints)}")
+        return self.joints.index(name)
 
     def torque_unit(self, joint: int) -> str:
         """Return the unit of the recorded torque of a joint after ``effort_gain``."""

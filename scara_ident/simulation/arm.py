@@ -137,18 +137,6 @@ class VirtualArm(Frozen):
         steps = np.where(self.encoder_steps > 0.0, self.encoder_steps, np.inf)
         return np.asarray(2.0 * np.pi / steps / np.abs(self.robot.reduction))
 
-    def joint_index(self, name: str) -> int:
-        """Return the place of a joint in the robot's order.
-
-        Raises
-        ------
-        UsageError
-            If there is no such joint; the line lists those there are.
-        """
-        if name not in self.robot.joints:
-            raise UsageError(f"{self.robot.name} has no joint {name!r}; its joints are {', '.join(self.robot.joints)}")
-        return self.robot.joints.index(name)
-
     def link_inertia(self) -> Array:
         """Return the diagonal of the links' mass matrix at the neutral pose, without rotors, shape (n,)."""
         from scara_ident.simulation.spatial import mass_and_bias
