@@ -31,11 +31,15 @@ from scara_ident.report.html.blocks import (
     number,
     superscripts,
 )
-from scara_ident.report.html.candidates import candidate_blocks
-from scara_ident.report.html.certainty import evidence_blocks, tentative_blocks
 from scara_ident.report.html.chapters import Chapter, chapters
-from scara_ident.report.html.events import events_blocks
-from scara_ident.report.html.gain import gain_blocks
+from scara_ident.report.html.evidence import (
+    candidate_blocks,
+    events_blocks,
+    evidence_blocks,
+    gain_blocks,
+    tentative_blocks,
+    variation_blocks,
+)
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.parameters import digits
 from scara_ident.report.html.remainder import remainder_group
@@ -43,7 +47,6 @@ from scara_ident.report.html.residual import residual_blocks
 from scara_ident.report.html.section import NamedSection, Section, notes_section
 from scara_ident.report.html.story import chapter_group, moment_group
 from scara_ident.report.html.torque import torque_group
-from scara_ident.report.html.variation import variation_blocks
 from scara_ident.report.traces import FittedContext, Trace, traces
 from scara_ident.report.use import WORDS
 from scara_ident.threads import one_blas_thread

@@ -11,7 +11,7 @@ from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.identification.identify import Identification, undetermined
 from scara_ident.manners import several
 from scara_ident.report.html.blocks import Block, Heading, Paragraph, estimator_words, information_words
-from scara_ident.report.html.events import events_blocks
+from scara_ident.report.html.evidence import events_blocks, variation_blocks
 from scara_ident.report.html.friction import friction_group
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.parameters import (
@@ -25,7 +25,6 @@ from scara_ident.report.html.parameters import (
 from scara_ident.report.html.residual import residual_blocks
 from scara_ident.report.html.section import NamedSection, Section, notes_section
 from scara_ident.report.html.torque import error_table, torque_group
-from scara_ident.report.html.variation import variation_blocks
 from scara_ident.report.identification import sentences
 from scara_ident.report.traces import FittedContext, Trace, traces
 from scara_ident.threads import one_blas_thread
