@@ -41,7 +41,7 @@ def fleet(
     from scara_ident.fleet import Settings, watch_fleet
     from scara_ident.fleet.table import fleet_table
     from scara_ident.manners import listed, several
-    from scara_ident.report.fleet import write_fleet
+    from scara_ident.report.html.fleet import write_fleet
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "fleet")

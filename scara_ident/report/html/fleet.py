@@ -1,13 +1,16 @@
-"""The report of a fleet: arms by their need of a look, and every quantity over time."""
+"""The files of a fleet: its table, and its report with arms by their need of a look and every quantity over time."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scara_ident.files import written_together
 from scara_ident.fleet import Fleet
 from scara_ident.fleet.changes import LEVEL
 from scara_ident.fleet.fleet import ArmReport
@@ -30,6 +33,10 @@ from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection, Section
 from scara_ident.report.plot import Dots, Drawing, Figure, Layer, Level, Mark, Panel, Plot
 
+if TYPE_CHECKING:
+    import polars as pl
+
+TABLE, REPORT = "fleet.parquet", "report.html"
 # Pictures of a report at the most; of further arms the table has the numbers.
 MOST_PLOTS = 4000
 WHOLE_ARM = "the whole arm"
@@ -191,3 +198,29 @@ def fleet_report(path: Path, fleet: Fleet) -> None:
         parts("fleet", SECTIONS, fleet),
         warn=bool(changed or fleet.faults),
     ).write(path)
+
+
+def write_fleet(folder: Path, fleet: Fleet, table: pl.DataFrame) -> None:
+    """Write the table and the report of a fleet; a file that is there with the same content stays as it is.
+
+    Parameters
+    ----------
+    folder : Path
+    fleet : Fleet
+    table : DataFrame
+        See `scara_ident.fleet.table.fleet_table`.
+
+    Raises
+    ------
+    ScaraIdentError
+        In one line, if they cannot be written.
+    """
+    content = BytesIO()
+    table.write_parquet(content)
+    with written_together(folder) as place:
+        (place / TABLE).write_bytes(content.getvalue())
+        fleet_report(place / REPORT, fleet)
+        for name in (TABLE, REPORT):
+            held = folder / name
+            if held.is_file() and held.read_bytes() == (place / name).read_bytes():
+                (place / name).unlink()
