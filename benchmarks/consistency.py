@@ -26,13 +26,14 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.estimation.consistent.bodies import pack, smallest_eigenvalue_share
+from scara_ident.estimation.consistent.bodies import pack
 from scara_ident.estimation.consistent.friction import friction_faults
 from scara_ident.estimation.consistent.prior import prior_rows
 from scara_ident.estimation.consistent.problem import Problem, constraints_on
 from scara_ident.estimation.consistent.solution import least_squares_arm, nearest_arm, solve_consistent, solve_joints
 from scara_ident.estimation.information import Information, merge
 from scara_ident.fleet.engine import run_all
+from scara_ident.model.base_parameters import pseudo_inertia
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.description import JointDescription, RobotDescription
@@ -64,6 +65,14 @@ def arm(name: str) -> Robot:
 @cache
 def problem(name: str) -> Problem:
     return Problem(build_model(arm(name), MODELS[name]))
+
+
+def smallest_eigenvalue_share(parameters: Array) -> float:
+    """Return the smallest eigenvalue of a body's pseudo-inertia as a share of its trace; below 0 it cannot exist."""
+    matrix = pseudo_inertia(parameters)
+    trace = float(np.trace(matrix))
+    smallest = float(np.linalg.eigvalsh(matrix)[0])
+    return smallest / trace if trace > 0.0 else (0.0 if not np.any(matrix) else -np.inf)
 
 
 def sines(robot: Robot, rng: np.random.Generator, seconds: float, harmonics: int, speed: float) -> Motion:

@@ -73,7 +73,7 @@ def true_member(found: Diagnosis, runs: Sequence[SimulationResult]) -> tuple[Sce
     arm, effect = runs[0].arm, runs[0].effects[0]
     value = np.array([item["value"] for item in truth(arm)["parameters"]])
     scene = replace(found.search.scene, value=value, armatures=dict(enumerate(arm.armature.tolist())), columns={})
-    joint = arm.joint_index(str(effect.joint))
+    joint = arm.robot.joint_index(str(effect.joint))
     sizes = vars(effect)
     if effect.name == "joint_elasticity":
         inertia, link, rotor = usual_link_inertia(scene, joint), arm.link_inertia()[joint], arm.armature[joint]

@@ -24,7 +24,7 @@ import numpy as np
 from scara_ident.fleet import Fleet, Settings, watch_fleet
 from scara_ident.fleet.changes import Change
 from scara_ident.fleet.fleet import changes_of
-from scara_ident.fleet.history import with_dates
+from scara_ident.fleet.history import History
 from scara_ident.fleet.table import Quantity
 from scara_ident.paper import OJD
 from scara_ident.recording.recording import Recording, write_recording
@@ -125,6 +125,11 @@ def make_faulty_fleet(folder: Path, seed: int) -> None:
 
 def _file(folder: Path, arm: int, month: int) -> Path:
     return folder / f"arm{arm:03d}" / date_name(month) / "OJD_1.parquet"
+
+
+def with_dates(history: History, count: int) -> History:
+    """Return the history as it was after so many dates."""
+    return replace(history, dates=history.dates[:count], visits=history.visits[:count])
 
 
 def found_when(fleet: Fleet) -> Iterator[tuple[int, dict[str, tuple[Change, ...]]]]:

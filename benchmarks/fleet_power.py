@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from fleet import DAILY, FAULTS, FLEET, MONTHS, SlowFault, date_name, first_at, is_right, run_of_fleet
+from fleet import DAILY, FAULTS, FLEET, MONTHS, SlowFault, date_name, first_at, is_right, run_of_fleet, with_dates
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
@@ -29,7 +29,7 @@ from scara_ident.arrays import Array
 from scara_ident.fleet.changes import LEVEL, Scatter, arms_counted, fleet_scatter, least_probability, trials_of
 from scara_ident.fleet.fleet import changes_of
 from scara_ident.fleet.folder import list_fleet
-from scara_ident.fleet.history import DateRows, History, common_removed, noise_of, with_dates
+from scara_ident.fleet.history import DateRows, History, common_removed, noise_of
 from scara_ident.fleet.table import quantities
 from scara_ident.fleet.visit import Visit, look
 from scara_ident.model.model import build_model

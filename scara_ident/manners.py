@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from html import escape
 from importlib import import_module
@@ -152,6 +152,16 @@ class Saved(Reported):
             In one line, if it cannot be written.
         """
         write_json(Path(path), self._reports.content(self))
+
+
+def several(count: int, noun: str) -> str:
+    """Return a number and what it counts, such as ``1 row`` or ``3 rows``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def listed(names: Sequence[str], most: int, sep: str = ", ") -> str:
+    """Return the first of some names, and how many more there are."""
+    return sep.join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _protected(value: Any) -> Any:

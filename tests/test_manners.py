@@ -16,7 +16,7 @@ import pytest
 
 import scara_ident
 from scara_ident.errors import ScaraIdentError, UsageError
-from scara_ident.manners import Reported
+from scara_ident.manners import Reported, listed, several
 from tests.results import Results
 
 # Families of effects are no results; each is equal to any other of its class.
@@ -157,3 +157,11 @@ def test_a_result_is_saved_whole_or_not_at_all(results: Results, tmp_path):
     assert '"trajectories"' in (tmp_path / "comparison.json").read_text()
     with pytest.raises(ScaraIdentError, match="cannot be written"):
         results.comparison.save(tmp_path / "comparison.json" / "below.json")
+
+
+def test_words_agree_with_their_number_and_lists_are_short():
+    assert [several(k, "recording") for k in (0, 1, 2)] == ["0 recordings", "1 recording", "2 recordings"]
+    assert listed(["a", "b", "c", "d", "e"], 3) == "a, b, c and 2 more"
+    assert listed(["a", "b"], 3, " and ") == "a and b"
+    assert listed(["a"], 3) == "a"
+    assert listed([], 3) == ""

@@ -10,14 +10,12 @@ import typer
 from scara_ident.cli import options
 from scara_ident.cli.console import READING_SHARE, check_report, progress, result_console, table, writing
 
-Result = Annotated[Path, typer.Argument(metavar="RESULT", help="identification.json or diagnosis.json of this arm.")]
-
 
 def check(
     trajectory: Annotated[
         Path, typer.Argument(metavar="TRAJECTORY", help="trajectory.csv, or a recording, with effort or without.")
     ],
-    result: Result,
+    result: options.Result,
     robot: options.Robot = None,
     ranges: options.Ranges = None,
     velocities: options.Velocities = None,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -13,9 +12,7 @@ from scara_ident.cli.console import READING_SHARE, check_report, progress, resul
 
 def contact(
     recordings: options.Recordings,
-    result: Annotated[
-        Path, typer.Argument(metavar="RESULT", help="identification.json or diagnosis.json of this arm.")
-    ],
+    result: options.Result,
     free: Annotated[
         list[str],
         typer.Option("--free", metavar="RECORDING", help="Without contact: thresholds are taken from it; repeatable."),

@@ -40,8 +40,8 @@ def fleet(
     from scara_ident.errors import ScaraIdentError
     from scara_ident.fleet import Settings, watch_fleet
     from scara_ident.fleet.table import fleet_table
-    from scara_ident.fleet.words import listed
-    from scara_ident.report.fleet import write_fleet
+    from scara_ident.manners import listed, several
+    from scara_ident.report.html.fleet import write_fleet
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "fleet")
@@ -67,8 +67,7 @@ def fleet(
         write_fleet(output, found, fleet_table(found))
     console.written(output, "fleet.parquet", "report.html")
     if found.faults:
-        count = len(found.faults)
         raise ScaraIdentError(
-            f"{count} fault{'s' if count > 1 else ''} in {folder}: {listed([str(fault) for fault in found.faults], 1)}; mend "
+            f"{several(len(found.faults), 'fault')} in {folder}: {listed([str(fault) for fault in found.faults], 1)}; mend "
             "and run again, all else is done"
         )

@@ -91,7 +91,7 @@ def inspection_dict(found: Inspection, written: Path | None) -> dict[str, Any]:
 
 
 def _show(console: PlainConsole, found: Inspection, written: Path | None) -> None:
-    from scara_ident.recording.audit.samples import several
+    from scara_ident.manners import several
 
     rows = table(str(found.path), "column", "samples", "range", "taken for", right=("samples",))
     # Only the last column folds, so that names can be copied into robot.yaml.

@@ -22,6 +22,7 @@ Recordings = Annotated[
         help="Recordings (.parquet, .csv, .mat, .h5, .mcap, .db3, a rosbag2 folder), folders or globs of them.",
     ),
 ]
+Result = Annotated[Path, typer.Argument(metavar="RESULT", help="identification.json or diagnosis.json of this arm.")]
 Robot = Annotated[
     Path | None,
     typer.Option(

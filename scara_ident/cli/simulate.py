@@ -50,7 +50,7 @@ def simulate(
     effects = [parse_effect(text) for text in effect or ()]
     motions = [named_motion(word, arm.robot) for word in trajectory]
     for joint in link_encoder or ():
-        arm.joint_index(joint)
+        arm.robot.joint_index(joint)
     made = [f"{motion.name}_{run}" for motion in motions for run in range(1, repetitions + 1)]
     for each in effects:
         if each.recording not in (None, *made):

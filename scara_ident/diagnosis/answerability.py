@@ -275,9 +275,7 @@ class _View:
         shape = self.inquiry._shapes.get(question.text)
         if shape is None:
             return 0.0
-        own = self.beside[:, self.inquiry.places[self._place(shape)][1]]
-        spanning = self._model(set())
-        left = np.column_stack([_outside(spanning, column) for column in own.T])
+        left = self.left(shape, set())
         before = np.eye(left.shape[1]) / (LARGEST_SHAPE * question.size) ** 2
         variance = np.diag(np.linalg.inv(left.T @ left + before))
         return float(question.size / np.sqrt(np.mean(variance)))

@@ -46,8 +46,6 @@ class Examination:
         that a fold which they cannot be fitted without does not speak against a candidate.
     fold_gains : tuple of float or None
         Per fold; None where the fold abstains.
-    contribution : float
-        Weighted sum of squares of what it adds.
     model_value : ndarray, shape (m,)
         The model's own parameters when the candidate is added.
     left : ndarray, shape (blocks,)
@@ -66,7 +64,6 @@ class Examination:
     gain: float
     held_out: float
     fold_gains: tuple[float | None, ...]
-    contribution: float
     model_value: Array
     left: Array
     products: Array
@@ -113,7 +110,7 @@ def held_out_gains(
     """Return `Examination.held_out` of candidates alone, in less than half the time."""
     before = float(np.sum(model.squares))
 
-    def gains(group: Sequence[Rows]) -> list[float]:
+    def of_group(group: Sequence[Rows]) -> list[float]:
         outside, products, scores = _outside(products_of(model, group), criteria)
         _, saved, voting = _in_folds(model, products, scores, criteria)
         seen = (outside >= criteria.absorbed) & (before > 0.0)
@@ -121,7 +118,47 @@ def held_out_gains(
             float(gain) for gain in np.where(seen, np.sum(np.where(voting, saved, 0.0), axis=0) / (before or 1.0), 0.0)
         ]
 
-    return _in_groups(model, candidates, gains)
+    return _in_groups(model, candidates, of_group)
+
+
+def gains(
+    model: FittedModel, candidates: Sequence[Rows], joints: Sequence[int | None], found: Sequence[Examination]
+) -> list[float]:
+    """Return what each candidate removes on rows that it was not fitted to, as a share of that and what its joint keeps.
+
+    It is near the share of its joint's squared residual where it removes little, and never above 1, though what a candidate
+    removes on other joints, through its columns there and through the model's parameters, may be more than its joint has.
+
+    Parameters
+    ----------
+    model : FittedModel
+    candidates : sequence of mapping of int to ndarray, shape (k, N)
+    joints : sequence of int or None
+        Whose each is; None counts all joints.
+    found : sequence of Examination
+        Of each candidate.
+    """
+    result = np.array([item.held_out for item in found])
+    total = float(np.sum(model.squares))
+    for joint in {joint for joint in joints if joint is not None}:
+        own = [k for k, place in enumerate(joints) if place == joint]
+        whole = total * np.array([found[k].gain for k in own])
+        removed = total * result[own]
+        # What holding out costs counts as left.
+        left = _left(model, joint, [candidates[k] for k in own], [found[k] for k in own]) + whole - removed
+        result[own] = removed / np.maximum(np.maximum(removed, 0.0) + left, np.finfo(float).tiny)
+    return [float(gain) for gain in result]
+
+
+def _left(model: FittedModel, joint: int, candidates: Sequence[Rows], found: Sequence[Examination]) -> Array:
+    """Return the weighted squared residual of one joint with each candidate, on the rows they were fitted to."""
+    rows = model.joints[joint]
+    values = np.array([item.model_value[rows.columns] for item in found])
+    left = rows.table[-1] - values @ rows.table[:-1]
+    for error, columns, item in zip(left, candidates, found, strict=True):
+        if joint in columns:
+            error -= item.value @ columns[joint]
+    return np.asarray(model.weights[joint] ** 2 * np.sum(left**2, axis=1))
 
 
 def _in_groups(
@@ -178,7 +215,7 @@ def _examinations(model: FittedModel, found: Products, criteria: SelectionCriter
     after = squares - np.einsum("gbi,gi->gb", 2.0 * scores - predicted, value)
     test = cluster_test(model, found, whole, value, scores - predicted, products)
     base, saved, voting = _in_folds(model, products, scores, criteria)
-    gains = saved / np.where(base > 0.0, base, 1.0)[:, None]
+    shares = saved / np.where(base > 0.0, base, 1.0)[:, None]
     before = float(np.sum(squares))
     own = model.root @ (model.projected[:, None] - np.einsum("gkr,gk->rg", found.sums, value))
     results = []
@@ -196,7 +233,6 @@ def _examinations(model: FittedModel, found: Products, criteria: SelectionCriter
                     0.0,
                     0.0,
                     (None,) * folds,
-                    0.0,
                     alone,
                     squares,
                     whole[g],
@@ -213,8 +249,7 @@ def _examinations(model: FittedModel, found: Products, criteria: SelectionCriter
                 float(outside[g]),
                 (before - float(np.sum(after[g]))) / before,
                 float(np.sum(saved[voting[:, g], g])) / before,
-                tuple(float(gain) if votes else None for gain, votes in zip(gains[:, g], voting[:, g], strict=True)),
-                float(value[g] @ whole[g] @ value[g]),
+                tuple(float(gain) if votes else None for gain, votes in zip(shares[:, g], voting[:, g], strict=True)),
                 own[:, g],
                 after[g],
                 whole[g],

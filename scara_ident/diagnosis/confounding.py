@@ -25,8 +25,6 @@ class Confounder:
     joint : str or None
     gain : float
         Of it in the place of the effect found; see `gains`.
-    found_gain : float
-        Of the effect found.
     candidate : Candidate
     value : tuple of float
         Its coefficients in the place of the effect found.
@@ -36,7 +34,6 @@ class Confounder:
     effect: str
     joint: str | None
     gain: float
-    found_gain: float
     candidate: Candidate
     value: tuple[float, ...]
 
@@ -98,5 +95,5 @@ def _confounders_of(
             candidate = decision.candidate
             name, joint = candidate.effect.name, candidate.joint(scene)
             value = tuple(float(x) for x in decision.examination.value)
-            others.append(Confounder(decision.label, name, joint, decision.gain, own.gain, candidate, value))
+            others.append(Confounder(decision.label, name, joint, decision.gain, candidate, value))
     return tuple(sorted(others, key=lambda item: -item.gain))

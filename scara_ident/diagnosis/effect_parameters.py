@@ -11,7 +11,7 @@ from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, Rows
 from scara_ident.diagnosis.nonlinear_fit import Linearised, linearise
 from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.diagnosis.unknowns import DERIVATIVE_STEP
+from scara_ident.diagnosis.unknowns import sides
 from scara_ident.effects import Parameter
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.information import merge
@@ -137,15 +137,8 @@ def parameters_beside(step: SelectionStep, candidate: Candidate) -> dict[str, Pa
     (alone,) = examine(step.model, [own], step.criteria)
     wide: Rows = {joint: rows for joint, rows in own.items()}
     size = len(alone.value)
-    for place, parameter in enumerate(candidate.effect.nonlinear):
-        value = candidate.member.nonlinear[place]
-        reach = DERIVATIVE_STEP * (abs(value) if value else parameter.upper - parameter.lower)
-        sides = []
-        for sign in (1.0, -1.0):
-            moved = list(candidate.member.nonlinear)
-            moved[place] = value + sign * reach
-            sides.append(candidate.at(moved))
-        up, down = step.columns.rows(step.scene, sides)
+    for one, other, reach in sides(candidate):
+        up, down = step.columns.rows(step.scene, [one, other])
         for joint in wide:
             change = alone.value @ (up[joint] - down[joint]) / (2.0 * reach)
             wide[joint] = np.concatenate([wide[joint], change[None]])

@@ -60,6 +60,11 @@ class FoundEffect:
         """The effect and its joint."""
         return self.effect if self.joint is None else f"{self.effect} of {self.joint}"
 
+    @property
+    def title(self) -> str:
+        """The effect and its joint, as a heading."""
+        return self.effect if self.joint is None else f"{self.effect} on {self.joint}"
+
 
 Readings = Mapping[tuple[str, str | None], Mapping[str, Parameter]]
 

@@ -12,6 +12,7 @@ from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.questions import HALF_THE_SPEED, Question, possible, questions
 from scara_ident.diagnosis.selection_step import best_of_each
+from scara_ident.manners import listed
 from scara_ident.threads import one_blas_thread
 
 # A motion that is designed to tell, s, and how that is asked for.
@@ -139,8 +140,7 @@ def _confirmations(diagnosis: Diagnosis) -> Iterator[NextStep]:
     experiment = {item.decision.candidate.effect.name: item.decision for item in diagnosis.search.steps}
     for effect in diagnosis.effects:
         if effect.effect not in told:
-            label = effect.effect if effect.joint is None else f"{effect.effect} of {effect.joint}"
-            confirm.setdefault(effect.effect, []).append(label)
+            confirm.setdefault(effect.effect, []).append(effect.label)
     for name, labels in confirm.items():
         yield NextStep(f"to confirm {' and '.join(labels)}", experiment[name].candidate.effect.experiment)
 
@@ -163,8 +163,7 @@ def _faint(diagnosis: Diagnosis) -> Iterator[NextStep]:
         ("to see {} at all, which these recordings cannot show", hidden),
     ):
         for members in list(found.values())[:MOST]:
-            labels = " and ".join(member.label for member in members[:MOST_LABELS])
-            labels += f" and {len(members) - MOST_LABELS} more" if len(members) > MOST_LABELS else ""
+            labels = listed([member.label for member in members], MOST_LABELS, " and ")
             yield NextStep(words.format(labels, members[0].why), members[0].candidate.effect.experiment)
 
 

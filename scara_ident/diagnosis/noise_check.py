@@ -62,7 +62,7 @@ def within_a_step(step: SelectionStep, candidate: Candidate) -> str | None:
     if joint is None or not np.isfinite(way):
         return None
     sizes = [part[joint][0] or 0.0 for parts in noise_sizes(step.observations.data) for part in parts]
-    unit = "m" if step.scene.robot.prismatic[joint] else "rad"
+    unit = step.scene.robot.position_unit(joint)
     if way >= max(sizes, default=0.0):
         return None
     return f"it turns on {way:.2g} {unit}, less than a step of the encoder, {max(sizes):.2g} {unit}"

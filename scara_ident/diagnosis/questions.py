@@ -18,6 +18,7 @@ from scara_ident.diagnosis.noise_check import less_noise
 from scara_ident.diagnosis.shape import shape_over
 from scara_ident.effects import EFFECTS, Effect, Member
 from scara_ident.errors import ScaraIdentError
+from scara_ident.manners import listed
 
 Kind = Literal["rivals", "unexplained", "below_limit", "parameter"]
 # Rivals of one effect, and candidates that these recordings would hardly have shown: of each family, in all, and by name.
@@ -249,8 +250,7 @@ def _below_limit(diagnosis: Diagnosis, asked: set[str]) -> Iterator[Question]:
         suspects.append(Suspect(decision.candidate, decision.label, tuple(float(x) for x in value), _odds(decision)))
     if suspects:
         chosen = tuple(suspects[:MOST_BELOW])
-        more = f" and {len(chosen) - MOST_NAMED} more" if len(chosen) > MOST_NAMED else ""
-        text = f"what these recordings hardly show: {', '.join(item.label for item in chosen[:MOST_NAMED])}{more}"
+        text = f"what these recordings hardly show: {listed([item.label for item in chosen], MOST_NAMED)}"
         yield Question("below_limit", text, chosen, experiment="record another motion over the whole workspace")
 
 

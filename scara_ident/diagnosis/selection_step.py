@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision, decide
-from scara_ident.diagnosis.candidate_tests import Examination, examine
+from scara_ident.diagnosis.candidate_tests import Examination, examine, gains
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, columns_at_hand, with_columns
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel
-from scara_ident.diagnosis.gain import gains
 from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.effects import Scene
 from scara_ident.estimation.joint_rows import JointRows

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.diagnosis.acceptance import Decision
-from scara_ident.diagnosis.candidate_tests import examine
+from scara_ident.diagnosis.candidate_tests import examine, gains
 from scara_ident.diagnosis.candidates import with_columns
-from scara_ident.diagnosis.gain import gains
 from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.estimation.run_variation import (

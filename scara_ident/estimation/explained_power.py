@@ -12,10 +12,9 @@ from scara_ident.arrays import Array, runs_of
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import informations, kept_rows
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import Stretch, motion_of, torque_of
+from scara_ident.motion.motion import Stretch, motion_of, thinned, torque_of
 from scara_ident.motion.prepared import PreparedData, PreparedStretch
 from scara_ident.motion.rest import LONGEST_WIDENING, Bands, fading
-from scara_ident.motion.thinning import thinned
 from scara_ident.threads import side_by_side
 
 # The first fit is not in a narrower band, Hz: too much about turning points would be left out to fit the rest.

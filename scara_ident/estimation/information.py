@@ -175,6 +175,12 @@ class Information(Frozen):
         half = orthonormal(self.regressor_factor)
         return half @ half.T
 
+    def std(self) -> Array:
+        """Return the std of every parameter for rows of unit noise, shape (p,); infinite where it stays unknown."""
+        variance = np.diag(self.inverse()).copy()
+        variance[self.solve().undetermined] = np.inf
+        return np.sqrt(variance)
+
     def residual_sum(self, value: Array | None = None) -> float:
         """Return the sum of squared residuals of parameters, by default of the least-squares estimate."""
         if value is None:

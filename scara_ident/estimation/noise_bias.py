@@ -16,8 +16,9 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import weighted
 from scara_ident.estimation.observations import Observations, informations
+from scara_ident.manners import listed
 from scara_ident.motion.position_noise import NoiseSizes, noise_sizes, noisier
-from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
+from scara_ident.motion.prepared import PreparedData, PreparedRecording
 from scara_ident.threads import side_by_side
 
 # Share of an acceleration's square that is noise within the band: less biases an inertia by less than a hundredth of a percent.
@@ -68,11 +69,7 @@ def noise_torque(observations: Observations, value: Array) -> Array:
 def _noise_torque(observations: Observations, value: Array) -> Array:
     model, data = observations.model, noisier(observations.data)
 
-    def of_motion(part: PreparedStretch) -> Array:
-        columns = model.joint_columns(part.motion)
-        return np.array([value[own] @ rows for own, rows in zip(model.active, columns, strict=True)])
-
-    again = side_by_side(of_motion, data.stretches)
+    again = side_by_side(lambda part: model.torque(part.motion, value), data.stretches)
     square, count = np.zeros(len(observations.joints)), np.zeros(len(observations.joints))
     parts = zip(observations.data.stretches, observations.predicted(value), again, strict=True)
     for part, once, twice in parts:
@@ -120,6 +117,5 @@ def bias_sentence(names: Sequence[str], bias: Array, std: Array) -> str | None:
     moved = [k for k in np.argsort(-np.abs(bias) / chance) if abs(bias[k]) > SPOKEN_OF * chance[k]]
     if not moved:
         return None
-    some = ", ".join(f"{names[k]} by about {bias[k]:.2g}" for k in moved[:6])
-    more = f" and {len(moved) - 6} more" if len(moved) > 6 else ""
-    return f"the noise of the positions biases {some}{more}; their standard deviations hold that"
+    said = listed([f"{names[k]} by about {bias[k]:.2g}" for k in moved], 6)
+    return f"the noise of the positions biases {said}; their standard deviations hold that"

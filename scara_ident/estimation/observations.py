@@ -62,19 +62,6 @@ class Observations(Frozen):
         """The observations whose rows are those of `data` and `raw`."""
         return self if self.kept is None else self.kept
 
-    def leading(self, model: TorqueModel) -> Observations:
-        """Return the observations of a model whose terms are the first of this one's."""
-        kept = [joint.columns < len(model.columns) for joint in self.joints]
-        joints = (
-            replace(rows, columns=rows.columns[own], table=rows.table[np.append(own, True)])
-            for rows, own in zip(self.joints, kept, strict=True)
-        )
-        raw = tuple(
-            tuple(tuple(rows[own] for rows, own in zip(part, kept, strict=True)) for part in recording)
-            for recording in self.raw
-        )
-        return Observations(model, self.data, tuple(joints), self.owner, raw)
-
     @property
     def parameters(self) -> int:
         """Number of parameters p."""
@@ -157,11 +144,6 @@ class Observations(Frozen):
     def samples(self) -> int:
         """Samples on the uniform time grids, those of long files counted in."""
         return sum(part.samples for part in self.data.stretches) if self.counts is None else sum(self.counts)
-
-    @property
-    def row_step(self) -> tuple[int, ...]:
-        """For each joint how many samples one row stands for."""
-        return next((part.steps for part in self._usable), (1,) * len(self.joints))
 
     @property
     def left_out_ends(self) -> float:

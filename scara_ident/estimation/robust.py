@@ -19,6 +19,7 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, orthonormal, weighted
 from scara_ident.estimation.joint_rows import JointRows, block_products
 from scara_ident.estimation.observations import Observations
+from scara_ident.manners import listed
 from scara_ident.threads import one_blas_thread, side_by_side
 
 # Blocks whose rms is that many times the noise floor begin to be bounded, and are given up. White noise of ten rows in a block
@@ -144,9 +145,8 @@ def disagreement(estimate: Estimate, robust: RobustFit) -> str | None:
     worst = [int(k) for k in np.argsort(-np.abs(shift)) if abs(shift[k]) > 1.0]
     if not worst:
         return None
-    said = ", ".join(f"{estimate.model.names[k]} by {shift[k]:+.1f} std" for k in worst[:LISTED])
-    more = f" and {len(worst) - LISTED} more" if len(worst) > LISTED else ""
-    return f"a fit that bounds what each half second can do differs from least squares in {said}{more}"
+    said = listed([f"{estimate.model.names[k]} by {shift[k]:+.1f} std" for k in worst], LISTED)
+    return f"a fit that bounds what each half second can do differs from least squares in {said}"
 
 
 def _huber(size: Array) -> Array:

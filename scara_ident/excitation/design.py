@@ -122,10 +122,7 @@ class Design(Saved, told_by="design"):
 
         For the given noise of the torques, or per unit of it on every row, white and at the design's samples.
         """
-        total = self.total
-        variance = np.diag(total.inverse()).copy()
-        variance[total.solve().undetermined] = np.inf
-        return np.sqrt(variance)
+        return self.total.std()
 
 
 def default_harmonics(duration: float, joints: int, trajectories: int = 1) -> int:

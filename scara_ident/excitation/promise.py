@@ -14,6 +14,7 @@ from scara_ident.diagnosis.belief import Blocks, believed, known_blocks
 from scara_ident.diagnosis.candidates import Candidate, Rows
 from scara_ident.diagnosis.questions import MOST_NAMED, Question, Suspect
 from scara_ident.effects import Parameter, Scene, Signals
+from scara_ident.manners import listed
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import block_seconds
 from scara_ident.motion.rest import Bands
@@ -96,11 +97,10 @@ class Told:
         if self.settled:
             return ""
         unshown = self.hidden[:MOST_NAMED]
-        more = f" and {len(self.hidden) - len(unshown)} more" if len(self.hidden) > len(unshown) else ""
-        which = ", ".join(item.label for item in unshown) or self.question.text
+        which = listed([item.label for item in self.hidden], MOST_NAMED) or self.question.text
         experiments = dict.fromkeys(item.candidate.effect.experiment for item in unshown)
         what = "; ".join(experiments) if len(self.question.suspects) > 1 and unshown else self.question.experiment
-        return f"Would not tell: {which}{more}. What would: {what}."
+        return f"Would not tell: {which}. What would: {what}."
 
     def entry(self) -> dict[str, object]:
         """Return it as plain values."""

@@ -127,7 +127,7 @@ def stopping(design: Design, asked: Mapping[str, float], not_judged: Sequence[st
     wanted = np.array(list(asked.values()))
 
     def farthest(known: Information, motions: int, seconds: float) -> After:
-        std = _std(known)[columns]
+        std = known.std()[columns]
         worst = int(np.argmax(std / wanted))
         return After(motions, seconds, names[columns[worst]], float(std[worst]), float(wanted[worst]))
 
@@ -151,12 +151,6 @@ def stopping(design: Design, asked: Mapping[str, float], not_judged: Sequence[st
         middle = (low + high) // 2
         low, high = (low, middle) if enough(middle) else (middle, high)
     return Stopping(tuple(after), high if high <= MOST_REPETITIONS else None, tuple(not_judged))
-
-
-def _std(known: Information) -> Array:
-    variance = np.diag(known.inverse()).copy()
-    variance[known.solve().undetermined] = np.inf
-    return np.sqrt(variance)
 
 
 def asked_std(words: Sequence[str], values: Mapping[str, float]) -> tuple[dict[str, float], tuple[str, ...]]:

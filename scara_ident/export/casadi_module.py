@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import chain
 
-from scara_ident.export.code import inputs_of
-from scara_ident.export.python_module import constants, docstring, function, numbers
+from scara_ident.export.code import constants, docstring, function, inputs_of, numbers
 from scara_ident.export.traced_model import TracedModel
 
 _TEXT = '''\

@@ -1,9 +1,10 @@
-"""Recorded arithmetic as straight-line code of a programming language."""
+"""Recorded arithmetic as straight-line code of a programming language, and the parts of the Python modules that have it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from scara_ident.model.regressor.tracing import (
     ABS,
@@ -104,3 +105,30 @@ def _output(value: Scalar, names: dict[int, str], language: Language) -> str:
 def _constant(value: float, language: Language) -> str:
     text = language.number(float(value))
     return f"({text})" if text.startswith("-") else text
+
+
+def docstring(first: str, lines: Sequence[str]) -> str:
+    """Return a module's docstring."""
+    text = "\n".join([first, "", *lines]) if lines else first
+    return '"""' + text.replace("\\", "/").replace('"""', "'''") + ('\n"""' if lines else '"""')
+
+
+def constants(values: Mapping[str, tuple[Any, str]]) -> str:
+    """Return assignments with their comments."""
+    return "\n".join(f"{name} = {value!r}  # {comment}" for name, (value, comment) in values.items())
+
+
+def numbers(values: Any) -> tuple[float, ...]:
+    """Return an array's numbers as they are written."""
+    return tuple(float(value) for value in values)
+
+
+def function(name: str, about: str, trace: Trace, outputs: Sequence[Scalar], joints: int) -> str:
+    """Return a function of q, v and a that gives a list."""
+    lines = [
+        f'"""{about}"""',
+        f"out = [0.0] * {len(outputs)}",
+        *code_lines(trace, outputs, PYTHON, joints),
+        "return out",
+    ]
+    return "\n    ".join([f"def {name}(q, v, a):", *lines])

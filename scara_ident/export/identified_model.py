@@ -136,8 +136,7 @@ class IdentifiedModel:
 
     def torque(self, motion: Motion) -> Array:
         """Return the torque along a motion, recorded side, shape (n, N)."""
-        columns = self.model.joint_columns(motion)
-        return np.array([self.value[own] @ rows for own, rows in zip(self.model.active, columns, strict=True)])
+        return self.model.torque(motion, self.value)
 
     def torque_std(self, motion: Motion) -> Array:
         """Return by how much the parameters leave the torque along a motion open, recorded side, shape (n, N).

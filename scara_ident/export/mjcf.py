@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
@@ -63,9 +64,9 @@ def mjcf_text(
         bodies.append(body)
         notes += [] if note is None else [note]
 
-    root = ElementTree.Element("mujoco", model=robot.name)
+    root = Element("mujoco", model=robot.name)
     root.append(
-        _element(
+        Element(
             "compiler",
             angle="radian",
             autolimits="true",
@@ -76,10 +77,10 @@ def mjcf_text(
         )
     )
     gravity = format_numbers(robot.model.gravity.linear.tolist())
-    root.append(_element("option", timestep="0.001", integrator="implicitfast", gravity=gravity))
-    drawn = _element("default")
+    root.append(Element("option", timestep="0.001", integrator="implicitfast", gravity=gravity))
+    drawn = Element("default")
     # Drawn only: no mass and no contact.
-    drawn.append(_element("geom", type="capsule", mass="0", contype="0", conaffinity="0", rgba="0.6 0.65 0.7 1"))
+    drawn.append(Element("geom", type="capsule", mass="0", contype="0", conaffinity="0", rgba="0.6 0.65 0.7 1"))
     root.append(drawn)
     world = ElementTree.SubElement(root, "worldbody")
     _grow(robot, world, 0, bodies, armature, known)
@@ -90,7 +91,7 @@ def mjcf_text(
 
 def _grow(
     robot: Robot,
-    parent: ElementTree.Element,
+    parent: Element,
     parent_id: int,
     bodies: Sequence[Body],
     armature: Array,
@@ -121,12 +122,8 @@ def _grow(
         _grow(robot, element, child_id, bodies, armature, friction)
 
 
-def _element(tag: str, **attributes: str) -> ElementTree.Element:
-    return ElementTree.Element(tag, attributes)
-
-
-def _placed(tag: str, name: str, placement: pin.SE3) -> ElementTree.Element:
-    element = _element(tag, name=name)
+def _placed(tag: str, name: str, placement: pin.SE3) -> Element:
+    element = Element(tag, name=name)
     if np.any(placement.translation):
         element.set("pos", format_numbers(placement.translation.tolist()))
     if not np.array_equal(placement.rotation, np.eye(3)):
@@ -135,8 +132,8 @@ def _placed(tag: str, name: str, placement: pin.SE3) -> ElementTree.Element:
     return element
 
 
-def _joint(robot: Robot, j: int, armature: float, coulomb: float, viscous: float) -> ElementTree.Element:
-    element = _element("joint", name=robot.joints[j], type="slide" if robot.prismatic[j] else "hinge")
+def _joint(robot: Robot, j: int, armature: float, coulomb: float, viscous: float) -> Element:
+    element = Element("joint", name=robot.joints[j], type="slide" if robot.prismatic[j] else "hinge")
     element.set("axis", format_numbers(_axis(robot, j).tolist()))
     # MuJoCo takes no one-sided range and no empty one.
     if np.isfinite(robot.lower[j]) and np.isfinite(robot.upper[j]) and robot.lower[j] < robot.upper[j]:
@@ -147,10 +144,10 @@ def _joint(robot: Robot, j: int, armature: float, coulomb: float, viscous: float
     return element
 
 
-def _actuators(robot: Robot, offset: Array) -> ElementTree.Element:
-    result = _element("actuator")
+def _actuators(robot: Robot, offset: Array) -> Element:
+    result = Element("actuator")
     for j, name in enumerate(robot.joints):
-        element = _element("general", name=name, joint=name, gear=format_numbers([1.0 / robot.row_scale[j]]))
+        element = Element("general", name=name, joint=name, gear=format_numbers([1.0 / robot.row_scale[j]]))
         if offset[j] != 0.0:
             element.set("biastype", "affine")
             element.set("biasprm", format_numbers([-offset[j], 0.0, 0.0]))
@@ -171,9 +168,9 @@ def _axis(robot: Robot, j: int) -> Array:
     return np.asarray(column[:3] if robot.prismatic[j] else column[3:])
 
 
-def _inertial(body: Body) -> ElementTree.Element:
+def _inertial(body: Body) -> Element:
     full = [body.inertia[k] for k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    return _element(
+    return Element(
         "inertial",
         pos=format_numbers(body.com.tolist()),
         mass=format_numbers([body.mass]),
@@ -199,7 +196,7 @@ def _acceptable(link: str, body: Body) -> tuple[Body, str | None]:
     return Body(body.mass, body.com, float(lifted.sum()) * np.eye(3) - spread), note
 
 
-def _draw(parent: ElementTree.Element, end: Array, radius: float) -> None:
+def _draw(parent: Element, end: Array, radius: float) -> None:
     if float(np.linalg.norm(end)) > radius > 0.0:
         ends = format_numbers([0.0, 0.0, 0.0, *end.tolist()])
-        parent.append(_element("geom", fromto=ends, size=format_numbers([radius])))
+        parent.append(Element("geom", fromto=ends, size=format_numbers([radius])))

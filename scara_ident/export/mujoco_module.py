@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scara_ident.arrays import Array
+from scara_ident.export.code import constants, docstring, function, numbers
 from scara_ident.export.friction import JointSideFriction
-from scara_ident.export.python_module import constants, docstring, function, numbers
 from scara_ident.export.traced_model import TracedModel
 
 _TEXT = '''\

@@ -210,7 +210,7 @@ def _rotors(robot: Robot, armature: Array, root: Element, content: bytes, told: 
 
 
 def _armature_comment(robot: Robot, joint: int, armature: float, element: Element, content: bytes) -> Iterator[Edit]:
-    unit = "kg" if robot.prismatic[joint] else "kg m^2"
+    unit = robot.armature_unit(joint)
     text = f" armature {format_numbers([armature])} {unit} at the joint "
     for comment in element.find_all(COMMENT):
         if _ARMATURE_COMMENT.fullmatch(content, comment.opened, comment.closing):

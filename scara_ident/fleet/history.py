@@ -8,7 +8,7 @@ lie far out, as a few arms that do change have them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -252,11 +252,6 @@ def variance_prior(ratios: Array, freedom: float) -> tuple[float, float]:
         value = float(polygamma(1, half))
         half += value * (1.0 - value / excess) / float(polygamma(2, half))
     return 2.0 * half, float(np.exp(np.mean(logs) + psi(half) - np.log(half)))
-
-
-def with_dates(history: History, count: int) -> History:
-    """Return the history as it was after so many dates."""
-    return replace(history, dates=history.dates[:count], visits=history.visits[:count])
 
 
 def noise_of(factor: Array, rows: float) -> float:

@@ -196,7 +196,9 @@ def _visit(model: TorqueModel, recordings: Sequence[Recording], reference: Refer
         reference = Reference(result.bands, estimate.value, scene.travel, scene.speed, reach, armatures)
     scene = reference.scene(model, observations)
     added = CandidateColumns(observations).rows(scene, watched(scene))
-    rows = with_columns(observations, [*added, *_delays(observations, reference.value)])
+    # What one second of delay of each joint's torque does on its rows.
+    delays: list[Rows] = [{j: own[None]} for j, own in enumerate(observations.late(reference.value))]
+    rows = with_columns(observations, [*added, *delays])
     known = [Information.empty(len(item.columns)).absorb_columns(item.table).factor for item in rows]
     errors = [
         np.nan if item is None or item.relative is None else item.relative for item in estimate.errors(result.training)
@@ -210,20 +212,6 @@ def _visit(model: TorqueModel, recordings: Sequence[Recording], reference: Refer
         np.array([item.table.shape[1] for item in rows], dtype=float),
         reference,
     )
-
-
-def _delays(observations: Observations, value: Array) -> list[Rows]:
-    """Return what one second of delay of each joint's torque does on its rows."""
-    raws = [raw for recording in observations.raw for raw in recording]
-    found: list[Rows] = []
-    for joint, own in enumerate(observations.joints):
-        parts = [
-            part.rows(joint, -np.gradient(value[own.columns] @ raw[joint], 1.0 / part.rate)[None])
-            for part, raw in zip(observations.data.stretches, raws, strict=True)
-            if part.usable
-        ]
-        found.append({joint: np.concatenate(parts, axis=1)})
-    return found
 
 
 def _size(candidate: Candidate, scene: Scene) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from datetime import date
 
 import numpy as np
@@ -50,11 +49,6 @@ def day(iso: str) -> str:
     """
     found = date.fromisoformat(iso)
     return f"{found.day} {found:%B %Y}"
-
-
-def listed(names: Sequence[str], most: int = 3) -> str:
-    """Return the first of some names, and how many more there are."""
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _amount(name: str, item: Parameter, shared: bool = True) -> str:

@@ -17,6 +17,7 @@ from scara_ident.identification.binned_residual import BIN, Binned, binned, boun
 from scara_ident.identification.event_background import without_states, without_trends
 from scara_ident.identification.event_search import Segment, standing_out
 from scara_ident.identification.usable import check_rows
+from scara_ident.model.regressor.kernel import configurations
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
 from scara_ident.motion.trajectories import LARGEST_SHIFT, SAME_RATE, alignment
 from scara_ident.robot.kinematics import tool_frame
@@ -308,7 +309,7 @@ def _per_force(robot: Robot, item: Binned, bins: Sequence[int]) -> Iterator[Arra
     place = robot.model.getFrameId(tool_frame(robot).name, pin.FrameType.BODY)
     model_data, back = robot.model.createData(), np.argsort(robot.order)
     for k in bins:
-        q = _configuration(robot, item.state[0][back, k])
+        q = configurations(robot.model, item.state[0][back, k : k + 1])[:, 0]
         jacobian = pin.computeFrameJacobian(robot.model, model_data, q, place, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
         yield -(jacobian[:3][:, robot.order] * robot.row_scale).T
 
@@ -332,17 +333,6 @@ def tool_force(robot: Robot, item: Binned, start: int, stop: int) -> tuple[Array
     force = np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-3)[0])
     total = float(right @ right)
     return force, 1.0 - float(np.sum((right - matrix @ force) ** 2)) / total if total > 0.0 else 0.0
-
-
-def _configuration(robot: Robot, angle: Array) -> Array:
-    """Return Pinocchio's configuration of joint positions in its own order."""
-    full = pin.neutral(robot.model)
-    for joint in list(robot.model.joints)[1:]:
-        if joint.nq == 1:
-            full[joint.idx_q] = angle[joint.idx_v]
-        else:
-            full[joint.idx_q : joint.idx_q + 2] = np.cos(angle[joint.idx_v]), np.sin(angle[joint.idx_v])
-    return np.asarray(full)
 
 
 def _repeated(segment: Segment, stretches: Sequence[Binned], data: PreparedData) -> bool:

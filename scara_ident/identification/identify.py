@@ -30,7 +30,7 @@ from scara_ident.identification.events import Event, event_notes, find_events
 from scara_ident.identification.long_recordings import with_all_samples
 from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
-from scara_ident.manners import Saved
+from scara_ident.manners import Saved, several
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.progress import Tell, Work, log_notes, silent
@@ -102,8 +102,7 @@ class Identification(Saved, told_by="identification"):
         return self.estimate.predict(q, v, a)
 
     def _in_short(self) -> str:
-        count = len(self.training.data.recordings)
-        return f"{self.estimate._in_short()} from {count} recording{'' if count == 1 else 's'}"
+        return f"{self.estimate._in_short()} from {several(len(self.training.data.recordings), 'recording')}"
 
     @cached_property
     def physical_consistency(self) -> PhysicalConsistency:

@@ -16,9 +16,8 @@ from scara_ident.errors import MemoryLimit, RecordingError, UsageError
 from scara_ident.files import path_fault
 from scara_ident.inspection.chain import arm_of, longest_chain
 from scara_ident.inspection.guess import Guess, guess
-from scara_ident.inspection.names import Meaning, meaning
+from scara_ident.inspection.names import Meaning, meaning, meanings_by_place
 from scara_ident.inspection.text import description_text, mapping
-from scara_ident.inspection.unnamed import meanings_by_place
 from scara_ident.recording.files import column_names, is_bag_folder, read_columns
 from scara_ident.recording.recording import Recording, read_recording
 from scara_ident.robot.description import check_description

@@ -1,12 +1,17 @@
-"""What the name of a column says: quantity, joint, unit, and whether it was measured or commanded."""
+"""What the name of a column says: quantity, joint, unit, and whether it was measured or commanded; else its place."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.inspection.values import ALIKE, slopes, time_unit
 from scara_ident.robot.units import find_unit, table_of
 
 QUANTITIES = {
@@ -60,6 +65,8 @@ _ENDINGS = {
 }  # fmt: skip
 # Units in brackets as they are also written.
 _ALSO = {"°": "deg", "°/s": "deg/s", "grad": "deg", "grad/s": "deg/s", "u/min": "rpm", "1/min": "rpm", "tr/min": "rpm"}
+# Columns without names, by how many a joint has: what slopes confirm comes first.
+BLOCKS = {3: ("position", "velocity", "effort"), 2: ("position", "effort")}
 # Units that their capitals tell from other words.
 _CAPITALS = re.compile(r"(?:^|[_ .])(mA|A|mNm|Nm|N)(?=$|[_ .\[])")
 
@@ -196,3 +203,41 @@ def _forms(joints: Sequence[str]) -> list[list[tuple[str, ...]]]:
         forms.append(mine)
     every = [form for mine in forms for form in mine]
     return [[form for form in mine if every.count(form) == 1] for mine in forms]
+
+
+def meanings_by_place(numbers: Mapping[str, Array], counts: Sequence[int]) -> dict[str, Meaning]:
+    """Return what columns without names hold, where their number and their slopes say it; nothing where they do not.
+
+    Parameters
+    ----------
+    numbers : mapping of str to ndarray, shape (N,)
+        All columns, in the file's order.
+    counts : sequence of int
+        How many joints there may be, the likeliest first.
+    """
+    names = list(numbers)
+    if not names or time_unit(numbers[names[0]]) is None:
+        return {}
+    for shares, count in product(BLOCKS, counts):
+        if len(names) - 1 != shares * count:
+            continue
+        blocks = dict(zip(BLOCKS[shares], np.reshape(names[1:], (shares, count)).tolist(), strict=True))
+        if "velocity" in blocks and not _are_slopes(numbers, names[0], blocks["position"], blocks["velocity"]):
+            continue
+        return {names[0]: _meaning("time", None)} | {
+            name: _meaning(quantity, k + 1) for quantity, block in blocks.items() for k, name in enumerate(block)
+        }
+    return {}
+
+
+def _meaning(quantity: str, number: int | None) -> Meaning:
+    return Meaning(quantity, None, number, None, False, False, f"{quantity} {{number}}", frozenset())
+
+
+def _are_slopes(numbers: Mapping[str, Array], time: str, positions: Sequence[str], velocities: Sequence[str]) -> bool:
+    slope, middle = slopes(numbers[time], np.array([numbers[name] for name in positions]))
+    for known, name in zip(slope, velocities, strict=True):
+        recorded = numbers[name][middle]
+        if np.std(known) > 0 and (np.std(recorded) == 0 or np.corrcoef(known, recorded)[0, 1] < ALIKE):
+            return False
+    return True

@@ -172,7 +172,7 @@ def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int 
     p = 11 * n
     names = [_numbered(text, i + 1) for i in range(n) for text in BODY_PARAMETERS]
     names += [f"Ia{i + 1}" for i in range(n)]
-    units = list(BODY_UNITS) * n + [_armature_unit(robot, i) for i in range(n)]
+    units = list(BODY_UNITS) * n + [robot.armature_unit(i) for i in range(n)]
 
     scale = _parameter_scale(robot)
     # Lengths of columns and what they share are those of the triangular factor, which has p rows.
@@ -232,10 +232,6 @@ def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int 
 def _numbered(text: str, body: int) -> str:
     # m2, mx2, I2zz: the body's number follows the symbol of the quantity.
     return text.replace("I", f"I{body}") if "I" in text else f"{text}{body}"
-
-
-def _armature_unit(robot: Robot, joint: int) -> str:
-    return "kg" if robot.prismatic[joint] else "kg m^2"
 
 
 def _length_scale(robot: Robot) -> float:

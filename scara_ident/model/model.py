@@ -96,6 +96,11 @@ class TorqueModel(Frozen):
             start = stop
         return found
 
+    def torque(self, motion: Motion, value: Array) -> Array:
+        """Return the torque of parameters ``value`` (p,) on a motion, recorded side, shape (n, N)."""
+        columns = self.joint_columns(motion)
+        return np.array([value[own] @ rows for own, rows in zip(self.active, columns, strict=True)])
+
 
 def build_model(robot: Robot, name: str = "complete") -> TorqueModel:
     """Build a model by its name.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
 
@@ -61,9 +60,6 @@ PARAMETERS: tuple[Parameter, ...] = (
 REDUCED: tuple[str, ...] = ("P_d1", "P_d2", "P_d4", "P_d5", "a01", "a11", "a21", "a02", "a12", "a22")
 """The ten parameters of the reduced model: no P_d3, no cubic friction, no offset."""
 
-REDUCED_COLUMNS: tuple[int, ...] = tuple(i for i, p in enumerate(PARAMETERS) if p.name in REDUCED)
-"""Columns of the regressor that the reduced model keeps, in the order of `REDUCED`."""
-
 
 def regressor(
     q: Array, v: Array, a: Array, *, link_length: float = LINK_LENGTH, reduction: tuple[float, float] = REDUCTION
@@ -115,55 +111,6 @@ def regressor(
         w[joint, first : first + 4] = direction, speed, direction * speed**2, speed**3
         w[joint, 13 + joint] = 1.0
     return w
-
-
-def inertial_grouping(link_length: float = LINK_LENGTH) -> Array:
-    """Matrix that takes the standard parameters of the two-link arm to P_d.
-
-    Parameters
-    ----------
-    link_length : float, optional
-        Length of link 1, m.
-
-    Returns
-    -------
-    ndarray, shape (5, 22)
-        ``P_d = grouping @ pi``, where pi holds ten parameters of link 1, ten of link 2 (m, m c, Ixx, Ixy, Iyy,
-        Ixz, Iyz, Izz, inertias about the joint's frame) and the two armatures Jm/tau^2, kg m^2.
-
-    Notes
-    -----
-    Eq. (2). Axes of both joints along z, link 2 at (l1, 0) in the frame of link 1.
-    """
-    mass, mx, my, izz = 0, 1, 2, 9
-    grouping = np.zeros((5, 22))
-    grouping[0, [izz, 10 + mass, 20]] = 1.0, link_length**2, 1.0
-    grouping[1, 10 + mx] = 1.0
-    grouping[2, 10 + my] = 1.0
-    grouping[3, 10 + izz] = 1.0
-    grouping[4, 21] = 1.0
-    return grouping
-
-
-def friction(velocity: ArrayLike, coefficients: ArrayLike) -> Array:
-    """Friction torque of one joint at the motor, eq. (3).
-
-    Parameters
-    ----------
-    velocity : array_like
-        Joint velocity, rad/s, any shape.
-    coefficients : array_like, shape (4,)
-        a_0 [N m], a_1 [N m s/rad], a_2 [N m s^2/rad^2], a_3 [N m s^3/rad^3].
-
-    Returns
-    -------
-    ndarray
-        Torque in N m, the shape of ``velocity``.
-    """
-    v = np.asarray(velocity, dtype=np.float64)
-    a0, a1, a2, a3 = np.asarray(coefficients, dtype=np.float64)
-    direction = np.sign(v)
-    return np.asarray(a0 * direction + a1 * v + a2 * direction * v**2 + a3 * v**3)
 
 
 def criteria(w: Array) -> tuple[float, float]:

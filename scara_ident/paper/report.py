@@ -109,10 +109,6 @@ class PaperReport:
         """Return the rows of a section; empty for a name that there is not."""
         return tuple(check for check in self.checks if check.section == name)
 
-    def differing(self) -> tuple[Check, ...]:
-        """Return the rows whose condition does not hold."""
-        return tuple(check for check in self.checks if check.agrees is False)
-
     def counts(self) -> tuple[SectionCount, ...]:
         """Return a count of agreeing and differing rows per section."""
         marks = {name: [check.agrees for check in self.section(name)] for name in self.sections}

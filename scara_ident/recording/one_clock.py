@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.manners import listed
 from scara_ident.recording.audit import Finding
 from scara_ident.recording.audit.samples import GAP_STEPS
 
@@ -105,6 +106,5 @@ def _findings(
         said = f"{len(groups)} groups of channels stand in rows of their own with the same times: joined"
         return (Finding("joined", said, len(groups)),)
     cut = f"; {lost} rows in gaps of theirs left out" if lost else ""
-    shown = ", ".join(resampled[:3]) + (f" and {len(resampled) - 3} more" if len(resampled) > 3 else "")
-    said = f"{shown} were sampled apart from {clock[0]}: interpolated onto its clock{cut}"
+    said = f"{listed(resampled, 3)} were sampled apart from {clock[0]}: interpolated onto its clock{cut}"
     return (Finding("resampled", said, len(resampled)),)

@@ -15,8 +15,9 @@ LEAST_VISITS = 5
 # Samples, which the band leaves independent, after which residuals are no longer alike.
 LONGEST_VISIT = 25
 DENSITY_BINS = (72, 44)
-# Logit of the share of samples outside the outermost edges of bins that are narrower in number towards the tails.
-TAIL = 5.5
+# Bins that are narrower in number towards the tails, fewer where many samples are equal, and the logit of the share of
+# samples outside the outermost edges.
+TAIL_BINS, TAIL = 30, 5.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +52,7 @@ def binned_means(x: Array, y: Array, limits: tuple[float, float], bins: int = ME
     return _means(place, y, centres)
 
 
-def tail_means(x: Array, y: Array, bins: int = MEAN_BINS) -> Means:
+def tail_means(x: Array, y: Array) -> Means:
     """Return means of y over all of x in bins of unequal width, which hold fewer samples the farther out they are.
 
     What is large in few samples only is then seen, and not alone in bins too empty for a mean.
@@ -60,10 +61,8 @@ def tail_means(x: Array, y: Array, bins: int = MEAN_BINS) -> Means:
     ----------
     x, y : ndarray, shape (N,)
         In the order of time.
-    bins : int, optional
-        At the most; fewer where many samples are equal.
     """
-    shares = 1.0 / (1.0 + np.exp(-np.linspace(-TAIL, TAIL, bins - 1)))
+    shares = 1.0 / (1.0 + np.exp(-np.linspace(-TAIL, TAIL, TAIL_BINS - 1)))
     edges = np.unique(np.quantile(x, shares))
     place = np.searchsorted(edges, x)
     count = np.bincount(place, minlength=len(edges) + 1)

@@ -26,8 +26,8 @@ def comparison_dict(comparison: Comparison) -> dict[str, Any]:
         "units": {
             joint: {
                 "torque": comparison.model.robot.torque_unit(j),
-                "velocity": f"{'m' if comparison.model.robot.prismatic[j] else 'rad'}/s",
-                "acceleration": f"{'m' if comparison.model.robot.prismatic[j] else 'rad'}/s^2",
+                "velocity": f"{comparison.model.robot.position_unit(j)}/s",
+                "acceleration": f"{comparison.model.robot.position_unit(j)}/s^2",
             }
             for j, joint in enumerate(joints)
         },

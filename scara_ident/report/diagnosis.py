@@ -176,7 +176,7 @@ def _rotor(rotor: RotorInertia, diagnosis: Diagnosis) -> dict[str, Any]:
 
 def _armature_unit(rotor: RotorInertia, diagnosis: Diagnosis) -> str:
     robot = diagnosis.robot
-    return "kg" if robot.prismatic[robot.joints.index(rotor.joint)] else "kg m^2"
+    return robot.armature_unit(robot.joints.index(rotor.joint))
 
 
 def _directly(name: str, told: Parameter, fitted: Parameter) -> str:

@@ -17,9 +17,12 @@ from scara_ident.estimation.saved import estimate_dict
 from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
+from scara_ident.manners import listed
 from scara_ident.model.urdf_values import urdf_values
 from scara_ident.robot.robot import Robot
 
+# Names in a sentence, at the most.
+MOST_NAMED = 12
 # What each shape of friction means.
 SHAPES = {
     "lubricated": "takes energy out, and grows ever less with speed",
@@ -111,20 +114,20 @@ def _left_out(robot: Robot, item: Observations) -> dict[str, Any]:
 
 def sentences(identification: Identification) -> tuple[str, ...]:
     """Return the result in words: where it generalises worst, and what the data leave open."""
-    found = []
+    found, robot = [], identification.model.robot
     worst = worst_validation(identification)
     if worst is not None:
         recording, joint, error = worst
         found.append(
             f"It generalises worst to {recording}, {joint}: {error.rms:.3g} "
-            f"{_unit(identification, joint)} rms, {error.relative:.1%} of the torque."
+            f"{robot.torque_unit(robot.joints.index(joint))} rms, {error.relative:.1%} of the torque."
         )
     else:
         found.append("Nothing was held out: give --validate recordings to learn how well it predicts.")
     open_ = undetermined(identification)
     if open_:
         found.append(
-            f"The data leave {_listed(open_)} undetermined; a motion that excites {'it' if len(open_) == 1 else 'them'} "
+            f"The data leave {listed(open_, MOST_NAMED)} undetermined; a motion that excites {'it' if len(open_) == 1 else 'them'} "
             "is needed."
         )
     else:
@@ -141,17 +144,17 @@ def sentences(identification: Identification) -> tuple[str, ...]:
         )
     small = not_told_from_zero(identification)
     if small:
-        found.append(f"Within two standard deviations of zero: {_listed(small)}.")
+        found.append(f"Within two standard deviations of zero: {listed(small, MOST_NAMED)}.")
     found.append(weights_said(identification.estimate))
     if identification.estimate.variation:
-        found += [f"{said}." for said in identification.estimate.variation.sentences(identification.model.robot)]
+        found += [f"{said}." for said in identification.estimate.variation.sentences(robot)]
     biased = bias_said(identification.estimate)
     if biased is not None:
         found.append(biased)
     if isinstance(identification.estimate, ConsistentEstimate):
         found += _shapes_said(identification.estimate.shapes)
     scales = urdf_scale(identification.estimate, identification.training)
-    found.append(scale_sentence(scales, identification.model.robot))
+    found.append(scale_sentence(scales, robot))
     return tuple(found)
 
 
@@ -188,15 +191,6 @@ def _shapes_said(choices: Sequence[ShapeChoice]) -> list[str]:
         tested = "" if choice.p_value is None else f" (p = {choice.p_value:.2g})"
         groups.setdefault((choice.shape, choice.why), []).append(f"{choice.joint}{tested}")
     return [
-        f"Friction is {shape} ({SHAPES[shape]}) on {_listed(joints)}: {why}." for (shape, why), joints in groups.items()
+        f"Friction is {shape} ({SHAPES[shape]}) on {listed(joints, MOST_NAMED)}: {why}."
+        for (shape, why), joints in groups.items()
     ]
-
-
-def _listed(names: list[str], most: int = 12) -> str:
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
-
-
-def _unit(identification: Identification, joint: str) -> str:
-    robot = identification.model.robot
-    return robot.torque_unit(robot.joints.index(joint))

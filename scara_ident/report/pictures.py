@@ -110,9 +110,8 @@ def effect_figures(context: DiagnosisContext) -> list[tuple[str, str, list[Seque
     found: list[tuple[str, str, list[Sequence[Figure]]]] = []
     with one_blas_thread():
         for effect, chapter in context.chapters:
-            title = effect.effect if effect.joint is None else f"{effect.effect} on {effect.joint}"
             rows: list[Sequence[Figure]] = [chapter_group(robot, chapter).figures, moment_group(robot, chapter).figures]
-            found.append((title, f"effect_{chapter.number}.png", rows))
+            found.append((effect.title, f"effect_{chapter.number}.png", rows))
         group = None if remainder is None else remainder_group(robot, remainder, context.sets["training"])
         if remainder is not None and group is not None:
             title = f"what no effect accounts for on {remainder.joint}"
@@ -233,9 +232,7 @@ def _parameters(design: Design) -> Figure:
         other = np.divide(1.0, size, out=np.full(len(size), np.inf), where=size > 0.0)
         labels = ("all parameters estimated", "all others known")
     else:
-        variance = np.diag(design.prior.inverse()).copy()
-        variance[design.prior.solve().undetermined] = np.inf
-        other = np.sqrt(variance)
+        other = design.prior.std()
         labels = ("after", "before")
     places = np.arange(float(len(together)))
     layers: list[Layer] = [

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
+from scara_ident.report.bins import Means
 
 # Arrays longer than this become 16-bit integers, which resolve 1/65000 of their range.
 MOST_PLAIN = 400
@@ -111,6 +112,21 @@ class Line(Layer):
         values, step = envelope(np.asarray(self.y, dtype=float), bucket), 0.5 * bucket * self.x.step
         # Two values stand for a bucket, at its quarter and at its three quarters.
         return replace(self, x=Grid(self.x.start + 0.5 * (step - self.x.step), step, len(values)), y=values)
+
+
+def mean_layers(means: Means, color: str, name: str) -> tuple[Layer, Layer]:
+    """Return means as a line in a band of two standard errors."""
+    band = Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, color)
+    return band, Line(means.x, means.y, color, name, 1.8)
+
+
+def thin_line(
+    time: Array, signal: Array, most: int, color: str, label: str, width: float = 1.4, dash: str = ""
+) -> Line:
+    """Return a line over equally spaced times of about so many points at the most."""
+    every = max(1, len(time) // most)
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    return Line(Grid(float(time[0]), every * step, -(-len(time) // every)), signal[::every], color, label, width, dash)
 
 
 def envelope(signal: Array, bucket: int) -> Array:

@@ -15,9 +15,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RobotError
+from scara_ident.errors import RobotError, UsageError
 from scara_ident.files import path_fault, real_path
-from scara_ident.manners import Frozen
+from scara_ident.manners import Frozen, several
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
 from scara_ident.robot.examples import urdf_of
 from scara_ident.robot.mimic import Follower, coupled_ends, followers, lock_followers, refuse_coupled
@@ -101,7 +101,7 @@ class Robot(Frozen):
         return len(self.joints)
 
     def _in_short(self) -> str:
-        return f"{self.name}: {self.n} joint{'' if self.n == 1 else 's'}, effort at the {self.effort_side}"
+        return f"{self.name}: {several(self.n, 'joint')}, effort at the {self.effort_side}"
 
     @cached_property
     def rotor_guess(self) -> RotorGuess:
@@ -123,6 +123,18 @@ class Robot(Frozen):
         """Effort limit on the side where effort is recorded, shape (n,)."""
         return self.effort_limit * np.abs(self.row_scale)
 
+    def joint_index(self, name: str) -> int:
+        """Return the place of a joint among `joints`.
+
+        Raises
+        ------
+        UsageError
+            If there is no such joint; the line lists those there are.
+        """
+        if name not in self.joints:
+            raise UsageError(f"{self.name} has no joint {name!r}; its joints are {', '.join(self.joints)}")
+        return self.joints.index(name)
+
     def torque_unit(self, joint: int) -> str:
         """Return the unit of the recorded torque of a joint after ``effort_gain``."""
         return "N" if self.prismatic[joint] and self.effort_side == "joint" else "N m"
@@ -130,6 +142,10 @@ class Robot(Frozen):
     def position_unit(self, joint: int) -> str:
         """Return the unit of a joint's position."""
         return "m" if self.prismatic[joint] else "rad"
+
+    def armature_unit(self, joint: int) -> str:
+        """Return the unit of a rotor's inertia at the joint."""
+        return "kg" if self.prismatic[joint] else "kg m^2"
 
     def standard_parameters(self) -> Array:
         """Return the nominal standard parameters of the URDF, shape (11 n,).

@@ -11,7 +11,7 @@ from scara_ident.simulation.defaults import virtual_arm
 from scara_ident.simulation.effects import CATALOGUE, EFFECTS, Effect, parse_effect
 from scara_ident.simulation.laws import MotionLaw
 from scara_ident.simulation.paths import PathError, circle, line
-from scara_ident.simulation.reconstructions import RECONSTRUCTIONS, reconstruction, reconstruction_match
+from scara_ident.simulation.reconstructions import RECONSTRUCTIONS, reconstruction
 from scara_ident.simulation.reference import ReferenceMotion, read_trajectory, sampled
 from scara_ident.simulation.runs import RunState, TorqueNoise
 from scara_ident.simulation.simulate import SimulationResult, TrueMotion, free_motion, simulate
@@ -39,7 +39,6 @@ __all__ = [
     "parse_effect",
     "read_trajectory",
     "reconstruction",
-    "reconstruction_match",
     "sampled",
     "simulate",
     "truth",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, UsageError
-from scara_ident.manners import Frozen
+from scara_ident.manners import Frozen, several
 from scara_ident.robot.robot import Robot
 from scara_ident.simulation.plant import PlantDraft, empty_draft
 
@@ -119,7 +119,7 @@ class VirtualArm(Frozen):
                 raise RobotError(f"{self.robot.name}: {name} must not be negative")
 
     def _in_short(self) -> str:
-        return f"{self.robot.name}: {self.robot.n} joint{'' if self.robot.n == 1 else 's'}"
+        return f"{self.robot.name}: {several(self.robot.n, 'joint')}"
 
     @property
     def scale(self) -> Array:
@@ -136,18 +136,6 @@ class VirtualArm(Frozen):
         """Joint position per encoder step, shape (n,), rad or m; 0 without steps."""
         steps = np.where(self.encoder_steps > 0.0, self.encoder_steps, np.inf)
         return np.asarray(2.0 * np.pi / steps / np.abs(self.robot.reduction))
-
-    def joint_index(self, name: str) -> int:
-        """Return the place of a joint in the robot's order.
-
-        Raises
-        ------
-        UsageError
-            If there is no such joint; the line lists those there are.
-        """
-        if name not in self.robot.joints:
-            raise UsageError(f"{self.robot.name} has no joint {name!r}; its joints are {', '.join(self.robot.joints)}")
-        return self.robot.joints.index(name)
 
     def link_inertia(self) -> Array:
         """Return the diagonal of the links' mass matrix at the neutral pose, without rotors, shape (n,)."""

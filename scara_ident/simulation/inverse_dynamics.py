@@ -1,4 +1,4 @@
-"""The torque that a motion takes, without effects: what the controller starts from and feeds forward."""
+"""The torque that a motion takes, without effects, and what the controller starts from."""
 
 from __future__ import annotations
 
@@ -19,12 +19,6 @@ def torque_at_start(arm: VirtualArm, motion: ReferenceMotion, bodies: Array | No
     a = np.where(v != 0.0, motion.acceleration[:, 0], 0.0)
     bodies = arm.bodies if bodies is None else bodies
     return inverse_dynamics(arm, bodies, motion.position[:, :1], v[:, None], a[:, None])[:, 0]
-
-
-def nominal_torque(arm: VirtualArm, motion: ReferenceMotion) -> Array:
-    """Return the torque of the URDF's bodies with the arm's rotors and friction, at the joint, shape (n, N)."""
-    nominal = arm.robot.standard_parameters()[: 10 * arm.robot.n].reshape(-1, 10)
-    return inverse_dynamics(arm, nominal, motion.position, motion.velocity, motion.acceleration)
 
 
 def inverse_dynamics(arm: VirtualArm, bodies: Array, q: Array, v: Array, a: Array) -> Array:

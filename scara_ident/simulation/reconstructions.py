@@ -3,20 +3,16 @@
 The paper draws them in a figure that is lost and prints of them only the duration, the range of q2, the four peaks of
 Table 1 and the indexes J_d and J_k. The paths here, with a trapezoidal law, were found by least squares on those
 figures and nothing else; other paths may fit as well. They are not the paper's trajectories, and everything that
-shows them must say so. `reconstruction_match` tells how far they agree.
+shows them must say so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from scara_ident.errors import UsageError
-from scara_ident.paper import LINK_LENGTH, TABLE_1, TRAJECTORIES, criteria, regressor
-from scara_ident.paper.tables import DURATION, POSITION_RANGE_2
-from scara_ident.paper.trajectories import SAMPLES
+from scara_ident.paper import TRAJECTORIES
+from scara_ident.paper.tables import DURATION
 from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation.laws import MotionLaw
 from scara_ident.simulation.paths import circle, line
@@ -53,22 +49,6 @@ RECONSTRUCTIONS: dict[str, LinePath | CirclePath] = {
 }
 
 
-@dataclass(frozen=True)
-class Match:
-    """One figure of the paper and the reconstruction's."""
-
-    trajectory: str
-    quantity: str
-    unit: str
-    printed: float
-    reconstructed: float
-
-    @property
-    def relative(self) -> float:
-        """Difference relative to the printed figure."""
-        return self.reconstructed / self.printed - 1.0
-
-
 def reconstruction(name: str, robot: Robot | None = None, *, rate: float = 1000.0) -> ReferenceMotion:
     """Return the reconstruction of one of the paper's working trajectories.
 
@@ -98,45 +78,3 @@ def reconstruction(name: str, robot: Robot | None = None, *, rate: float = 1000.
         robot, path.centre, path.radius, duration, near=ELBOW, start_angle=path.start_angle, turns=path.turns,
         law=path.law, rate=rate, name=name,
     )  # fmt: skip
-
-
-def reconstruction_match(names: tuple[str, ...] = ("L1", "L2", "CI"), *, samples: int = SAMPLES) -> tuple[Match, ...]:
-    """Compare the reconstructions with the figures that the paper prints.
-
-    Parameters
-    ----------
-    names : tuple of str
-    samples : int
-        Equally spaced samples for J_d and J_k, 2500 as for the paper's other trajectories.
-    """
-    found: list[Match] = []
-    for name in names:
-        column = TRAJECTORIES.index(name)
-        motion = reconstruction(name)
-        coarse = motion.at(np.linspace(0.0, motion.duration, samples))
-        log_det, condition = criteria(
-            regressor(coarse.position, coarse.velocity, coarse.acceleration, link_length=LINK_LENGTH)
-        )
-        low, high = POSITION_RANGE_2[column]
-        found.append(Match(name, "duration", "s", DURATION[column], motion.duration))
-        found.append(Match(name, "smallest q2", "rad", low, float(motion.position[1].min())))
-        found.append(Match(name, "largest q2", "rad", high, float(motion.position[1].max())))
-        for word, unit, printed, signal in (
-            ("velocity", "rad/s", TABLE_1.peak_velocity, motion.velocity),
-            ("acceleration", "rad/s^2", TABLE_1.peak_acceleration, motion.acceleration),
-        ):
-            for j in range(2):
-                peak = float(np.abs(signal[j]).max())
-                found.append(Match(name, f"peak {word} of joint {j + 1}", unit, printed[j][column], peak))
-        found.append(Match(name, "J_d", "", TABLE_1.log_det[column], log_det))
-        found.append(Match(name, "J_k", "", TABLE_1.condition[column], condition))
-    return tuple(found)
-
-
-def print_reconstruction_match(write: Callable[[str], object] = print) -> None:
-    """Print the table of `reconstruction_match`."""
-    write("Reconstructions of the paper's working trajectories (not the originals, which are not published)")
-    write(f"{'':4}{'quantity':34}{'paper':>12}{'reconstructed':>15}{'difference':>12}")
-    for row in reconstruction_match():
-        quantity = f"{row.quantity} [{row.unit}]" if row.unit else row.quantity
-        write(f"{row.trajectory:4}{quantity:34}{row.printed:12.5g}{row.reconstructed:15.5g}{row.relative:11.1%}")

@@ -100,8 +100,3 @@ class RunState:
         draft.gain *= self.torque_scale[back]
         draft.shift += self.torque_offset[back]
         draft.delay += self.delay
-
-
-def usual_run(arm: VirtualArm) -> RunState:
-    """Return the run in which nothing differs."""
-    return RunState(np.ones(arm.robot.n), np.ones(arm.robot.n), np.zeros(arm.robot.n))

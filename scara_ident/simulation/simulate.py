@@ -227,7 +227,7 @@ def _link_position(arm: VirtualArm, true: TrueMotion, joints: Sequence[str], see
         return None
     zero = np.random.default_rng(seed).uniform(size=arm.robot.n)
     read = np.full(true.link_position.shape, np.nan)
-    for j in map(arm.joint_index, joints):
+    for j in map(arm.robot.joint_index, joints):
         grid = arm.encoder_resolution[j]
         link = true.link_position[j]
         read[j] = grid * np.floor(link / grid + zero[j]) if grid > 0.0 else link

@@ -13,6 +13,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.export.identified_model import IdentifiedModel
+from scara_ident.manners import listed
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.files import column_names
@@ -27,6 +28,8 @@ from scara_ident.use.joint_limits import JointLimits, Margin, margins
 CLOSE, UNSURE = 2.0, 0.1
 # Slowest share of the speed that is tried, and how finely the largest that can be run is found.
 SLOWEST, STEPS = 0.02, 14
+# Limits or joints in a sentence, at the most.
+MOST_NAMED = 6
 # Samples at which slower motions are looked at.
 MOST_SAMPLES = 5000
 
@@ -281,7 +284,7 @@ def sentences(found: Check) -> list[str]:
         )
         others = [f"{each.name} at {each.time:.3f} s" for each in found.broken[1:]]
         if others:
-            said.append(f"Also beyond their limits: {_listed(others)}.")
+            said.append(f"Also beyond their limits: {listed(others, MOST_NAMED)}.")
     close = _close(found)
     if close:
         said.append(
@@ -294,7 +297,7 @@ def sentences(found: Check) -> list[str]:
     ]
     if unsure:
         said.append(
-            f"By two standard deviations the largest torque is known to no better than a tenth on {_listed(unsure)}."
+            f"By two standard deviations the largest torque is known to no better than a tenth on {listed(unsure, MOST_NAMED)}."
         )
     said.append(
         f"The drives give {energy.given.sum():.4g} J and take {energy.returned.sum():.4g} J back; "
@@ -310,10 +313,6 @@ def _close(found: Check) -> list[Margin]:
 
 def _named(each: Margin) -> str:
     return f"{each.kind.partition('.')[0]} of {each.joint}"
-
-
-def _listed(words: list[str], most: int = 6) -> str:
-    return ", ".join(words) if len(words) <= most else f"{', '.join(words[:most])} and {len(words) - most} more"
 
 
 def limits_of_joint(robot: Robot, limits: JointLimits, joint: int) -> dict[str, tuple[float, float]]:

@@ -67,7 +67,7 @@ def joint_limits(
     for name, (low, high) in (ranges or {}).items():
         if not low < high:
             raise UsageError(f"range of {name}: {low:g}..{high:g} is empty; give lower < upper")
-        lower[_place(robot, name)], upper[_place(robot, name)] = low, high
+        lower[robot.joint_index(name)], upper[robot.joint_index(name)] = low, high
     found = []
     for kind, given, own in (
         ("velocity", velocities, robot.velocity_limit),
@@ -79,15 +79,9 @@ def joint_limits(
         for name, value in (given or {}).items():
             if not value > 0.0:
                 raise UsageError(f"{kind} limit of {name}: {value:g} allows no motion; give more than 0")
-            bound[_place(robot, name)] = value
+            bound[robot.joint_index(name)] = value
         found.append(bound)
     return JointLimits(lower, upper, *found)
-
-
-def _place(robot: Robot, name: str) -> int:
-    if name not in robot.joints:
-        raise UsageError(f"{robot.name} has no joint {name!r}; its joints are {', '.join(robot.joints)}")
-    return robot.joints.index(name)
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,6 @@ GOOD = Examination(
     gain=0.3,
     held_out=0.2,
     fold_gains=(0.2, 0.2, 0.2, None),
-    contribution=1.0,
     model_value=SCENE.value,
     left=np.ones(4),
     products=np.eye(2),

@@ -32,7 +32,7 @@ def examined(freedom: float, size: int) -> Examination:
     """An examination of which only these are asked."""
     nothing = np.zeros(size)
     return Examination(
-        nothing, nothing, np.eye(size), 0.0, 1.0, 0.5, 0.5, (), 1.0, nothing, nothing, np.eye(size), freedom
+        nothing, nothing, np.eye(size), 0.0, 1.0, 0.5, 0.5, (), nothing, nothing, np.eye(size), freedom
     )  # fmt: skip
 
 

@@ -9,11 +9,10 @@ import pytest
 
 from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.belief import Blocks, believed, known_blocks, times_apart, times_believed
-from scara_ident.diagnosis.candidate_tests import examine
+from scara_ident.diagnosis.candidate_tests import examine, gains
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitted_model import FittedModel
-from scara_ident.diagnosis.gain import gains
 from scara_ident.diagnosis.questions import Question, Suspect, questions
 from scara_ident.effects import Member
 from scara_ident.effects.measurement import SAMPLING, TimeDelay

@@ -8,10 +8,11 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 from scipy.stats import f
 
-from scara_ident.diagnosis.candidate_tests import Examination, coefficients, examine, held_out_gains
+from scara_ident.diagnosis.candidate_tests import Examination, coefficients, examine, gains, held_out_gains
 from scara_ident.diagnosis.candidates import Rows
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitted_model import FittedModel
+from scara_ident.estimation.joint_rows import JointRows
 from tests.diagnosis.made import dense_rows, model_of, uneven_blocks
 
 ROWS = 1600
@@ -55,7 +56,7 @@ def test_a_textbook_test_would_call_correlated_noise_an_effect():
     assert low > 20
 
 
-def test_value_gain_and_contribution_are_those_of_the_joint_fit():
+def test_value_and_gain_are_those_of_the_joint_fit():
     rng = np.random.default_rng(2)
     columns = slow(rng, 6)
     torque = columns @ [1.0, -2.0, 0.5, 0.3, -0.2, 0.0] + rng.standard_normal(ROWS)
@@ -68,7 +69,6 @@ def test_value_gain_and_contribution_are_those_of_the_joint_fit():
         before = np.sum((torque - columns[:, :3] @ alone) ** 2)
         after = np.sum((torque - columns[:, [0, 1, 2, *group]] @ joined) ** 2)
         assert result.gain == pytest.approx(1.0 - after / before, rel=1e-6)
-        assert result.contribution == pytest.approx(before - after, rel=1e-6)
 
 
 @pytest.mark.parametrize("place", range(7))
@@ -274,7 +274,6 @@ def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
         float(1.0 - after / before),
         float(saved / before),
         tuple(gains),
-        float(before - after),
         own @ np.linalg.lstsq(own, torque, rcond=1e-12)[0],
         by_block(left**2),
         x.T @ x,
@@ -298,7 +297,7 @@ def test_it_is_what_all_rows_of_all_joints_say(seed: int):
         assert_allclose(item.p_value, dense.p_value, rtol=1e-7)
         assert item.freedom == pytest.approx(dense.freedom, rel=1e-7)
         assert item.outside == pytest.approx(dense.outside, rel=1e-9)
-        for name in ("gain", "held_out", "contribution"):
+        for name in ("gain", "held_out"):
             assert getattr(item, name) == pytest.approx(getattr(dense, name), rel=1e-9, abs=1e-9), name
         assert [gain is None for gain in item.fold_gains] == [gain is None for gain in dense.fold_gains]
         assert [x for x in item.fold_gains if x is not None] == pytest.approx(
@@ -331,3 +330,45 @@ def test_gains_alone_are_those_of_the_whole_examination():
     found = examine(model, candidates)
     assert_allclose(held_out_gains(model, candidates), [item.held_out for item in found], rtol=1e-12, atol=1e-15)
     assert held_out_gains(model, []) == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_it_is_what_is_removed_over_that_and_what_the_joint_keeps(seed: int):
+    model, candidates = uneven_blocks(seed)
+    candidates = candidates[:4]
+    found = examine(model, candidates)
+    sizes = [rows.table.shape[1] for rows in model.joints]
+    for joint in range(3):
+        own = slice(sum(sizes[:joint]), sum(sizes[: joint + 1]))
+        told = gains(model, candidates, [joint] * len(candidates), found)
+        for candidate, item, gain in zip(candidates, found, told, strict=True):
+            rows, _ = dense_rows(model, candidate)
+            errors = [
+                rows[:, -1] - columns @ np.linalg.lstsq(columns, rows[:, -1], rcond=1e-10)[0]
+                for columns in (rows[:, : model.parameters], rows[:, :-1])
+            ]
+            before, after = errors
+            removed = item.held_out * float(np.sum(before**2))
+            lost = float(np.sum(before**2) - np.sum(after**2)) - removed
+            kept = float(np.sum(after[own] ** 2)) + lost
+            assert gain == pytest.approx(removed / (max(removed, 0.0) + kept), rel=1e-6, abs=1e-9)
+    assert gains(model, candidates, [None] * len(candidates), found) == [item.held_out for item in found]
+
+
+def test_it_is_not_above_the_whole_where_other_joints_errors_fall_too():
+    """Two joints share a parameter, which what is missing on the first has pushed off: both errors fall with it."""
+    rng = np.random.default_rng(3)
+    shared, missing = rng.standard_normal((2, 400))
+    missing += shared
+    torques = (shared + missing + 0.1 * rng.standard_normal(400), shared + 0.1 * rng.standard_normal(400))
+    starts, counts = np.arange(0, 401, 40), np.full(10, 40.0)
+    rows = tuple(JointRows(np.array([0]), np.vstack([shared, torque]), starts, counts) for torque in torques)
+    owner = np.arange(10) // 5
+    model = FittedModel(rows, 1, owner, owner, np.ones(2))
+    candidate = {0: missing[None]}
+    (item,) = examine(model, [candidate])
+    (gain,) = gains(model, [candidate], [0], [item])
+    before = [float(np.sum(error**2)) for error in model.residual]
+    # All that it saves, over what its joint had left.
+    assert item.held_out * sum(before) / before[0] > 1.1
+    assert 0.95 < gain < 1.0

@@ -18,7 +18,7 @@ from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations, informations, observe
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.low_pass import low_pass
-from scara_ident.motion.prepared import prepare, row_step
+from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from tests.arms import PLANAR_2R, SWING_FRICTION, swing, write_urdf
@@ -75,7 +75,6 @@ def test_rows_count_samples_whatever_the_band_keeps(model: TorqueModel, one: Rec
     for bands in ([4.0, 4.0], [10.0, 25.0], [None, None]):
         item = seen(model, one, bands=bands)
         assert item.samples == len(one.time)
-        assert item.row_step == tuple(row_step(RATE, band) for band in bands)
         left = len(one.time) - item.left_out_ends * RATE
         unfiltered = item.unfiltered_rms(np.zeros(item.parameters))
         for j, banded in enumerate(item.by_joint):
@@ -321,19 +320,6 @@ def test_recordings_that_are_known_in_the_bands_are_not_observed_again(
     # In other bands nothing is known.
     observe(model, prepare([one], (5.0, 5.0)), known)
     assert made[1:] == [one.name]
-
-
-def test_the_first_terms_alone_are_the_model_of_them(model: TorqueModel, one: Recording):
-    first = TorqueModel("first", model.robot, model.terms[:2])
-    found, wanted = seen(model, one).leading(first), seen(first, one)
-    assert found.parameters == len(first.columns) < len(model.columns)
-    for part, whole in zip(found.joints, wanted.joints, strict=True):
-        assert_array_equal(part.columns, whole.columns)
-        assert_allclose(part.table, whole.table, rtol=0, atol=1e-12 * np.max(np.abs(whole.table)))
-        assert_array_equal(part.starts, whole.starts)
-    value = np.linspace(0.1, 1.0, found.parameters)
-    for part, whole in zip(found.predicted(value), wanted.predicted(value), strict=True):
-        assert_allclose(part, whole, rtol=0, atol=1e-12)
 
 
 def test_the_factors_alone_are_those_of_the_rows(model: TorqueModel, one: Recording):

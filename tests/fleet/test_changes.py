@@ -16,8 +16,12 @@ from scara_ident.fleet.changes import (
     residual_scatter,
     trials_of,
 )
-from scara_ident.fleet.history import common_removed, noise_of, with_dates
+from scara_ident.fleet.history import History, common_removed, noise_of
 from tests.fleet.made import DATES, WEAR, WORN
+
+
+def with_dates(history: History, count: int) -> History:
+    return replace(history, dates=history.dates[:count], visits=history.visits[:count])
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scara_ident.fleet.history import common_removed, freedom_of, run_scatter, scatter, variance_prior, with_dates
+from scara_ident.fleet.history import common_removed, freedom_of, run_scatter, scatter, variance_prior
 
 
 def test_the_scatter_is_that_which_was_put_in_and_a_slope_or_an_odd_arm_hardly_moves_it():
@@ -67,7 +67,5 @@ def test_parameters_that_all_dates_share_leave_nothing_of_themselves(histories):
     assert 0.5 < np.mean(np.concatenate(left) ** 2) < 1.5
 
 
-def test_fewer_dates_are_the_first_ones(histories):
-    early = with_dates(histories[0], 3)
-    assert early.dates == histories[0].dates[:3] and len(early.rows) == 3
-    assert early.days[0] == 0.0 and early.days[1] == 31.0
+def test_days_are_counted_from_the_first_date(histories):
+    assert histories[0].days[0] == 0.0 and histories[0].days[1] == 31.0

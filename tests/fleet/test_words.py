@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.fleet.changes import Change
-from scara_ident.fleet.words import day, listed, sentence
+from scara_ident.fleet.words import day, sentence
 
 
 def test_a_change_is_said_with_size_uncertainty_and_date(histories):
@@ -36,7 +36,5 @@ def test_a_change_is_said_with_size_uncertainty_and_date(histories):
     assert unknown == "Residual of joint2 up 200 % (± 10 %) since 1 March 2026; no watched cause explains it"
 
 
-def test_dates_and_lists_are_short():
+def test_dates_are_short():
     assert day("2026-12-31") == "31 December 2026"
-    assert listed(["a", "b", "c", "d", "e"]) == "a, b, c and 2 more"
-    assert listed(["a"]) == "a"

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from scara_ident.inspection.names import meaning
+from scara_ident.inspection.names import meaning, meanings_by_place
+from tests.inspection.made import MADE
+from tests.recording.files.formats import JOINTS
 
 UR = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint")
 
@@ -72,3 +75,27 @@ def test_german_and_french_say_what_was_asked_for_and_what_was_sensed(name, comm
     said = meaning(name)
     assert (said.commanded, said.measured) == (commanded, measured)
     assert said.template.count("{number}") == 1
+
+
+def table(*signals: str) -> dict[str, np.ndarray]:
+    rows = [MADE["time"], *(MADE[f"{joint}.{signal}"] for signal in signals for joint in JOINTS)]
+    return {f"column_{k + 1}": row for k, row in enumerate(rows)}
+
+
+def told(columns: dict[str, np.ndarray], counts: tuple[int, ...] = (3, 2)) -> list[str]:
+    return [f"{said.quantity} {said.number}" for said in meanings_by_place(columns, counts).values()]
+
+
+def test_two_blocks_are_positions_and_efforts():
+    assert told(table("position", "effort")) == ["time None", "position 1", "position 2", "effort 1", "effort 2"]
+
+
+def test_of_three_the_second_has_to_be_the_slope_of_the_first():
+    assert told(table("position", "velocity", "effort"))[3:5] == ["velocity 1", "velocity 2"]
+    assert told(table("velocity", "position", "effort"), (2,)) == []
+
+
+def test_other_numbers_of_columns_say_nothing():
+    columns = table("position", "effort")
+    assert told(columns, (3,)) == []
+    assert told({"column_0": np.zeros(600)} | columns) == []

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from scara_ident.errors import RecordingError
 from scara_ident.motion.low_pass import differentiate
-from scara_ident.motion.motion import motion_of, stretches, torque_of
+from scara_ident.motion.motion import Stretch, motion_of, stretches, thinned, torque_of
 from scara_ident.recording.recording import Recording
 
 RATE = 1000.0
@@ -111,3 +111,35 @@ def test_torque_is_needed_where_it_is_asked_for():
     (part,) = stretches(recorded(time, time[None]))
     with pytest.raises(RecordingError, match="run_1: no effort was recorded"):
         torque_of(part)
+
+
+def whole(position: np.ndarray, torque: np.ndarray | None) -> Stretch:
+    time = 3.0 + np.arange(position.shape[1]) / RATE
+    return Stretch("a_1", "a", time, position, torque, RATE, slice(0, position.shape[1]))
+
+
+def test_slow_signals_stay_where_they_were_in_time():
+    time = 3.0 + np.arange(10_003) / RATE
+    slow = np.sin(2.0 * np.pi * 0.5 * time)[None]
+    part = thinned(whole(slow, 2.0 * slow), 10)
+    assert part.rate == 100.0
+    assert part.position.shape == (1, 1000)
+    # A mean over 10 ms takes off (pi f T)^2 / 6 of the amplitude.
+    np.testing.assert_allclose(part.position[0], np.sin(np.pi * part.time), atol=(np.pi * 0.5 * 0.01) ** 2 / 6 * 1.1)
+    assert part.torque is not None
+    np.testing.assert_allclose(part.torque, 2.0 * part.position)
+
+
+def test_white_noise_keeps_its_density():
+    noise = np.random.default_rng(0).standard_normal((1, 200_000))
+    part = thinned(whole(noise, None), 8)
+    assert part.torque is None
+    np.testing.assert_allclose(np.var(part.position) / part.rate, np.var(noise) / RATE, rtol=0.03)
+
+
+def test_motion_is_made_once_and_short_stretches_stay():
+    signal = np.random.default_rng(0).standard_normal((1, 40))
+    part = whole(signal, signal)
+    assert thinned(part, 5).position is thinned(part, 5).position
+    assert thinned(part, 1) is part
+    assert thinned(part, 11) is part

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from scara_ident import paper
 from scara_ident.paper import parameter_checks
+from tests.paper.made import friction
 
 
 def test_no_arm_has_the_parameters_of_CI_and_L2(report: paper.PaperReport) -> None:
@@ -52,7 +53,7 @@ def test_friction_is_never_negative_where_it_was_measured_and_four_times_beyond(
 )
 def test_least_friction_is_that_of_a_fine_grid(coefficients: tuple[float, float, float, float], top: float) -> None:
     speeds = np.linspace(0.0, top, 20001)[1:]
-    torque = paper.friction(speeds, coefficients)
+    torque = friction(speeds, coefficients)
     least, zero = parameter_checks.least_friction(np.array(coefficients), top)
     # Between grid points the torque moves by less than this.
     spacing = (1.0 + 2.0 * top + 3.0 * top**2) * top / 20000
@@ -63,7 +64,7 @@ def test_least_friction_is_that_of_a_fine_grid(coefficients: tuple[float, float,
         assert torque[speeds < zero].min(initial=0.0) >= -1e-12
         # The crossing is a root to rounding, of terms of up to this size.
         size = float(np.abs(coefficients) @ zero ** np.arange(4))
-        assert paper.friction(zero, coefficients) <= 8.0 * np.finfo(float).eps * size
+        assert friction(zero, coefficients) <= 8.0 * np.finfo(float).eps * size
 
 
 def test_friction_that_only_grazes_zero_does_not_drive() -> None:

@@ -33,7 +33,7 @@ def test_what_is_large_in_few_samples_only_has_its_means_too():
     random = np.random.default_rng(5)
     x = 0.1 * random.standard_normal(10000)
     x[random.choice(10000, 100, replace=False)] = 10.0 + random.standard_normal(100)
-    means = tail_means(x, 2.0 * x + 0.01 * random.standard_normal(10000), 30)
+    means = tail_means(x, 2.0 * x + 0.01 * random.standard_normal(10000))
     shown = np.isfinite(means.y)
     assert np.count_nonzero(means.x[shown] > 9.0) >= 2
     np.testing.assert_allclose(means.y[shown], 2.0 * means.x[shown], atol=0.02)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation import ReferenceMotion, TrueMotion, VirtualArm, ideal, sampled, virtual_arm
+from scara_ident.simulation.inverse_dynamics import inverse_dynamics
 from tests.arms import Link, rnea, write_urdf
 
 Array = NDArray[np.float64]
@@ -79,3 +80,9 @@ def left_over(arm: VirtualArm, true: TrueMotion) -> Array:
     u = u - friction(arm, true.velocity, true.direction) - arm.torque_offset[:, None]
     u[true.direction == 0.0] = np.nan
     return u
+
+
+def nominal_torque(arm: VirtualArm, motion: ReferenceMotion) -> Array:
+    """Return the torque of the URDF's bodies with the arm's rotors and friction, at the joint, shape (n, N)."""
+    nominal = arm.robot.standard_parameters()[: 10 * arm.robot.n].reshape(-1, 10)
+    return inverse_dynamics(arm, nominal, motion.position, motion.velocity, motion.acceleration)

@@ -9,9 +9,8 @@ import pytest
 
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.simulation import simulate, virtual_arm
-from scara_ident.simulation.inverse_dynamics import nominal_torque
 from scara_ident.simulation.loop import velocity_filter
-from tests.simulation.made import scara, swing
+from tests.simulation.made import nominal_torque, scara, swing
 
 
 def test_closed_loop_reverses_without_chatter() -> None:

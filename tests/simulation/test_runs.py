@@ -9,10 +9,10 @@ import pytest
 
 from scara_ident.errors import UsageError
 from scara_ident.simulation import RunState, TorqueNoise, simulate
-from scara_ident.simulation.runs import usual_run
 from tests.simulation.made import friction, rigid, scara, swing
 
 RATE = 500.0
+USUAL = RunState(np.ones(2), np.ones(2), np.zeros(2))
 
 
 @pytest.mark.parametrize("kind", ["white", "coloured", "heavy"])
@@ -51,7 +51,7 @@ def test_noise_that_is_none_is_refused_in_one_line(noise: tuple[str, float], lin
 def test_the_usual_run_is_the_arm_itself() -> None:
     arm = scara()
     motion = swing(arm.robot, 0.5)
-    plain, usual = (simulate(arm, motion, run=run).recording for run in (None, usual_run(arm)))
+    plain, usual = (simulate(arm, motion, run=run).recording for run in (None, USUAL))
     np.testing.assert_array_equal(plain.effort, usual.effort)
     np.testing.assert_array_equal(plain.position, usual.position)
 
@@ -59,7 +59,7 @@ def test_the_usual_run_is_the_arm_itself() -> None:
 def test_friction_of_a_run_is_the_arms_times_its_factors() -> None:
     arm = scara()
     factor = np.array([1.2, 0.7])
-    run = replace(usual_run(arm), friction=factor)
+    run = replace(USUAL, friction=factor)
     true = simulate(arm, swing(arm.robot, 2.0), run=run).true
     u = true.effort - rigid(arm, true.position, true.velocity, true.acceleration)
     moving = true.direction != 0.0

@@ -88,11 +88,3 @@ def link_inertia(name: str, parameters: Array) -> LinkInertia:
     x, y, z = np.asarray(body.lever).tolist()
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = np.asarray(body.inertia).tolist()
     return LinkInertia(name, float(body.mass), (x, y, z), (xx, xy, xz, yy, yz, zz))
-
-
-def smallest_eigenvalue_share(parameters: Array) -> float:
-    """Return the smallest eigenvalue of a body's pseudo-inertia as a share of its trace; below 0 it cannot exist."""
-    matrix = pseudo_inertia(parameters)
-    trace = float(np.trace(matrix))
-    smallest = float(np.linalg.eigvalsh(matrix)[0])
-    return smallest / trace if trace > 0.0 else (0.0 if not np.any(matrix) else -np.inf)

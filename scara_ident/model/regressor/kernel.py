@@ -183,11 +183,11 @@ def pinocchio_regressor(model: pin.Model, q: ArrayLike, v: ArrayLike, a: ArrayLi
     ndarray (nv, 10 nbodies, samples)
     """
     v, a = np.asarray(v, dtype=np.float64), np.asarray(a, dtype=np.float64)
-    configurations = _configurations(model, np.asarray(q, dtype=np.float64))
+    full = configurations(model, np.asarray(q, dtype=np.float64))
     data = model.createData()
     result = np.empty((v.shape[1], model.nv, 10 * (model.njoints - 1)))
     for k in range(v.shape[1]):
-        result[k] = pin.computeJointTorqueRegressor(model, data, configurations[:, k], v[:, k], a[:, k])
+        result[k] = pin.computeJointTorqueRegressor(model, data, full[:, k], v[:, k], a[:, k])
     return np.ascontiguousarray(np.moveaxis(result, 0, -1))
 
 
@@ -244,7 +244,7 @@ def _check(kernel: RegressorKernel, model: pin.Model) -> None:
         )
 
 
-def _configurations(model: pin.Model, q: Array) -> Array:
+def configurations(model: pin.Model, q: Array) -> Array:
     """Return Pinocchio's configurations (nq, samples): cosine and sine of the angle of a continuous joint."""
     result = np.empty((model.nq, q.shape[1]))
     for joint in list(model.joints)[1:]:

@@ -197,8 +197,7 @@ class RigidBody(Filled):
     def _arm(self, value: Array) -> tuple[pin.Model, Array]:
         """Return an arm whose torque is that of parameters ``value`` (p,), each body with a mass, and its armatures."""
         n, back, model = self.robot.n, np.argsort(self.robot.order), self.robot.model.copy()
-        standard, lead = np.zeros(11 * n), self.base.kept
-        standard[lead[self.kept]] = value
+        standard, lead = self.standard(value), self.base.kept
         masses = np.setdiff1d(np.arange(0, 10 * n, 10), lead)
         standard[masses] = SPECK
         # What leads makes up for it.
@@ -219,11 +218,15 @@ class RigidBody(Filled):
         seeds = [trace.variable(inputs + k) for k in range(len(entries))]
         return compile_program(trace, list(enumerate(gradient(entries, seeds, states))))
 
+    def standard(self, value: Array) -> Array:
+        """Return standard parameters that have the base parameters ``value``, shape (11 n,): each stands for the one that leads it."""
+        standard = np.zeros(11 * self.robot.n)
+        standard[self.base.kept[self.kept]] = value
+        return standard
+
     def _standard(self, value: Array) -> tuple[Array, Array]:
         """Return the bodies' parameters, in Pinocchio's order, and the armatures, at the joints; what does not lead is zero."""
-        n = self.robot.n
-        standard = np.zeros(11 * n)
-        standard[self.base.kept[self.kept]] = value
+        n, standard = self.robot.n, self.standard(value)
         return standard[: 10 * n].reshape(-1, 10)[np.argsort(self.robot.order)].ravel(), standard[10 * n :]
 
     def state_torque(self, value: Array) -> StateTorque:

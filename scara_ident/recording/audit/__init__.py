@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 
-from scara_ident.recording.audit import clock, effort, lost_samples, position, sizes
+from scara_ident.recording.audit import clock, effort, lost_samples, position
 from scara_ident.recording.audit.samples import Finding, Samples
 
 _LOG = logging.getLogger(__name__)
@@ -17,7 +17,7 @@ CHECKS = (
     clock.enough,
     clock.missing_numbers,
     clock.enough,
-    sizes.impossible_sizes,
+    position.impossible_sizes,
     clock.clock_unit,
     clock.time_order,
     clock.enough,

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.recording.audit.samples import GAP_STEPS, Finding, Samples, runs, several
+from scara_ident.manners import several
+from scara_ident.recording.audit.samples import GAP_STEPS, Finding, Samples, runs
 
 Checked = tuple[Samples, list[Finding]]
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.recording.audit.samples import IDLE_TRAVEL, Finding, Samples, joint_range, runs, several
+from scara_ident.manners import several
+from scara_ident.recording.audit.samples import IDLE_TRAVEL, Finding, Samples, joint_range, runs
 
 Checked = tuple[Samples, list[Finding]]
 

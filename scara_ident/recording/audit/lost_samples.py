@@ -7,7 +7,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.recording.audit.samples import Finding, Samples, several
+from scara_ident.manners import several
+from scara_ident.recording.audit.samples import Finding, Samples
 
 Checked = tuple[Samples, list[Finding]]
 

@@ -1,4 +1,4 @@
-"""Faults of recorded positions: units, whole turns, spikes, jumps, limits, joints that stand still."""
+"""Faults of recorded positions: units, turns, spikes, jumps, limits, rest; and numbers that are no measurement at all."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.manners import several
 from scara_ident.recording.audit.samples import (
     GAP_STEPS,
     IDLE_TRAVEL,
     Finding,
     Samples,
     joint_range,
-    several,
     speed_limit,
 )
 
@@ -53,6 +53,27 @@ SPIKE_SHARE = 0.01
 SPIKE_ROWS = 5
 # Overshoot of the limits up to this share of the range is tracking error, not worth a line.
 OVERSHOOT = 0.005
+# The counts of 32 bits end at 4e9; what a broken channel or a wrong type of number gives has up to 300 digits.
+LARGEST_SIZE = 1e12
+
+
+def impossible_sizes(samples: Samples) -> Checked:
+    """Leave out single positions and efforts that no encoder, no drive and no unit gives; refuse many."""
+    found = []
+    keep = np.ones(samples.count, dtype=bool)
+    for signal, rows in (("position", samples.position), ("effort", samples.effort)):
+        if rows is None or not (wild := np.abs(rows) > LARGEST_SIZE).any():
+            continue
+        joint = int(np.argmax(wild.sum(axis=1)))
+        index, count = int(np.argmax(wild[joint])), int(wild[joint].sum())
+        what = f"{samples.robot.joints[joint]}.{signal} is {rows[joint, index]:.3g} in {samples.where(index)}, which no channel gives"
+        if count > max(SPIKE_ROWS, SPIKE_SHARE * samples.count):
+            samples.refuse(
+                f"{what}, so in {count} of {samples.count} rows; check the type of its numbers and record it again"
+            )
+        keep &= ~wild.any(axis=0)
+        found.append(Finding("spike", f"{what}: {several(int(wild.any(axis=0).sum()), 'row')} left out", count))
+    return samples.kept(keep), found
 
 
 class _Reading(NamedTuple):

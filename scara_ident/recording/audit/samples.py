@@ -130,8 +130,3 @@ def runs(same: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     edges = np.diff(np.concatenate(([False], same, [False])).astype(np.int8))
     start = np.flatnonzero(edges == 1)
     return start, np.flatnonzero(edges == -1) - start + 1
-
-
-def several(count: int, noun: str) -> str:
-    """Write a number and what it counts: "1 row", "3 rows"."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -33,11 +33,6 @@ class Listing:
 
     kind: ClassVar[str] = "listing"
     items: tuple[str, ...]
-
-
-def listing(items: Iterable[str]) -> Listing:
-    """Return a list of plain words."""
-    return Listing(tuple(items))
 
 
 @dataclass(frozen=True)
@@ -235,11 +230,6 @@ def chance(probability: float) -> str:
     if probability < 1e-99:
         return "< 1e-99"
     return f"{probability:.2g}" if probability >= 1e-3 else f"{probability:.0e}"
-
-
-def count(size: int, noun: str) -> str:
-    """Return how many of something there are, such as ``1 recording``."""
-    return f"{size} {noun}" if size == 1 else f"{size} {noun}s"
 
 
 def information_words(log_det: float | None, condition: float | None) -> str:

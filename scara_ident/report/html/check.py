@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scara_ident.arrays import Array
+from scara_ident.manners import listed, several
 from scara_ident.report.html.blocks import (
     Block,
     Cell,
@@ -16,14 +16,13 @@ from scara_ident.report.html.blocks import (
     Selector,
     Table,
     Tag,
-    count,
     name,
     number,
     superscripts,
 )
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection
-from scara_ident.report.plot import Figure, Grid, Layer, Level, Line, Mark, Panel, Plot, single, style
+from scara_ident.report.plot import Figure, Layer, Level, Mark, Panel, Plot, single, style, thin_line
 from scara_ident.use.check import CLOSE, Check, limits_of_joint, sentences
 
 # Points of a line, at the most.
@@ -47,7 +46,9 @@ def check_report(path: Path, found: Check) -> None:
         NamedSection("energy", "Energy", _energy),
     )
     seconds = sum(float(np.ptp(each.motion.time)) for each in found.drives)
-    subtitle = f"{seconds:.4g} s for {count(robot.n, 'joint')}; torques foreseen by the {found.known.model.name} model"
+    subtitle = (
+        f"{seconds:.4g} s for {several(robot.n, 'joint')}; torques foreseen by the {found.known.model.name} model"
+    )
     Page(f"Check of {found.name}", subtitle, said, parts("check", sections, found), bool(found.broken)).write(path)
 
 
@@ -71,8 +72,7 @@ def _limits(found: Check) -> list[Block]:
         tag = None if each.kept else Tag("broken", "bad")
         used = Cell("" if each.share is None else f"{each.share:.0%}", track=each.share, tag=tag)
         unit = superscripts(each.unit)
-        spans = ", ".join(f"{start:.3f} to {stop:.3f}" for start, stop in each.beyond[:3])
-        more = f" and {len(each.beyond) - 3} more" if len(each.beyond) > 3 else ""
+        spans = listed([f"{start:.3f} to {stop:.3f}" for start, stop in each.beyond], 3)
         rows.append(
             [
                 name(each.name),
@@ -82,7 +82,7 @@ def _limits(found: Check) -> list[Block]:
                 unit,
                 f"{each.time:.3f}",
                 used,
-                spans + more,
+                spans,
             ]
         )
     head = ["limit", "reached", "±", "bound", "unit", "at [s]", "used", "beyond it [s]"]
@@ -119,22 +119,16 @@ def _panel(found: Check, j: int, kind: str, height: int = 110) -> Panel:
     for each in found.drives:
         motion = each.motion
         if kind == "torque" and motion.torque is not None:
-            layers.append(_line(motion.time, motion.torque[j], "grey", "recorded", 0.8))
+            layers.append(thin_line(motion.time, motion.torque[j], MOST_POINTS, "grey", "recorded", 0.8))
         signal = {"position": motion.q, "velocity": motion.v, "acceleration": motion.a}.get(kind)
         own = (each.torque if kind == "torque" else each.power) if signal is None else signal
-        layers.append(_line(motion.time, own[j], "blue", kind))
+        layers.append(thin_line(motion.time, own[j], MOST_POINTS, "blue", kind))
     bounds = limits_of_joint(robot, found.limits, j)[kind]
     layers += [Level(bound, "vermillion", "limit") for bound in bounds if np.isfinite(bound)]
     worst = found.limited_by
     if worst is not None and worst.joint == robot.joints[j] and worst.kind.startswith(kind):
         layers.append(Mark(worst.time, "vermillion", f"{worst.reached:.4g}"))
     return Panel(f"{'acc.' if kind == 'acceleration' else kind} [{unit}]", layers, height)
-
-
-def _line(time: Array, signal: Array, color: str, label: str, width: float = 1.4) -> Line:
-    every = max(1, len(time) // MOST_POINTS)
-    step = float(time[-1] - time[0]) / (len(time) - 1)
-    return Line(Grid(float(time[0]), every * step, -(-len(time) // every)), signal[::every], color, label, width)
 
 
 def _energy(found: Check) -> list[Block]:
@@ -174,7 +168,6 @@ def _balances(found: Check) -> list[Layer]:
             time, power = each.motion.time, each.power[j]
             steps = 0.5 * (power[1:] + power[:-1]) * np.diff(time)
             sums = start + np.concatenate([[0.0], np.cumsum(steps)])
-            line = _line(time, sums, color, joint)
-            layers.append(Line(line.x, line.y, color, joint, 1.3, dash))
+            layers.append(thin_line(time, sums, MOST_POINTS, color, joint, 1.3, dash))
             start = float(sums[-1])
     return layers

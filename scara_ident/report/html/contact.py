@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from scara_ident.arrays import Array
-from scara_ident.report.html.blocks import Block, Cell, Group, Paragraph, Selector, Table, count, name, number
+from scara_ident.manners import several
+from scara_ident.report.html.blocks import Block, Cell, Group, Paragraph, Selector, Table, name, number
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection
-from scara_ident.report.plot import Drawing, Figure, Grid, Layer, Line, Panel, Plot, Region, single
+from scara_ident.report.plot import Drawing, Figure, Layer, Panel, Plot, Region, single, thin_line
 from scara_ident.use.contact import ContactFindings, sentences
 from scara_ident.use.external_torque import Observed
 
@@ -32,7 +32,7 @@ def contact_report(path: Path, found: ContactFindings) -> None:
         NamedSection("torque", "External torque", _torque),
         NamedSection("thresholds", "Thresholds", _thresholds),
     )
-    subtitle = f"{count(len(found.observed), 'recording')}; thresholds for {alarm.rate:g} false alarm{'' if alarm.rate == 1.0 else 's'} an hour"
+    subtitle = f"{several(len(found.observed), 'recording')}; thresholds for {alarm.rate:g} false alarm{'' if alarm.rate == 1.0 else 's'} an hour"
     page = Page(f"Contact with {robot.name}", subtitle, sentences(found), parts("contact", sections, found))
     page.write(path)
 
@@ -92,15 +92,12 @@ def _panel(found: ContactFindings, run: Observed, j: int, height: int) -> Panel:
         for each in found.contacts
         if each.recording == run.name
     ]
-    layers.append(_line(run.time, run.torque[j], "blue", "external torque", ""))
-    layers += [_line(run.time, sign * threshold, "vermillion", "threshold", "5 3") for sign in (-1.0, 1.0)]
+    layers.append(thin_line(run.time, run.torque[j], MOST_POINTS, "blue", "external torque", 1.3))
+    layers += [
+        thin_line(run.time, sign * threshold, MOST_POINTS, "vermillion", "threshold", 1.3, "5 3")
+        for sign in (-1.0, 1.0)
+    ]
     return Panel(f"{robot.joints[j]} [{robot.torque_unit(j)}]", layers, height)
-
-
-def _line(time: Array, signal: Array, color: str, label: str, dash: str) -> Line:
-    every = max(1, len(time) // MOST_POINTS)
-    step = float(time[-1] - time[0]) / (len(time) - 1)
-    return Line(Grid(float(time[0]), every * step, -(-len(time) // every)), signal[::every], color, label, 1.3, dash)
 
 
 def _thresholds(found: ContactFindings) -> list[Block]:

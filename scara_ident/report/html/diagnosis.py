@@ -14,6 +14,7 @@ from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.next_steps import next_steps
+from scara_ident.manners import several
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.html.blocks import (
     Block,
@@ -21,21 +22,24 @@ from scara_ident.report.html.blocks import (
     Gain,
     Gains,
     Heading,
+    Listing,
     Paragraph,
     Table,
     Tag,
     chance,
-    count,
-    listing,
     name,
     number,
     superscripts,
 )
-from scara_ident.report.html.candidates import candidate_blocks
-from scara_ident.report.html.certainty import evidence_blocks, tentative_blocks
 from scara_ident.report.html.chapters import Chapter, chapters
-from scara_ident.report.html.events import events_blocks
-from scara_ident.report.html.gain import gain_blocks
+from scara_ident.report.html.evidence import (
+    candidate_blocks,
+    events_blocks,
+    evidence_blocks,
+    gain_blocks,
+    tentative_blocks,
+    variation_blocks,
+)
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.parameters import digits
 from scara_ident.report.html.remainder import remainder_group
@@ -43,7 +47,6 @@ from scara_ident.report.html.residual import residual_blocks
 from scara_ident.report.html.section import NamedSection, Section, notes_section
 from scara_ident.report.html.story import chapter_group, moment_group
 from scara_ident.report.html.torque import torque_group
-from scara_ident.report.html.variation import variation_blocks
 from scara_ident.report.traces import FittedContext, Trace, traces
 from scara_ident.report.use import WORDS
 from scara_ident.threads import one_blas_thread
@@ -91,11 +94,6 @@ class DiagnosisContext(FittedContext):
         return self.diagnosis.robot.torque_unit(self.diagnosis.robot.joints.index(joint))
 
 
-def _gain(context: DiagnosisContext) -> list[Block]:
-    """Errors before and after."""
-    return gain_blocks(context.content, context.diagnosis.robot)
-
-
 def _story(context: DiagnosisContext) -> list[Block]:
     """Every effect found, with the residual before and after it, and the parameters that it had bent."""
     diagnosis = context.diagnosis
@@ -104,7 +102,7 @@ def _story(context: DiagnosisContext) -> list[Block]:
         return [Paragraph(f"{tried} candidates were tried and none was let in; their reasons stand under Candidates.")]
     blocks: list[Block] = []
     for effect, chapter in context.chapters:
-        blocks += [Heading(f"{chapter.number}. {_title(effect)}"), *_effect_words(effect, context)]
+        blocks += [Heading(f"{chapter.number}. {effect.title}"), *_effect_words(effect, context)]
         blocks += [chapter_group(diagnosis.robot, chapter), moment_group(diagnosis.robot, chapter)]
     columns = {column.name: column for column in diagnosis.before.model.columns}
     rows: list[list[Cell | str]] = [
@@ -126,10 +124,6 @@ def _story(context: DiagnosisContext) -> list[Block]:
             Table(("name", "URDF", "before", "after", "change / std", "unit", "meaning"), rows, (1, 2, 3, 4)),
         ]
     return blocks
-
-
-def _title(effect: FoundEffect) -> str:
-    return effect.effect if effect.joint is None else f"{effect.effect} on {effect.joint}"
 
 
 def _said(effect: FoundEffect) -> str:
@@ -172,21 +166,6 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
     return blocks
 
 
-def _tentative(context: DiagnosisContext) -> Sequence[Block]:
-    """What is worth a look and not believed."""
-    return tentative_blocks(context.content)
-
-
-def _evidence(context: DiagnosisContext) -> Sequence[Block]:
-    """Whether what is left was shown to be noise."""
-    return evidence_blocks(context.content)
-
-
-def _events(context: DiagnosisContext) -> Sequence[Block]:
-    """What was local in time."""
-    return events_blocks(context.diagnosis.robot, context.diagnosis.events)
-
-
 def _variation(context: DiagnosisContext) -> Sequence[Block]:
     """How runs differ."""
     found = context.diagnosis
@@ -200,9 +179,11 @@ def _next(context: DiagnosisContext) -> list[Block]:
     # The last ones are what the model absorbs on any data, which has a table of its own.
     found = [item.sentence() for item in steps[: len(steps) - aliases]]
     blocks: list[Block] = [
-        listing(found) if found else Paragraph("Nothing in these recordings asks for another experiment.")
+        Listing(tuple(found)) if found else Paragraph("Nothing in these recordings asks for another experiment.")
     ]
-    absorbed = f"Another {count(aliases, 'effect')} would need a measurement of another kind: see What cannot be known."
+    absorbed = (
+        f"Another {several(aliases, 'effect')} would need a measurement of another kind: see What cannot be known."
+    )
     return [*blocks, Paragraph(absorbed)] if aliases else blocks
 
 
@@ -257,23 +238,18 @@ def _torque(context: DiagnosisContext) -> list[Block]:
     return [Paragraph("Predicted by the model with the effects found."), group]
 
 
-def _candidates(context: DiagnosisContext) -> list[Block]:
-    """All that was tried, ranked, with the reason why it is in or out."""
-    return candidate_blocks(context.content)
-
-
 def _unknowable(context: DiagnosisContext) -> list[Block]:
     """Effects that these recordings, or any, cannot tell from another."""
     effects = context.diagnosis.effects
     groups = [
-        " | ".join((_title(effect), *dict.fromkeys(confounder.label for confounder in effect.confounded_with)))
+        " | ".join((effect.title, *dict.fromkeys(confounder.label for confounder in effect.confounded_with)))
         for effect in effects
         if effect.confounded_with
     ]
     none = Paragraph("None among the effects found." if effects else "No effect was found.")
     blocks: list[Block] = [
         Heading("Groups that these recordings cannot tell apart"),
-        listing(groups) if groups else none,
+        Listing(tuple(groups)) if groups else none,
     ]
     rows: list[list[Cell | str]] = [
         [
@@ -319,16 +295,16 @@ def _worth(context: DiagnosisContext) -> list[Block]:
 
 
 SECTIONS: tuple[Section, ...] = (
-    NamedSection("gain", "Before and after", _gain),
+    NamedSection("gain", "Before and after", lambda context: gain_blocks(context.content, context.diagnosis.robot)),
     NamedSection("story", "The story", _story),
-    NamedSection("tentative", "Worth a look", _tentative),
+    NamedSection("tentative", "Worth a look", lambda context: tentative_blocks(context.content)),
     NamedSection("next", "What to do next", _next),
     NamedSection("left", "What is left", _left),
-    NamedSection("evidence", "Is it noise?", _evidence),
-    NamedSection("events", "Events", _events),
+    NamedSection("evidence", "Is it noise?", lambda context: evidence_blocks(context.content)),
+    NamedSection("events", "Events", lambda context: events_blocks(context.diagnosis.robot, context.diagnosis.events)),
     NamedSection("variation", "How runs differ", _variation),
     NamedSection("torque-section", "Torque", _torque),
-    NamedSection("candidates", "Candidates", _candidates),
+    NamedSection("candidates", "Candidates", lambda context: candidate_blocks(context.content)),
     NamedSection("limits", "What cannot be known", _unknowable),
     NamedSection("worth", "What the effects cost", _worth),
     notes_section(lambda context: context.diagnosis.notes),
@@ -348,7 +324,7 @@ def diagnosis_report(path: Path, context: DiagnosisContext) -> None:
     with one_blas_thread():
         found = parts("diagnosis", SECTIONS, context)
     subtitle = (
-        f"{diagnosis.before.model.name} model; {count(len(diagnosis.training_after.data.recordings), 'recording')}, {len(diagnosis.validation_after.data.recordings)} held out; "
+        f"{diagnosis.before.model.name} model; {several(len(diagnosis.training_after.data.recordings), 'recording')}, {len(diagnosis.validation_after.data.recordings)} held out; "
         f"{diagnosis.search.tried} candidates tried"
     )
     verdict = _verdict(diagnosis, content["summary"])

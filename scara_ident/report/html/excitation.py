@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from scara_ident.manners import several
 from scara_ident.motion.motion import Motion
 from scara_ident.report.html.blocks import (
     Beside,
@@ -19,7 +20,6 @@ from scara_ident.report.html.blocks import (
     Paragraph,
     Table,
     Tag,
-    count,
     information_words,
     name,
     number,
@@ -115,10 +115,10 @@ def excitation_report(path: Path, content: Mapping[str, Any], robot: Robot, moti
         NamedSection(f"motion-{k}", "Motion" if len(motions) == 1 else f"Motion {motion.name}", partial(_motion, k))
         for k, motion in enumerate(motions)
     ]
-    trajectories = count(len(motions), "trajectory").replace("trajectorys", "trajectories")
-    subtitle = f"{trajectories} of {content.get('duration') or 0.0:g} s for {count(robot.n, 'joint')}"
+    trajectories = several(len(motions), "trajectory").replace("trajectorys", "trajectories")
+    subtitle = f"{trajectories} of {content.get('duration') or 0.0:g} s for {several(robot.n, 'joint')}"
     if content.get("harmonics"):
-        subtitle += f"; {count(content['harmonics'], 'harmonic')}"
+        subtitle += f"; {several(content['harmonics'], 'harmonic')}"
     if content.get("model"):
         subtitle += f"; parameters of the {content['model']} model"
     sections += [NamedSection("limits", "Limits", _limits), NamedSection("information", "Information", _information)]

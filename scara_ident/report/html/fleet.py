@@ -1,27 +1,30 @@
-"""The report of a fleet: arms by their need of a look, and every quantity over time."""
+"""The files of a fleet: its table, and its report with arms by their need of a look and every quantity over time."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scara_ident.files import written_together
 from scara_ident.fleet import Fleet
 from scara_ident.fleet.changes import LEVEL
 from scara_ident.fleet.fleet import ArmReport
+from scara_ident.manners import several
 from scara_ident.report.html.blocks import (
     Block,
     Cell,
     Group,
+    Listing,
     Paragraph,
     Selector,
     Table,
     Tag,
     chance,
-    count,
-    listing,
     name,
     number,
     superscripts,
@@ -30,6 +33,10 @@ from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection, Section
 from scara_ident.report.plot import Dots, Drawing, Figure, Layer, Level, Mark, Panel, Plot
 
+if TYPE_CHECKING:
+    import polars as pl
+
+TABLE, REPORT = "fleet.parquet", "report.html"
 # Pictures of a report at the most; of further arms the table has the numbers.
 MOST_PLOTS = 4000
 WHOLE_ARM = "the whole arm"
@@ -133,7 +140,7 @@ def _plots(fleet: Fleet, item: ArmReport, joint: str | None) -> list[Plot]:
 
 def _faults(fleet: Fleet) -> list[Block]:
     """What could not be used."""
-    return [listing(str(fault) for fault in fleet.faults)] if fleet.faults else []
+    return [Listing(tuple(str(fault) for fault in fleet.faults))] if fleet.faults else []
 
 
 def _scatter(fleet: Fleet) -> list[Block]:
@@ -179,15 +186,41 @@ def fleet_report(path: Path, fleet: Fleet) -> None:
         If the file cannot be written.
     """
     changed = [item for item in fleet.ranked if item.changes]
-    verdict = [f"{len(changed)} of {count(len(fleet.arms), 'arm')} changed by more than noise."]
+    verdict = [f"{len(changed)} of {several(len(fleet.arms), 'arm')} changed by more than noise."]
     verdict += [f"{item.arm}: {words}." for item in changed for words in item.sentences]
     if fleet.faults:
-        verdict.append(f"{count(len(fleet.faults), 'fault')}: see below.")
+        verdict.append(f"{several(len(fleet.faults), 'fault')}: see below.")
     dates = sum(len(item.history.dates) for item in fleet.arms if item.history is not None)
     Page(
         f"Fleet of {fleet.robot.name}",
-        f"{fleet.model.name} model; {count(len(fleet.arms), 'arm')}, {count(dates, 'date')} in all",
+        f"{fleet.model.name} model; {several(len(fleet.arms), 'arm')}, {several(dates, 'date')} in all",
         verdict,
         parts("fleet", SECTIONS, fleet),
         warn=bool(changed or fleet.faults),
     ).write(path)
+
+
+def write_fleet(folder: Path, fleet: Fleet, table: pl.DataFrame) -> None:
+    """Write the table and the report of a fleet; a file that is there with the same content stays as it is.
+
+    Parameters
+    ----------
+    folder : Path
+    fleet : Fleet
+    table : DataFrame
+        See `scara_ident.fleet.table.fleet_table`.
+
+    Raises
+    ------
+    ScaraIdentError
+        In one line, if they cannot be written.
+    """
+    content = BytesIO()
+    table.write_parquet(content)
+    with written_together(folder) as place:
+        (place / TABLE).write_bytes(content.getvalue())
+        fleet_report(place / REPORT, fleet)
+        for name in (TABLE, REPORT):
+            held = folder / name
+            if held.is_file() and held.read_bytes() == (place / name).read_bytes():
+                (place / name).unlink()

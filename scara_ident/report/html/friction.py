@@ -72,13 +72,12 @@ def _figures(estimate: Estimate, term: Friction, traces: Sequence[Trace], j: int
     layers.append(Line(grid, np.where(inside, value, np.nan), "blue", "friction", 2.0))
     layers.append(Line(grid, np.where(inside, np.nan, value), "blue", "beyond the data", 1.6, "3 4"))
     unit = robot.torque_unit(j)
-    length = "m" if robot.prismatic[j] else "rad"
     return [
         single(
             f"friction-{j}",
             f"Friction of {robot.joints[j]}",
             "",
-            Plot(f"velocity [{length}/s]", (Panel(f"friction [{unit}]", layers, 230),), (-most, most)),
+            Plot(f"velocity [{robot.position_unit(j)}/s]", (Panel(f"friction [{unit}]", layers, 230),), (-most, most)),
         )
     ]
 

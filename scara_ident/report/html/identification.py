@@ -9,8 +9,9 @@ from pathlib import Path
 
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.identification.identify import Identification, undetermined
-from scara_ident.report.html.blocks import Block, Heading, Paragraph, count, estimator_words, information_words
-from scara_ident.report.html.events import events_blocks
+from scara_ident.manners import several
+from scara_ident.report.html.blocks import Block, Heading, Paragraph, estimator_words, information_words
+from scara_ident.report.html.evidence import events_blocks, variation_blocks
 from scara_ident.report.html.friction import friction_group
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.parameters import (
@@ -24,7 +25,6 @@ from scara_ident.report.html.parameters import (
 from scara_ident.report.html.residual import residual_blocks
 from scara_ident.report.html.section import NamedSection, Section, notes_section
 from scara_ident.report.html.torque import error_table, torque_group
-from scara_ident.report.html.variation import variation_blocks
 from scara_ident.report.identification import sentences
 from scara_ident.report.traces import FittedContext, Trace, traces
 from scara_ident.threads import one_blas_thread
@@ -154,7 +154,7 @@ def identification_report(path: Path, context: IdentificationContext) -> None:
     fitted, held_out = identification.training, identification.validation
     subtitle = (
         f"{identification.model.name} model, {len(identification.model.columns)} parameters, {estimator_words(identification.estimate.method)}; "
-        f"{count(len(fitted.data.recordings), 'recording')}, {fitted.samples} samples fitted, {count(len(held_out.data.recordings), 'recording')} held out"
+        f"{several(len(fitted.data.recordings), 'recording')}, {fitted.samples} samples fitted, {several(len(held_out.data.recordings), 'recording')} held out"
     )
     # How runs differ has a section of its own.
     variation = identification.estimate.variation

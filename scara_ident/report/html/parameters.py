@@ -55,12 +55,7 @@ def digits(value: float, std: float) -> str:
     if not np.isfinite(std) or std <= 0.0:
         return f"{value:.4g}"
     places = max(0, int(np.ceil(1.0 - np.log10(std))))
-    text = f"{value:.{places}f}" if places <= 6 else f"{value:.4g}"
-    return _unsigned_zero(text)
-
-
-def _unsigned_zero(text: str) -> str:
-    return text.lstrip("-") if float(text) == 0.0 else text
+    return f"{value:z.{places}f}" if places <= 6 else f"{value:z.4g}"
 
 
 def link_table(estimate: ConsistentEstimate) -> Table:
@@ -68,7 +63,7 @@ def link_table(estimate: ConsistentEstimate) -> Table:
     rows: list[list[Cell | str]] = []
     for link in links(estimate):
         least = NO_INERTIA * max(abs(x) for x in link.inertia)
-        com = (_unsigned_zero(f"{x:.3f}") for x in link.com)
+        com = (f"{x:z.3f}" for x in link.com)
         rows.append(
             [name(link.name), number(link.mass), *com, *("0" if abs(x) < least else number(x) for x in link.inertia)]
         )

@@ -65,7 +65,7 @@ def signal_of(robot: Robot, name: str, j: int) -> tuple[Callable[[Trace], Array]
     kind, _, joint = name.partition(" of ")
     if joint in robot.joints:
         i = robot.joints.index(joint)
-        length = "m" if robot.prismatic[i] else "rad"
+        length = robot.position_unit(i)
         if kind == "position":
             return (lambda trace: trace.motion.q[i]), length
         if kind == "velocity":

@@ -10,7 +10,20 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.report.bins import MEAN_BINS, binned_means, density, middle_range
 from scara_ident.report.html.blocks import Block, Group, Heading, Paragraph, Selector
-from scara_ident.report.plot import Band, Density, Drawing, Figure, Layer, Level, Line, Mark, Panel, Plot, Region
+from scara_ident.report.plot import (
+    Band,
+    Density,
+    Drawing,
+    Figure,
+    Layer,
+    Level,
+    Line,
+    Mark,
+    Panel,
+    Plot,
+    Region,
+    mean_layers,
+)
 from scara_ident.report.spectra import ORDER_WORDS, autocorrelation, orders, spectrum
 from scara_ident.report.traces import Trace, kept
 from scara_ident.robot.robot import Robot
@@ -19,7 +32,7 @@ Sets = Mapping[str, Sequence[Trace]]
 Variants = dict[tuple[int, ...], Drawing]
 
 
-def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None], prefix: str = "") -> list[Block]:
+def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None]) -> list[Block]:
     """Return the figures of the residual.
 
     Parameters
@@ -29,8 +42,6 @@ def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None], pre
         Such as the fitted and the held-out recordings; empty ones are left out.
     bands : sequence of float or None, one per joint
         Hz.
-    prefix : str, optional
-        Keeps the names of figures apart where there are several on a page.
     """
     sets = {name: traces for name, traces in sets.items() if traces}
     still = [joint for j, joint in enumerate(robot.joints) if not any(_turns(robot, s, j) for s in sets.values())]
@@ -46,9 +57,9 @@ def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None], pre
             "Blue: how many samples lie where. Vermillion: their mean over the signal, with two standard errors; where it leaves zero, "
             f"the model lacks something that depends on the signal.{motor}"
         ),
-        _signals_group(robot, sets, prefix),
+        _signals_group(robot, sets),
         Heading("By frequency, motor angle and lag"),
-        _spectra_group(robot, sets, bands, prefix),
+        _spectra_group(robot, sets, bands),
     ]
 
 
@@ -58,7 +69,7 @@ def _turns(robot: Robot, traces: Sequence[Trace], j: int) -> bool:
     return any(float(np.ptp(trace.motion.q[j])) >= span for trace in traces)
 
 
-def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None], prefix: str) -> Group:
+def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None]) -> Group:
     by_time: Variants = {}
     by_order: Variants = {}
     by_lag: Variants = {}
@@ -74,21 +85,21 @@ def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None], pref
                     found[j, s] = plot
     figures = [
         Figure(
-            f"{prefix}frequency",
+            "frequency",
             "Spectrum over frequency",
             "Amplitude density of recorded torque, which is the effort in the file times its gain, and of what is left of it, nothing filtered; the area reaches to the highest line of each bin. In the shade, beyond the band, the prediction carries the noise of the position.",
             by_time,
             (0, 1),
         ),
         Figure(
-            f"{prefix}order",
+            "order",
             "Spectrum over the motor's angle",
             f"What repeats with the motor's turn; noise alone crosses the dashed bound anywhere in 1 of 100 cases. {ORDER_WORDS}",
             by_order,
             (0, 1),
         ),
         Figure(
-            f"{prefix}lag",
+            "lag",
             "Autocorrelation",
             "Within the band, from the first lag on (at lag 0 it is 1); white residuals stay between the dashed bounds at 95 % of the lags.",
             by_lag,
@@ -96,7 +107,7 @@ def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None], pref
         ),
     ]
     kept = [figure for figure in figures if figure.variants]
-    return Group(f"{prefix}spectra-group", kept, _selectors(robot, sets), "two")
+    return Group("spectra-group", kept, _selectors(robot, sets), "two")
 
 
 def _selectors(robot: Robot, sets: Sets) -> tuple[Selector, Selector]:
@@ -142,11 +153,11 @@ def _lag_plot(traces: Sequence[Trace], j: int) -> Plot | None:
     return Plot("lag [s]", (Panel("correlation", layers, 220),))
 
 
-def _signals_group(robot: Robot, sets: Sets, prefix: str) -> Group:
+def _signals_group(robot: Robot, sets: Sets) -> Group:
     signals: tuple[tuple[str, str, Callable[[Trace, int], Array], Callable[[int], str]], ...] = (
-        ("position", "Position", lambda trace, i: trace.motion.q[i], lambda i: f"position [{_length(robot, i)}]"),
-        ("velocity", "Velocity", lambda trace, i: trace.motion.v[i], lambda i: f"velocity [{_length(robot, i)}/s]"),
-        ("acceleration", "Acceleration", lambda trace, i: trace.motion.a[i], lambda i: f"acceleration [{_length(robot, i)}/s²]"),
+        ("position", "Position", lambda trace, i: trace.motion.q[i], lambda i: f"position [{robot.position_unit(i)}]"),
+        ("velocity", "Velocity", lambda trace, i: trace.motion.v[i], lambda i: f"velocity [{robot.position_unit(i)}/s]"),
+        ("acceleration", "Acceleration", lambda trace, i: trace.motion.a[i], lambda i: f"acceleration [{robot.position_unit(i)}/s²]"),
         ("load", "Load", lambda trace, i: trace.load[i], lambda i: f"links and rotors [{robot.torque_unit(i)}]"),
         ("time", "Time", lambda trace, i: trace.time, lambda i: "time since the start [s]"),
         ("motor", "Motor angle", lambda trace, i: np.mod(robot.reduction[i] * trace.motion.q[i], 2.0 * np.pi), lambda i: "within a motor turn [rad]"),
@@ -163,9 +174,9 @@ def _signals_group(robot: Robot, sets: Sets, prefix: str) -> Group:
                 x = kept(traces, [signal(trace, i) for trace in traces], j)
                 variants[(j, s) if name == "time" else (j, s, i)] = scatter(x, y, label(i), robot.torque_unit(j))
         by = (0, 1) if name == "time" else (0, 1, 2)
-        figures.append(Figure(f"{prefix}against-{name}", title, "", variants, by, quiet=True))
+        figures.append(Figure(f"against-{name}", title, "", variants, by, quiet=True))
     selectors = (*_selectors(robot, sets), Selector("signals of", robot.joints))
-    return Group(f"{prefix}signals-group", figures, selectors, "three")
+    return Group("signals-group", figures, selectors, "three")
 
 
 def scatter(x: Array, y: Array, label: str, unit: str, height: int = 170, bins: int = MEAN_BINS) -> Plot:
@@ -189,11 +200,6 @@ def scatter(x: Array, y: Array, label: str, unit: str, height: int = 170, bins: 
     means = binned_means(x, y, limits, bins)
     layers = (
         Density(density(x, y, limits, (-reach, reach)), limits, (-reach, reach), "blue", "samples"),
-        Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, "vermillion"),
-        Line(means.x, means.y, "vermillion", "mean ± 2 s.e.", 1.8),
+        *mean_layers(means, "vermillion", "mean ± 2 s.e."),
     )
     return Plot(label, (Panel(f"residual [{unit}]", layers, height, (-reach, reach)),), limits, small=True)
-
-
-def _length(robot: Robot, joint: int) -> str:
-    return "m" if robot.prismatic[joint] else "rad"

@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol, get_args
 
 from scara_ident.errors import ScaraIdentError
 from scara_ident.registry import Registry
-from scara_ident.report.html.blocks import Block, listing
+from scara_ident.report.html.blocks import Block, Listing
 
 Kind = Literal["identification", "diagnosis", "comparison", "excitation", "paper", "use", "check", "contact", "fleet"]
 
@@ -61,7 +61,7 @@ class NamedSection:
 
 def notes_section(notes: Callable[[Any], Sequence[str] | None], title: str = "Notes on the data") -> NamedSection:
     """Return the section of what there is to know, which ``notes`` takes from the context."""
-    return NamedSection("notes", title, lambda context: [listing(found)] if (found := notes(context)) else [])
+    return NamedSection("notes", title, lambda context: [Listing(tuple(found))] if (found := notes(context)) else [])
 
 
 @dataclass(frozen=True)

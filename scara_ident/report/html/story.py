@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.report.bins import binned_means, middle_range, tail_means
+from scara_ident.report.bins import Means, binned_means, middle_range, tail_means
 from scara_ident.report.html.blocks import Group
 from scara_ident.report.html.chapters import Chapter
 from scara_ident.report.html.torque import banded, unused_regions
-from scara_ident.report.plot import Band, Figure, Layer, Line, Panel, Plot, single
+from scara_ident.report.plot import Figure, Layer, Line, Panel, Plot, mean_layers, single
 from scara_ident.report.spectra import ORDER_WORDS, orders, spectrum
 from scara_ident.report.traces import Trace, kept
 from scara_ident.robot.robot import Robot
@@ -116,9 +116,7 @@ def _own(robot: Robot, chapter: Chapter) -> Figure | None:
         (chapter.after, "blue", "residual after"),
     ):
         y = kept(traces, [trace.residual[j] for trace in traces], j)
-        means = tail_means(kept(traces, added, j), y, 30)
-        layers.append(Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, color))
-        layers.append(Line(means.x, means.y, color, name, 1.8))
+        layers += mean_layers(tail_means(kept(traces, added, j), y), color, name)
     x = kept(chapter.after, added, j)
     ends = [float(np.min(x)), float(np.max(x))]
     layers.append(Line(ends, ends, "black", ADDED, 1.2, "4 3"))
@@ -144,9 +142,7 @@ def _means_plot(
         (chapter.after, x_after, "blue", "residual after"),
     ):
         y = kept(traces, [trace.residual[j] * _direction(trace, j, view.along) for trace in traces], j)
-        means = binned_means(kept(traces, signals, j), y, limits, 30)
-        layers.append(Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, color))
-        layers.append(Line(means.x, means.y, color, name, 1.8))
+        layers += mean_layers(binned_means(kept(traces, signals, j), y, limits, 30), color, name)
     added = chapter.added
     law = _law(chapter, after, limits)
     if added is not None:
@@ -164,17 +160,14 @@ def _law(chapter: Chapter, x: Array, limits: tuple[float, float]) -> list[Layer]
     j, own, view = chapter.joint, chapter.own, chapter.view
     if own is None:
         return []
-    layers: list[Layer] = []
-    for signals, color, name, dash in (
-        ([part + trace.residual[j] for part, trace in zip(own, chapter.after, strict=True)], "green", LEFT, ""),
-        (own, "black", LAW, "2 3"),
-    ):
+
+    def means(signals: Sequence[Array]) -> Means:
         turned = [part * _direction(trace, j, view.along) for part, trace in zip(signals, chapter.after, strict=True)]
-        means = binned_means(x, kept(chapter.after, turned, j), limits, 30)
-        if not dash:
-            layers.append(Band(means.x, means.y - 2.0 * means.error, means.y + 2.0 * means.error, color))
-        layers.append(Line(means.x, means.y, color, name, 1.8 if not dash else 1.2, dash))
-    return layers
+        return binned_means(x, kept(chapter.after, turned, j), limits, 30)
+
+    left = means([part + trace.residual[j] for part, trace in zip(own, chapter.after, strict=True)])
+    law = means(own)
+    return [*mean_layers(left, "green", LEFT), Line(law.x, law.y, "black", LAW, 1.2, "2 3")]
 
 
 def _direction(trace: Trace, j: int, along: bool) -> Array | float:

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from scara_ident.report.html.blocks import Block, Cell, Group, Paragraph, Table, count, name, number, superscripts
+from scara_ident.manners import several
+from scara_ident.report.html.blocks import Block, Cell, Group, Paragraph, Table, name, number, superscripts
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection, Section
 from scara_ident.report.plot import Dots, Grid, Layer, Line, Panel, Plot, single, style
@@ -43,7 +44,7 @@ def _tracking(context: UseContext) -> list[Block]:
         rows.append([name(WORDS[key]), *cells])
     head = ["rms tracking error", *(f"{joint} [{superscripts(units[joint])}]" for joint in context.joints)]
     words = (
-        f"{count(len(result.runs), 'virtual arm')} drawn about the model by its standard deviations: how well a motion of "
+        f"{several(len(result.runs), 'virtual arm')} drawn about the model by its standard deviations: how well a motion of "
         f"{result.motion.duration:.3g} s, which played no part in the identification, is followed. Bars: share of the PID's own error."
     )
     figures = []

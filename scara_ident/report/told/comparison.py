@@ -15,17 +15,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
+# The content of ``comparison.json``.
+content = comparison_dict
+
 
 def summary(comparison: Comparison) -> str:
     """Return the trajectories and the errors as tables, and the result in sentences."""
     held = comparison_dict(comparison)
     notes = [f"note: {note}" for note in comparison.notes]
     return text_of(*notes, *tables(held), *held["summary"])
-
-
-def content(comparison: Comparison) -> dict[str, Any]:
-    """Return the content of ``comparison.json``."""
-    return comparison_dict(comparison)
 
 
 def columns(comparison: Comparison) -> dict[str, Any]:

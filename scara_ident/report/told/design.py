@@ -12,16 +12,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
+# The content of ``excitation.json``.
+content = excitation_dict
+
 
 def summary(design: Design) -> str:
     """Return the result in sentences, and every limit with what is used of it."""
     held = excitation_dict(design)
     return text_of(*held["summary"], limit_table(design), *(f"note: {note}" for note in held["notes"]))
-
-
-def content(design: Design) -> dict[str, Any]:
-    """Return the content of ``excitation.json``."""
-    return excitation_dict(design)
 
 
 def columns(design: Design) -> dict[str, Any]:

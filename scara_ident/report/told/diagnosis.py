@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 # Candidates shown where not all are wanted.
 MOST_CANDIDATES = 8
+# The content of ``diagnosis.json``.
+content = diagnosis_dict
 
 
 def summary(diagnosis: Diagnosis) -> str:
@@ -23,11 +25,6 @@ def summary(diagnosis: Diagnosis) -> str:
     heading = f"{diagnosis.robot.name}: {diagnosis.verdict}"
     left = [f"predict leaves out {name}." for name in diagnosis.not_predicted]
     return text_of(*notes, heading, *held["summary"], *tables(held), *left)
-
-
-def content(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return the content of ``diagnosis.json``."""
-    return diagnosis_dict(diagnosis)
 
 
 def columns(diagnosis: Diagnosis) -> dict[str, Any]:

@@ -13,16 +13,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
+# The content of ``identification.json``, with the estimate that `load_estimate` reads.
+content = identification_dict
+
 
 def summary(identification: Identification) -> str:
     """Return parameters, errors and bands as tables, and the result in sentences."""
     notes = [f"note: {note}" for note in identification.notes]
     return text_of(*notes, *tables(identification), bands_said(identification), *sentences(identification))
-
-
-def content(identification: Identification) -> dict[str, Any]:
-    """Return the content of ``identification.json``, with the estimate that `load_estimate` reads."""
-    return identification_dict(identification)
 
 
 def columns(identification: Identification) -> dict[str, Any]:

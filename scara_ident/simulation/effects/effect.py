@@ -73,7 +73,7 @@ class Effect:
             raise UsageError(f"{self.name} belongs to the whole arm; leave out the joint {joint!r}")
         if self.whole_arm == "never" and joint is None:
             joint = self.first_choice(arm)
-        index = arm.joint_index(joint) if joint is not None else 0
+        index = arm.robot.joint_index(joint) if joint is not None else 0
         sizes = self.sizes(arm, index)
         left: dict[str, Any] = {key: value for key, value in sizes.items() if _is_left(getattr(self, key))}
         resolved = replace(self, joint=joint, **left)
@@ -89,7 +89,7 @@ class Effect:
 
     def place(self, arm: VirtualArm) -> int:
         """Return the row of its joint in Pinocchio's order."""
-        return int(arm.robot.order[arm.joint_index(self.joint or arm.robot.joints[0])])
+        return int(arm.robot.order[arm.robot.joint_index(self.joint or arm.robot.joints[0])])
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Add the effect, which must be resolved, to the arm's arrays."""
@@ -124,7 +124,7 @@ def neighbour(effect: Effect, arm: VirtualArm) -> str:
     UsageError
         If the arm has one joint.
     """
-    n, j = arm.robot.n, arm.joint_index(effect.joint or arm.robot.joints[0])
+    n, j = arm.robot.n, arm.robot.joint_index(effect.joint or arm.robot.joints[0])
     if n < 2:
         raise UsageError(f"{effect.name}: {arm.robot.name} has one joint; a coupling needs two")
     return arm.robot.joints[j + 1 if j + 1 < n else j - 1]

@@ -122,7 +122,7 @@ class FrictionCoupling(Effect):
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Set the row of the coupling matrices."""
-        j, k = self.place(arm), int(arm.robot.order[arm.joint_index(self.other(arm))])
+        j, k = self.place(arm), int(arm.robot.order[arm.robot.joint_index(self.other(arm))])
         vacant(self, draft.arrays["coupling_viscous"][j, k] or draft.arrays["coupling_coulomb"][j, k])
         draft.arrays["coupling_viscous"][j, k] = draft.scale[j] * self.viscous
         draft.arrays["coupling_coulomb"][j, k] = draft.scale[j] * self.coulomb

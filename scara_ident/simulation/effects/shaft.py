@@ -61,7 +61,7 @@ class CoupledShaft(Effect):
         """Append the shaft."""
         if abs(self.sign) != 1.0:
             raise UsageError(f"{self.name}: sign is {self.sign:g}; expected 1 for the sum or -1 for the difference")
-        j, k = self.place(arm), int(arm.robot.order[arm.joint_index(self.other(arm))])
+        j, k = self.place(arm), int(arm.robot.order[arm.robot.joint_index(self.other(arm))])
         pairs = zip(draft.arrays["shaft_joint"], draft.arrays["shaft_other"], strict=True)
         vacant(self, float(any({int(i), int(o)} == {j, k} for i, o in pairs)))
         if self.inertia or self.viscous or self.coulomb:

@@ -78,7 +78,7 @@ class JointElasticity(Effect):
         j = self.place(arm)
         _needs_rotor(self, arm, draft, j)
         vacant(self, 0.0 if draft.arrays["width"][j] else draft.arrays["elastic"][j])
-        reduced = _reduced_inertia(arm, arm.joint_index(self.joint or arm.robot.joints[0]))
+        reduced = _reduced_inertia(arm, arm.robot.joint_index(self.joint or arm.robot.joints[0]))
         draft.arrays["elastic"][j] = 1.0
         draft.arrays["stiffness"][j] = self.stiffness
         draft.arrays["damping"][j] = 2.0 * self.damping_ratio * np.sqrt(self.stiffness * reduced)
@@ -117,7 +117,7 @@ class Backlash(Effect):
         vacant(self, draft.arrays["width"][j])
         draft.arrays["width"][j] = self.width
         if not draft.arrays["elastic"][j]:
-            reduced = _reduced_inertia(arm, arm.joint_index(self.joint or arm.robot.joints[0]))
+            reduced = _reduced_inertia(arm, arm.robot.joint_index(self.joint or arm.robot.joints[0]))
             draft.arrays["elastic"][j] = 1.0
             draft.arrays["stiffness"][j] = self.contact_stiffness
             draft.arrays["damping"][j] = 2.0 * self.contact_damping_ratio * np.sqrt(self.contact_stiffness * reduced)

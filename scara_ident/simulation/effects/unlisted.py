@@ -10,14 +10,22 @@ from scara_ident.simulation.effects.effect import BY_ARM, Effect
 from scara_ident.simulation.plant import PlantDraft
 
 
-def _other(arm: VirtualArm, joint: str | None) -> int:
-    """Return the row of the next joint, of the one before for the last, of itself where it is alone."""
-    n, j = arm.robot.n, arm.joint_index(joint or arm.robot.joints[0])
-    return int(arm.robot.order[j + 1 if j + 1 < n else max(j - 1, 0)])
+@dataclass(frozen=True)
+class _OfOtherJoint(Effect):
+    """Friction that varies with the position of the next joint, of the one before for the last, of its own where it is alone."""
+
+    # Array of the draft with the row of that joint.
+    other: ClassVar[str]
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set the size and the other joint."""
+        super().apply(arm, draft)
+        n, j = arm.robot.n, arm.robot.joint_index(self.joint or arm.robot.joints[0])
+        draft.arrays[self.other][self.place(arm)] = int(arm.robot.order[j + 1 if j + 1 < n else max(j - 1, 0)])
 
 
 @dataclass(frozen=True)
-class UnlistedSignedSine(Effect):
+class UnlistedSignedSine(_OfOtherJoint):
     """Dry friction that varies with the other joint's position: ``amplitude sin(3 q_k) sign(v_j)``."""
 
     name: ClassVar[str] = "unlisted_1"
@@ -25,17 +33,13 @@ class UnlistedSignedSine(Effect):
     units: ClassVar[dict[str, str]] = {"amplitude": "N m"}
     shares: ClassVar[dict[str, float]] = {"amplitude": 0.06}
     arrays: ClassVar[dict[str, str]] = {"amplitude": "signed_sine"}
+    other = "signed_sine_of"
     joint_side = ("amplitude",)
     amplitude: float = BY_ARM
 
-    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
-        """Set amplitude and the other joint."""
-        super().apply(arm, draft)
-        draft.arrays["signed_sine_of"][self.place(arm)] = _other(arm, self.joint)
-
 
 @dataclass(frozen=True)
-class UnlistedSwingingViscous(Effect):
+class UnlistedSwingingViscous(_OfOtherJoint):
     """Smooth viscous friction that varies with the other joint's position: ``viscous cos(2 q_k) v_j``."""
 
     name: ClassVar[str] = "unlisted_2"
@@ -43,10 +47,6 @@ class UnlistedSwingingViscous(Effect):
     units: ClassVar[dict[str, str]] = {"viscous": "N m s/rad"}
     shares: ClassVar[dict[str, float]] = {"viscous": 0.06}
     arrays: ClassVar[dict[str, str]] = {"viscous": "swinging_viscous"}
+    other = "swinging_viscous_of"
     joint_side = ("viscous",)
     viscous: float = BY_ARM
-
-    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
-        """Set size and the other joint."""
-        super().apply(arm, draft)
-        draft.arrays["swinging_viscous_of"][self.place(arm)] = _other(arm, self.joint)

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.estimation import ConsistentEstimate
-from scara_ident.estimation.consistent.bodies import smallest_eigenvalue_share
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations
+from scara_ident.model.base_parameters import pseudo_inertia
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import PreparedData
@@ -117,6 +117,14 @@ def observed(model: TorqueModel, item: Motion, value: Array, noise: float, seed:
 
 def truth(model: TorqueModel) -> Array:
     return parameters(model, model.robot.standard_parameters(), (0.08, 0.05))
+
+
+def smallest_eigenvalue_share(parameters: Array) -> float:
+    """Return the smallest eigenvalue of a body's pseudo-inertia as a share of its trace; below 0 it cannot exist."""
+    matrix = pseudo_inertia(parameters)
+    trace = float(np.trace(matrix))
+    smallest = float(np.linalg.eigvalsh(matrix)[0])
+    return smallest / trace if trace > 0.0 else (0.0 if not np.any(matrix) else -np.inf)
 
 
 def smallest(estimate: ConsistentEstimate) -> float:

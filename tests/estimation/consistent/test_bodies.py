@@ -10,11 +10,11 @@ from scara_ident.estimation.consistent.bodies import (
     link_inertia,
     pack,
     packed_pseudo_inertia,
-    smallest_eigenvalue_share,
     unpack,
     unpacking,
 )
 from scara_ident.model.base_parameters import pseudo_inertia
+from tests.estimation.consistent.arms import smallest_eigenvalue_share
 
 
 def point_mass(mass: float, place: tuple[float, float, float]) -> np.ndarray:
@@ -61,11 +61,6 @@ def test_a_point_mass_with_a_product_of_inertia_of_the_wrong_sign_cannot_exist()
     values = np.linalg.eigvalsh(rotational)
     assert values[0] > 0.0
     assert smallest_eigenvalue_share(body) < -1e-3
-
-
-def test_nothing_at_all_can_exist_and_a_negative_mass_cannot():
-    assert smallest_eigenvalue_share(np.zeros(10)) == 0.0
-    assert smallest_eigenvalue_share(-point_mass(1.0, (0.0, 0.0, 0.0))) == -np.inf
 
 
 def test_links_are_written_about_their_centre_of_mass():

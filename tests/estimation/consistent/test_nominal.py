@@ -3,11 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.estimation.consistent.bodies import smallest_eigenvalue_share
 from scara_ident.estimation.consistent.nominal import nominal
 from scara_ident.robot.robot import load_robot
 from tests.arms import Link, write_urdf
-from tests.estimation.consistent.arms import panda, ur5
+from tests.estimation.consistent.arms import panda, smallest_eigenvalue_share, ur5
 
 LINKS = (Link(), Link(xyz=(0.3, 0.0, 0.0), axis=(0.0, 1.0, 0.0)))
 

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from scara_ident.errors import UsageError
 from scara_ident.estimation import ConsistentOptions, consistent, links, physical_consistency, wls
-from scara_ident.estimation.consistent.bodies import smallest_eigenvalue_share
 from scara_ident.estimation.consistent.prior import prior_rows
 from scara_ident.estimation.consistent.problem import Problem
 from scara_ident.estimation.consistent.solution import nearest_arm, noise_of, solve_consistent
@@ -27,6 +26,7 @@ from tests.estimation.consistent.arms import (
     parameters,
     scara,
     smallest,
+    smallest_eigenvalue_share,
     stroke,
     truth,
     ur5,

@@ -1,4 +1,4 @@
-"""Units, turns, spikes, jumps, limits and joints at rest."""
+"""Sizes, units, turns, spikes, jumps, limits and joints at rest."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.made_recordings import COUNT, columns
-from tests.recording.audit.made import kinds, only, refusal
+from tests.recording.audit.made import Read, kinds, only, refusal
 
 
 @pytest.mark.parametrize(
@@ -177,3 +177,24 @@ def test_a_joint_that_stands_still_is_said(read):
     finding = only(read(made), "idle_joint")
     assert finding.count == 1
     assert finding.message.startswith("joint2 does not move")
+
+
+@pytest.mark.parametrize("rows", [slice(None, None, 2), slice(600, None)], ids=["every other", "half a file"])
+@pytest.mark.parametrize("signal", ["position", "effort"])
+def test_numbers_that_no_channel_gives_are_refused(read: Read, signal: str, rows: slice):
+    made = columns(1200)
+    made[f"joint2.{signal}"][rows] = -1e29
+    said = refusal(read, made)
+    assert f"joint2.{signal} is -1e+29 in row {(rows.start or 0) + 1} " in said
+    assert (
+        f"in {np.count_nonzero(made[f'joint2.{signal}'] == -1e29)} of 1200 rows; check the type of its numbers" in said
+    )
+
+
+@pytest.mark.parametrize("signal", ["position", "effort"])
+def test_a_single_one_is_left_out(read: Read, signal: str):
+    made = columns(1200)
+    made[f"joint2.{signal}"][700] = 1e29
+    recording = read(made)
+    assert "row 701" in only(recording, "spike").message
+    assert len(recording.time) == 1199

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scara_ident.report.html.blocks import Arm, chance, count, number, superscripts
+from scara_ident.report.html.blocks import Arm, chance, number, superscripts
 
 
 @given(value=st.floats(-1e12, 1e12).filter(lambda x: x == 0.0 or abs(x) > 1e-12), digits=st.integers(1, 8))
@@ -29,8 +29,7 @@ def test_chances_are_told_in_few_digits(p: float, text: str):
     assert chance(p) == text
 
 
-def test_words_agree_with_their_number_and_exponents_are_raised():
-    assert [count(k, "recording") for k in (0, 1, 2)] == ["0 recordings", "1 recording", "2 recordings"]
+def test_exponents_are_raised():
     assert superscripts("N m s^2/rad^3") == "N m s²/rad³"
 
 

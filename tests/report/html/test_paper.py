@@ -10,7 +10,7 @@ from tests.report.html.document import document
 def test_every_check_of_the_paper_stands_there_with_its_verdict(printed):
     report, found = check_paper(), document(printed)
     assert found.sections == [f"checks-{k}" for k in range(len(report.sections))]
-    assert found.words.count("differs") >= len(report.differing()) > 0
+    assert found.words.count("differs") >= sum(c.agrees is False for c in report.checks) > 0
     for check in report.checks:
         assert superscripts(check.quantity) in found.words
         assert superscripts(check.comment) in found.words

@@ -62,11 +62,10 @@ def test_white_noise_stays_within_the_bounds_of_its_autocorrelation():
     assert np.mean(np.abs(line.y) <= bound) > 0.85
 
 
-def test_sets_without_recordings_are_left_out_and_a_prefix_keeps_names_apart():
+def test_sets_without_recordings_are_left_out():
     sets = {"fitted": [trace_of(swinging(noise()))], "held out": []}
-    blocks = residual_blocks(ROBOT, sets, BANDS, prefix="before-")
+    blocks = residual_blocks(ROBOT, sets, BANDS)
     found = figures(blocks)
-    assert all(name.startswith("before-") for name in found)
     assert {key[1] for figure in found.values() for key in figure.variants} == {0}
     (group,) = {tuple(s.options) for b in blocks if isinstance(b, Group) for s in b.selectors[1:2]}
     assert group == ("fitted",)

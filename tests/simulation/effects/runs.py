@@ -33,7 +33,7 @@ def assert_changes_by(effect: Effect, equation: Callable[[SimulationResult], Arr
     """Find the equation of an effect in the torque of its joint, and nothing in that of the other."""
     result = run(effect)
     extra = left_over(result.arm, result.true)
-    j = result.arm.joint_index(effect.joint)
+    j = result.arm.robot.joint_index(effect.joint)
     expected = equation(result)
     moving = result.true.direction[j] != 0.0
     assert np.abs(expected[moving]).max() > 0.005
