@@ -146,7 +146,9 @@ def _estimate(
     bias = None
     if plain.noise_bias is not None:
         # As far as constraints let the noise of the positions move the estimate.
-        bias = inverse @ (plain.information.regressor_factor.T @ (plain.information.regressor_factor @ plain.noise_bias))
+        bias = inverse @ (
+            plain.information.regressor_factor.T @ (plain.information.regressor_factor @ plain.noise_bias)
+        )
         covariance += np.outer(bias, bias)
     # What constraints leave a parameter less than that of is rounding: they hold it.
     alone = _inverse_along(information, np.eye(len(value)), u.sizes(value))
