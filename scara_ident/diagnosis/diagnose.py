@@ -16,7 +16,7 @@ from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.correction import corrected
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
-from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence, unsure_of_others
+from scara_ident.diagnosis.evidence import Evidence, even_evidence, evidence, held_out_evidence, unsure_of_others
 from scara_ident.diagnosis.found_effect import (
     FoundEffect,
     direct_readings,
@@ -272,8 +272,9 @@ def diagnose(
     log_notes(_LOG, notes)
     undisturbed = without_stretches(validation_after, in_held_out)
     doubtful = (*outcome.suspected, *left_open(found, after.weights, outcome.demoted))
+    shown = evidence(found, outcome.residuals, outcome.fit_after, outcome.small, doubtful, criteria)
     shown = held_out_evidence(
-        evidence(found, outcome.residuals, outcome.fit_after, outcome.small, doubtful, criteria),
+        even_evidence(shown, after, outcome.training, criteria),
         rms_of(after.value, outcome.training),
         rms_of(after.value, undisturbed),
         unsure,

@@ -153,6 +153,50 @@ def held_out_evidence(
     return tuple(found)
 
 
+def even_evidence(
+    shown: Sequence[Evidence], after: Estimate, training: Observations, criteria: SelectionCriteria = CRITERIA
+) -> tuple[Evidence, ...]:
+    """Take back that a residual is noise where one recording leaves much more of it than all others do.
+
+    What acts in one recording, such as a load, may be as white as noise, and no repetition shows it.
+
+    Parameters
+    ----------
+    shown : sequence of Evidence
+    after : Estimate
+    training : Observations
+        Of the same model.
+    criteria : SelectionCriteria, optional
+    """
+    from scipy.special import fdtrc
+
+    if len(training.each) < 2:
+        return tuple(shown)
+    rows = np.array([[item.rows for item in own.by_joint] for own in training.each])
+    squares = np.array(
+        [
+            [item.rms(after.value) ** 2 * item.rows if item.rows else 0.0 for item in own.by_joint]
+            for own in training.each
+        ]
+    )
+    found = []
+    for j, item in enumerate(shown):
+        others = np.sum(rows[:, j]) - rows[:, j]
+        known = (rows[:, j] > 0) & (others > 0)
+        level = np.where(known, np.sum(squares[:, j]) - squares[:, j], 1.0) / np.maximum(others, 1)
+        ratio = np.divide(squares[:, j], rows[:, j] * level, out=np.zeros(len(rows)), where=known & (level > 0.0))
+        place = int(np.argmax(ratio))
+        chance = len(rows) * float(fdtrc(rows[place, j], others[place], ratio[place])) if known[place] else 1.0
+        if item.shown and ratio[place] > criteria.worse_held_out**2 and chance < criteria.significant:
+            own = training.each[place]
+            made = float(noise_torque(own, after.value)[j])
+            if squares[place, j] / rows[place, j] > criteria.worse_held_out**2 * level[place] + made**2:
+                why = f"{own.name} leaves {np.sqrt(ratio[place]):.2g} times the error of all others"
+                item = replace(item, shown=False, by="", why=why)
+        found.append(item)
+    return tuple(found)
+
+
 def unsure_of_others(after: Estimate, held_out: Observations) -> Array:
     """Return the rms error of a right model on recordings held out that training's residual does not have.
 

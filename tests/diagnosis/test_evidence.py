@@ -13,6 +13,7 @@ from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.diagnosis.evidence import (
     Evidence,
     coloured_shares,
+    even_evidence,
     evidence,
     held_out_evidence,
     least_found,
@@ -58,6 +59,28 @@ def test_complete_is_earned_by_repetition(nothing_missing):
     assert nothing_missing.verdict == "complete"
     assert [item.by for item in nothing_missing.evidence] == ["repetition"] * 2
     assert all(item.limit < CRITERIA.least_power for item in nothing_missing.evidence)
+
+
+def test_what_one_recording_leaves_more_of_than_all_others_is_no_noise(nothing_missing):
+    """A load of 2 kg in one of three recordings was as white as noise, and `complete` was said."""
+    after, training = nothing_missing.after, nothing_missing.training_after
+    shown = nothing_missing.evidence
+    assert even_evidence(shown, after, training) == shown
+    rows = training.joints[1]
+    own = training.owner == 2
+    inside = np.repeat(own, np.diff(rows.starts))
+    left = rows.table[-1] - after.value[rows.columns] @ rows.table[:-1]
+    table = rows.table.copy()
+    table[-1] += np.where(inside, left, 0.0)
+    louder = replace(training, joints=(training.joints[0], replace(rows, table=table)))
+    first, second = even_evidence(shown, after, louder)
+    assert first == shown[0]
+    name = training.data.recordings[2].name
+    assert (
+        not second.shown and second.why.startswith(f"{name} leaves ") and "times the error of all others" in second.why
+    )
+    # Of a single recording nothing is said.
+    assert even_evidence(shown, after, louder.of([2])) == shown
 
 
 def test_an_effect_comes_in_from_its_detection_limit_on(nothing_missing):
