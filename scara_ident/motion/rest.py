@@ -20,6 +20,9 @@ POSITION_BAND = 3.0
 REST_SHARE = 3e-3
 REST_NOISE = 5.0
 REST_WIDEN = 0.5
+# A turn is sharp where that filter moves it by more than this share of the band's period: friction, on the wrong side of zero
+# meanwhile, would leave a few thousandths of itself. Smooth turns of measured arms are moved by up to a tenth of it.
+LONGEST_SHIFT = 5e-4
 # Both sides of the equation fade out towards rest over this many periods of the position's low-pass.
 FADE_PERIODS = 1.0
 # The noise of an unfiltered joint is what a filter at this share of the rate takes out.
@@ -36,8 +39,25 @@ def position_cuts(rate: float, bands: Bands) -> list[float | None]:
 
 
 def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.bool_]:
-    """Return where each joint stands still, shape (n, N), widened by the memory of the position's filter."""
-    return slower(motion.v, rest_speeds(stretch, motion, bands), stretch.rate, bands)
+    """Return where each joint stands still, shape (n, N), widened by the memory of the position's filter.
+
+    So is where it turns sharply, however fast: friction jumps there and the acceleration with it, and the filter, which
+    rounds that off, moves the time of the turn.
+    """
+    found = slower(motion.v, rest_speeds(stretch, motion, bands), stretch.rate, bands)
+    for j, (own, band) in enumerate(zip(found, bands, strict=True)):
+        if band is None or position_cuts(stretch.rate, [band])[0] is None:
+            continue
+        widen = _widening(REST_WIDEN, stretch.rate, band)
+        turns = np.flatnonzero(np.diff(np.signbit(motion.v[j])) & ~own[:-1])
+        for around in (slice(max(0, last + 1 - widen), last + 1 + widen) for last in turns):
+            removed = stretch.position[j, around] - motion.q[j, around]
+            time = (np.arange(len(removed)) - 0.5 * (len(removed) - 1)) / stretch.rate
+            # The speed that the filter takes off, over the acceleration.
+            speed = abs(time @ removed) / (time @ time) if len(removed) > 1 else 0.0
+            if speed * band > LONGEST_SHIFT * np.max(np.abs(motion.a[j, around])):
+                own[around] = True
+    return found
 
 
 def rest_speeds(stretch: Stretch, motion: Motion, bands: Bands) -> Array:
@@ -50,19 +70,13 @@ def rest_speeds(stretch: Stretch, motion: Motion, bands: Bands) -> Array:
 
 
 def slower(v: Array, speeds: Array, rate: float, bands: Bands) -> NDArray[np.bool_]:
-    """Return where each joint turns, or is slower than a speed for some samples, shape (n, N), widened as `standstill`.
-
-    However fast it turns: friction then jumps, and with it the acceleration, which the position's filter rounds off.
-    """
+    """Return where each joint is slower than a speed for some samples, shape (n, N), widened as `standstill`."""
     found = np.zeros(v.shape, dtype=bool)
-    turned = np.diff(np.signbit(v), axis=1)
-    for own, slow, turns, band in zip(found, np.abs(v) <= speeds[:, None], turned, bands, strict=True):
+    for own, slow, band in zip(found, np.abs(v) <= speeds[:, None], bands, strict=True):
         widen = _widening(REST_WIDEN, rate, band)
         for start, stop in runs_of(slow):
             if stop - start > 1:
                 own[max(0, start - widen) : stop + widen] = True
-        for last in np.flatnonzero(turns):
-            own[max(0, last + 1 - widen) : last + 1 + widen] = True
     return found
 
 
