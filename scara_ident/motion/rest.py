@@ -20,9 +20,9 @@ POSITION_BAND = 3.0
 REST_SHARE = 3e-3
 REST_NOISE = 5.0
 REST_WIDEN = 0.5
-# A turn is sharp where that filter moves it by more than this share of the band's period: friction, on the wrong side of zero
-# meanwhile, would leave a few thousandths of itself. Smooth turns of measured arms are moved by up to a tenth of it.
-LONGEST_SHIFT = 5e-4
+# A turn is sharp where the acceleration about it has a range of more than this share of its extremes' sum: in smooth motion that
+# is 0.02, and where friction makes 0.1 the filter moves the turn by a thousandth of the band's period.
+SHARP = 0.1
 # Both sides of the equation fade out towards rest over this many periods of the position's low-pass.
 FADE_PERIODS = 1.0
 # The noise of an unfiltered joint is what a filter at this share of the rate takes out.
@@ -45,17 +45,12 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
     rounds that off, moves the time of the turn.
     """
     found = slower(motion.v, rest_speeds(stretch, motion, bands), stretch.rate, bands)
-    for j, (own, band) in enumerate(zip(found, bands, strict=True)):
-        if band is None or position_cuts(stretch.rate, [band])[0] is None:
-            continue
+    for own, v, a, cut, band in zip(found, motion.v, motion.a, position_cuts(stretch.rate, bands), bands, strict=True):
         widen = _widening(REST_WIDEN, stretch.rate, band)
-        turns = np.flatnonzero(np.diff(np.signbit(motion.v[j])) & ~own[:-1])
-        for around in (slice(max(0, last + 1 - widen), last + 1 + widen) for last in turns):
-            removed = stretch.position[j, around] - motion.q[j, around]
-            time = (np.arange(len(removed)) - 0.5 * (len(removed) - 1)) / stretch.rate
-            # The speed that the filter takes off, over the acceleration.
-            speed = abs(time @ removed) / (time @ time) if len(removed) > 1 else 0.0
-            if speed * band > LONGEST_SHIFT * np.max(np.abs(motion.a[j, around])):
+        turns = np.flatnonzero(np.diff(np.signbit(v)) & ~own[:-1]) + 1
+        for around in (slice(max(0, turn - widen), turn + widen + 1) for turn in turns if cut is not None):
+            least, most = float(np.min(a[around])), float(np.max(a[around]))
+            if most - least > SHARP * (abs(most) + abs(least)):
                 own[around] = True
     return found
 
