@@ -48,7 +48,7 @@ def made() -> Results:
         simulate(arm, named_motion(name, robot), effects=hidden, rate=250.0, repetition=k) for name, k in asked
     )
     *training, held_out = (run.recording for run in runs)
-    bands = [20.0, 20.0]
+    bands = [25.0, 25.0]
     return Results(
         robot,
         arm,

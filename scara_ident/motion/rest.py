@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array, median, runs_of
-from scara_ident.motion.low_pass import HIGHEST_CUT
+from scara_ident.motion.low_pass import HIGHEST_CUT, low_pass
 from scara_ident.motion.motion import Motion, Stretch
 
 Bands = Sequence[float | None]
@@ -20,9 +20,9 @@ POSITION_BAND = 3.0
 REST_SHARE = 3e-3
 REST_NOISE = 5.0
 REST_WIDEN = 0.5
-# A turn is sharp where the acceleration about it has a range of more than this share of its extremes' sum: in smooth motion that
-# is 0.02, and where friction makes 0.1 the filter moves the turn by a thousandth of the band's period.
-SHARP = 0.1
+# A turn is sharp where the acceleration about it has a range of more than this share of itself beyond the band, where smooth motion
+# has none: there friction makes it jump, and the filter moves the turn by a thousandth of the band's period and more.
+SHARP = 0.2
 # Both sides of the equation fade out towards rest over this many periods of the position's low-pass.
 FADE_PERIODS = 1.0
 # The noise of an unfiltered joint is what a filter at this share of the rate takes out.
@@ -46,11 +46,12 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
     """
     found = slower(motion.v, rest_speeds(stretch, motion, bands), stretch.rate, bands)
     for own, v, a, cut, band in zip(found, motion.v, motion.a, position_cuts(stretch.rate, bands), bands, strict=True):
-        widen = _widening(REST_WIDEN, stretch.rate, band)
         turns = np.flatnonzero(np.diff(np.signbit(v)) & ~own[:-1]) + 1
-        for around in (slice(max(0, turn - widen), turn + widen + 1) for turn in turns if cut is not None):
-            least, most = float(np.min(a[around])), float(np.max(a[around]))
-            if most - least > SHARP * (abs(most) + abs(least)):
+        if cut is None or not len(turns):
+            continue
+        widen, fast = _widening(REST_WIDEN, stretch.rate, band), a - low_pass(a, stretch.rate, band)
+        for around in (slice(max(0, turn - widen), turn + widen + 1) for turn in turns):
+            if np.ptp(fast[around]) > SHARP * np.max(np.abs(a[around])):
                 own[around] = True
     return found
 

@@ -30,7 +30,7 @@ def recorded(motion: ReferenceMotion, seed: int = 1) -> tuple[Recording, ...]:
 @lru_cache(maxsize=1)
 def small_runs() -> tuple[Recording, ...]:
     """Two runs within 0.4 rad about the middle."""
-    return recorded(multisine("small", 1, 5.0, 0.4), seed=3)
+    return recorded(multisine("small", 2, 5.0, 0.4), seed=3)
 
 
 @lru_cache(maxsize=1)

@@ -56,7 +56,7 @@ def test_torque_that_is_no_motion_s_or_faster_than_noise_allows_widens_no_band(m
 
 
 def test_the_times_at_rest_of_a_motion_that_is_not_recorded_yet_are_foreseen(model: TorqueModel):
-    slow, fast = (prepare([pendulum(model, 12.0, 0.02, pace=pace)], (6.0, 6.0)) for pace in (1.0, 2.0))
+    slow, fast = (prepare([pendulum(model, 12.0, 0.02, pace=pace)], (6.0, 6.0)) for pace in (1.0, 1.8))
     reach = reach_of(model, slow, ols(observe(model, slow)).value, widening=False)
     (part,) = fast.stretches
     bands, fade = reach.foreseen(part.torque, part.motion.v, RATE)
