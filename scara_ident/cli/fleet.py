@@ -51,7 +51,7 @@ def fleet(
     console = output_console()
     counts = {
         kind: sum(item.verdict == kind for item in found.arms)
-        for kind in ("changed", "unchanged", "one date", "no data")
+        for kind in ("changed", "unchanged", "undecided", "one date", "no data")
     }
     said = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
     console.print(f"{len(found.arms)} arms of {arm.name}: {said}", style="bold")
@@ -61,6 +61,7 @@ def fleet(
             rows.add_row("" if k else item.arm, words)
     if rows.row_count:
         console.print(rows)
+    console.note([found.reservation] if found.reservation else [])
     console.note(str(fault) for fault in found.faults)
     with progress() as work:
         work("drawing report.html")

@@ -38,7 +38,8 @@ def simulate(
 ) -> None:
     """Record the virtual arm in closed loop, with what it really was in a JSON beside."""
     from scara_ident.errors import UsageError
-    from scara_ident.files import check_output
+    from scara_ident.files import check_output, slug
+    from scara_ident.manners import listed
     from scara_ident.robot.robot import load_robot
     from scara_ident.simulation import parse_effect, virtual_arm, write_simulation
     from scara_ident.simulation import simulate as simulate_run
@@ -51,6 +52,15 @@ def simulate(
     motions = [named_motion(word, arm.robot) for word in trajectory]
     for joint in link_encoder or ():
         arm.robot.joint_index(joint)
+    # Numbered apart they would be taken for repetitions of one motion.
+    names = [slug(motion.name, "motion") for motion in motions]
+    for name in names:
+        if names.count(name) > 1:
+            same = [word for word, other in zip(trajectory, names, strict=True) if other == name]
+            raise UsageError(
+                f"{listed(same, 3)}: each would be recorded as {name}_1, in the place of the other; rename a file, or record "
+                "a motion more often with --repetitions"
+            )
     made = [f"{motion.name}_{run}" for motion in motions for run in range(1, repetitions + 1)]
     for each in effects:
         if each.recording not in (None, *made):

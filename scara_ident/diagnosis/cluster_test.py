@@ -159,9 +159,12 @@ def _weights(
         each = 1.0 / (1.0 + shares_of(model, few, each) / bend)
         found = weighted(model, few, each)
         least = _least(_of_weighted(neighbours, found)[1])
-        spread = np.sqrt(np.trace(found.spread, axis1=1, axis2=2) / rank[places])
+        # What the weighted blocks do not tell has no spread, and what rounding leaves of it may be less than nothing.
+        square = np.trace(found.spread, axis1=1, axis2=2)
+        told = (found.strength > _LEAST_REDUNDANCY) & (square > 0.0)
+        spread = np.sqrt(np.where(told, square, np.inf) / rank[places])
         size = spread * [needed(k, v, chance) for k, v in zip(rank[places], least, strict=True)]
-        better = (found.strength > _LEAST_REDUNDANCY) & (size < sizes[places])
+        better = size < sizes[places]
         sizes[places[better]], weights[better], bent[better] = size[better], each[better], True
     return places[bent], weights[bent], sizes
 

@@ -191,6 +191,8 @@ def binned_power(signals: Array, rate: float, edges: Array) -> Array:
     """
     count = signals.shape[1]
     length = min(count, max(8, int(SEGMENT_SECONDS * rate)))
+    # Torques cut out of a recording with gaps lie in memory sample by sample; the view of the spectra wants signal by signal.
+    signals = np.ascontiguousarray(signals)
     centred = signals - np.mean(signals, axis=1, keepdims=True)
     segments = np.lib.stride_tricks.sliding_window_view(centred, length, axis=1)[:, :: max(1, length // 2)]
     window = np.hanning(length)

@@ -22,6 +22,7 @@ from scara_ident.export.ros2 import ros2_text
 from scara_ident.export.traced_model import TracedModel, trace_model
 from scara_ident.export.urdf import urdf_text
 from scara_ident.files import slug, write_json, write_text, written_together
+from scara_ident.manners import listed
 from scara_ident.model.terms import Friction, Offset, RigidBody
 
 
@@ -67,6 +68,7 @@ def export_model(found: IdentifiedModel, to: str) -> Exported:
     """
     form = FORMS[to]
     standard, notes = possible_standard(found) if form.bodies else (None, ())
+    notes = (*_open(found), *notes)
     alone = said_by(form, found, standard)
     if standard is None:
         model = trace_model(found.model, alone.value)
@@ -122,7 +124,16 @@ def about_lines(found: IdentifiedModel, said: Said) -> tuple[str, ...]:
         f"{name}: rms error {kind} {_number(own[name])} {found.robot.torque_unit(j)}, of the model {_number(model[name])}."
         for j, name in enumerate(found.robot.joints)
     ]
+    lines += [f"{note[0].upper()}{note[1:]}." for note in _open(found)]
     return (*lines, *(f"Not said: {what}: {why}." for what, why in said.missing))
+
+
+def _open(found: IdentifiedModel) -> tuple[str, ...]:
+    """Say which parameters the recordings do not tell."""
+    names = [name for name, missing in zip(found.model.names, found.undetermined, strict=True) if missing]
+    if not names:
+        return ()
+    return (f"the recordings leave {listed(names, 12)} undetermined: torques that rest on them are not known",)
 
 
 def _number(value: float | None) -> str:

@@ -127,7 +127,9 @@ def _rms(content: Mapping[str, Any], joints: Sequence[str]) -> Array:
     runs = [run for run in (errors.get("validation") or errors.get("training") or {}).values() if run]
     found = np.full(len(joints), np.nan)
     for j, joint in enumerate(joints):
-        told = [float(run[joint]["rms_unfiltered"]) for run in runs if run.get(joint)]
+        # A joint at rest has no error in a run.
+        each = [run[joint]["rms_unfiltered"] for run in runs if run.get(joint)]
+        told = [float(rms) for rms in each if rms is not None]
         if told:
             found[j] = float(np.sqrt(np.mean(np.square(told))))
     return found

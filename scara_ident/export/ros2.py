@@ -36,6 +36,12 @@ def ros2_text(found: IdentifiedModel, value: Array, armature: Array, urdf: str, 
     """
     import yaml
 
+    class Plain(yaml.SafeDumper):
+        """Without anchors and aliases, which ROS 2's parser does not know."""
+
+        def ignore_aliases(self, data: object) -> bool:
+            return True
+
     robot, model = found.robot, found.model
     joints = list(robot.joints)
     friction: dict[str, list[float]] = {word: [0.0] * robot.n for word in WORDS}
@@ -84,7 +90,7 @@ def ros2_text(found: IdentifiedModel, value: Array, armature: Array, urdf: str, 
         },
     }
     head = "".join(f"# {line}\n" for line in about)
-    return head + yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=120)
+    return head + yaml.dump(content, Dumper=Plain, sort_keys=False, default_flow_style=None, width=120)
 
 
 def _mean_inertia(found: IdentifiedModel, value: Array) -> Array:

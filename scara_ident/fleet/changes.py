@@ -40,6 +40,9 @@ AS_GOOD = 0.05
 SIMULATED, SIMULATED_LEVEL = 2000, 0.1
 # Causes of which runs are less than this share of the variance tell each other how much larger than noise it is.
 BY_RUNS = 0.5
+# The median of fewer differences between dates does not withstand one that is a change: what differs by nature is then taken
+# to be as large, and nothing is named.
+FEWEST_STEPS = 3
 # A combination of which less is left beside the common parameters, as a share of its square, is one of them.
 LEFT_SHARE = 1e-9
 
@@ -109,7 +112,8 @@ def fleet_scatter(histories: Sequence[History]) -> Scatter:
     """Return what differs from date to date in a fleet.
 
     A cause's variance is that of runs and of noise. The first is as sure as `run_scatter` tells it; how much larger the second
-    is than noise all causes tell each other, see `variance_prior`. The degrees of freedom of the sum are Satterthwaite's (1946).
+    is than noise all causes tell each other, see `variance_prior`, and with no more degrees of freedom than all of them have
+    together (Smyth 2004). The degrees of freedom of the sum are Satterthwaite's (1946).
 
     Parameters
     ----------
@@ -142,12 +146,12 @@ def fleet_scatter(histories: Sequence[History]) -> Scatter:
     raw = {label: _mean_square(np.concatenate(squares)) for label, squares in found.items()}
     by_runs = {label: float(np.mean(part)) for label, part in parts.items()}
     noisy = [ratio for label, ratio in raw.items() if by_runs[label] < BY_RUNS]
-    prior, usual = variance_prior(np.concatenate(noisy) if noisy else np.zeros(0), freedom)
+    pooled = np.concatenate(noisy) if noisy else np.zeros(0)
+    prior, usual = variance_prior(pooled, freedom)
+    moderated = min(freedom + prior, freedom * max(1, np.count_nonzero(pooled > 0.0)))
     weight = freedom / (freedom + prior)
     ratios = {label: np.maximum(1.0, usual + weight * (ratio - usual)) for label, ratio in raw.items()}
-    freedoms = {
-        label: 1.0 / (part**2 / freedom + (1.0 - part) ** 2 / (freedom + prior)) for label, part in by_runs.items()
-    }
+    freedoms = {label: 1.0 / (part**2 / freedom + (1.0 - part) ** 2 / moderated) for label, part in by_runs.items()}
     return Scatter(runs, ratios, freedom, freedoms)
 
 

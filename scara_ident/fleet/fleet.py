@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import groupby
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from scara_ident.fleet.changes import (
+    FEWEST_STEPS,
     LEVEL,
     Change,
     arms_counted,
@@ -27,6 +28,7 @@ from scara_ident.fleet.store import FOLDER, Store
 from scara_ident.fleet.table import Quantity, quantities
 from scara_ident.fleet.words import sentence
 from scara_ident.fleet.work import IDENTIFYING, LateEngine, Settings, Work
+from scara_ident.manners import several
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.progress import Tell, silent
 from scara_ident.robot.robot import Robot
@@ -47,6 +49,8 @@ class ArmReport:
     diagnosis : mapping or None
         Verdict and effects of the latest date of an arm that changed.
     faults : tuple of Fault
+    told : bool
+        Whether the fleet has dates enough to tell a change from what differs by nature.
     """
 
     arm: str
@@ -54,6 +58,7 @@ class ArmReport:
     changes: tuple[Change, ...] = ()
     diagnosis: Mapping[str, Any] | None = None
     faults: tuple[Fault, ...] = ()
+    told: bool = True
 
     @property
     def known(self) -> History:
@@ -64,12 +69,14 @@ class ArmReport:
 
     @property
     def verdict(self) -> str:
-        """``changed``, ``unchanged``, ``one date`` or ``no data``."""
+        """``changed``, ``unchanged``, ``undecided``, ``one date`` or ``no data``."""
         if self.history is None:
             return "no data"
         if len(self.history.dates) < 2:
             return "one date"
-        return "changed" if self.changes else "unchanged"
+        if self.changes:
+            return "changed"
+        return "unchanged" if self.told else "undecided"
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -100,6 +107,18 @@ class Fleet:
     def ranked(self) -> tuple[ArmReport, ...]:
         """The arms by their need of a look: the surest change first, then faults, then the rest by name."""
         return tuple(sorted(self.arms, key=lambda item: (not item.changes, -_surest(item), not item.faults, item.arm)))
+
+    @property
+    def reservation(self) -> str | None:
+        """Why nothing can be said of arms that are undecided, and what would tell."""
+        few = [item for item in self.arms if item.verdict == "undecided"]
+        if not few:
+            return None
+        steps = _steps(item.history for item in self.arms if item.history is not None)
+        return (
+            f"{several(steps, 'difference')} between dates of the whole fleet cannot tell a change from what differs from day to "
+            f"day on any arm: it takes {FEWEST_STEPS}, of more dates or more arms"
+        )
 
     @property
     def faults(self) -> tuple[Fault, ...]:
@@ -158,6 +177,7 @@ def watch_fleet(
         if settings.diagnosed:
             work.diagnose({arm: histories[arm].dates[-1] for arm, found in changes.items() if found}, by_arm, engine)
     arms = sorted({*by_arm, *(fault.arm for fault in work.faults)})
+    told = _steps(histories.values()) >= FEWEST_STEPS
     reports = tuple(
         ArmReport(
             arm,
@@ -165,6 +185,7 @@ def watch_fleet(
             changes.get(arm, ()),
             work.diagnoses.get(arm),
             tuple(sorted((item for item in work.faults if item.arm == arm), key=str)),
+            told,
         )
         for arm in arms
     )
@@ -179,23 +200,28 @@ def changes_of(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:
     histories : sequence of History
         Of one robot and model.
     """
-    several = [item for item in histories if len(item.dates) > 1]
-    if not several:
+    compared = [item for item in histories if len(item.dates) > 1]
+    if not compared:
         return {}
     with one_thread():
-        scatter = fleet_scatter(several)
+        scatter = fleet_scatter(compared)
         # Arms with as many dates are tried as often.
-        trials = {len(item.dates): item for item in several}
+        trials = {len(item.dates): item for item in compared}
         tried = {count: trials_of(item, scatter) for count, item in trials.items()}
-        least = [least_probability(item, scatter, tried[len(item.dates)]) for item in several]
-        arms, residuals = arms_counted(least), residual_scatter(several)
+        least = [least_probability(item, scatter, tried[len(item.dates)]) for item in compared]
+        arms, residuals = arms_counted(least), residual_scatter(compared)
         found = {}
-        for item, probability in zip(several, least, strict=True):
+        for item, probability in zip(compared, least, strict=True):
             own = tried[len(item.dates)]
             # Of most arms the surest change is none, and no more is asked.
             named = find_changes(item, scatter, own * arms) if probability * arms < LEVEL else ()
-            found[item.arm] = named or grown_residuals(item, *residuals, own * len(several))
+            found[item.arm] = named or grown_residuals(item, *residuals, own * len(compared))
         return found
+
+
+def _steps(histories: Iterable[History]) -> int:
+    """Return how many differences between neighbouring dates there are."""
+    return sum(len(item.dates) - 1 for item in histories)
 
 
 def _surest(report: ArmReport) -> float:

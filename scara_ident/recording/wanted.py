@@ -6,13 +6,14 @@ import re
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
+from shlex import quote
 
 import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.recording.audit import Finding, Samples
-from scara_ident.robot.signal_map import Channel, Channels
+from scara_ident.robot.signal_map import SIGNALS, Channel, Channels
 
 OPTIONAL = ("velocity", "acceleration", "temperature")
 
@@ -37,17 +38,19 @@ def refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str], chan
     ending = name.rpartition(".")[2]
     mapped = _declaring(channels, name)
     have = [other for other in names if other.endswith(f".{ending}")] if "." in name and not mapped else list(names)
-    lower = {other.lower(): other for other in names}
+    # A column that holds another signal is not the one looked for.
+    used = {channels.time.column, *(channel.column for signal in SIGNALS for channel in channels.of(signal))}
+    lower = {other.lower(): other for other in names if other not in used}
     near = get_close_matches(name.lower(), lower, n=1, cutoff=0.75)
     guess = f"is it {lower[near[0]]!r}? " if near else ""
     kind = f"{ending} columns" if "." in name and not mapped else "columns"
     shown = ", ".join(have[:8]) + (", ..." if len(have) > 8 else "") if have else "none"
     remedy = "rename the column, or correct the joints in the robot description; one for these columns "
-    remedy += f"writes: scara-ident inspect {path.name} --urdf URDF"
+    remedy += f"writes: scara-ident inspect {quote(str(path))} --urdf URDF"
     if mapped:
         remedy = f"correct recording: {mapped} in the robot description"
     elif len(missing) == len(wanted) and path.exists():
-        remedy = f"map its columns in the robot description; a first one writes: scara-ident inspect {path.name}"
+        remedy = f"map its columns in the robot description; a first one writes: scara-ident inspect {quote(str(path))}"
     raise RecordingError(f"{path}: no column {name!r}{more}; {guess}its {kind}: {shown}; {remedy}")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, RobotError, ScaraIdentError, UsageError
 from scara_ident.export.identified_model import Entry, IdentifiedModel
+from scara_ident.manners import listed
 from scara_ident.motion.prepared import PreparedStretch, prepare
 from scara_ident.progress import Tell, silent
 from scara_ident.recording.recording import Recording
@@ -110,9 +111,18 @@ def use(
     ------
     RobotError
         If no arm with these parameters can move.
+    ScaraIdentError
+        If a joint did not move in the recordings that the model was found on.
     UsageError
         If the virtual arm has no such model.
     """
+    rows = [item.rows for item in model.training]
+    if any(rows) and not all(rows):
+        still = listed([joint for joint, count in zip(model.robot.joints, rows, strict=True) if not count], 3)
+        raise ScaraIdentError(
+            f"{model.robot.name}: {still} did not move in the recordings that the model was found on, and no arm can be "
+            "simulated by it; identify it with recordings in which all joints move"
+        )
     random = np.random.default_rng(seed)
     pairs, missing = simulated(model.found)
     progress("feed-forward torques", 0.0)

@@ -72,3 +72,14 @@ def test_a_push_is_in_the_recording_named_and_a_second_encoder_in_all(command, t
     told = [json.loads((tmp_path / "pushed" / f"short_{k}.truth.json").read_text())["effects"] for k in (1, 2)]
     assert told[0] == []
     assert (told[1][0]["effect"], told[1][0]["parameters"]["from"]) == ("push", 0.1)
+
+
+def test_motions_that_would_replace_each_other_are_refused(command, trajectory: Path, tmp_path: Path):
+    other = tmp_path / "b" / trajectory.name
+    other.parent.mkdir()
+    other.write_bytes(trajectory.read_bytes())
+    out = tmp_path / "out"
+    for first, second in ((trajectory, other), ("OJK", "OJK")):
+        result = command("simulate", first, second, "--output", out)
+        assert result.status == 2 and not out.exists()
+        assert f"{first}, {second}" in result.err and "--repetitions" in result.err

@@ -21,3 +21,11 @@ def test_binned_power_is_the_mean_square_whatever_the_bins():
     tone = np.sin(2 * np.pi * 30.0 * np.arange(count) / RATE)[None]
     assert binned_power(tone, RATE, edges)[0, 1] > 0.999 * binned_power(tone, RATE, edges).sum()
     np.testing.assert_allclose(binned_power(tone + 7.0, RATE, edges), binned_power(tone, RATE, edges), atol=1e-6)
+
+
+def test_binned_power_is_the_same_however_the_signals_lie_in_memory():
+    signals = np.random.default_rng(0).standard_normal((2, 5000))
+    edges = np.array([0.0, 10.0, 60.0, 250.0])
+    np.testing.assert_array_equal(
+        binned_power(np.asfortranarray(signals), RATE, edges), binned_power(signals, RATE, edges)
+    )

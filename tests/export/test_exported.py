@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -40,6 +41,17 @@ def test_every_form_gives_the_model_s_torque_in_what_it_can_say(models, readers,
             assert model[joint] == pytest.approx(NOISE, rel=0.2)
             assert errors[joint] == pytest.approx(model[joint], rel=1e-6) or not complete
         assert (max(errors.values()) > 1.5 * max(model.values())) == (not complete)
+
+
+@pytest.mark.parametrize("to", FORMS)
+def test_what_the_recordings_leave_open_is_said_beside_and_in_the_file(models, to):
+    found = models["scara", False]
+    open_ = np.array([name == "a02" for name in found.model.names])
+    done = export_model(replace(found, undetermined=open_), to)
+    said = "recordings leave a02 undetermined: torques that rest on them are not known"
+    assert f"the {said}" in done.notes
+    code = [text for name, text in done.files.items() if name.endswith((".h", ".py", ".yaml"))]
+    assert all(f"The {said}." in text for text in code)
 
 
 def test_nothing_is_written_where_a_file_fails(models, tmp_path, monkeypatch):

@@ -70,6 +70,16 @@ def test_a_parameter_without_a_value_is_named_where_all_are_needed(content, read
         read(open_ | {"model": "mine"})
 
 
+def test_a_joint_at_rest_has_no_error_and_the_others_have_theirs(content, read):
+    still = json.loads(json.dumps(content))
+    for kind in ("training", "validation"):
+        for own in still["errors"][kind].values():
+            own["joint2"] = dict.fromkeys(own["joint2"])
+    rms = read(still).rms
+    assert rms[0] == pytest.approx(content["errors"]["validation"]["CI_1"]["joint1"]["rms_unfiltered"], rel=1e-9)
+    assert np.isnan(rms[1])
+
+
 def test_every_effect_reads_back_as_it_was(found, content, read):
     base = found.model
     names = tuple(sorted({effect.name for effect in available_effects() if effect.name != "time_delay"}))

@@ -11,6 +11,8 @@ def test_parameters_are_those_of_the_model_in_the_order_of_its_joints(models) ->
     armature = found.standard[20:]
     text = ros2_text(found, found.value, armature, "arm.urdf", ("one line",))
     assert text.startswith("# one line\n")
+    # ROS 2's parser knows neither anchors nor aliases.
+    assert not any(isinstance(token, yaml.AnchorToken | yaml.AliasToken) for token in yaml.scan(text))
     content = yaml.safe_load(text)
     given = content["computed_torque"]["ros__parameters"]
     value = dict(zip(found.model.names, found.value, strict=True))

@@ -29,6 +29,15 @@ def test_a_missing_column_has_a_remedy(names: list[str], said: str):
         refuse_missing(Path("a.csv"), names, WANTED, CHANNELS)
 
 
+def test_what_is_to_be_run_names_the_file_where_it_is_and_no_column_of_another_joint_is_the_one():
+    names = ["time", "joint1.position", "joint1.effort", "joint2.position"]
+    channels = contract_channels(("joint1", "joint2"))
+    with pytest.raises(RecordingError) as told:
+        refuse_missing(Path("my runs/A_1.csv"), names, [*names, "joint2.effort"], channels)
+    assert "no column 'joint2.effort'; its effort columns: joint1.effort;" in str(told.value)
+    assert "scara-ident inspect 'my runs/A_1.csv' --urdf URDF" in str(told.value)
+
+
 def test_a_signal_of_some_joints_only_is_left_out_and_said():
     found, (said,) = optional_channels(Path("a.csv"), CHANNELS, ["j1.velocity"], ())
     assert found == {}

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from scara_ident.errors import UsageError
+from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.estimation.information import Information
 from scara_ident.model.model import TorqueModel
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
 from scara_ident.use import use
@@ -26,6 +28,13 @@ def test_the_effect_wins_in_tracking_and_in_rollouts() -> None:
     assert list(rms) == ["pid", "urdf", "identified", "effects"]
     assert rms["effects"][0] < 0.7 * rms["identified"][0]
     assert found.rollouts["effects"][-1, 0] < 0.5 * found.rollouts["identified"][-1, 0]
+
+
+def test_a_joint_that_did_not_move_is_named() -> None:
+    model = with_spring()
+    moved = Information.empty(len(model.value)).absorb(np.ones((1, len(model.value))), np.ones(1))
+    with pytest.raises(ScaraIdentError, match="joint2 did not move in the recordings"):
+        use(replace(model, training=(moved, model.training[1])))
 
 
 def test_a_model_that_the_virtual_arm_has_not_is_refused_in_one_line() -> None:

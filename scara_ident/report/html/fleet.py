@@ -188,6 +188,8 @@ def fleet_report(path: Path, fleet: Fleet) -> None:
     changed = [item for item in fleet.ranked if item.changes]
     verdict = [f"{len(changed)} of {several(len(fleet.arms), 'arm')} changed by more than noise."]
     verdict += [f"{item.arm}: {words}." for item in changed for words in item.sentences]
+    if fleet.reservation:
+        verdict.append(f"{fleet.reservation}.")
     if fleet.faults:
         verdict.append(f"{several(len(fleet.faults), 'fault')}: see below.")
     dates = sum(len(item.history.dates) for item in fleet.arms if item.history is not None)
