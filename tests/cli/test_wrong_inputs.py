@@ -105,10 +105,10 @@ OTHERS = [
     ("diagnose good_1.parquet --robot reduction.yaml", 1, ("reduction.yaml: joints.joint1.reduction",)),
     # compare
     ("compare missing.csv", 2, ("missing.csv: no such file",)),
-    ("compare good_1.parquet", 2, ("at least two trajectories, found 1", "repetitions")),
+    ("compare good_1.parquet", 1, ("at least two trajectories, found 1", "repetitions")),
     ("compare good_1.parquet good_1.csv", 1, ("two recordings named 'good_1'", "rename one")),
     ("compare good_1.parquet --method magic", 2, ("method 'magic': expected one of",)),
-    ("compare good_1.parquet day1/run_1.parquet still_1.parquet", 2, ("trajectories, found 1",)),
+    ("compare good_1.parquet day1/run_1.parquet still_1.parquet", 1, ("trajectories, found 1",)),
     # simulate
     ("simulate nowhere.csv", 2, ("'nowhere.csv': no such file", "OJK, OJD")),
     ("simulate OJD5", 2, ("'OJD5': no such file", "OJK, OJD")),
