@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from scara_ident.errors import RobotError
+from scara_ident.errors import NoRobotError, RobotError
 from scara_ident.files import path_fault, real_path
 from scara_ident.robot.examples import example_urdf, is_name
 
@@ -206,7 +206,7 @@ def read_description(path: Path) -> RobotDescription:
         _refuse_twice(tree, path)
         content: Any = yaml.load(text, Loader=Loader)
     except FileNotFoundError:
-        raise RobotError(f"{path}: no such robot description") from None
+        raise NoRobotError(f"{path}: no such robot description") from None
     except IsADirectoryError:
         raise RobotError(f"{path}: is a folder; give its robot.yaml") from None
     except OSError as error:
@@ -223,7 +223,10 @@ def read_description(path: Path) -> RobotDescription:
     description = check_description(content, path)
     # What lies beside the file comes before a robot of that name.
     named = is_name(description.urdf, path.parent)
-    urdf = example_urdf(description.urdf.name) if named else path.parent / description.urdf
+    try:
+        urdf = example_urdf(description.urdf.name) if named else path.parent / description.urdf
+    except NoRobotError as error:
+        raise RobotError(f"{path}: urdf: {error}") from None
     return description.model_copy(update={"urdf": real_path(urdf)})
 
 
