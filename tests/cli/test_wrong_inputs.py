@@ -59,7 +59,7 @@ ROBOTS = [
     ("key.yaml", 1, ("key.yaml: joints.joint1.reductoin: unknown key", "expected one of reduction")),
     ("reduction.yaml", 1, ("reduction.yaml: joints.joint1.reduction: expected a number other than 0",)),
     ("side.yaml", 1, ("side.yaml: effort_side:", "'motor' or 'joint'", "found 'elbow'")),
-    ("gravity.yaml", 1, ("gravity.yaml: gravity.2: missing",)),
+    ("gravity.yaml", 1, ("gravity.yaml: gravity: expected three numbers in m/s^2",)),
     ("unknown.yaml", 1, ("unknown.yaml: joints.jiont1: the URDF has no such joint", "did you mean joint1?")),
     ("both.yaml", 1, ("both.yaml: locked.joint2: the joint is also under joints", "name it in one of them")),
     ("nourdf.yaml", 1, ("nourdf.yaml: urdf: no such file", "arm_that_is_not_there.urdf")),
