@@ -159,6 +159,13 @@ OTHERS = [
     ("excite --tell missing.json", 2, ("missing.json: no such file", "give a diagnosis.json")),
     ("excite --parameters missing.json", 2, ("missing.json: no such file", "give an identification.json")),
     ("use missing.json --robot good_1.csv", 2, ("missing.json: no such file",)),
+    # An empty word, as of a variable of the shell that is not set, is not the current folder.
+    ("identify good_1.parquet --output=", 2, ("Invalid value for '--output': it is empty; give a value",)),
+    ("excite --output=", 2, ("'--output': it is empty",)),
+    ("fleet nothing --output=", 2, ("'--output': it is empty",)),
+    ("identify good_1.parquet --validate=", 2, ("'--validate': it is empty",)),
+    ("base --robot=", 2, ("'--robot': it is empty", "see scara-ident base --help")),
+    ("excite --tell=", 2, ("'--tell': it is empty",)),
     # base and paper
     ("base extra", 2, ("unexpected extra argument", "extra", "see scara-ident base --help")),
     ("base --robot", 2, ("--robot", "requires an argument")),
@@ -230,7 +237,7 @@ def test_a_wrong_input_is_one_line_and_changes_nothing(
 ):
     monkeypatch.chdir(wrong)
     given = words.split()
-    if "--output" not in given and given[0] not in ("inspect", "identfy", "ask"):
+    if "--output" not in words and given[0] not in ("inspect", "identfy", "ask"):
         given[1:1] = ["--output", str(results)]
     before = state(wrong), state(results)
     answer = command(*given)
