@@ -12,7 +12,7 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.answerability import Inquiry, inquiry_of
@@ -248,6 +248,7 @@ def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], aske
         words = f"No motion within the limits would tell. What would: {others}."
         return _note(folder, replace(asked, state="untold", words=words))
     _written(folder, design)
+    write_json(folder / "diagnosis.json", _promised(content, design.tells))
     words = (
         f"Record next/trajectory.csv into recordings/. It asks: {told[0].question.text}; "
         f"{told[0].before:.2g} standard errors apart so far, {told[0].after:.2g} expected with it."
@@ -297,6 +298,16 @@ def worth_recording(tells: Sequence[Told]) -> list[Told]:
         for item in tells
         if item.after >= max(SURE, WORTH * item.before) and not 0 < len(item.question.suspects) == len(item.unshown)
     ]
+
+
+def _promised(content: Mapping[str, Any], tells: Sequence[Told]) -> dict[str, Any]:
+    """Return a diagnosis with how far apart the designed motion is expected to bring the answers to what it asks."""
+    after = {item.question.text: item.after for item in tells}
+    steps = [
+        {**step, "sigma_after": after[step["question"]]} if step["question"] in after else step
+        for step in content["next"]
+    ]
+    return {**content, "next": steps}
 
 
 def _written(folder: Path, design: Design) -> None:

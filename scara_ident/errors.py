@@ -21,6 +21,10 @@ class RobotError(ScaraIdentError):
     """A robot description that cannot be used."""
 
 
+class NoRobotError(UsageError, RobotError):
+    """A robot description that is not there."""
+
+
 class RecordingError(ScaraIdentError):
     """A recording that cannot be used."""
 

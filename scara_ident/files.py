@@ -66,6 +66,21 @@ def path_fault(path: Path | str) -> str | None:
     return None
 
 
+def unreadable(path: Path, error: OSError, instead: str) -> ScaraIdentError:
+    """Return the error that says why a file that was given cannot be read: bad usage where there is none.
+
+    Parameters
+    ----------
+    path : Path
+    error : OSError
+    instead : str
+        What to give.
+    """
+    if isinstance(error, FileNotFoundError | NotADirectoryError):
+        return UsageError(f"{path}: no such file; {instead}")
+    return ScaraIdentError(f"{path}: cannot be read: {error.strerror or error}; {instead}")
+
+
 def real_path(path: Path) -> Path:
     """Return the path behind links, absolute; of links that go round in a ring, the path as it is."""
     try:

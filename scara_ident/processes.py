@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
+import signal
+import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import cache
+from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
+from scara_ident.errors import ScaraIdentError
 from scara_ident.threads import forget_threads, one_blas_thread, one_thread, works_alone
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-_work: Callable[[Any], Any] | None = None
+# Items that a process is given ahead, so that it never waits for the caller.
+AHEAD = 2
 # Threads begin without it.
 _OWN: ContextVar[bool] = ContextVar("own process", default=False)
 
@@ -37,7 +43,7 @@ def map_in_order(
     ----------
     work : callable
     items : iterable
-        Sent to the workers, as are the results to the caller.
+        The results are sent to the caller.
     processes : int, optional
         Default: as many as there are cores.
     """
@@ -47,8 +53,19 @@ def map_in_order(
         with one_blas_thread():
             yield from map(work, wanted)
         return
-    with _forked(count, work) as pool:
-        yield from pool.map(_apply, wanted)
+    with _forked(count, lambda place: work(wanted[place])) as workers:
+        places, found = iter(range(len(wanted))), dict[int, tuple[bool, Any]]()
+        given = {
+            worker: [place for _ in range(AHEAD) if (place := _give(worker, places)) is not None] for worker in workers
+        }
+        for place in range(len(wanted)):
+            while place not in found:
+                for worker in wait([worker for worker in workers if given[worker]]):
+                    assert isinstance(worker, Connection)
+                    found[given[worker].pop(0)] = _taken(worker)
+                    if (more := _give(worker, places)) is not None:
+                        given[worker].append(more)
+            yield _result(*found.pop(place))
 
 
 def all_beside(tasks: Sequence[Callable[[], None]]) -> None:
@@ -72,12 +89,13 @@ def beside(work: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
         yield work
         return
 
-    def alone(_: None) -> Result:
+    def alone(_: int) -> Result:
         forget_threads()
         return work()
 
-    with _forked(1, alone) as pool:
-        yield pool.submit(_apply, None).result
+    with _forked(1, alone) as (worker,):
+        worker.send(0)
+        yield cache(lambda: _result(*_taken(worker)))
 
 
 @contextmanager
@@ -125,26 +143,98 @@ def _may_fork() -> bool:
 
 
 @contextmanager
-def _forked(count: int, work: Callable[[Any], Any]) -> Iterator[ProcessPoolExecutor]:
+def _forked(count: int, work: Callable[[int], Any]) -> Iterator[list[Connection]]:
+    """Start processes that do work of a number; yields what the numbers are sent through and the results come back by.
+
+    However the block ends, the processes are ended with it: nobody wants what they are still at.
+    """
     context = multiprocessing.get_context("fork")
-    with ProcessPoolExecutor(count, mp_context=context, initializer=_adopt, initargs=(work,)) as pool:
+    processes, ends = [], list[Connection]()
+    try:
+        with uninterrupted():
+            for _ in range(count):
+                end, other = context.Pipe()
+                ends.append(end)
+                process = context.Process(target=_serve, args=(work, other, list(ends)))
+                process.start()
+                processes.append(process)
+                other.close()
+        yield ends
+    finally:
+        with uninterrupted():
+            for process in processes:
+                process.kill()
+                process.join()
+            for end in ends:
+                end.close()
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Hold Ctrl-C back until the block ends; threads and processes that it starts never hear of one."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _serve(work: Callable[[int], Any], end: Connection, others: Sequence[Connection]) -> None:
+    """Do work of the numbers that come, until the caller is gone."""
+    # The caller ends this process; a signal to all of the terminal's is for the caller alone.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    for other in others:
+        other.close()
+    try:
+        while True:
+            end.send_bytes(_answer(work, end.recv()))
+    except (EOFError, ConnectionError):
+        return
+
+
+def _answer(work: Callable[[int], Any], place: int) -> bytes:
+    """Return whether work was done, and its result or its error, to be sent."""
+    try:
+        with one_blas_thread():
+            return pickle.dumps((True, work(place)), pickle.HIGHEST_PROTOCOL)
+    except Exception as error:
+        error.add_note(f"In another process:\n{traceback.format_exc()}")
         try:
-            yield pool
-        except BaseException:
-            # Leaving the pool waits for its work, which nobody wants any more.
-            pool.shutdown(wait=False, cancel_futures=True)
-            for worker in multiprocessing.active_children():
-                worker.kill()
-            raise
+            return pickle.dumps((False, error))
+        except (TypeError, AttributeError, pickle.PicklingError):
+            return pickle.dumps((False, RuntimeError(f"{type(error).__name__}: {error}")))
 
 
-def _adopt(work: Callable[[Any], Any]) -> None:
-    global _work
-    _work = work
+def _give(worker: Connection, places: Iterator[int]) -> int | None:
+    """Send the next number to a process; return it, or None where none is left."""
+    place = next(places, None)
+    if place is not None:
+        try:
+            worker.send(place)
+        except ConnectionError:
+            raise _lost() from None
+    return place
 
 
-def _apply(item: Any) -> Any:
-    if _work is None:
-        raise RuntimeError("the worker was not given its function")
-    with one_blas_thread():
-        return _work(item)
+def _taken(worker: Connection) -> tuple[bool, Any]:
+    try:
+        done, found = pickle.loads(worker.recv_bytes())
+    except (EOFError, ConnectionError):
+        raise _lost() from None
+    return done, found
+
+
+def _lost() -> ScaraIdentError:
+    return ScaraIdentError(
+        "a process of this run was ended from outside, as where memory runs out; give fewer recordings at a time, or shorter ones"
+    )
+
+
+def _result(done: bool, found: Any) -> Any:
+    if done:
+        return found
+    raise found

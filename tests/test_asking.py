@@ -57,7 +57,7 @@ def test_a_killed_run_is_gone_on_with_and_a_second_one_touches_nothing(
     def killed(*_: object, **__: object) -> None:
         raise KilledError
 
-    for name in ("write_json", "design_excitation", "write_joint_trajectory"):
+    for name in ("write_json", "design_excitation", "write_joint_trajectory", "_promised"):
         with monkeypatch.context() as patch:
             patch.setattr(asking, name, killed)
             with pytest.raises(KilledError):
@@ -76,6 +76,9 @@ def test_a_killed_run_is_gone_on_with_and_a_second_one_touches_nothing(
     assert contents(folder) == once
     tells = json.loads((folder / "next" / "excitation.json").read_text())["tells"]
     assert tells[0]["question"] == PAIR and tells[0]["sigma_after"] > tells[0]["sigma_before"]
+    promised = {item["question"]: item["sigma_after"] for item in tells}
+    steps = json.loads((folder / "diagnosis.json").read_text())["next"]
+    assert PAIR in promised and [item["sigma_after"] for item in steps] == [promised.get(x["question"]) for x in steps]
     # Without a stop in between it comes to the same.
     (folder / "ask.json").unlink()
     ask(folder, QUICK)
@@ -83,6 +86,7 @@ def test_a_killed_run_is_gone_on_with_and_a_second_one_touches_nothing(
     assert (
         again["next/trajectory.csv"][0] == once["next/trajectory.csv"][0]
         and again["ask.json"][0] == once["ask.json"][0]
+        and again["diagnosis.json"][0] == once["diagnosis.json"][0]
     )
 
 

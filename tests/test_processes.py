@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
+import signal
+import time
 from threading import Thread
 
 import pytest
 
 from scara_ident import processes
+from scara_ident.errors import ScaraIdentError
 from scara_ident.processes import available_cores, beside, halved, map_in_order, own_process
 from scara_ident.threads import one_thread, side_by_side
 
@@ -114,3 +118,49 @@ def test_it_is_all_done_here_where_no_other_process_is_wanted(why: str, monkeypa
         with own_process():
             work()
     assert found == [(item, os.getpid()) for item in items]
+
+
+def test_ctrl_c_reaches_the_caller_alone_and_ends_the_others_at_once(capfd: pytest.CaptureFixture[str]):
+    def work(item: int) -> int:
+        # As a terminal does, to all processes of a command.
+        os.kill(os.getpid(), signal.SIGINT)
+        if item == 1:
+            os.kill(caller, signal.SIGINT)
+            time.sleep(60.0)
+        return os.getpid()
+
+    caller, before, found = os.getpid(), signal.signal(signal.SIGINT, signal.default_int_handler), list[int]()
+    start = time.monotonic()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            found.extend(map_in_order(work, range(4), 2))
+        with pytest.raises(KeyboardInterrupt), beside(lambda: work(1)) as result:
+            result()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert time.monotonic() - start < 30.0
+    assert multiprocessing.active_children() == []
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_process_that_dies_and_a_result_that_cannot_travel_are_said():
+    with pytest.raises(ScaraIdentError, match="ended from outside"):
+        list(map_in_order(lambda item: os.kill(os.getpid(), signal.SIGKILL) or item, range(4), 2))
+    with (
+        pytest.raises((AttributeError, TypeError, pickle.PicklingError), match="lambda"),
+        beside(lambda: lambda: 1) as result,
+    ):
+        result()
+    with pytest.raises(ZeroDivisionError) as caught:
+        list(map_in_order(lambda item: item // 0, range(2), 2))
+    assert "item // 0" in "".join(caught.value.__notes__)
+
+
+def test_whose_result_nobody_waits_for_is_not_waited_for():
+    start = time.monotonic()
+    with beside(lambda: time.sleep(60.0)):
+        pass
+    results = map_in_order(lambda item: time.sleep(60.0 * (item > 1)), range(4), 2)
+    next(results)
+    results.close()
+    assert time.monotonic() - start < 30.0

@@ -46,6 +46,8 @@ def ask(
 
     if effect and not virtual:
         raise UsageError("--effect is what the virtual arm has; give --virtual with it")
+    if not folder.exists():
+        raise UsageError(f"{folder}: no such folder; make it, with recordings/ in it or empty for a first motion")
     check_output(folder)
     arm = load_robot(robot)
     within = limits(arm)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import typer
-from typer.core import TyperCommand, TyperOption
+from typer.core import TyperArgument, TyperCommand, TyperOption
 
 from scara_ident.identification import ESTIMATORS
 from scara_ident.memory import set_limit
@@ -160,7 +160,20 @@ def with_signature(run: Any, parameters: Sequence[Parameter]) -> Callable[..., A
 
 
 class Command(TyperCommand):
-    """A command whose help lists what the registries hold; they are asked then only, as finding out takes time."""
+    """A command that refuses empty words, and whose help lists what the registries hold.
+
+    These are asked then only, as finding out takes time.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Take the words of the command line: an empty one is nobody's wish, and as a path would be the current folder."""
+        given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
+        for option in self.params:
+            value = given.get(option.name or "")
+            if not ctx.resilient_parsing and (value == "" or (isinstance(value, list | tuple) and "" in value)):
+                assert isinstance(option, TyperOption | TyperArgument)
+                raise typer.BadParameter("it is empty; give a value or leave it out", ctx=ctx, param=option)
+        return super().parse_args(ctx, args)
 
     def get_help(self, ctx: Any) -> str:
         """Return the help."""

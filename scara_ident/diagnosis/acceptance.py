@@ -115,8 +115,10 @@ def _small(
 
 
 def _insignificant(examination: Examination, tried: int, criteria: SelectionCriteria) -> str | None:
-    if examination.p_value * tried > criteria.family_error:
-        return f"not significant: p = {examination.p_value:.1e} with {tried} candidates tried"
+    corrected = examination.p_value * tried
+    if corrected > criteria.family_error:
+        asked = f"{criteria.family_error:.1g} is asked"
+        return f"not significant: p = {min(corrected, 1.0):.1e} over the {tried} candidates tried, {asked}"
     return None
 
 

@@ -155,8 +155,12 @@ def uncounted_correction(found: Search, parameters: PhysicalParameters) -> str |
     if small is not None:
         return small
     own = Coefficients(value, parameters.coefficients[-1].covariance)
-    least = own.at_least(found.step.criteria.least_final_size)
-    if np.any(least) and candidate.effect.negligible(found.scene, candidate.member, least) is None:
+    stds = found.step.criteria.least_final_size
+    least = own.at_least(stds)
+    small = candidate.effect.negligible(found.scene, candidate.member, least)
+    if np.any(least) and small is None:
         return None
-    told = candidate.effect.parameters(found.scene, candidate.member, value, own.covariance)
-    return f"{said(told)}: within its uncertainty, with what runs differ by counted"
+    told = said(candidate.effect.parameters(found.scene, candidate.member, value, own.covariance))
+    if not np.any(least):
+        return f"{told}, with what runs differ by counted: within {stds:g} standard deviations of none"
+    return f"{told}, with what runs differ by counted: less {stds:g} standard deviations, {small}"

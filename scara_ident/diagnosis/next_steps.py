@@ -54,6 +54,7 @@ class NextStep:
             "question": self.question,
             "motion": self.motion,
             "sigma_before": self.sigma_before,
+            # Of the motion, which `ask` designs and then says.
             "sigma_after": None,
             "seconds": self.seconds,
         }

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.errors import ScaraIdentError
-from scara_ident.files import path_fault
+from scara_ident.files import path_fault, unreadable
 from scara_ident.memory import read_text
 from scara_ident.model.model import TorqueModel
 
@@ -41,9 +41,7 @@ def read_parameters(path: Path, model: TorqueModel) -> dict[str, float]:
         if not np.isfinite(list(found.values())).all():
             raise ValueError("a value is not finite")
     except OSError as error:
-        raise ScaraIdentError(
-            f"{path}: cannot be read: {error.strerror or error}; give an identification.json"
-        ) from None
+        raise unreadable(path, error, "give an identification.json") from None
     except (ValueError, KeyError, TypeError, RecursionError):
         raise ScaraIdentError(
             f"{path}: no parameters in it; give the identification.json that identify wrote"
@@ -68,7 +66,7 @@ def read_diagnosis(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(read_text(path))
     except OSError as error:
-        raise ScaraIdentError(f"{path}: cannot be read: {error.strerror or error}; give a diagnosis.json") from None
+        raise unreadable(path, error, "give a diagnosis.json") from None
     except ValueError:
         content = None
     if not isinstance(content, dict) or not {"verdict", "model", "next"} <= content.keys():

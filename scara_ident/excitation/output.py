@@ -226,7 +226,6 @@ def summary(design: Design) -> list[str]:
     what = "A trajectory" if count == 1 else f"{count} trajectories"
     held = [each.name for each in design.reached if each.active]
     broken = [each.name for each in design.reached if not each.kept]
-    condition = np.sqrt(design.condition)
     lengths = _listed([each.duration for each in design.trajectories])
     samples = _listed(list(design.samples))
     each = "" if count == 1 or len(set(design.samples)) > 1 else " each"
@@ -237,7 +236,8 @@ def summary(design: Design) -> list[str]:
         else f"All limits hold, at {design.verified} samples and between them.",
         *(f"{capital(item.question.text)}: {item.words}" for item in design.tells),
         f"Held back by {_few(held, 'limit')}." if held else "No limit holds it back: use more harmonics.",
-        f"Information: ln det {design.log_det:.2f} over {samples} samples{each}, condition of the regressor {condition:.4g}.",
+        f"Information of the regressor H over {samples} samples{each}: J_d = ln det H^T H {design.log_det:.2f}, "
+        f"J_k = cond H^T H {design.condition:.4g}.",
     ]
 
 

@@ -21,7 +21,7 @@ from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.estimation.information import Information
 from scara_ident.estimation.observations import Observations
 from scara_ident.export.identified_model import IdentifiedModel
-from scara_ident.files import path_fault
+from scara_ident.files import path_fault, unreadable
 from scara_ident.memory import read_text
 from scara_ident.model import MODELS
 from scara_ident.model.model import TorqueModel, build_model
@@ -148,7 +148,7 @@ def read_content(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(read_text(path))
     except OSError as error:
-        raise ScaraIdentError(f"{path}: cannot be read: {error.strerror}") from None
+        raise unreadable(path, error, "give an identification.json or diagnosis.json") from None
     except (ValueError, RecursionError):
         raise ScaraIdentError(f"{path}: not JSON; give an identification.json or diagnosis.json") from None
     if not isinstance(content, dict) or not {KEY, "model", "parameters"} <= set(content):

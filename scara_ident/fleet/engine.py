@@ -5,14 +5,16 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
+from multiprocessing import resource_tracker
 from queue import Empty, Queue
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.fleet.folder import INSTALL
+from scara_ident.processes import uninterrupted
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -152,17 +154,22 @@ def started(scheduler: str | None = None, workers: int | None = None) -> Iterato
                     yield Engine(client)
                 return
             count = workers or len(os.sched_getaffinity(0))
-            with (
-                LocalCluster(
-                    n_workers=count,
-                    threads_per_worker=1,
-                    processes=True,
-                    dashboard_address="localhost:0",
-                    memory_limit=0,
-                    silence_logs=logging.CRITICAL,
-                ) as cluster,
-                Client(cluster, set_as_default=False) as client,
-            ):
+            with ExitStack() as stack:
+                # Its processes, and those that stand in for them later, hear of no Ctrl-C: they are ended from here. Python's
+                # own process beside them is there before, as what starts it lets Ctrl-C through again.
+                resource_tracker.ensure_running()
+                with uninterrupted():
+                    cluster = stack.enter_context(
+                        LocalCluster(
+                            n_workers=count,
+                            threads_per_worker=1,
+                            processes=True,
+                            dashboard_address="localhost:0",
+                            memory_limit=0,
+                            silence_logs=logging.CRITICAL,
+                        )
+                    )
+                    client = stack.enter_context(Client(cluster, set_as_default=False))
                 yield Engine(client)
         finally:
             log.setLevel(level)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RecordingError, UsageError
+from scara_ident.errors import RecordingError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.estimate import paper_criteria
 from scara_ident.estimation.observations import Observations, observe
@@ -113,9 +113,9 @@ def compare(
     Raises
     ------
     UsageError
-        If there are fewer than two trajectories, or a band is no frequency that the slowest recording carries.
+        If a band is no frequency that the slowest recording carries.
     RecordingError
-        If none of the recordings can be used; one of several that cannot, or a trajectory with fewer rows than the model has
+        If there are fewer than two trajectories, or none of the recordings can be used; one of several that cannot, or a trajectory with fewer rows than the model has
         parameters, is left out with a note.
 
     Examples
@@ -138,7 +138,7 @@ def compare(
     noise = repeatability(data)
     each, useless = _with_enough(observations)
     if len(each) < 2:
-        raise UsageError(
+        raise RecordingError(
             "; ".join(
                 [
                     f"compare needs recordings of at least two trajectories, found {len(each)}; "

@@ -158,8 +158,8 @@ def design_figures(design: Design) -> tuple[str, list[list[Figure]]]:
     """Return title and rows of the picture of a design, see `design_picture`."""
     names = ", ".join(each.name for each in design.trajectories)
     title = (
-        f"{design.model.robot.name}: {names} - ln det {design.log_det:.2f}, "
-        f"cond of the regressor {np.sqrt(design.condition):.3g} ({design.model.name} model)"
+        f"{design.model.robot.name}: {names} - J_d = ln det H^T H {design.log_det:.2f}, "
+        f"J_k = cond H^T H {design.condition:.4g} ({design.model.name} model)"
     )
     return title, [[_motion(design), _phases(design)], _paths(design), [_parameters(design)]]
 

@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from scara_ident.errors import RobotError
+from scara_ident.errors import NoRobotError, RobotError
 from scara_ident.files import path_fault, real_path
 from scara_ident.robot.examples import example_urdf, is_name
 
@@ -26,6 +26,8 @@ from scara_ident.robot.examples import example_urdf, is_name
 SMALLEST, LARGEST_FACTOR = 1e-12, 1e12
 # Characters of a robot.yaml, and nodes of it with its aliases written out.
 LARGEST = 1_000_000
+# What the key urdf takes.
+URDF = "the path of a URDF, or the name of a robot of example-robot-data"
 
 
 def _not_zero(value: float) -> float:
@@ -61,6 +63,18 @@ def _counts(value: Any) -> float:
     if number <= 0.0:
         raise ValueError("expected a number above 0")
     return _not_zero(number)
+
+
+def _three(value: Any) -> Any:
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise ValueError("expected three numbers in m/s^2, such as [0, 0, -9.81]")
+    return value
+
+
+def _urdf(value: Any) -> Any:
+    if not isinstance(value, str | Path) or not str(value).strip():
+        raise ValueError(f"expected {URDF}")
+    return value
 
 
 def _word(value: Any) -> str:
@@ -160,11 +174,11 @@ class RobotDescription(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    urdf: Path
+    urdf: Annotated[Path, BeforeValidator(_urdf)]
     effort_side: Literal["motor", "joint"] | None = None
     joints: dict[str, JointDescription | None] | None = None
     locked: dict[str, Finite] = Field(default_factory=dict)
-    gravity: tuple[Finite, Finite, Finite] | None = None
+    gravity: Annotated[tuple[Finite, Finite, Finite], BeforeValidator(_three)] | None = None
     recording: RecordingDescription | None = None
 
 
@@ -206,7 +220,7 @@ def read_description(path: Path) -> RobotDescription:
         _refuse_twice(tree, path)
         content: Any = yaml.load(text, Loader=Loader)
     except FileNotFoundError:
-        raise RobotError(f"{path}: no such robot description") from None
+        raise NoRobotError(f"{path}: no such robot description") from None
     except IsADirectoryError:
         raise RobotError(f"{path}: is a folder; give its robot.yaml") from None
     except OSError as error:
@@ -223,7 +237,10 @@ def read_description(path: Path) -> RobotDescription:
     description = check_description(content, path)
     # What lies beside the file comes before a robot of that name.
     named = is_name(description.urdf, path.parent)
-    urdf = example_urdf(description.urdf.name) if named else path.parent / description.urdf
+    try:
+        urdf = example_urdf(description.urdf.name) if named else path.parent / description.urdf
+    except NoRobotError as error:
+        raise RobotError(f"{path}: urdf: {error}") from None
     return description.model_copy(update={"urdf": real_path(urdf)})
 
 
@@ -279,7 +296,7 @@ def _first_problem(error: ValidationError) -> str:
         owner = _owner(problem["loc"])
         return f"{key}: unknown key; expected one of {', '.join(owner.model_fields)}"
     if kind == "missing":
-        return f"{key}: missing"
+        return f"{key}: missing; expected {URDF}"
     message = problem["msg"].removeprefix("Value error, ")
     return f"{key}: {message[0].lower()}{message[1:]}; found {_short(problem['input'])}"
 

@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
-from scara_ident.errors import RobotError
+from scara_ident.errors import NoRobotError, RobotError
 
 PACKAGE = "example-robot-data"
 
@@ -37,7 +37,7 @@ def example_urdf(name: str) -> Path:
 
     Raises
     ------
-    RobotError
+    NoRobotError
         In one line that names the robots of similar names.
     """
     robots = example_robots()
@@ -46,7 +46,7 @@ def example_urdf(name: str) -> Path:
         return robots[word]
     near = get_close_matches(word, robots, n=4)
     hint = f"did you mean {' or '.join(near)}?" if near else f"it has {', '.join(robots)}"
-    raise RobotError(f"{name}: no such file, nor a robot of {PACKAGE}; {hint}")
+    raise NoRobotError(f"{name}: no such file, nor a robot of {PACKAGE}; {hint}")
 
 
 def example_robots() -> dict[str, Path]:

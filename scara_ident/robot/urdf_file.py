@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 
 import pinocchio as pin
 
-from scara_ident.errors import RobotError
-from scara_ident.files import path_fault
+from scara_ident.errors import NoRobotError, RobotError
+from scara_ident.files import path_fault, real_path
 from scara_ident.quiet import quiet_stderr
 from scara_ident.robot.urdf_validation import XACRO, urdf_fault
 
@@ -37,6 +37,8 @@ def read_urdf(urdf: Path, source: Path) -> ElementTree.Element:
             raise RobotError(f"{urdf}: {urdf.stat().st_size:.2g} bytes, more than any URDF; give the robot's URDF")
         root = ElementTree.parse(urdf).getroot()
     except FileNotFoundError:
+        if real_path(source) == real_path(urdf):
+            raise NoRobotError(f"{source}: no such file; give a robot.yaml or a URDF") from None
         raise RobotError(f"{source}: urdf: no such file: {urdf}") from None
     except OSError as error:
         raise RobotError(f"{source}: urdf: cannot read {urdf}: {error.strerror}") from None

@@ -22,5 +22,12 @@ def test_an_empty_folder_asks_for_a_first_motion(command, steps, tmp_path: Path)
     assert json.loads((tmp_path / "arm" / "ask.json").read_text())["state"] == "record"
 
 
+def test_a_folder_that_is_not_there_is_not_made(command, tmp_path: Path):
+    for more in ((), ("--virtual",)):
+        result = command("ask", tmp_path / "arn", *QUICK, *more)
+        assert result.status == 2 and "arn: no such folder; make it" in result.err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_effects_are_those_of_the_virtual_arm(command, tmp_path: Path):
     assert "--virtual" in command("ask", tmp_path, "--effect", "spring").err

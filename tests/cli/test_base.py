@@ -35,13 +35,17 @@ def test_an_angle_with_few_digits_is_said(command, tmp_path: Path):
     assert "an angle in the URDF may have few digits" in " ".join(result.out.split())
 
 
-def test_a_bad_robot_is_status_1(command, tmp_path: Path):
+def test_a_robot_that_is_not_there_is_status_2_and_a_bad_one_1(command, tmp_path: Path):
     result = command("base", "--robot", tmp_path / "robot.yaml")
-    assert result.status == 1
+    assert result.status == 2
     assert f"{tmp_path / 'robot.yaml'}: no such robot description" in result.err
     (tmp_path / "robot.yaml").write_bytes(bytes(range(256)))
     assert command("base", "--robot", tmp_path / "robot.yaml").status == 1
     assert command("base", "--robot", tmp_path).status == 1
+    # What a description names is no bad usage.
+    (tmp_path / "robot.yaml").write_text("urdf: ur6\n")
+    result = command("base", "--robot", tmp_path / "robot.yaml")
+    assert result.status == 1 and "robot.yaml: urdf: ur6: no such file" in result.err
 
 
 def test_words_it_does_not_know_are_bad_usage(command):

@@ -31,6 +31,6 @@ def test_json_on_the_output_is_the_same(command, folder: Path, tmp_path: Path):
 
 def test_one_trajectory_is_refused_in_a_line(command, folder: Path, tmp_path: Path):
     result = command("compare", folder / "OJD_1.parquet", folder / "OJD_2.parquet", "--output", tmp_path / "out")
-    assert result.status == 2
+    assert result.status == 1
     assert "at least two trajectories" in result.err
     assert not (tmp_path / "out").exists()

@@ -99,7 +99,7 @@ def test_what_cannot_be_is_said_before_the_search(command, tmp_path: Path):
         (("--asked-std", "5"), 2, "the noise of joint1, joint2 is not known; give --noise joint1=RMS"),
         (("--asked-std", "five"), 2, "expected a percentage such as 5"),
         (("--noise", "joint1=1"), 2, "--noise is for --asked-std"),
-        (("--parameters", "none.json"), 1, "none.json: cannot be read"),
+        (("--parameters", "none.json"), 2, "none.json: no such file"),
     ):
         outcome = command("excite", *words, "--output", tmp_path)
         assert (outcome.status, said in outcome.err) == (status, True), outcome.err
@@ -131,7 +131,7 @@ def test_a_motion_is_designed_for_what_a_diagnosis_left_open(command, tmp_path: 
 def test_a_file_that_is_no_diagnosis_is_said(command, tmp_path: Path):
     (tmp_path / "other.json").write_text("[]", encoding="utf-8")
     assert "no diagnosis" in command("excite", "--tell", tmp_path / "other.json").err
-    assert "cannot be read" in command("excite", "--tell", tmp_path / "none.json").err
+    assert "no such file" in command("excite", "--tell", tmp_path / "none.json").err
     for words, said in (
         (("--for", "friction"), "two goals"),
         (("--asked-std", "5"), "two goals"),

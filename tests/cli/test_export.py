@@ -48,5 +48,5 @@ def test_wrong_uses_are_said_in_a_line(command, result: Path, tmp_path: Path):
     assert command("export", result).status == 2
     assert command("export", result, "--to", "fortran").status == 2
     missing = command("export", tmp_path / "none.json", "--to", "c")
-    assert (missing.status, "cannot be read" in missing.err) == (1, True)
+    assert (missing.status, "no such file" in missing.err) == (2, True)
     assert "its parameters are not those of" in command("export", result, "--to", "c", "--robot", "ur5").err

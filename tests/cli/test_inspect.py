@@ -70,9 +70,9 @@ def test_json_on_stdout_is_all_there_is(log, capsys):
     [
         (("absent.csv",), 2, "no such file"),
         (("log_1.csv", "--output", "out"), 2, "--urdf"),
-        (("log_1.csv", "--urdf", "absent.urdf", "--output", "out"), 1, "absent.urdf"),
+        (("log_1.csv", "--urdf", "absent.urdf", "--output", "out"), 2, "absent.urdf"),
         (("log_1.csv", "--urdf", "log_1.csv", "--output", "out"), 1, "not well-formed XML"),
-        (("log_1.csv", "--robot", "absent.yaml"), 1, "no such robot description"),
+        (("log_1.csv", "--robot", "absent.yaml"), 2, "no such robot description"),
         (("empty.mat",), 1, "empty"),
         (("log_1.csv", "--urdf", "U", "--output", "log_1.csv"), 1, "log_1.csv"),
         ((), 2, "FILE"),

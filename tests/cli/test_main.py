@@ -89,7 +89,7 @@ def test_long_errors_are_not_wrapped(command, tmp_path: Path):
 
 
 def test_main_exits_with_the_status(capfd: pytest.CaptureFixture[str]):
-    for words, status in ((["--version"], 0), (["base", "--robot", "nowhere.yaml"], 1), (["nothing"], 2)):
+    for words, status in ((["--version"], 0), (["export", __file__, "--to", "c"], 1), (["nothing"], 2)):
         with pytest.raises(SystemExit) as caught:
             main(words)
         assert caught.value.code == status

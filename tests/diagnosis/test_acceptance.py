@@ -78,6 +78,10 @@ def test_the_p_value_is_corrected_for_what_was_tried():
     item = replace(GOOD, p_value=0.01 * CRITERIA.family_error)
     assert decided(SPRING, item, 50).accepted
     assert not decided(SPRING, item, 200).accepted
+    # As the tables of a report show it, beside what is asked.
+    assert (
+        decided(SPRING, item, 200).why == "not significant: p = 4.0e-03 over the 200 candidates tried, 0.002 is asked"
+    )
 
 
 def test_a_joints_own_delay_of_less_than_a_sample_is_not_an_effect():

@@ -29,7 +29,7 @@ def test_what_an_identification_determined_is_known(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (None, "No such file"),
+        (None, "no such file"),
         ("nothing", "no parameters in it"),
         ("{}", "no parameters in it"),
         ('{"parameters": 3}', "no parameters in it"),

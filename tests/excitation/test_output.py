@@ -19,6 +19,7 @@ from scara_ident.excitation.curves import make_basis
 from scara_ident.excitation.output import joint_trajectory_yaml, notes
 from scara_ident.files import plain
 from scara_ident.model.model import build_model
+from scara_ident.report.pictures import design_figures
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import ReferenceMotion
 
@@ -88,6 +89,9 @@ def test_the_json_says_what_was_designed(made):
     content = json.loads(json.dumps(plain(excitation_dict(made)), allow_nan=False))
     assert content["log_det"] == pytest.approx(made.log_det)
     assert content["condition"] == pytest.approx(content["condition_of_regressor"] ** 2)
+    # The same number wherever it is shown.
+    said = f"J_k = cond H^T H {content['condition']:.4g}"
+    assert content["summary"][-1].endswith(f"{said}.") and said in design_figures(made)[0]
     assert content["duration"] == 4.0 and content["harmonics"] == 6 and content["bandwidth_hz"] == pytest.approx(1.5)
     acceleration = content["limits"]["tool.acceleration"]
     assert acceleration["bound"] == 9.0 and acceleration["reached"] <= 9.0

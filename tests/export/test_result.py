@@ -161,7 +161,7 @@ def test_a_robot_that_has_moved_can_be_given(content, read, tmp_path: Path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (None, "cannot be read"),
+        (None, "no such file"),
         ("{", "not JSON"),
         ("{}", "holds no model"),
         ('{"model": "complete"}', "holds no model"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 import os
 import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,17 @@ def die_once(flag: str) -> str:
         Path(flag).touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return "lived"
+
+
+def interrupted(x: int) -> int:
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(0.5)
+    return x
+
+
+def test_ctrl_c_in_a_terminal_is_for_who_started_the_processes_alone(capfd):
+    assert run_all(interrupted, [(1,)], workers=1) == [1]
+    assert capfd.readouterr() == ("", "")
 
 
 def test_what_raises_hands_on_its_exception_and_what_follows_is_done(cluster, tmp_path):

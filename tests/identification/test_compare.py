@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.errors import UsageError
+from scara_ident.errors import RecordingError
 from scara_ident.estimation.observations import observe
 from scara_ident.identification.compare import compare
 from scara_ident.motion.prepared import prepare
@@ -57,5 +57,5 @@ def test_repeatability_is_the_noise_and_names_are_kept(clean):
 
 
 def test_one_trajectory_is_not_a_comparison():
-    with pytest.raises(UsageError, match="at least two trajectories"):
+    with pytest.raises(RecordingError, match="at least two trajectories"):
         compare(ROBOT, exact_runs()[:2], bands=BANDS)

@@ -106,7 +106,7 @@ def excitation_report(path: Path, content: Mapping[str, Any], robot: Robot, moti
     context = ExcitationContext(content, robot, motions)
     broken = [limit for limit, each in context.limits if (each.get("share") or 0.0) > 1.0]
     # The numbers of its information have a section of their own, which explains them.
-    said = [each for each in content.get("summary") or () if not each.startswith("Information:")]
+    said = [each for each in content.get("summary") or () if not each.startswith("Information of")]
     verdict = said or [
         f"A motion of {number(content.get('duration'))} s.",
         f"Broken limits: {', '.join(broken)}." if broken else "All limits hold.",

@@ -155,6 +155,19 @@ def test_dark_light_and_print_differ_in_colours_only(identified, opened):
     assert not dark.locator("nav").is_visible()
 
 
+def test_all_sections_are_named_beside_the_button_whatever_the_width(diagnosed, opened):
+    for width in (1920, 1300, 800, 560):
+        page = opened(diagnosed, viewport={"width": width, "height": 900})
+        bar = page.locator("nav div")
+        # As many as a page of all sections has.
+        bar.evaluate("bar => { while (bar.children.length < 12) bar.prepend(bar.querySelector('a').cloneNode(true)); }")
+        assert bar.evaluate("bar => bar.scrollWidth <= bar.clientWidth")
+        button = page.locator("#theme").bounding_box()
+        right = [link.bounding_box() for link in page.locator("nav a").all()]
+        assert max(box["x"] + box["width"] for box in right) < button["x"]
+        assert button["x"] + button["width"] <= width
+
+
 @pytest.mark.parametrize("kind", PAGES)
 def test_a_phone_shows_a_page_without_scrolling_sideways(pages, opened, kind):
     phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
