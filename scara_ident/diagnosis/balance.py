@@ -121,7 +121,7 @@ def shares_of(model: FittedModel, found: Products, weights: Array) -> Array:
     left = found.columns - found.cross @ _t(spanned) - spanned @ _t(found.cross - spanned @ model.basis_products)
     whole = power(np.sum(left, axis=1), -0.5)[:, None]
     # Of columns that the model nearly holds rounding leaves less than nothing in some blocks: those have no share.
-    return np.maximum(np.max(np.linalg.eigvalsh(whole @ left @ whole), axis=2), 0.0)
+    return np.asarray(np.maximum(np.max(np.linalg.eigvalsh(whole @ left @ whole), axis=2), 0.0))
 
 
 def _t(matrices: Array) -> Array:

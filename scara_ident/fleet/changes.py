@@ -148,7 +148,7 @@ def fleet_scatter(histories: Sequence[History]) -> Scatter:
     noisy = [ratio for label, ratio in raw.items() if by_runs[label] < BY_RUNS]
     pooled = np.concatenate(noisy) if noisy else np.zeros(0)
     prior, usual = variance_prior(pooled, freedom)
-    moderated = min(freedom + prior, freedom * max(1, np.count_nonzero(pooled > 0.0)))
+    moderated = min(freedom + prior, freedom * max(1, int(np.count_nonzero(pooled > 0.0))))
     weight = freedom / (freedom + prior)
     ratios = {label: np.maximum(1.0, usual + weight * (ratio - usual)) for label, ratio in raw.items()}
     freedoms = {label: 1.0 / (part**2 / freedom + (1.0 - part) ** 2 / moderated) for label, part in by_runs.items()}
