@@ -70,7 +70,7 @@ class Inquiry:
     in_model : tuple of Suspect
         Effects that the model has.
     noise : ndarray, shape (n,)
-        Of each joint's torque, (N m)^2 s; see `noise_density`.
+        Of each joint's torque, (N m)^2 s; see `noise_density`. Rows of a joint where it is infinite say nothing.
     bands : tuple of float or None
         Hz.
     known : Information or None
@@ -372,7 +372,8 @@ def inquiry_of(content: Mapping[str, Any], robot: Robot, recordings: Sequence[Re
         value = np.array([row["value"] for row in content["parameters"]][: len(model.columns)], dtype=float)
         asked = tuple(question_of(item) for item in content["next"] if item.get("kind"))
         in_model = tuple(suspect_of(item["suspect"]) for item in content["effects"] if item.get("suspect"))
-        noise = np.array([content["noise_density"][joint] for joint in robot.joints], dtype=float)
+        density = np.array([content["noise_density"][joint] for joint in robot.joints], dtype=float)
+        noise = np.where(np.isnan(density), np.inf, density)
         bands = tuple(content["band_hz"][joint] for joint in robot.joints)
         tried = max(1, int(content.get("tried", USUALLY_TRIED)))
         armatures = {robot.joints.index(row["joint"]): float(row["armature"]) for row in content["rotors"]}

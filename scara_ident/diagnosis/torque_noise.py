@@ -13,7 +13,7 @@ from scara_ident.motion.low_pass import noise_share
 
 
 def noise_density(diagnosis: Diagnosis) -> Array:
-    """Return the noise of each joint that an estimate sees, (N m)^2 s, shape (n,).
+    """Return the noise of each joint that an estimate sees, (N m)^2 s, shape (n,); infinite where nothing tells it.
 
     Squares of what is left over those that white noise would leave, which the low-pass thins, the times at rest fade and the
     columns take a part of; times by how much blocks of time scatter more than white residuals would, for all joints alike,
@@ -28,7 +28,7 @@ def noise_density(diagnosis: Diagnosis) -> Array:
     model = fitted_model(step.observations, columns, after.weights, 1)
     parts = [part for part in step.observations.data.stretches if part.usable]
     rate = min(part.rate for part in parts)
-    level, thinned, count = np.full(len(model.joints), np.nan), 0.0, 0
+    level, thinned, count = np.full(len(model.joints), np.inf), 0.0, 0
     made = noise_torque(observations, after.value) ** 2
     taken = needed_rows(after.model)
     for rows in columns[len(search.chosen) :]:

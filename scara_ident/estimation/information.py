@@ -196,6 +196,24 @@ class Information(Frozen):
         """Rms of the torque over the rows."""
         return float(np.linalg.norm(self.factor[:, -1]) / np.sqrt(self.rows)) if self.rows else 0.0
 
+    def noise(self, value: Array) -> float:
+        """Return the rms residual of parameters as what it tells of the noise; 1 without rows or torque.
+
+        Rows that are `saturated` are fitted exactly whatever their noise is: it may then be as large as the torque. An exact fit of more rows would give an infinite weight; rounding is the floor.
+        """
+        least = 1.0 if self.saturated else LEAST_NOISE
+        return max(self.rms(value), least * self.torque_rms) or 1.0
+
+    @property
+    def saturated(self) -> bool:
+        """Whether there are no more rows than directions that they tell, so that they are fitted exactly."""
+        rows = self.factor[:, :-1]
+        size = np.linalg.norm(rows, axis=0)
+        if not 0 < len(rows) <= np.count_nonzero(size):
+            return False
+        singular = np.linalg.svd(rows / np.where(size > 0.0, size, 1.0), compute_uv=False)
+        return bool(singular[len(rows) - 1] > UNDETERMINED * singular[0])
+
     def log_det(self) -> float:
         """Return ln det(W.T W), -inf where W does not have full rank (J_d of Indri et al. 2002)."""
         size = np.linalg.norm(self.regressor_factor, axis=0)
@@ -271,8 +289,7 @@ def joint_noise(joints: Sequence[Information]) -> Array:
     noise = np.ones(len(joints))
     for _ in range(WEIGHTING_ROUNDS):
         value = weighted(joints, 1.0 / noise).solve().value
-        # An exact fit would give an infinite weight; rounding is the floor.
-        noise = np.array([max(part.rms(value), LEAST_NOISE * part.torque_rms) or 1.0 for part in joints])
+        noise = np.array([part.noise(value) for part in joints])
     return noise
 
 

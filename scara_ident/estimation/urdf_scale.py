@@ -39,8 +39,8 @@ def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, floa
     """
     model = observations.model
     stated = urdf_values(model)
-    known = np.isfinite(stated) & ~estimate.undetermined
-    spread = np.where(np.isfinite(estimate.covariance), estimate.covariance, 0.0)
+    # What has no finite variance is not told, though the estimate may have a value for it.
+    known = np.isfinite(stated) & ~estimate.undetermined & np.isfinite(estimate.std)
     found = {}
     for joint, rows in zip(model.robot.joints, observations.joints, strict=True):
         own = rows.columns[use := known[rows.columns]]
@@ -52,7 +52,9 @@ def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, floa
         identified = estimate.value[own] @ columns
         # The scale is a sum of parameters, so its spread follows from theirs.
         share = columns @ nominal / size
-        scale, std = float(share @ estimate.value[own]), float(np.sqrt(share @ spread[np.ix_(own, own)] @ share))
+        # Of a covariance rounding may leave less than nothing along what is known best.
+        variance = max(0.0, float(share @ estimate.covariance[np.ix_(own, own)] @ share))
+        scale, std = float(share @ estimate.value[own]), float(np.sqrt(variance))
         left = float(np.linalg.norm(identified - scale * nominal))
         if scale > SURE * std and left < MOST_LEFT * np.linalg.norm(identified):
             found[joint] = scale

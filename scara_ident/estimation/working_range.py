@@ -18,7 +18,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.estimation.information import LEAST_NOISE, UNDETERMINED, Information, triangular, weighted
+from scara_ident.estimation.information import UNDETERMINED, Information, triangular, weighted
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.urdf_scale import USUAL
 from scara_ident.model.terms.friction import Friction, Offset
@@ -89,7 +89,7 @@ def told_directions(observations: Observations, value: Array) -> Told | None:
         return None
     joints = observations.by_joint
     rows = np.array([joint.independent for joint in observations.joints])
-    noise = np.array([max(part.rms(value), LEAST_NOISE * part.torque_rms) or 1.0 for part in joints])
+    noise = np.array([part.noise(value) for part in joints])
     # A row stands for several samples, and has their noise.
     step = np.array([part.rows for part in joints]) / np.maximum(rows, 1)
     whole = weighted(joints, 1.0 / (noise * np.sqrt(np.maximum(step, 1.0))))
@@ -118,7 +118,7 @@ def believable(observations: Observations, value: Array, noise: Array) -> Array:
     value : ndarray, shape (p,)
         The estimate.
     noise : ndarray, shape (n,)
-        Of each joint's torque, (N m)^2 s.
+        Of each joint's torque, (N m)^2 s; infinite where it is not known, and data of that joint say nothing.
 
     Returns
     -------

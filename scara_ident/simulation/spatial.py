@@ -290,8 +290,10 @@ def with_bodies(model: pin.Model, bodies: Array) -> pin.Model:
         if row[0] > 0.0:
             result.inertias[i + 1] = pin.Inertia.FromDynamicParameters(row)
         else:
-            inertia = row[[4, 5, 7, 5, 6, 8, 7, 8, 9]].reshape(3, 3)
-            result.inertias[i + 1] = pin.Inertia(0.0, np.zeros(3), inertia)
+            body = pin.Inertia.Zero()
+            # Set, not constructed: of base parameters bodies follow that cannot exist, and what moves with them may still.
+            body.inertia = row[[4, 5, 7, 5, 6, 8, 7, 8, 9]].reshape(3, 3)
+            result.inertias[i + 1] = body
     return result
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import polars as pl
 import pytest
 
 from scara_ident.recording.recording import write_recording
 from scara_ident.report.html.blocks import number
 from tests.diagnosis.made import held_out_run, virtual_runs
+from tests.shared import shared_path
 
 pytestmark = pytest.mark.slow
 
@@ -78,3 +80,28 @@ def test_recordings_can_be_named_as_without_payload(command, folder: Path, tmp_p
     assert result.status == 0
     # What is named as unloaded is trained on too, once.
     assert {run.stem for run in runs} == set(json.loads(result.out)["recordings"]["training"])
+
+
+def test_a_joint_that_does_not_move_leaves_the_others_their_diagnosis_and_the_next_motion(
+    command, folder: Path, tmp_path: Path
+):
+    logs = pl.read_parquet(folder / "OJD_1.parquet")
+    still = logs.with_columns(pl.lit(0.3).alias("joint2.position")).select(
+        "time", *(f"joint{j}.{what}" for j in (1, 2) for what in ("position", "effort"))
+    )
+    still.write_parquet(tmp_path / "still_1.parquet")
+    out = tmp_path / "out"
+    assert command("diagnose", tmp_path / "still_1.parquet", "--output", out).status == 0
+    content = json.loads((out / "diagnosis.json").read_text())
+    assert content["noise_density"]["joint1"] > 0.0 and content["noise_density"]["joint2"] is None
+    words = ("--tell", out / "diagnosis.json", "--duration", "3", "--starts", "1", "--output", tmp_path / "next")
+    assert command("excite", *words).status == 0
+    tells = json.loads((tmp_path / "next" / "excitation.json").read_text())["tells"]
+    assert any(item["sigma_after"] > item["sigma_before"] for item in tells)
+
+
+def test_joints_that_hardly_move_leave_the_one_that_does_its_diagnosis(command, tmp_path: Path):
+    arm = shared_path("data", "ur10e", "robot.yaml")
+    run = shared_path("data", "ur10e", "jointwise_1.parquet")
+    result = command("diagnose", run, "--robot", arm, "--output", tmp_path / "out")
+    assert result.status == 0 and "DLASCL" not in result.out

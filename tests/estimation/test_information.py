@@ -352,3 +352,18 @@ def test_how_near_to_singular_is_measured_by_the_whole_matrix():
     assert 0.4e-3 < 1.0 / np.linalg.cond(near, 1) < 0.6e-3
     table = np.vstack([np.linalg.cholesky(near).T, np.zeros((GRAM_ROWS, 12))])
     assert information._updated(np.eye(12), table.T, np.zeros((12, 12))) is None
+
+
+def test_rows_that_are_fitted_exactly_whatever_their_noise_tell_no_noise():
+    few = Information.empty(6).absorb(*rows(3, 4, 6))
+    left = few.solve().value
+    assert few.rms(left) < 1e-9 * few.torque_rms
+    assert few.noise(left) == few.torque_rms
+    # Of more rows an exact fit says that there is next to none, and one that is not exact how much there is.
+    w, u = rows(4, 40, 6)
+    exact = Information.empty(6).absorb(w, w @ np.ones(6))
+    assert exact.noise(np.ones(6)) == 1e-6 * exact.torque_rms
+    noisy = Information.empty(6).absorb(w, u)
+    value = noisy.solve().value
+    assert noisy.noise(value) == noisy.rms(value)
+    assert Information.empty(6).noise(np.zeros(6)) == 1.0

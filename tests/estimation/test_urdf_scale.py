@@ -64,3 +64,15 @@ def test_a_urdf_that_does_not_show_says_nothing_of_scale(arm):
     assert scales(robot, replace(run, effort=rng.standard_normal(run.effort.shape)), (1.0, 1.0)) == {}
     assert scale_sentence({}, robot).endswith("the URDF's masses do not show in these torques.")
     assert scale_sentence(None, robot).endswith("the clock.")
+
+
+def test_what_has_no_finite_variance_says_nothing_of_scale(arm):
+    robot, run = arm
+    observations = observe(build_model(robot, "basic"), prepare([run], (8.0, 8.0)))
+    estimate = wls(observations)
+    free = [k for k, name in enumerate(estimate.model.names) if "2" in name]
+    covariance = estimate.covariance.copy()
+    # With what others share with it, which is no covariance once its variance is left out.
+    covariance[np.ix_(free, free)] = -1.0
+    covariance[free, free] = np.inf
+    assert list(urdf_scale(replace(estimate, covariance=covariance), observations)) == ["j1"]

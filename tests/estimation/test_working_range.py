@@ -114,3 +114,15 @@ def test_an_estimate_that_is_told_well_is_believed_itself(robot: Robot, size: fl
     found = observations(robot, 6, (size, size), noise=1e-3)
     told = wls(found).value
     assert (believable(found, told, np.full(robot.n, 1e-6 / RATE)) is told) == same
+
+
+def test_a_joint_whose_noise_is_not_known_says_nothing(robot: Robot):
+    found = observations(robot, 6, (1.0, 1.0))
+    told, noise = wls(found).value, 0.02**2 / RATE
+    both, one = (believable(found, told, np.array([noise, other])) for other in (noise, np.inf))
+    assert np.all(np.isfinite(one))
+    own = [name.endswith("2") and name[0] in "ap" for name in found.model.names]
+    # Friction of joint 2 is what is known without data, and joint 1 is as its own data tell.
+    assert not np.allclose(one[own], told[own], rtol=0.01)
+    error = found.unfiltered_rms(one) - found.unfiltered_rms(both)
+    assert abs(error[0]) < 0.01 * found.unfiltered_torque_rms[0] < 0.01 * found.unfiltered_torque_rms[0] + error[1]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from scara_ident import Identification, identify, load_robot, read_recordings
+from scara_ident.estimation.urdf_scale import urdf_scale
 from tests.shared import shared_path
 
 
@@ -76,3 +77,16 @@ def test_repeatability_is_the_torque_noise_of_the_cases():
     assert set(noise) == {"OJD", "OJK", "CI", "L1"}
     for sigma in noise.values():
         np.testing.assert_allclose(sigma, [0.020, 0.008], rtol=0.05)
+
+
+@pytest.mark.slow
+def test_joints_that_do_not_move_leave_an_arm_that_can_exist():
+    """A few rows at the end of a standstill are fitted exactly, and had weights of millions."""
+    robot = load_robot(shared_path("data", "ur10e", "robot.yaml"))
+    for name in ("jointwise_1", "jointwise_2"):
+        recordings = read_recordings([shared_path("data", "ur10e", f"{name}.parquet")], robot)
+        plain, result = identify(robot, recordings), identify(robot, recordings, method="consistent")
+        moved = int(np.argmax([own.rows for own in result.training.by_joint]))
+        least, possible = (each.training_errors()[name][moved] for each in (plain, result))
+        assert least.rms <= possible.rms < 1.2 * least.rms
+        assert np.all(np.isfinite(list(urdf_scale(plain.estimate, plain.training).values())))

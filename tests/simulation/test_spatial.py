@@ -57,3 +57,11 @@ def test_a_body_that_pinocchio_sees_differently_is_refused() -> None:
     bodies[2, 0] = np.nan
     with pytest.raises(RobotError, match="differ from Pinocchio"):
         check_against_pinocchio(robot.model, bodies)
+
+
+def test_a_body_that_cannot_exist_may_be_part_of_a_model() -> None:
+    """Bodies that follow from base parameters: pin.Inertia refuses to be constructed with such an inertia."""
+    robot = load_robot(example_urdf("ur5_robot.urdf"))
+    bodies = random_bodies(6, robot.n)
+    bodies[2] = [0.0, 0.0, 0.0, 0.0, -0.1, 0.0, 0.2, 0.0, 0.0, 0.3]
+    assert check_against_pinocchio(robot.model, bodies) <= TOLERANCE

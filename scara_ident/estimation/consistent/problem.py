@@ -322,7 +322,7 @@ class Problem:
             if status == "Solved":
                 break
         else:
-            raise EstimationError(_what_to_try(status))
+            raise EstimationError(_what_to_try(status, self.options))
         # A variable of no numbers has no value in cvxpy.
         auxiliary = self._auxiliary.value if u.auxiliary else np.zeros(0)
         return Point(centre + root @ self._w.value, auxiliary, self._statement.multipliers())
@@ -387,8 +387,9 @@ def _triangle(size: int) -> Any:
     return sp.csr_array((np.ones(count), (size * rows + columns, np.arange(count))), shape=(size**2, count))
 
 
-def _what_to_try(status: str) -> str:
-    if "PrimalInfeasible" in status:
+def _what_to_try(status: str, options: ConsistentOptions) -> str:
+    # An arm that can exist is there unless something was given that none has.
+    if "PrimalInfeasible" in status and (options.total_mass or options.link_mass or options.com != "free"):
         what = "has no solution"
         advice = (
             ": given masses, centres of mass and friction contradict each other; widen a tolerance or leave one out"

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from scara_ident.errors import UsageError
 from scara_ident.estimation import ConsistentOptions
-from scara_ident.estimation.consistent.problem import Problem, build_unknowns
+from scara_ident.estimation.consistent.problem import Problem, _what_to_try, build_unknowns
 from scara_ident.estimation.consistent.solution import solve_consistent
 from scara_ident.estimation.information import merge
 from tests.estimation.consistent.arms import (
@@ -41,3 +41,9 @@ def test_a_velocity_limit_of_no_joint_is_refused():
         build_unknowns(scara(), ConsistentOptions(speed={"nose": 1.0}))
     with pytest.raises(UsageError, match="friction: 'nose' is no identified joint"):
         build_unknowns(scara(), ConsistentOptions(friction={"nose": "free"}))
+
+
+def test_what_was_not_given_is_not_said_to_contradict():
+    free, held = _what_to_try("PrimalInfeasible", ConsistentOptions()), ConsistentOptions(total_mass=(1.0, 0.1))
+    assert "was not solved" in free and "given" not in free
+    assert "given masses" in _what_to_try("PrimalInfeasible", held)
