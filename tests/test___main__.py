@@ -12,7 +12,7 @@ from tests.shared import PATIENCE
 
 
 @pytest.mark.parametrize(
-    ("words", "status"), [(["--version"], 0), (["base", "--robot", "nowhere.yaml"], 1), (["nothing"], 2)]
+    ("words", "status"), [(["--version"], 0), (["base", "--robot", "nowhere.yaml"], 2), (["nothing"], 2)]
 )
 def test_it_is_the_command(words: list[str], status: int):
     done = subprocess.run(

@@ -161,11 +161,14 @@ def read_files(robot: Robot, files: Sequence[RecordingFile]) -> tuple[list[Recor
     faults = []
     with ExitStack() as copies:
         for file in files:
+            path = file.url
             try:
-                recording = read_recording(fetched(file.url, copies), robot)
+                path = str(fetched(file.url, copies))
+                recording = read_recording(path, robot)
             except (ScaraIdentError, OSError) as error:
                 passing = isinstance(error, OSError)
-                faults.append(Fault(file.arm, file.date, file.place, _why(error), passing))
+                why = _why(error).replace(path, file.place)
+                faults.append(Fault(file.arm, file.date, file.place, why, passing))
                 continue
             # Results and effects know recordings by their names.
             name = recording.name if recording.name not in found else file.place

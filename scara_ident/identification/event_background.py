@@ -185,8 +185,8 @@ def _of_others(
     lengths = np.diff(np.append(starts[firsts], len(left)))
     for _ in range(MOST_FEATURES):
         off = left - taken
-        scale = NORMAL * median(np.abs(off[known]))
-        use = known * np.minimum(1.0, INFLUENCE * scale / np.maximum(np.abs(off), 1e-300))
+        most = INFLUENCE * NORMAL * median(np.abs(off[known]))
+        use = known * (most / np.maximum(np.abs(off), most or 1.0))
         weighted = columns * use
         scores, squares = (np.add.reduceat(weighted * more, starts, axis=1) for more in (off, columns))
         away = _not_near(squares)

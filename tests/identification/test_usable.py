@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.diagnose import diagnose
-from scara_ident.errors import RecordingError, UsageError
+from scara_ident.errors import RecordingError
 from scara_ident.estimation.observations import kept_rows, observe
 from scara_ident.identification.compare import compare
 from scara_ident.identification.identify import identify, known_information
@@ -146,7 +146,7 @@ def test_a_trajectory_that_is_too_short_alone_is_not_compared(robot: Robot):
     found = compare(robot, [*good, short], model="basic", bands=(3.0, 3.0))
     assert [item.name for item in found.trajectories] == ["a", "b"]
     assert found.notes[-1].startswith("s_1: ")
-    with pytest.raises(UsageError, match=r"at least two trajectories, found 1.*s_1: .* left out"):
+    with pytest.raises(RecordingError, match=r"at least two trajectories, found 1.*s_1: .* left out"):
         compare(robot, [good[0], short], model="basic", bands=(3.0, 3.0))
 
 

@@ -32,8 +32,8 @@ def test_a_missing_channel_is_named_with_the_key_to_correct(tmp_path):
 
 
 def test_a_file_of_other_names_points_to_inspect(tmp_path):
-    message = refusal(write_plotjuggler(tmp_path / "log.csv", MADE), load_robot())
-    assert "scara-ident inspect log.csv" in message
+    path = write_plotjuggler(tmp_path / "log.csv", MADE)
+    assert f"scara-ident inspect {path}" in refusal(path, load_robot())
 
 
 def test_a_unit_that_is_wrong_is_caught_by_the_audit(tmp_path):
