@@ -95,7 +95,8 @@ def beside(work: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
 
     with _forked(1, alone) as (worker,):
         worker.send(0)
-        yield cache(lambda: _result(*_taken(worker)))
+        taken = cache(lambda: _taken(worker))
+        yield lambda: _result(*taken())
 
 
 @contextmanager

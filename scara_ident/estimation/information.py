@@ -288,9 +288,13 @@ def joint_noise(joints: Sequence[Information]) -> Array:
     """
     noise = np.ones(len(joints))
     for _ in range(WEIGHTING_ROUNDS):
-        value = weighted(joints, 1.0 / noise).solve().value
-        noise = np.array([part.noise(value) for part in joints])
+        noise = residual_noise(joints, weighted(joints, 1.0 / noise).solve().value)
     return noise
+
+
+def residual_noise(joints: Sequence[Information], value: Array) -> Array:
+    """Return the std of each joint's rows as the residuals of parameters tell it, shape (n,), see `Information.noise`."""
+    return np.array([part.noise(value) for part in joints])
 
 
 def orthonormal(factor: Array) -> Array:

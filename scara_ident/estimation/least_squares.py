@@ -10,7 +10,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.estimate import Estimate
-from scara_ident.estimation.information import Information, joint_noise, merge, weighted
+from scara_ident.estimation.information import Information, joint_noise, merge, residual_noise, weighted
 from scara_ident.estimation.noise_bias import noise_bias
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation, run_variation
@@ -80,7 +80,11 @@ def least_squares(
     solution = information.solve()
     value, undetermined, inverse = solution.value, solution.undetermined, information.inverse()
     # Equal weights stay what they are in the literature, the paper's among it.
-    told = told_directions(observations, value) if prior is None and method == "wls" else None
+    told = (
+        told_directions(observations, residual_noise(observations.by_joint, value))
+        if prior is None and method == "wls"
+        else None
+    )
     if told is not None:
         within = told.within(information)
         value, undetermined = told.kept @ within.solve().value, told.undetermined
@@ -140,7 +144,7 @@ def value_and_weights(observations: Observations) -> tuple[Array, Array]:
 def told_value_and_weights(observations: Observations) -> tuple[Array, Array]:
     """Return the same with what data leave open of the torque within the arm's limits at zero, as `wls` leaves it."""
     value, weights = value_and_weights(observations)
-    told = told_directions(observations, value)
+    told = told_directions(observations, residual_noise(observations.by_joint, value))
     if told is not None:
         value = told.kept @ told.within(weighted(_joints(observations), weights)).solve().value
     return value, weights

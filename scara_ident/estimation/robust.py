@@ -9,7 +9,8 @@ of which there are half as many.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, orthonormal, weighted
 from scara_ident.estimation.joint_rows import JointRows, block_products
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.working_range import told_directions
 from scara_ident.manners import listed
 from scara_ident.threads import one_blas_thread, side_by_side
 
@@ -27,7 +29,9 @@ from scara_ident.threads import one_blas_thread, side_by_side
 HUBER = 1.5
 TUKEY = 5.0
 # Rounds of reweighting with each; what moves after them is below a hundredth of a standard deviation.
-ROUNDS = (4, 3)
+HUBER_ROUNDS, TUKEY_ROUNDS = 4, 3
+# Rows for each direction that acts on a joint, beyond which its residual is its noise.
+ROWS = 2
 # Blocks of a joint: of long recordings, neighbours are one.
 MOST_BLOCKS = 400
 # Names that a note lists.
@@ -63,35 +67,55 @@ def robust_fit(observations: Observations) -> RobustFit:
         With at least one row.
     """
     noise = joint_noise(observations.by_joint)
-    root = orthonormal(weighted(observations.by_joint, 1.0 / noise).regressor_factor)
+    whole = weighted(observations.by_joint, 1.0 / noise).regressor_factor
+    root = orthonormal(whole)
 
     def of_joint(rows: JointRows, part: Information) -> _Sums:
         return _sums(rows, part.regressor_factor[:, rows.columns], root[rows.columns])
 
     joints = side_by_side(of_joint, observations.joints, observations.by_joint)
     weights = [np.ones(len(joint.rows)) for joint in joints]
-    point = np.zeros(root.shape[1])
+    point = _reweighted(joints, weights, noise, np.zeros(root.shape[1]), _huber, HUBER_ROUNDS)
+    # Where no event steers the noise any more, what data leave open is left at zero, as by `wls`.
+    told = told_directions(observations, noise)
+    if told is not None:
+        kept, sizes = np.linalg.qr((whole @ root).T @ (whole @ told.kept))
+        root, point = np.linalg.solve(sizes.T, told.kept.T).T, kept.T @ point
+        joints = [replace(joint, own=joint.own @ kept) for joint in joints]
+    point = _reweighted(joints, weights, noise, point, _tukey, TUKEY_ROUNDS)
+    return RobustFit(root @ _solved(joints, weights, noise, point), noise, tuple(weights))
 
-    def solved() -> Array:
-        shares = [weight / sigma**2 for weight, sigma in zip(weights, noise, strict=True)]
-        normal, right = np.zeros((len(point),) * 2), np.zeros(len(point))
-        for share, joint in zip(shares, joints, strict=True):
-            normal += joint.own.T @ np.tensordot(share, joint.products, 1) @ joint.own
-            right += (share @ joint.scores) @ joint.own
-        # A direction that only blocks without weight know stays where it was.
-        least = 1e-9 * np.trace(normal) / max(1, len(point))
-        return np.linalg.solve(normal + least * np.eye(len(point)), right + least * point)
 
-    for weigh, rounds in zip((_huber, _tukey), ROUNDS, strict=True):
-        for _ in range(rounds):
-            point = solved()
-            for j, joint in enumerate(joints):
-                rms = joint.rms(point)
-                floor = median(rms[joint.rows > 0]) if np.any(joint.rows) else 0.0
-                # Weights as with one joint's own noise, so that none is fitted at another's cost.
-                noise[j] = floor or noise[j]
-                weights[j] = weigh(rms / noise[j])
-    return RobustFit(root @ solved(), noise, tuple(weights))
+def _reweighted(
+    joints: Sequence[_Sums],
+    weights: list[Array],
+    noise: Array,
+    point: Array,
+    weigh: Callable[[Array], Array],
+    rounds: int,
+) -> Array:
+    """Go on with weights and noise, which change in place, and return the point that they stand for."""
+    for _ in range(rounds):
+        point = _solved(joints, weights, noise, point)
+        for j, joint in enumerate(joints):
+            rms = joint.rms(point)
+            # A joint of few rows may be met exactly, which tells nothing of its noise and would give it all weight.
+            floor = median(rms[joint.rows > 0]) if joint.rows.sum() > ROWS * len(joint.own) else 0.0
+            # Weights as with one joint's own noise, so that none is fitted at another's cost.
+            noise[j] = floor or noise[j]
+            weights[j] = weigh(rms / noise[j])
+    return point
+
+
+def _solved(joints: Sequence[_Sums], weights: Sequence[Array], noise: Array, point: Array) -> Array:
+    """Return the weighted fit; a direction that only blocks without weight know stays at the point."""
+    normal, right = np.zeros((len(point),) * 2), np.zeros(len(point))
+    for joint, weight, sigma in zip(joints, weights, noise, strict=True):
+        share = weight / sigma**2
+        normal += joint.own.T @ np.tensordot(share, joint.products, 1) @ joint.own
+        right += (share @ joint.scores) @ joint.own
+    least = 1e-9 * np.trace(normal) / max(1, len(point))
+    return np.linalg.solve(normal + least * np.eye(len(point)), right + least * point)
 
 
 @dataclass(frozen=True, eq=False)

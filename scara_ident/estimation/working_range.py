@@ -70,14 +70,14 @@ class Told:
         return Information(triangular(rows), information.rows)
 
 
-def told_directions(observations: Observations, value: Array) -> Told | None:
+def told_directions(observations: Observations, noise: Array) -> Told | None:
     """Tell directions that data determine from those that they leave open.
 
     Parameters
     ----------
     observations : Observations
-    value : ndarray, shape (p,)
-        Least squares, whose residuals say how large the noise is.
+    noise : ndarray, shape (n,)
+        Std of each joint's rows, N m or N, see `Information.noise`.
 
     Returns
     -------
@@ -87,20 +87,19 @@ def told_directions(observations: Observations, value: Array) -> Told | None:
     range_ = _range_factor(observations)
     if range_ is None:
         return None
-    joints = observations.by_joint
+    joints, parameters = observations.by_joint, len(range_)
     rows = np.array([joint.independent for joint in observations.joints])
-    noise = np.array([part.noise(value) for part in joints])
     # A row stands for several samples, and has their noise.
     step = np.array([part.rows for part in joints]) / np.maximum(rows, 1)
     whole = weighted(joints, 1.0 / (noise * np.sqrt(np.maximum(step, 1.0))))
     _, singular, right = np.linalg.svd(whole.regressor_factor @ range_)
     some = int(np.count_nonzero(singular > UNDETERMINED * singular[0]))
-    std = np.sqrt(rows.sum() / max(int(rows.sum()) - len(value), 1)) / singular[:some]
+    std = np.sqrt(rows.sum() / max(int(rows.sum()) - parameters, 1)) / singular[:some]
     known = SURE * std <= 1.0
     # What no row shows at all is open anyway, see `Information.solve`.
     if np.all(known):
         return None
-    unknown = np.append(~known, np.ones(len(value) - some, dtype=bool))
+    unknown = np.append(~known, np.ones(parameters - some, dtype=bool))
     directions = range_ @ right.T
     return Told(directions[:, ~unknown], directions[:, unknown])
 
