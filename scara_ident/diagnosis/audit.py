@@ -35,7 +35,7 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
     if not step.chosen:
         return []
     # Whether runs that differ make it is asked of it alone, on rows that weigh them as noise.
-    coefficients = physical_parameters(step, runs_differ=False).coefficients
+    coefficients = physical_parameters(step, scatter_alone=True).coefficients
     result = []
     for place, (candidate, own) in enumerate(zip(step.chosen, coefficients, strict=True)):
         beside = step.without(place)

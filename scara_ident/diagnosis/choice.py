@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.correction import taken_out
+from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import parameters_beside
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.nonlinear_fit import tune
@@ -129,7 +130,7 @@ def fitted_beside(
     """
     criteria = step.criteria
     enough = max(criteria.least_gain, criteria.near_best * best)
-    worth = _worth_fitting(candidates, enough, step.tried, criteria.most_fitted)
+    worth = _worth_fitting(candidates, enough, step.tried, criteria)
     begins = {item.label: (step.scene, item.candidate) for item in worth}
     if known is not None:
         # Found in another band: from there it is near.
@@ -181,15 +182,26 @@ def objection(step: SelectionStep, decision: Decision) -> str | None:
     )
 
 
-def _worth_fitting(points: Sequence[Decision], enough: float, tried: int, most: int) -> list[Decision]:
+def more_than_chance(point: Decision, tried: int, criteria: SelectionCriteria) -> bool:
+    """Whether a grid point may stand for something, so that work on its family may be worth it.
+
+    Where few blocks hold most of a column, as those of a jerk at the end of a dwell do, chance may do as well whatever it
+    removes; the fit, which has to be sure, then decides.
+    """
+    return point.gain > 0.0 and (point.examination.p_value * tried <= 1.0 or point.gain >= criteria.dominant)
+
+
+def _worth_fitting(
+    points: Sequence[Decision], enough: float, tried: int, criteria: SelectionCriteria
+) -> list[Decision]:
     """Return the best points of those that promise so much gain and what they may stand for, the most promising first."""
     # A fit is dear. Of a resonance with little damping a grid point loses most, or is unsure where it removes most, as its
     # waves are others in every run; a point beside it, or the same of another joint, may be more than chance would bring.
-    sure = {x.candidate.effect.name for x in points if x.gain > 0.0 and x.examination.p_value * tried <= 1.0}
+    sure = {item.candidate.effect.name for item in points if more_than_chance(item, tried, criteria)}
     best = [item for item in best_of_each(points).values() if item.candidate.effect.name in sure]
     large = {item.candidate.effect.name for item in best if item.gain >= enough}
     best.sort(key=lambda item: -item.gain)
-    return [item for item in best if item.candidate.effect.name in large][:most]
+    return [item for item in best if item.candidate.effect.name in large][: criteria.most_fitted]
 
 
 def _left_again(step: SelectionStep, decision: Decision) -> str | None:

@@ -94,6 +94,11 @@ class SelectionCriteria:
         0.6, "of the best gain", "families worth refining before one is chosen: a grid point loses up to 40 %"
     )
     most_refined: int = _criterion(4, "families", "refined at once, for time")
+    dominant: float = _criterion(
+        0.5,
+        "share of squared residual",
+        "a family whose grid point removes as much is fitted, or another band tried for it, however few blocks show it",
+    )
     most_fitted: int = _criterion(
         2,
         "candidates",

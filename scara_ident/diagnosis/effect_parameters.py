@@ -9,12 +9,13 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, Rows
-from scara_ident.diagnosis.nonlinear_fit import Linearised, linearise
+from scara_ident.diagnosis.nonlinear_fit import Linearised, linearise, tune
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.unknowns import sides
 from scara_ident.effects import Parameter
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.information import merge
+from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
 from scara_ident.estimation.run_variation import run_variation
 
 # A rotor is told by the data where they leave less than this share of its prior's standard deviation.
@@ -72,14 +73,14 @@ class PhysicalParameters:
     rotors: tuple[RotorInertia, ...]
 
 
-def physical_parameters(step: SelectionStep, *, runs_differ: bool = True) -> PhysicalParameters:
+def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> PhysicalParameters:
     """Return the physical parameters of each chosen effect, and the rotor inertias that they depend on.
 
     Parameters
     ----------
     step : SelectionStep
-    runs_differ : bool, optional
-        Whether what runs differ by stands in the standard deviations.
+    scatter_alone : bool, optional
+        Whether standard deviations leave out what runs differ by and what the noise of the positions does.
 
     Notes
     -----
@@ -87,7 +88,7 @@ def physical_parameters(step: SelectionStep, *, runs_differ: bool = True) -> Phy
     covariance is that of all parameters together.
     """
     state = linearise(step.scene, step.columns, step.weights, step.chosen, step.criteria.rotor_inertia_std)
-    covariance = _covariance(step, state, runs_differ=runs_differ)
+    covariance = _covariance(step, state, scatter_alone=scatter_alone)
     found: list[dict[str, Parameter]] = []
     coefficients = []
     for owner, (candidate, own) in enumerate(zip(step.chosen, state.places, strict=True)):
@@ -147,13 +148,31 @@ def parameters_beside(step: SelectionStep, candidate: Candidate) -> dict[str, Pa
     return dict(candidate.effect.parameters(step.scene, candidate.member, alone.value, covariance))
 
 
-def _covariance(step: SelectionStep, state: Linearised, *, runs_differ: bool) -> Array:
+def _covariance(step: SelectionStep, state: Linearised, *, scatter_alone: bool) -> Array:
     """Block covariance of all parameters, with what the priors leave open, which no residual shows."""
     inverse = merge([state.information, state.prior]).inverse()
     value = np.concatenate([state.value, np.zeros(len(state.unknowns))])
     spread = block_covariance(inverse, value, state.joints, step.observations.owner, step.weights).matrix
-    if runs_differ:
+    if not scatter_alone:
         variation = run_variation(step.observations, state.joints, value)
-        spread = spread + variation.covariance(inverse, state.joints, step.weights)
+        bias = _noise_bias(step, state)
+        spread = spread + variation.covariance(inverse, state.joints, step.weights) + np.outer(bias, bias)
     known = state.prior.factor[:, :-1]
     return np.asarray(spread + state.variance * inverse @ (known.T @ known) @ inverse)
+
+
+def _noise_bias(step: SelectionStep, state: Linearised) -> Array:
+    """Return by how much the noise of positions moves all parameters of a fit, see `scara_ident.estimation.noise_bias`."""
+    if max(noise_shares(step.observations.data), default=0.0) < NEGLIGIBLE:
+        return np.zeros(state.information.parameters)
+    twin, std = step.noisier, step.criteria.rotor_inertia_std
+    scene, chosen = twin.scene, twin.chosen
+    if len(state.ties.factor):
+        # A resonance with little damping bends too much for one step.
+        scene, chosen = tune(scene, twin.columns, step.weights, chosen, std)
+    again = linearise(scene, twin.columns, step.weights, chosen, std)
+    bias = again.solve()[0] - state.solve()[0]
+    bias[state.linear :] += [
+        there.value - here.value for there, here in zip(again.unknowns, state.unknowns, strict=True)
+    ]
+    return np.asarray(bias)

@@ -12,7 +12,7 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision, hopeless
 from scara_ident.diagnosis.audit import outdone, superfluous, suspected, unsettled
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
-from scara_ident.diagnosis.choice import fitted_beside
+from scara_ident.diagnosis.choice import fitted_beside, more_than_chance
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.evidence import coloured_shares
 from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
@@ -150,7 +150,7 @@ def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
         for item in found.decisions
         if item.label not in chosen
         and item.candidate.effect.band(item.candidate.member) > 0.0
-        and item.examination.p_value * found.tried <= 1.0
+        and more_than_chance(item, found.tried, criteria)
         # A grid point loses the rest.
         and item.gain >= criteria.near_best * criteria.least_gain
         and hopeless(item.candidate, item.examination, found.scene, criteria) is None
