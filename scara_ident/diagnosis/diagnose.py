@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -37,6 +38,7 @@ from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.estimation import Estimate
+from scara_ident.estimation.noise_bias import noise_signals
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import robust_fit
 from scara_ident.identification.arguments import Recordings, model_of, recordings_of
@@ -272,7 +274,8 @@ def diagnose(
     log_notes(_LOG, notes)
     undisturbed = without_stretches(validation_after, in_held_out)
     doubtful = (*outcome.suspected, *left_open(found, after.weights, outcome.demoted))
-    shown = evidence(found, outcome.residuals, outcome.fit_after, outcome.small, doubtful, criteria)
+    made = partial(noise_signals, outcome.training, after.value)
+    shown = evidence(found, outcome.residuals, outcome.fit_after, outcome.small, doubtful, criteria, made)
     shown = held_out_evidence(
         even_evidence(shown, after, outcome.training, criteria),
         rms_of(after.value, outcome.training),

@@ -7,7 +7,7 @@ not spread evenly over frequency, can be in more than a small share of it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,11 +24,14 @@ from scara_ident.estimation.explained_power import binned_power
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
+from scara_ident.motion.prepared import PreparedData
 
 # Bins of frequency within the band that a residual's power is compared in.
 BINS = 12
 # Share of the band in which the low-pass leaves the residual as it is.
 UNTOUCHED = 0.8
+# Noise of the positions by one draw that has more of the residual's power than this is not what it was taken for.
+MOST_KNOWN = 1.5
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,7 @@ def evidence(
     small: Sequence[float],
     suspected: Sequence[Decision] = (),
     criteria: SelectionCriteria = CRITERIA,
+    made: Callable[[], Sequence[Array]] | None = None,
 ) -> tuple[Evidence, ...]:
     """Return for each joint whether what is left was shown to be noise.
 
@@ -78,9 +82,14 @@ def evidence(
     suspected : sequence of Decision, optional
         On effects that explain some of it and are not believed.
     criteria : SelectionCriteria, optional
+    made : callable, optional
+        Returns what the noise of the positions makes in the torque of each stretch, shape (n, N): it is not white.
     """
     limits = detection_limits(found, criteria)
     coloured = coloured_shares(residuals)
+    noise = "white noise"
+    if made is not None and np.any(coloured > criteria.least_colour):
+        noise, coloured = "white noise and that of the positions", coloured_shares(residuals, made())
     repeated = {item.joint: item for item in fit}
     doubts = dict(found.step.columns.unresolved)
     for item in suspected:
@@ -90,13 +99,19 @@ def evidence(
     return tuple(
         Evidence(joint, False, "", doubts[j], float(limits[j]))
         if j in doubts
-        else _of_joint(joint, repeated.get(joint), float(coloured[j]), float(limits[j]), small[j], criteria)
+        else _of_joint(joint, repeated.get(joint), float(coloured[j]), noise, float(limits[j]), small[j], criteria)
         for j, joint in enumerate(found.scene.robot.joints)
     )
 
 
 def _of_joint(
-    joint: str, fit: LackOfFit | None, coloured: float, limit: float, small: float, criteria: SelectionCriteria
+    joint: str,
+    fit: LackOfFit | None,
+    coloured: float,
+    noise: str,
+    limit: float,
+    small: float,
+    criteria: SelectionCriteria,
 ) -> Evidence:
     if limit > criteria.least_power:
         effect = (
@@ -112,9 +127,9 @@ def _of_joint(
         why = f"repetitions leave at most {fit.most_missing:.3g} that repeats, and {fit.noise:.3g} that does not"
         return Evidence(joint, True, "repetition", why, limit)
     if coloured <= criteria.least_colour:
-        why = f"at most {max(coloured, 0.0):.0%} of its power stands out from white noise within the band"
+        why = f"at most {max(coloured, 0.0):.0%} of its power stands out from {noise} within the band"
         return Evidence(joint, True, "whiteness", why, limit)
-    why = f"{coloured:.0%} of its power stands out from white noise within the band, and "
+    why = f"{coloured:.0%} of its power stands out from {noise} within the band, and "
     why += (
         "no trajectory is repeated that would tell whether it repeats"
         if fit is None
@@ -280,10 +295,16 @@ def least_found(found: Search, decision: Decision, criteria: SelectionCriteria =
     return dict([next(iter(told.items()))])
 
 
-def coloured_shares(residuals: Residuals) -> Array:
+def coloured_shares(residuals: Residuals, made: Sequence[Array] | None = None) -> Array:
     """Return for each joint the share of the residual's power within the band above that of white noise.
 
     The power in bins of equal width is that of white noise at the level of the median bin, and what stands out from it.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    made : sequence of ndarray, shape (n, N), optional
+        What of each stretch's torque is known to be noise: its power is taken off before.
 
     Returns
     -------
@@ -292,17 +313,27 @@ def coloured_shares(residuals: Residuals) -> Array:
     """
     data = residuals.data
     found = []
-    for j, band in enumerate(data.bands):
-        slowest = min(part.rate for part in data.stretches)
-        highest = UNTOUCHED * (0.5 * slowest if band is None else band)
-        edges = np.linspace(0.0, highest, BINS + 1)
-        power = np.zeros(BINS + 1)
-        for part, predicted in zip(data.stretches, residuals.predicted, strict=True):
-            if part.usable and np.any(part.used[j]):
-                inside = slice(part.trim, part.samples - part.trim)
-                left = (part.fade[j] * (part.torque[j] - predicted[j]))[inside]
-                power += binned_power(left[None], part.rate, np.append(edges, 0.5 * part.rate))[0]
-        within = power[:BINS]
+    for j in range(len(data.bands)):
+        within = _power(
+            data, j, [part.torque - own for part, own in zip(data.stretches, residuals.predicted, strict=True)]
+        )
         mean = float(np.mean(within))
-        found.append(1.0 if mean == 0.0 else 1.0 - float(np.median(within)) / mean)
+        if made is not None:
+            known = _power(data, j, made)
+            within = within - known if float(np.mean(known)) <= MOST_KNOWN * mean else within
+        found.append(1.0 if mean == 0.0 else float(np.mean(within) - np.median(within)) / mean)
     return np.array(found)
+
+
+def _power(data: PreparedData, joint: int, signals: Sequence[Array]) -> Array:
+    """Return the power of a joint's signal, faded as its rows are, in bins of the part of the band that no filter touches."""
+    band = data.bands[joint]
+    slowest = min(part.rate for part in data.stretches)
+    edges = np.linspace(0.0, UNTOUCHED * (0.5 * slowest if band is None else band), BINS + 1)
+    power = np.zeros(BINS + 1)
+    for part, signal in zip(data.stretches, signals, strict=True):
+        if part.usable and np.any(part.used[joint]):
+            inside = slice(part.trim, part.samples - part.trim)
+            own = (part.fade[joint] * signal[joint])[inside]
+            power += binned_power(own[None], part.rate, np.append(edges, 0.5 * part.rate))[0]
+    return power[:BINS]

@@ -66,15 +66,24 @@ def noise_torque(observations: Observations, value: Array) -> Array:
     return known[1]
 
 
-def _noise_torque(observations: Observations, value: Array) -> Array:
-    model, data = observations.model, noisier(observations.data)
+def noise_signals(observations: Observations, value: Array) -> list[Array]:
+    """Return what the noise of positions makes in the torque that parameters predict, of each stretch (n, N), one draw.
 
+    Parameters
+    ----------
+    observations : Observations
+    value : ndarray, shape (p,)
+    """
+    model, data = observations.model, noisier(observations.data)
     again = side_by_side(lambda part: model.torque(part.motion, value), data.stretches)
+    return [twice - once for once, twice in zip(observations.predicted(value), again, strict=True)]
+
+
+def _noise_torque(observations: Observations, value: Array) -> Array:
     square, count = np.zeros(len(observations.joints)), np.zeros(len(observations.joints))
-    parts = zip(observations.data.stretches, observations.predicted(value), again, strict=True)
-    for part, once, twice in parts:
-        for joint, (before, after) in enumerate(zip(once, twice, strict=True)):
-            made = part.smooth(joint, after - before)[part.used[joint]]
+    for part, signals in zip(observations.data.stretches, noise_signals(observations, value), strict=True):
+        for joint, signal in enumerate(signals):
+            made = part.smooth(joint, signal)[part.used[joint]]
             square[joint] += float(made @ made)
             count[joint] += len(made)
     result = np.asarray(np.sqrt(square / np.maximum(count, 1.0)))
