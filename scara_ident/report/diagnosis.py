@@ -117,7 +117,12 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
         "run_variation": diagnosis.after.variation.sizes(diagnosis.robot) if diagnosis.after.variation else {},
         "noise_bias": bias_of(diagnosis.after),
         "not_identifiable": [
-            {"effect": alias.effect, "absorbed_by": list(alias.absorbed_by), "opened_by": alias.opened_by}
+            {
+                "effect": alias.effect,
+                "joints": list(alias.joints),
+                "absorbed_by": list(alias.absorbed_by),
+                "opened_by": alias.opened_by,
+            }
             for alias in diagnosis.aliases
         ],
         "candidates": [_candidate(decision, diagnosis) for decision in best_by_label(diagnosis.search.decisions)],

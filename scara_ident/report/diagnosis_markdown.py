@@ -65,9 +65,10 @@ def diagnosis_markdown(
             f"| {row['label']} | {row['gain']:.2%} | {row['p_value']:.1e} | {row['decision']} | {row['why']} |"
         )
     if content["not_identifiable"]:
-        lines += ["", "## What no such recording can show", "", "| effect | absorbed by | opened by |", "|---|---|---|"]
+        lines += ["", "## What no such recording can show", ""]
+        lines += ["| effect | joints | absorbed by | opened by |", "|---|---|---|---|"]
         lines += [
-            f"| {row['effect']} | {', '.join(row['absorbed_by'])} | {row['opened_by']} |"
+            f"| {row['effect']} | {', '.join(row['joints']) or '-'} | {', '.join(row['absorbed_by'])} | {row['opened_by']} |"
             for row in content["not_identifiable"]
         ]
     if content["worth"] is not None:
