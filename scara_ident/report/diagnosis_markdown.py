@@ -86,7 +86,12 @@ def _certainty(content: Mapping[str, Any], diagnosis: Diagnosis) -> list[str]:
             for row in content["events"]
         ]
     if content["tentative"]:
-        lines += ["", "## Worth a look, not added", "", "| effect | joint | gain | p | why not | settled by |"]
+        lines += [
+            "",
+            "## Worth a look, not added",
+            "",
+            "| effect | joint | gain | p over all tried | why not | settled by |",
+        ]
         lines += ["|---|---|---|---|---|---|"]
         lines += [
             f"| {row['effect']} | {row['joint'] or '-'} | {row['gain']:.2%} | {row['p_value']:.1e} | {row['why']} | {row['settled_by']} |"
