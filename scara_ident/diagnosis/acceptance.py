@@ -115,11 +115,15 @@ def _small(
 
 
 def _insignificant(examination: Examination, tried: int, criteria: SelectionCriteria) -> str | None:
-    corrected = examination.p_value * tried
-    if corrected > criteria.family_error:
-        asked = f"{criteria.family_error:.1g} is asked"
-        return f"not significant: p = {min(corrected, 1.0):.1e} over the {tried} candidates tried, {asked}"
-    return None
+    alone, corrected = examination.p_value, examination.p_value * tried
+    if corrected <= criteria.family_error:
+        return None
+    # Worth a look by its own p-value: corrected, that may be 1, and no reader would see why to look.
+    if alone <= criteria.significant:
+        asked = f"{criteria.family_error / tried:.1e} is asked of one of so many"
+        return f"could be chance: one of {tried} candidates tried; p = {alone:.1e} of it alone, {asked}"
+    asked = f"{criteria.family_error:.1g} is asked"
+    return f"not significant: p = {min(corrected, 1.0):.1e} over the {tried} candidates tried, {asked}"
 
 
 def _seldom(candidate: Candidate, examination: Examination, criteria: SelectionCriteria) -> str | None:

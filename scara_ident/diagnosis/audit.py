@@ -141,7 +141,9 @@ def left_open(found: Search, weights: Array, demoted: Sequence[Decision] = ()) -
             continue
         if not (differing and variation_objection(step, item)):
             result.append(
-                item.refused(f"{item.label} would remove {item.gain:.0%} of it (p = {p_value:.1e}): {item.why}")
+                item.refused(
+                    f"{item.label} would remove {item.gain:.0%} of it (p = {p_value:.1e} over all tried): {item.why}"
+                )
             )
     return result
 

@@ -117,6 +117,17 @@ def _of_speed(*laws: Callable[[Array], Array]) -> Candidates:
     return columns
 
 
+def _counterbalances(model: TorqueModel, motion: Motion, rng: np.random.Generator) -> Columns:
+    """Give sine and cosine of each turning joint's position: the torque of a spring or weight that balances it.
+
+    A link whose horizontal axis is the first, or comes right after a vertical one, has gravity of the same form.
+    """
+    for joint in np.flatnonzero(~model.robot.prismatic):
+        result = np.zeros((model.robot.n, 2, motion.samples))
+        result[joint] = np.sin(motion.q[joint]), np.cos(motion.q[joint])
+        yield int(joint), result
+
+
 def _common_torque_scale(model: TorqueModel, motion: Motion, rng: np.random.Generator) -> Columns:
     """Give a torque scale that is wrong for all joints alike, of arbitrary parameters."""
     value = rng.uniform(0.5, 1.5, len(model.columns))
@@ -218,6 +229,11 @@ HIDDEN = (
         "zero_offset",
         "a known payload, symmetry of the link taken as given, or a mechanical reference for the zero",
         _zero_offsets,
+    ),
+    Hidden(
+        "gravity_counterbalance",
+        "recordings with the base at another tilt (gravity in robot.yaml), or with the balancer taken off",
+        _counterbalances,
     ),
     Hidden(
         "asymmetric_coulomb",

@@ -230,8 +230,8 @@ class PayloadOfRecordings(Effect):
 class GravityCounterbalance(Sinusoid):
     """A spring or weight that balances a joint: ``u = a sin q + b cos q``.
 
-    Where gravity already turns with the same angle, as on the first joint of a planar arm, the model absorbs it. It may
-    pull either way.
+    Where gravity already turns with the same angle, as on the first joint of a planar arm or a shoulder right after a
+    vertical axis, the model absorbs it. It may pull either way.
     """
 
     name = "gravity_counterbalance"

@@ -117,7 +117,12 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
         "run_variation": diagnosis.after.variation.sizes(diagnosis.robot) if diagnosis.after.variation else {},
         "noise_bias": bias_of(diagnosis.after),
         "not_identifiable": [
-            {"effect": alias.effect, "absorbed_by": list(alias.absorbed_by), "opened_by": alias.opened_by}
+            {
+                "effect": alias.effect,
+                "joints": list(alias.joints),
+                "absorbed_by": list(alias.absorbed_by),
+                "opened_by": alias.opened_by,
+            }
             for alias in diagnosis.aliases
         ],
         "candidates": [_candidate(decision, diagnosis) for decision in best_by_label(diagnosis.search.decisions)],
@@ -291,7 +296,10 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
             found.append(f"These recordings cannot tell it from: {others}.")
     for guess in diagnosis.tentative:
         where = f" on {guess.joint}" if guess.joint else ""
-        found.append(f"Worth a look, not added: {guess.effect}{where}; {guess.why}; settled by: {guess.settled_by}.")
+        gain = f"would remove {max(guess.gain, 0.0):.0%} of the squared residual"
+        found.append(
+            f"Worth a look, not added: {guess.effect}{where}, {gain}; {guess.why}; settled by: {guess.settled_by}."
+        )
     found += [
         _of_rotor(rotor, diagnosis) for rotor in diagnosis.rotors if not rotor.stated and rotor.factor is not None
     ]

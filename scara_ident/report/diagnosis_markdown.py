@@ -65,9 +65,10 @@ def diagnosis_markdown(
             f"| {row['label']} | {row['gain']:.2%} | {row['p_value']:.1e} | {row['decision']} | {row['why']} |"
         )
     if content["not_identifiable"]:
-        lines += ["", "## What no such recording can show", "", "| effect | absorbed by | opened by |", "|---|---|---|"]
+        lines += ["", "## What no such recording can show", ""]
+        lines += ["| effect | joints | absorbed by | opened by |", "|---|---|---|---|"]
         lines += [
-            f"| {row['effect']} | {', '.join(row['absorbed_by'])} | {row['opened_by']} |"
+            f"| {row['effect']} | {', '.join(row['joints']) or '-'} | {', '.join(row['absorbed_by'])} | {row['opened_by']} |"
             for row in content["not_identifiable"]
         ]
     if content["worth"] is not None:
@@ -85,7 +86,12 @@ def _certainty(content: Mapping[str, Any], diagnosis: Diagnosis) -> list[str]:
             for row in content["events"]
         ]
     if content["tentative"]:
-        lines += ["", "## Worth a look, not added", "", "| effect | joint | gain | p | why not | settled by |"]
+        lines += [
+            "",
+            "## Worth a look, not added",
+            "",
+            "| effect | joint | gain | p over all tried | why not | settled by |",
+        ]
         lines += ["|---|---|---|---|---|---|"]
         lines += [
             f"| {row['effect']} | {row['joint'] or '-'} | {row['gain']:.2%} | {row['p_value']:.1e} | {row['why']} | {row['settled_by']} |"

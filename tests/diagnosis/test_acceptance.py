@@ -54,7 +54,7 @@ def test_a_good_candidate_comes_in_and_its_gain_is_told():
     [
         ({"outside": 1e-9}, "absorbs"),
         ({"outside": 1e-4}, "lies outside the model"),
-        ({"p_value": 2.0 * CRITERIA.family_error / 100}, "not significant"),
+        ({"p_value": 2.0 * CRITERIA.family_error / 100}, "could be chance"),
         ({"value": np.array([-0.05, 0.0])}, "push away"),
         ({"fold_gains": (0.5, -0.1, 0.2, None)}, "helps in only 2 of 3"),
     ],
@@ -78,10 +78,17 @@ def test_the_p_value_is_corrected_for_what_was_tried():
     item = replace(GOOD, p_value=0.01 * CRITERIA.family_error)
     assert decided(SPRING, item, 50).accepted
     assert not decided(SPRING, item, 200).accepted
-    # As the tables of a report show it, beside what is asked.
-    assert (
-        decided(SPRING, item, 200).why == "not significant: p = 4.0e-03 over the 200 candidates tried, 0.002 is asked"
+
+
+def test_what_is_worth_a_look_may_be_chance_and_is_not_said_to_have_a_p_value_of_one():
+    look = decided(SPRING, replace(GOOD, p_value=0.008), 200)
+    assert look.tentative
+    assert look.why == (
+        "could be chance: one of 200 candidates tried; p = 8.0e-03 of it alone, 1.0e-05 is asked of one of so many"
     )
+    other = decided(SPRING, replace(GOOD, p_value=0.02), 20)
+    assert not other.tentative
+    assert other.why == "not significant: p = 4.0e-01 over the 20 candidates tried, 0.002 is asked"
 
 
 def test_a_joints_own_delay_of_less_than_a_sample_is_not_an_effect():
@@ -108,7 +115,7 @@ def test_too_small_a_gain_is_below_the_detection_limit(gain: float, removes: str
     ("change", "why"),
     [
         ({"least_outside": 0.6}, "lies outside the model"),
-        ({"family_error": 1e-11}, "not significant"),
+        ({"family_error": 1e-11}, "could be chance"),
         ({"least_gain": 0.5}, "below the detection limit: removes 40.0% of the squared residual, 50% is asked"),
     ],
 )

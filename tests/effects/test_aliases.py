@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from scara_ident.effects.aliases import aliases
@@ -50,6 +52,34 @@ def test_rotors_on_links_of_any_arm_are_absorbed_by_the_inertias_of_links():
     arm = found(load_robot(example_urdf("ur5_robot.urdf")), "basic")
     assert len(arm["rotor_coupling"].joints) == 5
     assert set(arm["zero_offset"].joints) == {"shoulder_pan_joint", "wrist_3_joint"}
+
+
+@pytest.mark.parametrize(
+    ("robot", "joints", "carriers"),
+    [
+        ("z1", ("joint2",), ("mx2", "mz2")),
+        ("xarm7", ("joint2",), ("mx2", "my2")),
+        ("panda", ("panda_joint2",), ("mx2", "my2")),
+    ],
+)
+def test_a_balanced_shoulder_is_a_heavier_link(robot: str, joints: tuple[str, ...], carriers: tuple[str, ...]):
+    balanced = found(load_robot(robot), "basic")["gravity_counterbalance"]
+    assert (balanced.joints, balanced.absorbed_by) == (joints, carriers)
+
+
+def test_a_tilted_base_tells_a_balancer_from_the_link():
+    level = load_robot("z1")
+    tilted = level.model.copy()
+    tilted.gravity.linear = 9.81 * np.array([np.sin(0.1), 0.0, -np.cos(0.1)])
+    # The first joint's axis is then no longer vertical, and what balances that joint is its own link's.
+    assert found(replace(level, model=tilted), "basic")["gravity_counterbalance"].joints == ("joint1",)
+
+
+def test_a_counterbalance_shows_where_gravity_does_not_turn_with_the_joint(tmp_path: Path):
+    # No gravity on the SCARA's vertical axes; of a planar arm, only the first joint's gravity turns with its own angle.
+    assert "gravity_counterbalance" not in found(load_robot())
+    planar = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
+    assert found(planar)["gravity_counterbalance"].joints == planar.joints[:1]
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -249,6 +249,17 @@ def test_an_angle_with_few_digits_is_said_and_gains_no_parameters(tmp_path: Path
     assert all(0 < share < 2e-5 for _, share in approximate[1])
 
 
+def test_an_angle_with_few_digits_leaves_no_rotor_in_other_sums():
+    """The xArm7's right angles have few digits; a column met exactly keeps its terms, however small."""
+    base = find_base_parameters(load_robot("xarm7"))
+    written = {name: base.expression(k) for k, name in enumerate(base.names)}
+    assert "Ia2" in {base.standard_names[k] for k, _ in base.approximate}
+    assert {name for name, text in written.items() if "Jm2" in text} == {"I2zz"}
+    assert written["my3"] == "my3 - mz4 + 3.67321e-06 mz5"
+    # What the sums leave of the torque is no more than the column itself had outside them.
+    assert check_base_parameters(load_robot("xarm7"), base).torque_error < 1e-5
+
+
 def test_single_joints_have_what_moves_them(tmp_path: Path):
     for link, lead in ((Link(), "I1zz"), (Link(kind="prismatic"), "m1")):
         robot = load_robot(write_urdf(tmp_path / "arm.urdf", (link,)))

@@ -27,3 +27,11 @@ def test_a_sum_with_a_rotor_that_nobody_stated_has_none():
     stated = dict(zip(*((model := build_model(silent, "reduced")).names, urdf_values(model)), strict=True))
     assert np.isnan(stated["P_d5"])
     assert np.isfinite(stated["P_d1"])
+
+
+def test_right_angles_of_few_digits_put_no_rotor_into_sums_that_are_without_it():
+    model = build_model(load_robot("xarm7"), "basic")
+    stated = dict(zip(model.names, urdf_values(model), strict=True))
+    rotors = {"I1zz", "I2zz", *(f"Ia{k}" for k in range(3, 8))}
+    bodies = {column.name for column in model.rigid_body.columns}
+    assert {name for name in bodies if np.isnan(stated[name])} == rotors

@@ -254,6 +254,7 @@ def _unknowable(context: DiagnosisContext) -> list[Block]:
     rows: list[list[Cell | str]] = [
         [
             name(row["effect"]),
+            Cell(", ".join(row["joints"]) or "-", "words"),
             Cell(", ".join(row["absorbed_by"]) or "no torque at all", "words"),
             Cell(row["opened_by"], "words"),
         ]
@@ -263,7 +264,7 @@ def _unknowable(context: DiagnosisContext) -> list[Block]:
         blocks += [
             Heading("Effects that the model absorbs on any data"),
             Paragraph("Neither found nor excluded: whatever the arm does, these parameters take them up."),
-            Table(("effect", "absorbed by", "what would show it"), rows),
+            Table(("effect", "joints", "absorbed by", "what would show it"), rows),
         ]
     return blocks
 

@@ -116,7 +116,7 @@ def tentative_blocks(content: Mapping[str, Any]) -> Sequence[Block]:
         "Not believed and not in the model. The gain is the share of its joint's squared residual that it would remove on "
         "data that it was not fitted to."
     )
-    head = ("effect", "gain", "p", "why it is not believed", "what would settle it")
+    head = ("effect", "gain", "p over all tried", "why it is not believed", "what would settle it")
     return [Paragraph(words), Table(head, rows, (1, 2))] if rows else []
 
 
