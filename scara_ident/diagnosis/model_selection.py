@@ -157,7 +157,8 @@ def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
     ]
     if not promising:
         return 0.0
-    best = max(promising, key=lambda item: item.gain).candidate
+    # What chance would not do says better where the band has to reach.
+    best = max(promising, key=lambda item: (item.examination.p_value * found.tried <= 1.0, item.gain)).candidate
     return _within(best.effect.band(best.member), found)
 
 
