@@ -15,13 +15,13 @@ class _OfOtherJoint(Effect):
     """Friction that varies with the position of the next joint, of the one before for the last, of its own where it is alone."""
 
     # Array of the draft with the row of that joint.
-    other: ClassVar[str]
+    place_of_other: ClassVar[str]
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Set the size and the other joint."""
         super().apply(arm, draft)
         n, j = arm.robot.n, arm.robot.joint_index(self.joint or arm.robot.joints[0])
-        draft.arrays[self.other][self.place(arm)] = int(arm.robot.order[j + 1 if j + 1 < n else max(j - 1, 0)])
+        draft.arrays[self.place_of_other][self.place(arm)] = int(arm.robot.order[j + 1 if j + 1 < n else max(j - 1, 0)])
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class UnlistedSignedSine(_OfOtherJoint):
     units: ClassVar[dict[str, str]] = {"amplitude": "N m"}
     shares: ClassVar[dict[str, float]] = {"amplitude": 0.06}
     arrays: ClassVar[dict[str, str]] = {"amplitude": "signed_sine"}
-    other = "signed_sine_of"
+    place_of_other = "signed_sine_of"
     joint_side = ("amplitude",)
     amplitude: float = BY_ARM
 
@@ -47,6 +47,6 @@ class UnlistedSwingingViscous(_OfOtherJoint):
     units: ClassVar[dict[str, str]] = {"viscous": "N m s/rad"}
     shares: ClassVar[dict[str, float]] = {"viscous": 0.06}
     arrays: ClassVar[dict[str, str]] = {"viscous": "swinging_viscous"}
-    other = "swinging_viscous_of"
+    place_of_other = "swinging_viscous_of"
     joint_side = ("viscous",)
     viscous: float = BY_ARM
