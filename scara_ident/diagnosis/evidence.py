@@ -87,9 +87,12 @@ def evidence(
     """
     limits = detection_limits(found, criteria)
     coloured = coloured_shares(residuals)
-    noise = "white noise"
+    noise = np.full(len(coloured), "white noise", dtype=object)
     if made is not None and np.any(coloured > criteria.least_colour):
-        noise, coloured = "white noise and that of the positions", coloured_shares(residuals, made())
+        less = coloured_shares(residuals, made())
+        # What is white is shown as it is, whatever other joints need.
+        mended = (coloured > criteria.least_colour) & (less < coloured)
+        noise[mended], coloured[mended] = "white noise and that of the positions", less[mended]
     repeated = {item.joint: item for item in fit}
     doubts = dict(found.step.columns.unresolved)
     for item in suspected:
@@ -99,7 +102,7 @@ def evidence(
     return tuple(
         Evidence(joint, False, "", doubts[j], float(limits[j]))
         if j in doubts
-        else _of_joint(joint, repeated.get(joint), float(coloured[j]), noise, float(limits[j]), small[j], criteria)
+        else _of_joint(joint, repeated.get(joint), float(coloured[j]), noise[j], float(limits[j]), small[j], criteria)
         for j, joint in enumerate(found.scene.robot.joints)
     )
 

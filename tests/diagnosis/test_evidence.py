@@ -166,3 +166,26 @@ def test_what_surely_repeats_is_no_noise_however_small_beside_it(nothing_missing
     found = evidence(nothing_missing.search, residuals, fit, (0.0057, 0.0057))
     assert [item.shown for item in found] == [shown, shown]
     assert ("repeats (p = 1.3e-14)" in found[0].why) != shown
+
+
+def test_the_noise_of_positions_speaks_of_the_joints_alone_that_it_colours(nothing_missing):
+    """What it is on one joint must not take from another, whose residual is white, that it was shown to be noise."""
+    left = nothing_missing.training_after.residuals(nothing_missing.after.value)
+    data, rng = left.data, np.random.default_rng(6)
+    made = []
+    for part in data.stretches:
+        frequency = np.fft.rfftfreq(part.samples, 1.0 / part.rate) / BANDS[0]
+        shape = np.where(frequency < 1.0, frequency**2, 0.0)
+        made.append(np.fft.irfft(shape * np.fft.rfft(rng.standard_normal((2, part.samples))), part.samples))
+    predicted = [part.torque - rng.standard_normal(part.torque.shape) for part in data.stretches]
+    for own, noise in zip(predicted, made, strict=True):
+        # As much again, the other way round in time: of the same power.
+        own[0] -= 10.0 * noise[0, ::-1]
+    residuals = Residuals(data, tuple(predicted))
+    told = [np.array([10.0, 1.0])[:, None] * noise for noise in made]
+    without, within = (
+        evidence(nothing_missing.search, residuals, (), (0.0, 0.0), made=known) for known in (None, lambda: told)
+    )
+    assert [item.shown for item in without] == [False, True]
+    assert [item.shown for item in within] == [True, True]
+    assert "that of the positions" in within[0].why and within[1] == without[1]
