@@ -29,8 +29,9 @@ types: $(STAMP)
 compiled: $(STAMP)
 	$(BIN)/python -c "from scara_ident import *; arm = virtual_arm(); simulate(arm, named_motion('OJD', arm.robot), rate=250.0)"
 
-# Two workers share two cores: a second BLAS thread of each would only wait for the other's.
-PYTEST := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2
+# Two workers share two cores: a second BLAS thread of each would only wait for the other's. Commands that tests run keep
+# what they compile: each would compile all modules again.
+PYTEST := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2
 
 fast: $(STAMP)
 	$(PYTEST) --dist worksteal -m "not slow"

@@ -125,7 +125,9 @@ def left_open(found: Search, weights: Array, demoted: Sequence[Decision] = ()) -
     demoted : sequence of Decision, optional
         On effects that the search had found and did without in the end; what came in since may have made them nothing.
     """
-    step = replace(found.step, weights=weights)
+    # What noise or runs would make is asked no more than it is itself: it need not be sure of it to be possible.
+    of_one = replace(found.step.criteria, family_error=found.step.criteria.significant)
+    step = replace(found.step, weights=weights, criteria=of_one)
     differing = len(step.observations.data.recordings) >= LEAST_RUNS
     labels = {item.label(found.scene) for item in found.chosen}
     gone = [item for item in demoted if item.label not in labels]
