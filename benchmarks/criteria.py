@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -62,7 +63,8 @@ class NotedCriteria(SelectionCriteria):
     read: ClassVar[set[str]] = set()
 
     def __getattribute__(self, name: str) -> Any:
-        if name in NAMES:
+        # What is copied with another value is read where that copy is.
+        if name in NAMES and sys._getframe(1).f_globals["__name__"] != "dataclasses":
             NotedCriteria.read.add(name)
         return super().__getattribute__(name)
 
