@@ -94,19 +94,15 @@ def sines(rng: np.random.Generator, time: Array, n: int, size: float = 0.6, lowe
 
 def rnea(robot: Robot, q: Array, v: Array, a: Array) -> Array:
     """Inverse dynamics by Pinocchio in the order of the robot's joints, rotors not included, shape (n, N)."""
-    data = robot.model.createData()
+    model, data = robot.model, robot.model.createData()
     back = np.argsort(robot.order)
-    torque = np.empty_like(q)
-    for k in range(q.shape[1]):
-        angle = q[back, k]
-        full = pin.neutral(robot.model)
-        for joint in list(robot.model.joints)[1:]:
-            if joint.nq == 1:
-                full[joint.idx_q] = angle[joint.idx_v]
-            else:
-                full[joint.idx_q : joint.idx_q + 2] = np.cos(angle[joint.idx_v]), np.sin(angle[joint.idx_v])
-        torque[:, k] = pin.rnea(robot.model, data, full, v[back, k], a[back, k])[robot.order]
-    return torque
+    angle, speed, acceleration = q[back], v[back], a[back]
+    full = np.tile(pin.neutral(model)[:, None], q.shape[1])
+    for joint in list(model.joints)[1:]:
+        own = angle[joint.idx_v]
+        full[joint.idx_q : joint.idx_q + joint.nq] = own if joint.nq == 1 else (np.cos(own), np.sin(own))
+    states = zip(full.T, speed.T, acceleration.T, strict=True)
+    return np.array([pin.rnea(model, data, *state) for state in states]).reshape(-1, len(back)).T[robot.order]
 
 
 def recorded_torque(robot: Robot, q: Array, v: Array, a: Array, friction: Sequence[Sequence[float]]) -> Array:

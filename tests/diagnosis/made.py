@@ -62,6 +62,7 @@ class Bent(Spring):
         return [turn + 0.01 * turn**2]
 
 
+@lru_cache(maxsize=16)
 def multisine(name: str, seed: int, duration: float, size: float = 1.9) -> ReferenceMotion:
     """Five harmonics per joint within ``size`` rad about the middle and 2.5 rad/s."""
     robot = load_robot()

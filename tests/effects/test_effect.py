@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -38,6 +39,7 @@ class Hook(Effect):
         return [np.maximum(signals.motion.q[member.place] - member.nonlinear[0], 0.0)]
 
 
+@lru_cache(maxsize=1)
 def scene_of_ur5():
     return scene_of(load_robot(example_urdf("ur5_robot.urdf")), start={"m": 0.0, "other_1": 5.0})
 
