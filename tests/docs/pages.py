@@ -14,6 +14,7 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,15 +64,17 @@ def blocks(page: Path) -> list[Block]:
     return found
 
 
-def run(page: Path, folder: Path) -> dict[str, Any]:
+def run(page: Path, folder: Path, done: Sequence[Block] = ()) -> dict[str, Any]:
     """Run a page in a folder, which is the working directory; return the names that its Python made.
 
-    Fails where a block fails or prints something else than the page shows.
+    Blocks that were run before are not run again. Fails where a block fails or prints something else than the page shows.
     """
     names: dict[str, Any] = {"__name__": "__main__"}
     printed: str | None = None
     for block in blocks(page):
         where = f"{page.relative_to(ROOT) if page.is_relative_to(ROOT) else page}, line {block.line}"
+        if block in done:
+            continue
         if block.title is not None:
             (folder / block.title).write_text(block.text, encoding="utf-8")
         elif block.language == "bash":

@@ -137,7 +137,7 @@ def test_what_the_readme_says_to_type_runs(reader: Path) -> None:
     first, second, *_ = blocks(README)
     assert first.prompted.startswith("scara-ident diagnose")
     run_bash("README.md", second.text, reader)
-    run(README, reader)
+    run(README, reader, done=[second])
     assert (reader / "out" / "identify" / "scara03_identified.urdf").is_file()
 
 
