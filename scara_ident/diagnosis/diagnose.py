@@ -255,7 +255,8 @@ def diagnose(
     drift = clock_drift(after.value, outcome.training)
     notes += [] if drift is None else [drift]
     if after.variation is not None:
-        notes += after.variation.sentences(robot)
+        left = outcome.unexplained
+        notes += after.variation.sentences(robot, None if left is None else left.joint)
     uncounted = uncounted_correction(found, parameters)
     if uncounted is not None:
         notes.append(f"{uncounted}; corrected in the data, not counted as an effect")

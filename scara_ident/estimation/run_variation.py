@@ -110,8 +110,15 @@ class RunVariation:
             if item is not None
         }
 
-    def sentences(self, robot: Robot) -> list[str]:
-        """Return in words what differs by more than a hundredth of the torque."""
+    def sentences(self, robot: Robot, unexplained: str | None = None) -> list[str]:
+        """Return in words what differs by more than a hundredth of the torque.
+
+        Parameters
+        ----------
+        robot : Robot
+        unexplained : str, optional
+            Joint of which no model explains the torque: what it lacks differs from motion to motion too.
+        """
         found = []
         for j, (joint, item) in enumerate(zip(robot.joints, self.joints, strict=True)):
             if item is None:
@@ -124,7 +131,8 @@ class RunVariation:
                 if std * size > SPOKEN_OF * rms[KINDS.index("torque scale")]
             ]
             if shown:
-                found.append(f"{joint} differs from run to run (standard deviation): {', '.join(shown)}")
+                said = f"{joint} differs from run to run (standard deviation): {', '.join(shown)}"
+                found.append(said + ("; what is unexplained may make it seem so" if joint == unexplained else ""))
         return found
 
     def __bool__(self) -> bool:

@@ -63,6 +63,10 @@ def test_how_far_runs_differ_is_found():
         estimate = wls(observed(runs(np.random.default_rng(seed))))
         assert estimate.variation is not None
         found += [item.std for item in estimate.variation.joints if item is not None]
+        # What a model lacks of a joint differs from motion to motion, too.
+        plain, doubted = (estimate.variation.sentences(ROBOT, joint) for joint in (None, "joint1"))
+        assert all(said.startswith(f"joint{j} differs from run to run") for j, said in enumerate(plain, 1))
+        assert doubted == [plain[0] + "; what is unexplained may make it seem so", plain[1]]
     assert len(found) == 8
     assert_allclose(np.sqrt(np.mean(np.square(found), axis=0)), DIFFERENT, rtol=0.35)
 
