@@ -17,7 +17,8 @@ from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.correction import corrected
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
-from scara_ident.diagnosis.evidence import Evidence, even_evidence, evidence, held_out_evidence, unsure_of_others
+from scara_ident.diagnosis.even_evidence import even_evidence
+from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence, unsure_of_others
 from scara_ident.diagnosis.found_effect import (
     FoundEffect,
     direct_readings,
@@ -38,6 +39,7 @@ from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.estimation import Estimate
+from scara_ident.estimation.another_run import of_another_run
 from scara_ident.estimation.noise_bias import noise_signals
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import robust_fit
@@ -263,6 +265,9 @@ def diagnose(
     validation_after = _with_effects(found, held, validation_before)
     in_held_out = held_out_events(after.value, outcome.training, validation_after)
     unsure = unsure_of_others(after, validation_after)
+    apart = np.zeros(robot.n)
+    if after.variation is not None:
+        apart = of_another_run(after.variation, validation_after, after.value)
     in_held_out = tuple(own_uncertainty(event, dict(zip(robot.joints, unsure, strict=True))) for event in in_held_out)
     # Where something stays unexplained that is why a whole recording is, and no event.
     in_held_out = tuple(
@@ -282,6 +287,7 @@ def diagnose(
         rms_of(after.value, outcome.training),
         rms_of(after.value, undisturbed),
         unsure,
+        apart,
         criteria,
     )
     verdict = _verdict(outcome.unexplained is not None, bool(effects), shown)

@@ -146,6 +146,7 @@ def held_out_evidence(
     training: Sequence[float | None],
     held_out: Sequence[float | None],
     unsure: Array,
+    differing: Array,
     criteria: SelectionCriteria = CRITERIA,
 ) -> tuple[Evidence, ...]:
     """Take back what the training recordings showed where the model does not hold on others.
@@ -157,60 +158,21 @@ def held_out_evidence(
         Rms error of each joint; None without rows.
     unsure : ndarray, shape (n,)
         Rms error on the recordings held out that a right model has there, see `unsure_of_others`.
+    differing : ndarray, shape (n,)
+        Rms torque by which these are expected to differ from the training's, see `of_another_run`.
     criteria : SelectionCriteria, optional
     """
     found = []
-    for item, own, other, known in zip(shown, training, held_out, unsure, strict=True):
+    for item, own, other, known, apart in zip(shown, training, held_out, unsure, differing, strict=True):
         if item.shown and own and other is not None and other > criteria.worse_held_out * own:
             why = f"the error on the recordings held out is {other / own:.2g} times that of the training"
-            if other > np.hypot(criteria.worse_held_out * own, known):
+            # The few draws of a run are known by their standard deviation alone.
+            most = np.linalg.norm([criteria.worse_held_out * own, known, criteria.alike * apart])
+            if other > most:
                 item = replace(item, shown=False, by="", why=why)
             else:
-                item = replace(item, why=f"{item.why}; {why}, as unsure as the parameters are there")
-        found.append(item)
-    return tuple(found)
-
-
-def even_evidence(
-    shown: Sequence[Evidence], after: Estimate, training: Observations, criteria: SelectionCriteria = CRITERIA
-) -> tuple[Evidence, ...]:
-    """Take back that a residual is noise where one recording leaves much more of it than all others do.
-
-    What acts in one recording, such as a load, may be as white as noise, and no repetition shows it.
-
-    Parameters
-    ----------
-    shown : sequence of Evidence
-    after : Estimate
-    training : Observations
-        Of the same model.
-    criteria : SelectionCriteria, optional
-    """
-    from scipy.special import fdtrc
-
-    if len(training.each) < 2:
-        return tuple(shown)
-    rows = np.array([[item.rows for item in own.by_joint] for own in training.each])
-    squares = np.array(
-        [
-            [item.rms(after.value) ** 2 * item.rows if item.rows else 0.0 for item in own.by_joint]
-            for own in training.each
-        ]
-    )
-    found = []
-    for j, item in enumerate(shown):
-        others = np.sum(rows[:, j]) - rows[:, j]
-        known = (rows[:, j] > 0) & (others > 0)
-        level = np.where(known, np.sum(squares[:, j]) - squares[:, j], 1.0) / np.maximum(others, 1)
-        ratio = np.divide(squares[:, j], rows[:, j] * level, out=np.zeros(len(rows)), where=known & (level > 0.0))
-        place = int(np.argmax(ratio))
-        chance = len(rows) * float(fdtrc(rows[place, j], others[place], ratio[place])) if known[place] else 1.0
-        if item.shown and ratio[place] > criteria.worse_held_out**2 and chance < criteria.significant:
-            own = training.each[place]
-            made = float(noise_torque(own, after.value)[j])
-            if squares[place, j] / rows[place, j] > criteria.worse_held_out**2 * level[place] + made**2:
-                why = f"{own.name} leaves {np.sqrt(ratio[place]):.2g} times the error of all others"
-                item = replace(item, shown=False, by="", why=why)
+                by = "as unsure as the parameters are there" if known >= apart else "as runs were found to differ"
+                item = replace(item, why=f"{item.why}; {why}, {by}")
         found.append(item)
     return tuple(found)
 

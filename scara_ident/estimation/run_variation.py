@@ -247,7 +247,7 @@ def run_variation(
     _ = observations.late(value[: observations.parameters])
 
     def of_joint(joint: int, rows: JointRows) -> _Sums | None:
-        directions = _directions(observations, joint, rows, value)
+        directions = directions_of(observations, joint, rows, value)
         left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
         return _sums(directions, left, rows.starts, firsts)
 
@@ -278,7 +278,7 @@ def assumed_variation(
             found.append(None)
             continue
         noise = float(np.sqrt(np.mean((rows.table[-1] - value[rows.columns] @ rows.table[:-1]) ** 2)))
-        directions = _directions(observations, joint, rows, value)
+        directions = directions_of(observations, joint, rows, value)
         offset = ASSUMED_OFFSET * float(np.sqrt(np.mean(directions[KINDS.index("torque scale")] ** 2)))
         std = np.array([ASSUMED_FRICTION, scale, offset, ASSUMED_DELAY])
         told = noise > 0.0 and bool(np.any(directions[std > 0.0]))
@@ -288,7 +288,7 @@ def assumed_variation(
     return RunVariation(tuple(found))
 
 
-def _directions(observations: Observations, joint: int, rows: JointRows, value: Array) -> Array:
+def directions_of(observations: Observations, joint: int, rows: JointRows, value: Array) -> Array:
     """Return what one unit of each kind does on the rows of a joint, shape (kinds, N); zero where it does nothing."""
     late = observations.late(value[: observations.parameters])[joint]
     return _of_columns(observations, rows.columns, value, rows.table[:-1], late)

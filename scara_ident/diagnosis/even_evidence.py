@@ -1,0 +1,119 @@
+"""Whether one recording leaves more than all others do, though each of them looks like noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
+from scara_ident.diagnosis.evidence import Evidence
+from scara_ident.estimation import Estimate
+from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.noise_bias import noise_torque
+from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_variation import JointVariation
+
+# Of fewer runs one that carries something looks as runs that differ do.
+LEAST_ALIKE = 5
+
+
+def even_evidence(
+    shown: Sequence[Evidence], after: Estimate, training: Observations, criteria: SelectionCriteria = CRITERIA
+) -> tuple[Evidence, ...]:
+    """Take back that a residual is noise where one recording leaves much more of it than all others do.
+
+    What acts in one recording, such as a load, may be as white as noise, and no repetition shows it. Nothing is taken back
+    where without what runs were found to differ by no recording stands out, nor one in what it differs by.
+
+    Parameters
+    ----------
+    shown : sequence of Evidence
+    after : Estimate
+    training : Observations
+        Of the same model.
+    criteria : SelectionCriteria, optional
+    """
+    if len(training.each) < 2:
+        return tuple(shown)
+    rows = np.array([[item.rows for item in own.by_joint] for own in training.each])
+    squares = np.array(
+        [
+            [item.rms(after.value) ** 2 * item.rows if item.rows else 0.0 for item in own.by_joint]
+            for own in training.each
+        ]
+    )
+    made = np.array([noise_torque(own, after.value) for own in training.each])
+    found = []
+    for j, item in enumerate(shown):
+        loud = _loudest(squares[:, j], rows[:, j], made[:, j], criteria)
+        if item.shown and loud is not None:
+            place, ratio = loud
+            own = after.variation.joints[j] if after.variation is not None else None
+            differing = own is not None and _as_runs_differ(
+                own, training.joints[j], after.value, squares[:, j], rows[:, j], made[:, j], criteria
+            )
+            if not differing:
+                why = f"{training.each[place].name} leaves {ratio:.2g} times the error of all others"
+                item = replace(item, shown=False, by="", why=why)
+        found.append(item)
+    return tuple(found)
+
+
+def _loudest(squares: Array, rows: Array, made: Array, criteria: SelectionCriteria) -> tuple[int, float] | None:
+    """Return the recording that leaves most beside all others, and how many times their rms, where that is much more.
+
+    Parameters
+    ----------
+    squares, rows : ndarray, shape (recordings,)
+        Sum of squares that each leaves, of so many rows.
+    made : ndarray, shape (recordings,)
+        Rms that the noise of the positions makes in each.
+    """
+    from scipy.special import fdtrc
+
+    others = np.sum(rows) - rows
+    known = (rows > 0) & (others > 0)
+    level = np.where(known, np.sum(squares) - squares, 1.0) / np.maximum(others, 1)
+    ratio = np.divide(squares, rows * level, out=np.zeros(len(rows)), where=known & (level > 0.0))
+    place = int(np.argmax(ratio))
+    if ratio[place] <= criteria.worse_held_out**2:
+        return None
+    if len(rows) * float(fdtrc(rows[place], others[place], ratio[place])) >= criteria.significant:
+        return None
+    if squares[place] / rows[place] <= criteria.worse_held_out**2 * level[place] + made[place] ** 2:
+        return None
+    return place, float(np.sqrt(ratio[place]))
+
+
+def _as_runs_differ(
+    item: JointVariation,
+    joint: JointRows,
+    value: Array,
+    squares: Array,
+    rows: Array,
+    made: Array,
+    criteria: SelectionCriteria,
+) -> bool:
+    """Whether no run stands out by what is left without what runs differ by, nor by how far it lies off the others."""
+    from scipy.special import fdtrc
+
+    runs = len(item.of_run)
+    if runs < LEAST_ALIKE or item.directions.shape[1] != joint.table.shape[1]:
+        return False
+    left = joint.table[-1] - value[joint.columns] @ joint.table[:-1]
+    rest = left - np.sum(np.repeat(item.of_run, np.diff(item.bounds), axis=0).T * item.directions, axis=0)
+    of_run = list(zip(item.bounds[:-1], item.bounds[1:], strict=True))
+    before, after = (np.array([np.sum(each[start:stop] ** 2) for start, stop in of_run]) for each in (left, rest))
+    share = np.divide(after, before, out=np.ones(runs), where=before > 0.0)
+    if _loudest(share * squares, rows, made, criteria) is not None:
+        return False
+    # A run of the same arm lies no further off the others' mean than they do: Student's t of one beside all others.
+    off, unsure = item.of_run[:, item.std > 0.0], item.unsure[:, item.std > 0.0]
+    count = runs - 1.0
+    mean = (np.sum(off, axis=0) - off) / count
+    spread = (np.sum(off**2, axis=0) - off**2 - count * mean**2) / (count - 1.0) + np.mean(unsure, axis=0)
+    ratio = np.divide((off - mean) ** 2, spread * (1.0 + 1.0 / count), out=np.zeros_like(off), where=spread > 0.0)
+    return off.size * float(fdtrc(1.0, count - 1.0, float(np.max(ratio, initial=0.0)))) >= criteria.significant
