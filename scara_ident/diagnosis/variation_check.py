@@ -12,16 +12,14 @@ from scara_ident.diagnosis.candidate_tests import examine, gains
 from scara_ident.diagnosis.candidates import with_columns
 from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.estimation.run_variation import (
+from scara_ident.estimation.assumed_variation import (
     ASSUMED_DELAY,
     ASSUMED_FRICTION,
     ASSUMED_OFFSET,
     ASSUMED_SCALE,
-    LEAST_RUNS,
-    RunVariation,
     assumed_variation,
-    run_variation,
 )
+from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation, run_variation
 
 
 def variation_objection(step: SelectionStep, decision: Decision, least_gain: float = 0.0) -> str | None:
@@ -40,7 +38,9 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     decision : Decision
         That lets it in.
     least_gain : float, optional
-        What it must remove there. While others are missing runs seem to differ more, and nothing is asked.
+        What it must remove there, unless that is far more than runs differ by: what all runs have alike, such as the delay of
+        a joint, removes little of what is left beside differences of the same kind. While others are missing runs seem to
+        differ more, and nothing is asked.
     """
     if decision.candidate.corrects_data:
         return None
@@ -61,9 +61,21 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
         why = f"{each}{ASSUMED_DELAY * 1e3:g} ms: runs that differ so may do as much: with that counted as noise"
     if again.p_value * step.tried > step.criteria.family_error:
         return f"{why} p = {again.p_value:.1e}"
-    if gain < least_gain:
+    if gain < least_gain and not _dwarfs(step, decision, variation):
         return f"{why} it removes {max(gain, 0.0):.1%} of the squared residual, {least_gain:.0%} is asked"
     return None
+
+
+def _dwarfs(step: SelectionStep, decision: Decision, variation: RunVariation) -> bool:
+    """Whether an effect removes far more of its joint's residual than what runs differ by with it in the model."""
+    joint = decision.candidate.member.joint
+    if joint is None or decision.candidate.effect.by_recording:
+        return False
+    joints = with_columns(step.observations, step.columns.rows(step.scene, step.chosen))
+    rows, value = joints[joint], step.model.root @ step.model.projected
+    left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
+    removed = decision.gain * float(left @ left) / rows.samples
+    return removed >= step.criteria.alike**2 * float(variation.mean_squares(joints)[joint])
 
 
 def best_first(pairs: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:

@@ -30,14 +30,10 @@ OFFSET = KINDS.index("offset")
 
 # With fewer recordings than this none can be told from the parameters.
 LEAST_RUNS = 3
-# Of fewer each is taken to have friction, an offset and a delay of its own with these standard deviations, shares of the
-# friction and of the joint's rms torque, and s: what a gear does as it warms, a sensor between days, and few samples of a
-# slow recorder. A torque scale of its own would hide one that differs between joints.
-ASSUMED_FRICTION, ASSUMED_OFFSET, ASSUMED_DELAY = 0.05, 0.02, 0.003
-# Share of all torque, asked of what acts in some recordings only: days differ by it, and of it a load is made.
-ASSUMED_SCALE = 0.02
 # Of differences below this share of the torque nothing is said in words.
 SPOKEN_OF = 0.01
+# Delays of runs whose mean is so many of their standard deviations are one delay: no parameter takes up their mean.
+ALIKE = 2.0
 # Directions of a run below this share of the largest are not told apart.
 _RANK = 1e-9
 
@@ -124,11 +120,16 @@ class RunVariation:
             if item is None:
                 continue
             rms = np.sqrt(np.mean(item.directions**2, axis=1))
+            late = _late_alike(item)
+            if late:
+                found.append(
+                    f"{joint} {'lags' if late > 0.0 else 'leads'} by {1e3 * abs(late):.2g} ms in all runs alike"
+                )
             units = ("{:.2g} %", "{:.2g} %", "{:.2g} " + robot.torque_unit(j), "{:.2g} ms")
             shown = [
                 f"its {kind} by {unit.format(std * scale)}"
                 for kind, std, size, unit, scale in zip(KINDS, item.std, rms, units, (100, 100, 1, 1000), strict=True)
-                if std * size > SPOKEN_OF * rms[KINDS.index("torque scale")]
+                if std * size > SPOKEN_OF * rms[KINDS.index("torque scale")] and not (late and kind == "delay")
             ]
             if shown:
                 said = f"{joint} differs from run to run (standard deviation): {', '.join(shown)}"
@@ -215,6 +216,13 @@ class RunVariation:
         return same_day(offsets, unsure, np.array([item.std[OFFSET] for item in told]))
 
 
+def _late_alike(item: JointVariation) -> float:
+    """Return by how much every run is late, s, where they differ little in it; 0 where they do not."""
+    late = item.of_run[:, KINDS.index("delay")]
+    mean, apart = float(np.mean(late)), float(np.std(late, ddof=1))
+    return mean if abs(mean) >= ALIKE * apart else 0.0
+
+
 def unit_of_kind(robot: Robot, joint: str, kind: str) -> str:
     """Return the unit in which runs differ by a kind on a joint; 1 for a share of what the model predicts."""
     units = ("1", "1", robot.torque_unit(robot.joints.index(joint)), "s")
@@ -255,37 +263,6 @@ def run_variation(
     told = [item for item in sums if item is not None]
     estimated = iter(_estimated(told) if told else ())
     return RunVariation(tuple(None if item is None else next(estimated) for item in sums))
-
-
-def assumed_variation(
-    observations: Observations, joints: Sequence[JointRows], value: Array, scale: float = 0.0
-) -> RunVariation:
-    """Return how runs would differ had each friction, an offset and a delay of its own, where they are too few to say so.
-
-    Parameters
-    ----------
-    observations, joints, value
-        See `run_variation`.
-    scale : float, optional
-        Share of all torque by which they would differ too.
-    """
-    runs = len(observations.data.recordings)
-    firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
-    found: list[JointVariation | None] = []
-    for joint, rows in enumerate(joints):
-        if rows.table.shape[1] == 0:
-            # At rest throughout.
-            found.append(None)
-            continue
-        noise = float(np.sqrt(np.mean((rows.table[-1] - value[rows.columns] @ rows.table[:-1]) ** 2)))
-        directions = directions_of(observations, joint, rows, value)
-        offset = ASSUMED_OFFSET * float(np.sqrt(np.mean(directions[KINDS.index("torque scale")] ** 2)))
-        std = np.array([ASSUMED_FRICTION, scale, offset, ASSUMED_DELAY])
-        told = noise > 0.0 and bool(np.any(directions[std > 0.0]))
-        nothing = np.zeros((runs, len(KINDS)))
-        item = JointVariation(directions, std, nothing, noise, rows.starts[firsts], nothing)
-        found.append(item if told else None)
-    return RunVariation(tuple(found))
 
 
 def directions_of(observations: Observations, joint: int, rows: JointRows, value: Array) -> Array:
