@@ -147,6 +147,12 @@ class SelectionCriteria:
     remainder_to_noise: float = _criterion(
         1.0, "of the noise", "a repeatable remainder larger than the noise is one whatever it depends on"
     )
+    far_above_noise: float = _criterion(
+        3.0,
+        "of the noise, and of what that of positions makes",
+        "what repeats so much more is a remainder whatever its colour: a ripple at many speeds is as even as noise",
+        "docs/diagnosis.md",
+    )
     colour_of_remainder: float = _criterion(
         0.5,
         "share of the residual's power",

@@ -256,8 +256,13 @@ def diagnose(
     notes += [f"{item.label} is not counted: {item.why}" for item in refused]
     drift = clock_drift(after.value, outcome.training)
     notes += [] if drift is None else [drift]
+    left = outcome.unexplained
+    if left is not None and robot.reduction[robot.joints.index(left.joint)] == 1.0:
+        notes.append(
+            f"{left.joint}: no reduction is stated, and of a motor behind a gear or a screw no ripple is looked for; "
+            "state it in robot.yaml"
+        )
     if after.variation is not None:
-        left = outcome.unexplained
         notes += after.variation.sentences(robot, None if left is None else left.joint)
     uncounted = uncounted_correction(found, parameters)
     if uncounted is not None:

@@ -227,18 +227,26 @@ def _outcome(task: SearchTask, found: Search) -> Outcome:
     # controller makes of them.
     coloured = dict(zip(joints, coloured_shares(left).tolist(), strict=True))
     above = [fit for fit in fit_after if _above_noise(fit, criteria)]
-    standing_out = [fit for fit in above if coloured[fit.joint] > criteria.colour_of_remainder]
-    repeating = [fit for fit in standing_out if fit.p_value < criteria.significant]
+    repeating = [fit for fit in above if fit.p_value < criteria.significant]
     depending = [
         item for item in dependences if item.p_value < criteria.significant and item.explained > least[item.joint]
     ]
-    small = np.zeros(len(joints))
+    made, small = np.zeros(len(joints)), np.zeros(len(joints))
     if depending or any(fit.p_value < criteria.significant for fit in fit_after):
         # What the positions' noise does to the columns may repeat too; and what is small beside the torque is not called one.
         torque = [item.torque_rms if item.rows else 0.0 for item in training.by_joint]
-        small = np.maximum(noise_torque(training, after.value), np.array(list(least_share.values())) * torque)
-    least_rms = dict(zip(joints, small.tolist(), strict=True))
-    repeating = [fit for fit in repeating if fit.missing > least_rms[fit.joint]]
+        made = noise_torque(training, after.value)
+        small = np.maximum(made, np.array(list(least_share.values())) * torque)
+    least_rms, of_positions = (dict(zip(joints, each.tolist(), strict=True)) for each in (small, made))
+    repeating = [
+        fit
+        for fit in repeating
+        if fit.missing > least_rms[fit.joint]
+        and (
+            coloured[fit.joint] > criteria.colour_of_remainder
+            or fit.missing > criteria.far_above_noise * max(fit.noise, of_positions[fit.joint])
+        )
+    ]
     depending = [item for item in depending if item.rms > least_rms[item.joint]]
     unexplained = _unexplained(repeating, depending, criteria)
     # An effect may stand for that all the same.

@@ -184,3 +184,16 @@ def test_no_share_of_the_work_is_smaller_than_one_before_where_a_search_is_repea
     assert shares == sorted(shares)
     assert shares[-1] <= 1.0
     assert sum(step.startswith("trying") for step, _ in told) > 1
+
+
+def test_without_a_reduction_ripple_of_the_motor_is_not_looked_for_and_that_is_said():
+    runs = []
+    for run in exact_runs(2, 3):
+        effort = run.effort.copy()
+        effort[0] += 0.1 * np.random.default_rng(ord(run.name[0])).standard_normal(effort.shape[1])
+        runs.append(replace(run, effort=effort))
+    for reduction, said in ((1.0, True), (100.0, False)):
+        robot = replace(load_robot(), reduction=np.full(2, reduction))
+        found = diagnose(robot, runs, bands=BANDS, catalogue=(Spring(),))
+        assert found.unexplained is not None and found.unexplained.joint == "joint1"
+        assert any(note.startswith("joint1: no reduction is stated") for note in found.notes) is said
