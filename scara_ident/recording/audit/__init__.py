@@ -31,6 +31,7 @@ CHECKS = (
     effort.dead_effort,
     effort.copies,
     effort.saturation,
+    effort.coarse_effort,
     position.limits,
     clock.enough,
 )

@@ -27,6 +27,8 @@ PILE_SHARE = 1e-3
 # ... and this many times more often than it takes the values next to it: a quantised sine reaches 3.
 PILE_UP = 5.0
 NEXT_VALUES = 3
+# Of so few values one is more than a twentieth of all that a joint's effort does.
+FEW_VALUES = 24
 
 
 def dead_effort(samples: Samples) -> Checked:
@@ -100,6 +102,25 @@ def saturation(samples: Samples) -> Checked:
                 "the amplifier saturates or the log is clipped; left out of the fit"
             )
             found.append(Finding("saturation", said, count, (joint, float(torque))))
+    return samples, found
+
+
+def coarse_effort(samples: Samples) -> Checked:
+    """Say where efforts of a moving joint take a few values only: how they are rounded repeats with the motion."""
+    if samples.effort is None:
+        return samples, []
+    found = []
+    for joint in np.flatnonzero(~samples.idle()).tolist():
+        values = np.unique(samples.effort[joint])
+        if not 1 < len(values) <= min(FEW_VALUES, samples.count // 10):
+            continue
+        torque = float(np.min(np.diff(values))) * abs(samples.robot.effort_gain[joint])
+        said = (
+            f"{samples.robot.joints[joint]}.effort takes {len(values)} values only, {torque:.3g} "
+            f"{samples.robot.torque_unit(joint)} apart: what rounding leaves repeats with the motion and may look like an "
+            "effect; record it finer"
+        )
+        found.append(Finding("coarse_effort", said, samples.count))
     return samples, found
 
 

@@ -70,3 +70,18 @@ def test_the_crests_of_a_quantised_effort_are_not_called_saturation(read):
     assert "saturation" not in kinds(read(made))
     made["joint1.effort"] = 0.01 * np.rint(columns()["joint1.effort"] / 0.01)
     assert "saturation" not in kinds(read(made))
+
+
+@pytest.mark.parametrize(("levels", "said"), [(9, True), (60, False)])
+def test_an_effort_of_few_values_is_said(read, levels: int, said: bool):
+    """What rounding of 7 values left was `unexplained`, and nothing was said of it."""
+    made = columns()
+    rng = np.random.default_rng(1)
+    step = 2.0 * np.max(np.abs(made["joint2.effort"])) / (levels - 1)
+    noisy = made["joint2.effort"] + 0.05 * step * rng.standard_normal(len(made["joint2.effort"]))
+    made["joint2.effort"][:] = step * np.round(noisy / step)
+    findings = [item for item in read(made).findings if item.kind == "coarse_effort"]
+    assert bool(findings) is said
+    if said:
+        assert "joint2.effort takes" in findings[0].message
+        assert f"values only, {step:.3g} N m apart" in findings[0].message
