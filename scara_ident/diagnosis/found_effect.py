@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -106,7 +106,7 @@ def found_effects(
     for item in found.steps:
         decision = item.decision
         candidate = decision.candidate
-        now = item.rms
+        now, otherwise = item.rms, ""
         if candidate.corrects_data and found.correction is not None:
             if uncounted_correction(found, parameters) is not None:
                 before = now
@@ -119,11 +119,15 @@ def found_effects(
             place = labels.index(decision.label)
             candidate = found.chosen[place]
             values, confounded = parameters.effects[place], groups[place]
+            # By the model that it is part of.
+            beside = replace(scene, value=decision.examination.model_value[: len(scene.value)])
+            coefficients = parameters.coefficients[place].value
+            otherwise = candidate.effect.or_else(beside, candidate.member, coefficients)
         results.append(
             FoundEffect(
                 candidate.effect.name,
                 candidate.joint(scene),
-                candidate.effect.description(scene, candidate.member),
+                candidate.effect.description(scene, candidate.member) + otherwise,
                 values,
                 confounded,
                 min(1.0, decision.examination.p_value * found.tried),

@@ -233,6 +233,13 @@ class Effect(ABC):
         """Say in a few words what the effect is, for a person."""
         return self.summary.format(**self.words(scene, member))
 
+    def or_else(self, scene: Scene, member: Member, value: Array) -> str:
+        """Say what else an effect of these coefficients may be, by the parameters of the model with it; "" for nothing.
+
+        It follows the description.
+        """
+        return ""
+
     def resolution(self, scene: Scene, member: Member) -> tuple[float, ...] | None:
         """Return, for every nonlinear parameter, how far apart two values must be to be told apart.
 

@@ -95,6 +95,20 @@ class Stribeck(Effect):
             return f"it would be more than {LARGEST_STRIBECK_SHARE:g} times the Coulomb friction"
         return None
 
+    def or_else(self, scene: Scene, member: Member, value: Array) -> str:
+        """Say so where friction as a whole never falls with speed, as Stribeck's does."""
+        own, velocity = friction_of(scene, member.place), member.nonlinear[0]
+        if not own:
+            return ""
+        ratio = np.linspace(0.05, 3.0, 60)
+        slope = -2.0 * value[0] / velocity * ratio * np.exp(-(ratio**2))
+        for power, each in own.items():
+            if power:
+                slope = slope + power * each * (ratio * velocity) ** (power - 1)
+        if np.min(slope) < 0.0:
+            return ""
+        return "; as a whole the friction never falls with speed: it may be one that grows ever less"
+
 
 class AsymmetricFriction(Effect):
     """Viscous friction that differs by direction of the drive: ``u = viscous_difference/2 |v|``.

@@ -18,6 +18,7 @@ from scara_ident.effects.friction import (
     friction_of,
 )
 from scara_ident.model.model import build_model
+from scara_ident.model.terms import Friction
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import effects as fx
 from scara_ident.simulation import simulate, virtual_arm
@@ -148,3 +149,17 @@ def test_parameters_are_recovered_from_noisy_closed_loop_recordings(switch, effe
         assert abs(found.value - true) < 4.0 * found.std + 0.01 * abs(true), name
         assert found.std < 0.2 * abs(true), name
     assert friction_of(scene, 0)[0] == pytest.approx(arm.friction[0, 0], rel=0.1)
+
+
+@pytest.mark.parametrize(("viscous", "falls"), [(0.3, False), (0.1, True)])
+def test_where_friction_as_a_whole_never_falls_that_is_said(viscous: float, falls: bool):
+    """Friction that grows as the root of speed was told as Stribeck's on three arms, and nothing else."""
+    scene = scene_of(load_robot())
+    (term,) = (term for term in scene.model.terms if isinstance(term, Friction))
+    value = np.zeros(len(scene.value))
+    value[scene.model.place(term).start + len(term.powers) + 1] = viscous
+    beside, member = replace(scene, value=value), Member(1, (0.2,))
+    assert friction_of(beside, 1)[1] == viscous
+    # It falls by at most 0.858 times its amplitude over its velocity: 0.215 N m s/rad.
+    assert ("never falls" in Stribeck().or_else(beside, member, np.array([0.05]))) is not falls
+    assert AsymmetricFriction().or_else(beside, Member(1), np.array([0.05])) == ""
