@@ -96,7 +96,12 @@ def one_diagnosis(job: tuple[Path, tuple[str, int], str, float]) -> Item:
     result = diagnose(load_robot(), recordings, validation=held_out, criteria=criteria)
     seconds = time.perf_counter() - began
     found = [
-        {"effect": e.effect, "joint": e.joint, "group": [other.effect for other in e.confounded_with]}
+        {
+            "effect": e.effect,
+            "joint": e.joint,
+            "group": [other.effect for other in e.confounded_with],
+            "parameters": {name: [each.value, each.std] for name, each in e.parameters.items()},
+        }
         for e in result.effects
     ]
     left = None if result.unexplained is None else result.unexplained.joint
@@ -105,8 +110,7 @@ def one_diagnosis(job: tuple[Path, tuple[str, int], str, float]) -> Item:
     if name != AS_IT_IS:
         return item
     was = json.loads((own / "truth.json").read_text(encoding="utf-8"))
-    true = [{"effect": each["effect"], "joint": each["joint"]} for each in was["effects"]]
-    return item | {"read": read, "kind": was["kind"], "true": true}
+    return item | {"read": read, "kind": was["kind"], "true": was["effects"], "conditions": was["conditions"]}
 
 
 def run(
@@ -150,7 +154,7 @@ def _key(name: str, factor: float) -> str:
 
 def judged(as_it_is: Item, item: Item) -> dict[str, bool]:
     """Judge a diagnosis; an effect named where none of the catalogue is there is a false find."""
-    whole = item | {"true": as_it_is["true"]}
+    whole = item | {name: as_it_is[name] for name in ("true", "conditions")}
     unlisted = as_it_is["kind"] == "unlisted"
     listed = bool(whole["true"]) and not unlisted
     left = item["verdict"] == "unexplained"
@@ -196,7 +200,8 @@ def table(results: Item, names: Sequence[str]) -> list[str]:
 
 
 def _finding(item: Item) -> Any:
-    return item["verdict"], item["found"], item["unexplained"]
+    named = [(each["effect"], each["joint"], each["group"]) for each in item["found"]]
+    return item["verdict"], named, item["unexplained"]
 
 
 def main() -> None:
