@@ -131,7 +131,7 @@ def run(
             job = missing[place]
             results.setdefault(_set(*job[:2]), {})[_key(*job[2:])] = item
             output.parent.mkdir(parents=True, exist_ok=True)
-            output.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+            output.write_text(json.dumps(results) + "\n", encoding="utf-8")
             print(_set(*job[:2]), _key(*job[2:]), item["verdict"], f"{item['seconds']:.1f} s", flush=True)
 
         work = [((folder, job[:2], *job[2:]),) for job in missing]
