@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 
@@ -45,15 +46,16 @@ def even_evidence(
             for own in training.each
         ]
     )
-    made = np.array([noise_torque(own, after.value) for own in training.each])
+    # Made where it matters only: it takes recordings that are noisier.
+    made = cache(lambda place: noise_torque(training.each[place], after.value))
     found = []
     for j, item in enumerate(shown):
-        loud = _loudest(squares[:, j], rows[:, j], made[:, j], criteria)
+        loud = _loudest(squares[:, j], rows[:, j], partial(_of_joint, made, j), criteria)
         if item.shown and loud is not None:
             place, ratio = loud
             own = after.variation.joints[j] if after.variation is not None else None
             differing = own is not None and _as_runs_differ(
-                own, training.joints[j], after.value, squares[:, j], rows[:, j], made[:, j], criteria
+                own, training.joints[j], after.value, squares[:, j], rows[:, j], partial(_of_joint, made, j), criteria
             )
             if not differing:
                 why = f"{training.each[place].name} leaves {ratio:.2g} times the error of all others"
@@ -62,15 +64,21 @@ def even_evidence(
     return tuple(found)
 
 
-def _loudest(squares: Array, rows: Array, made: Array, criteria: SelectionCriteria) -> tuple[int, float] | None:
+def _of_joint(made: Callable[[int], Array], joint: int, place: int) -> float:
+    return float(made(place)[joint])
+
+
+def _loudest(
+    squares: Array, rows: Array, made: Callable[[int], float], criteria: SelectionCriteria
+) -> tuple[int, float] | None:
     """Return the recording that leaves most beside all others, and how many times their rms, where that is much more.
 
     Parameters
     ----------
     squares, rows : ndarray, shape (recordings,)
         Sum of squares that each leaves, of so many rows.
-    made : ndarray, shape (recordings,)
-        Rms that the noise of the positions makes in each.
+    made : callable
+        Returns the rms that the noise of the positions makes in one of them.
     """
     from scipy.special import fdtrc
 
@@ -83,7 +91,7 @@ def _loudest(squares: Array, rows: Array, made: Array, criteria: SelectionCriter
         return None
     if len(rows) * float(fdtrc(rows[place], others[place], ratio[place])) >= criteria.significant:
         return None
-    if squares[place] / rows[place] <= criteria.worse_held_out**2 * level[place] + made[place] ** 2:
+    if squares[place] / rows[place] <= criteria.worse_held_out**2 * level[place] + made(place) ** 2:
         return None
     return place, float(np.sqrt(ratio[place]))
 
@@ -94,7 +102,7 @@ def _as_runs_differ(
     value: Array,
     squares: Array,
     rows: Array,
-    made: Array,
+    made: Callable[[int], float],
     criteria: SelectionCriteria,
 ) -> bool:
     """Whether no run stands out by what is left without what runs differ by, nor by how far it lies off the others."""
