@@ -120,8 +120,8 @@ class RunVariation:
             if item is None:
                 continue
             rms = np.sqrt(np.mean(item.directions**2, axis=1))
-            late = _late_alike(item)
-            if late:
+            late, least = _late_alike(item), SPOKEN_OF * rms[KINDS.index("torque scale")]
+            if abs(late) * rms[KINDS.index("delay")] > least:
                 found.append(
                     f"{joint} {'lags' if late > 0.0 else 'leads'} by {1e3 * abs(late):.2g} ms in all runs alike"
                 )
@@ -129,7 +129,7 @@ class RunVariation:
             shown = [
                 f"its {kind} by {unit.format(std * scale)}"
                 for kind, std, size, unit, scale in zip(KINDS, item.std, rms, units, (100, 100, 1, 1000), strict=True)
-                if std * size > SPOKEN_OF * rms[KINDS.index("torque scale")] and not (late and kind == "delay")
+                if std * size > least and not (late and kind == "delay")
             ]
             if shown:
                 said = f"{joint} differs from run to run (standard deviation): {', '.join(shown)}"
