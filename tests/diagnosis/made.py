@@ -141,6 +141,17 @@ def with_torque(recordings: Sequence[Recording], joint: int, added) -> list[Reco
     return made
 
 
+def runs_that_repeat(size: float, added=lambda run: 0.0) -> list[Recording]:
+    """Three runs each of two motions, whose first joint has further torque that is white, and the same in each repetition."""
+    made = []
+    for run in exact_runs(2, 3):
+        rng = np.random.default_rng([1, ord(run.name[0])])
+        effort = run.effort.copy()
+        effort[0] += size * rng.standard_normal(effort.shape[1]) + added(run)
+        made.append(replace(run, effort=effort))
+    return made
+
+
 def runs_with_a_spring() -> list[Recording]:
     """Runs of small and of large motion, with offsets of their own that a spring of another shape can stand for."""
     runs = [*exact_runs(size=0.6)[:2], *exact_runs(size=1.2)[2:]]

@@ -17,7 +17,16 @@ from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.position import Spring
 from scara_ident.errors import UsageError
 from scara_ident.robot.robot import load_robot
-from tests.diagnosis.made import BANDS, RATE, complete, exact_runs, held_out_run, virtual_runs, with_torque
+from tests.diagnosis.made import (
+    BANDS,
+    RATE,
+    complete,
+    exact_runs,
+    held_out_run,
+    runs_that_repeat,
+    virtual_runs,
+    with_torque,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -187,11 +196,7 @@ def test_no_share_of_the_work_is_smaller_than_one_before_where_a_search_is_repea
 
 
 def test_without_a_reduction_ripple_of_the_motor_is_not_looked_for_and_that_is_said():
-    runs = []
-    for run in exact_runs(2, 3):
-        effort = run.effort.copy()
-        effort[0] += 0.1 * np.random.default_rng(ord(run.name[0])).standard_normal(effort.shape[1])
-        runs.append(replace(run, effort=effort))
+    runs = runs_that_repeat(0.1)
     for reduction, said in ((1.0, True), (100.0, False)):
         robot = replace(load_robot(), reduction=np.full(2, reduction))
         found = diagnose(robot, runs, bands=BANDS, catalogue=(Spring(),))

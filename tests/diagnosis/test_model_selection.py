@@ -40,7 +40,7 @@ from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.observations import observe
 from scara_ident.estimation.run_variation import JointVariation, RunVariation
 from scara_ident.motion.prepared import prepare
-from tests.diagnosis.made import complete, exact_runs, searched, virtual_runs, with_torque
+from tests.diagnosis.made import complete, exact_runs, runs_that_repeat, searched, virtual_runs, with_torque
 
 MODEL = complete()
 
@@ -176,12 +176,7 @@ def test_nothing_is_demoted_where_the_rest_is_noise() -> None:
 
 def test_an_effect_may_stand_for_what_repeats_at_all_frequencies_alike() -> None:
     """Encoders of 12 bits left 0.058 N m in every repetition, beside 0.026 of noise; a ripple that removed 7 % was believed."""
-    runs = []
-    for run in exact_runs(2, 3):
-        rng = np.random.default_rng([1, ord(run.name[0])])
-        effort = run.effort.copy()
-        effort[0] += 0.1 * rng.standard_normal(effort.shape[1]) + 0.015 * (run.position[0] - 1.57)
-        runs.append(replace(run, effort=effort))
+    runs = runs_that_repeat(0.1, lambda run: 0.015 * (run.position[0] - 1.57))
     once = searched(runs, Spring(), bands=(11.0, 11.0))
     assert found(SimpleNamespace(search=once)) == {"spring of joint1"}
     outcome = selected(runs, Spring(), bands=(11.0, 11.0), free=False)
@@ -257,12 +252,7 @@ def test_the_rms_of_a_joint_is_that_of_its_rows() -> None:
 @pytest.mark.parametrize(("size", "standing_out"), [(0.017, False), (0.024, True)])
 def test_what_repeats_is_a_remainder_where_most_of_it_is_not_spread_evenly(size: float, standing_out: bool) -> None:
     """Two of four arms with nothing missing were `unexplained`: of what encoders of 13 and 14 bits left 36 % stood out."""
-    runs = []
-    for run in exact_runs(2, 3):
-        rng = np.random.default_rng([1, ord(run.name[0])])
-        effort = run.effort.copy()
-        effort[0] += 0.04 * rng.standard_normal(effort.shape[1]) + size * np.sin(2.6 * np.pi * run.time)
-        runs.append(replace(run, effort=effort))
+    runs = runs_that_repeat(0.04, lambda run: size * np.sin(2.6 * np.pi * run.time))
     outcome = selected(runs, Spring(), bands=(11.0, 11.0), free=False)
     share = coloured_shares(outcome.residuals)[0]
     assert share > CRITERIA.least_colour
@@ -273,12 +263,7 @@ def test_what_repeats_is_a_remainder_where_most_of_it_is_not_spread_evenly(size:
 @pytest.mark.parametrize(("size", "unexplained"), [(0.05, False), (0.1, True)])
 def test_what_repeats_far_above_noise_is_a_remainder_of_any_colour(size: float, unexplained: bool) -> None:
     """Cogging of 5 N beside 0.2 N of noise was `undecided`: over many speeds it is as even as white noise."""
-    runs = []
-    for run in exact_runs(2, 3):
-        rng = np.random.default_rng([1, ord(run.name[0])])
-        effort = run.effort.copy()
-        effort[0] += size * rng.standard_normal(effort.shape[1])
-        runs.append(replace(run, effort=effort))
+    runs = runs_that_repeat(size)
     outcome = selected(runs, Spring(), bands=(11.0, 11.0), free=False)
     assert coloured_shares(outcome.residuals)[0] < CRITERIA.least_colour
     (fit,) = [fit for fit in outcome.fit_after if fit.joint == "joint1"]
