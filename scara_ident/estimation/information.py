@@ -35,6 +35,9 @@ NEAR_SINGULAR = 1e-3
 # Directions whose singular value, with columns scaled to unit length, is below this share of the largest are
 # not determined: half the digits of a double.
 UNDETERMINED = 1e-10
+# Reciprocal condition, as LAPACK estimates it in the norm of sums, above which no direction is near that share: the singular
+# values, which take ten times as long as the solution, need not be asked.
+SURELY = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -154,16 +157,21 @@ class Information(Frozen):
         r = self.regressor_factor
         size = np.linalg.norm(r, axis=0)
         entering = size > 0.0
+        if np.all(entering):
+            known = _surely_determined(r / size, self.projected_torque)
+            if known is not None:
+                nothing = np.zeros(self.parameters, dtype=bool)
+                return Solution(known / size, nothing, np.zeros((self.parameters, 0)))
         value = np.zeros(self.parameters)
         undetermined = ~entering
         null = np.eye(self.parameters)[:, ~entering]
         if np.any(entering):
             scaled = r[:, entering] / size[entering]
             left, singular, right = np.linalg.svd(scaled)
-            known = int(np.count_nonzero(singular > UNDETERMINED * singular[0]))
-            seen = right[:known].T / singular[:known] @ (left[:, :known].T @ self.projected_torque)
+            rank = int(np.count_nonzero(singular > UNDETERMINED * singular[0]))
+            seen = right[:rank].T / singular[:rank] @ (left[:, :rank].T @ self.projected_torque)
             value[entering] = seen / size[entering]
-            blind = right[known:].T
+            blind = right[rank:].T
             undetermined[entering] = np.linalg.norm(blind, axis=1) > np.sqrt(UNDETERMINED)
             spread = np.zeros((self.parameters, blind.shape[1]))
             spread[entering] = blind / size[entering][:, None]
@@ -297,6 +305,16 @@ def residual_noise(joints: Sequence[Information], value: Array) -> Array:
     return np.array([part.noise(value) for part in joints])
 
 
+def _surely_determined(factor: Array, right: Array) -> Array | None:
+    """Solve a system whose columns have unit length; None where it is not triangular or might leave a direction open."""
+    from scipy.linalg.lapack import dtrcon, dtrtrs
+
+    size = factor.shape[1]
+    if not 0 < size <= len(factor) or np.any(factor[~_above(*factor.shape)]) or not dtrcon(factor[:size])[0] > SURELY:
+        return None
+    return np.asarray(dtrtrs(factor[:size], right)[0])
+
+
 def orthonormal(factor: Array) -> Array:
     """Return the sums of columns, shape (p, r), that are orthonormal on the rows of a triangular factor, shape (k, p).
 
@@ -306,6 +324,10 @@ def orthonormal(factor: Array) -> Array:
     entering = size > 0.0
     if not np.any(entering):
         return np.zeros((factor.shape[1], 0))
+    if np.all(entering):
+        inverse = _surely_determined(factor / size, np.eye(len(size)))
+        if inverse is not None:
+            return np.asarray(inverse / size[:, None])
     _, singular, right = np.linalg.svd(factor[:, entering] / size[entering], full_matrices=False)
     known = singular > UNDETERMINED * singular[0]
     result = np.zeros((factor.shape[1], int(np.count_nonzero(known))))

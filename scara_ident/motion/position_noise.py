@@ -17,6 +17,7 @@ from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import Stretch
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
 from scara_ident.motion.rest import REST_NOISE, WIDE, position_cuts, velocity_noise
+from scara_ident.threads import side_by_side
 
 # Positions have steps where their changes are whole multiples of the least one, but for this much of it in the mean:
 # numbers of random size leave a quarter.
@@ -193,7 +194,7 @@ def noise_sizes(data: PreparedData) -> tuple[tuple[NoiseSizes, ...], ...]:
                 for part in item.stretches
             )
 
-        _SIZES[data] = tuple(map(of_recording, data.recordings))
+        _SIZES[data] = tuple(side_by_side(of_recording, data.recordings))
     return _SIZES[data]
 
 

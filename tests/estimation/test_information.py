@@ -220,6 +220,33 @@ def test_nothing_is_known_of_an_empty_factor():
     assert_same(empty.absorb(np.zeros((0, 3)), np.zeros(0)), empty)
 
 
+@settings(max_examples=40)
+@given(st.integers(0, 10_000), st.integers(1, 7), st.floats(-9, 0))
+def test_singular_values_are_asked_only_where_that_changes_nothing(seed: int, p: int, decades: float):
+    """Far from singular the triangular system is solved as it stands; nearer, and where it is none, by its singular values."""
+    w, u = rows(seed, 40, p)
+    w[:, -1] = w[:, 0] + 10.0**decades * w[:, -1] * np.linalg.norm(w[:, 0]) / np.linalg.norm(w[:, -1])
+    known = batch(w, u)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(information, "SURELY", 2.0)
+        asked, span = known.solve(), information.orthonormal(known.regressor_factor)
+    found, basis = known.solve(), information.orthonormal(known.regressor_factor)
+    condition = np.linalg.cond(w / np.linalg.norm(w, axis=0))
+    size = np.linalg.norm(w, axis=0)
+    assert_allclose(size * found.value, size * asked.value, atol=1e-14 * condition**2 * np.linalg.norm(u))
+    assert found.undetermined.tolist() == asked.undetermined.tolist()
+    assert found.null.shape == asked.null.shape == (p, 0)
+    # Each is orthonormal on the rows, and both span the same.
+    between = (w @ span).T @ (w @ basis)
+    assert_allclose(between @ between.T, np.eye(p), atol=1e-13 * condition)
+    turned = known.regressor_factor[::-1]
+    assert_allclose(
+        (turned @ information.orthonormal(turned)).T @ (turned @ information.orthonormal(turned)),
+        np.eye(p),
+        atol=1e-13 * condition,
+    )
+
+
 def test_a_zero_column_is_undetermined_and_changes_nothing_else():
     w, u = rows(13, 50, 3)
     wide = np.insert(w, 1, 0.0, axis=1)
