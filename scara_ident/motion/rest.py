@@ -23,6 +23,9 @@ REST_WIDEN = 0.5
 # A turn is sharp where the acceleration about it has a range of more than this share of itself beyond the band, where smooth motion
 # has none: there friction makes it jump, and the filter moves the turn by a thousandth of the band's period and more.
 SHARP = 0.2
+# Nor is it known which share of a sample's torque is from before a turn and which from after it. Friction of the wrong sign in one
+# sample leaves four times the band over the rate of it: a fifth and more where a period of the band has fewer samples than these.
+FEW_SAMPLES = 20.0
 # Both sides of the equation fade out towards rest over this many periods of the position's low-pass.
 FADE_PERIODS = 1.0
 # The noise of an unfiltered joint is what a filter at this share of the rate takes out.
@@ -42,16 +45,17 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
     """Return where each joint stands still, shape (n, N), widened by the memory of the position's filter.
 
     So is where it turns sharply, however fast: friction jumps there and the acceleration with it, and the filter, which
-    rounds that off, moves the time of the turn.
+    rounds that off, moves the time of the turn. Where samples are few, so is every turn.
     """
     found = slower(motion.v, rest_speeds(stretch, motion, bands), stretch.rate, bands)
     for own, v, a, cut, band in zip(found, motion.v, motion.a, position_cuts(stretch.rate, bands), bands, strict=True):
         turns = np.flatnonzero(np.diff(np.signbit(v)) & ~own[:-1]) + 1
-        if cut is None or not len(turns):
+        if cut is None or band is None or not len(turns):
             continue
-        widen, fast = _widening(REST_WIDEN, stretch.rate, band), a - low_pass(a, stretch.rate, band)
+        few = stretch.rate < FEW_SAMPLES * band
+        widen, fast = _widening(REST_WIDEN, stretch.rate, band), a if few else a - low_pass(a, stretch.rate, band)
         for around in (slice(max(0, turn - widen), turn + widen + 1) for turn in turns):
-            if np.ptp(fast[around]) > SHARP * np.max(np.abs(a[around])):
+            if few or np.ptp(fast[around]) > SHARP * np.max(np.abs(a[around])):
                 own[around] = True
     return found
 

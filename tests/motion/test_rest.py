@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.prepared import PreparedStretch, prepare
-from scara_ident.motion.rest import fading, position_cuts, rest_speeds, slower
+from scara_ident.motion.rest import FEW_SAMPLES, fading, position_cuts, rest_speeds, slower
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from tests.arms import PLANAR_2R, swing, write_urdf
@@ -40,21 +40,39 @@ def test_a_joint_that_stops_is_left_out_there_and_no_more(run: Recording):
     assert not part.used[1, 2100:2900].any()
 
 
+def turning(
+    run: Recording, position: np.ndarray, bands: tuple[float | None, ...] = BANDS
+) -> tuple[PreparedStretch, list[np.ndarray]]:
+    """Return a recording of other positions, and each joint's turns at which no two samples in a row are slow."""
+    time = np.arange(position.shape[1]) / RATE
+    part = only(replace(run, time=time, position=position, effort=np.zeros(position.shape), velocity=None), bands)
+    turns = [np.flatnonzero(np.diff(np.signbit(v))) + 1 for v in part.motion.v]
+    slow = slower(part.motion.v, rest_speeds(part.stretch, part.motion, bands), RATE, bands)
+    return part, [own[~rest[own]] for own, rest in zip(turns, slow, strict=True)]
+
+
 def test_a_sharp_turn_is_left_out_however_fast_it_is_and_a_smooth_one_is_not(run: Recording):
     """A few turns that no sample showed to be slow left most of a wrist's residual, and were a delay and a spring to it."""
     time = np.arange(4000) / RATE
-    smooth = 0.3 * np.sin(2.0 * np.pi * 0.7 * time + 0.3)
+    # Turns between two samples, and no nearer to one.
+    smooth = 0.3 * np.sin(2.0 * np.pi * (np.arange(4000) - 250.5) / 1000.0)
     # The acceleration is five times as large on one side of a turn as on the other.
     side = np.where(np.sin(2.0 * np.pi * 2.0 * time + 0.2) > 0.0, 5.0, 1.0)
     sharp = np.cumsum(side * np.sin(2.0 * np.pi * 2.0 * time + 0.2)) / RATE
-    position = np.array([smooth, sharp])
-    joints = replace(run, time=time, position=position, effort=np.zeros((2, 4000)), velocity=None)
-    part = only(joints)
-    turns = [np.flatnonzero(np.diff(np.signbit(v))) + 1 for v in part.motion.v]
-    slow = slower(part.motion.v, rest_speeds(part.stretch, part.motion, BANDS), RATE, BANDS)
-    fast = [own[~rest[own]] for own, rest in zip(turns, slow, strict=True)]
+    part, fast = turning(run, np.array([smooth, sharp]))
     assert len(fast[0]) > 5 and not part.rest[0, fast[0]].any()
     assert len(fast[1]) > 3 and part.rest[1, fast[1]].all()
+
+
+def test_where_samples_are_few_every_turn_is_left_out(run: Recording):
+    """One sample of the wrong sign left a UR5's joint fifty times its noise, where a period of the band had ten samples."""
+    position = 0.3 * np.sin(2.0 * np.pi * (np.arange(4000) - np.array([[250.3], [250.5]])) / 1000.0)
+    for band, left_out in ((4.0, False), (0.99 * RATE / FEW_SAMPLES, False), (1.01 * RATE / FEW_SAMPLES, True)):
+        part, fast = turning(run, position, (band, band))
+        for joint in range(2):
+            assert len(fast[joint]) > 3
+            assert np.all(part.rest[joint, fast[joint]] == left_out)
+        assert part.rest.mean() < 0.1
 
 
 def test_the_weight_is_zero_at_rest_one_away_from_it_and_has_no_step():
