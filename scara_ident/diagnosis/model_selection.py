@@ -331,6 +331,9 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
     variation = found.after.variation
     varied = np.zeros(len(joints)) if variation is None else variation.mean_squares(found.training.joints)
     own = dict(zip(joints, varied.tolist(), strict=True))
+    # What the noise of the positions makes does, and where that is all that does it is no effect's to remove.
+    made = dict(zip(joints, noise_torque(found.training, found.after.value).tolist(), strict=True))
+    of_positions = {fit.joint: made[fit.joint] for fit in found.fit_after if 0.0 < fit.missing <= made[fit.joint]}
     proxies = []
     before, whole = rms_of(search.start.value, search.uncorrected), rms_of(found.after.value, found.training)
     labels = [item.label(search.scene) for item in search.chosen]
@@ -345,17 +348,22 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
             fitted = observed(replace(search.step, columns=search.step.columns.beside(search.uncorrected)))
             old_rms, new_rms = rms_of(value_and_weights(fitted)[0], fitted), whole
         owner = decision.candidate.joint(search.scene)
-        repeats = removed = 0.0
+        repeats = beyond = removed = 0.0
         for joint, old, new in zip(joints, old_rms, new_rms, strict=True):
             if joint in noise and owner in (joint, None) and old is not None and new is not None:
-                repeats += max(0.0, (old**2 - own[joint]) / noise[joint] ** 2 - 1.0)
+                most = (old**2 - own[joint]) / noise[joint] ** 2 - 1.0
+                repeats += max(0.0, most)
+                beyond += max(0.0, most - (of_positions.get(joint, 0.0) / noise[joint]) ** 2)
                 removed += (old**2 - new**2) / noise[joint] ** 2
         before = after
-        if (owner is None or owner in left) and removed < criteria.least_of_repeatable * repeats:
+        short = removed < criteria.least_of_repeatable * repeats
+        excused = short and owner in of_positions and removed >= criteria.least_of_repeatable * beyond
+        if (owner is None or owner in left) and short and not (excused and decision.label in labels):
             share = max(0.0, removed / repeats)
             why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"
             proxies.append(decision.refused(why))
-        elif decision.label in labels and found.unexplained and owner in (None, found.unexplained.joint):
+        elif decision.label in labels and (excused or (found.unexplained and owner in (None, found.unexplained.joint))):
+            # Its repetitions are no more than one.
             place = labels.index(decision.label)
             p_value = examine_moments(search.step.without(place), search.chosen[place]).p_value
             if p_value * search.tried > criteria.family_error:
