@@ -53,7 +53,11 @@ def run(
     folder.mkdir(parents=True, exist_ok=True)
     left = [(kind, seed) for kind, seed in wanted if not _place(folder, kind, seed).exists()]
 
-    def write(place: int, item: Item) -> None:
+    def write(place: int, item: Item | str) -> None:
+        if isinstance(item, str):
+            kind, seed = left[place]
+            print(f"set {seed} ({kind}) was not simulated: {item}", file=sys.stderr, flush=True)
+            return
         path = _place(folder, *left[place])
         part = path.with_suffix(".part")
         part.write_text(json.dumps(item) + "\n", encoding="utf-8")

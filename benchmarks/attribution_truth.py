@@ -52,8 +52,14 @@ class OutOfTimeError(Exception):
     """A diagnosis took longer than it may."""
 
 
-def set_alone(kind: str, seed: int, robot: str, asked: Asked, limit: int) -> Item:
-    """Work on a set in a process that is used once: it can be stopped, and tells its peak memory."""
+def set_alone(kind: str, seed: int, robot: str, asked: Asked, limit: int) -> Item | str:
+    """Work on a set in a process that is used once: it can be stopped, and tells its peak memory.
+
+    Returns
+    -------
+    Item, or str
+        Why the set could not be simulated, as where a controller shakes the arm.
+    """
     # The server that it is forked from has imported all once.
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["attribution_truth"])
@@ -61,8 +67,8 @@ def set_alone(kind: str, seed: int, robot: str, asked: Asked, limit: int) -> Ite
         return pool.submit(one_set, kind, seed, robot, asked, limit).result()
 
 
-def one_set(kind: str, seed: int, robot: str, asked: Asked, limit: int) -> Item:
-    """Simulate a set, diagnose it, and compare with what the arm was.
+def one_set(kind: str, seed: int, robot: str, asked: Asked, limit: int) -> Item | str:
+    """Simulate a set, diagnose it, and compare with what the arm was; return why where it could not be simulated.
 
     Parameters
     ----------
@@ -73,7 +79,10 @@ def one_set(kind: str, seed: int, robot: str, asked: Asked, limit: int) -> Item:
     """
     with tempfile.TemporaryDirectory() as place:
         began = time.perf_counter()
-        made = simulate_set(kind, seed, robot, Path(place) / "set", asked)
+        try:
+            made = simulate_set(kind, seed, robot, Path(place) / "set", asked)
+        except ScaraIdentError as error:
+            return str(error)
         was = made.truth()
         item: Item = {
             "robot": robot,
