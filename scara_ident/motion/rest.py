@@ -50,9 +50,9 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
     found = slower(motion.v, rest_speeds(stretch, motion, bands), stretch.rate, bands)
     for own, v, a, cut, band in zip(found, motion.v, motion.a, position_cuts(stretch.rate, bands), bands, strict=True):
         turns = np.flatnonzero(np.diff(np.signbit(v)) & ~own[:-1]) + 1
-        if cut is None or band is None or not len(turns):
+        few = band is not None and stretch.rate < FEW_SAMPLES * band
+        if not len(turns) or (cut is None and not few):
             continue
-        few = stretch.rate < FEW_SAMPLES * band
         widen, fast = _widening(REST_WIDEN, stretch.rate, band), a if few else a - low_pass(a, stretch.rate, band)
         for around in (slice(max(0, turn - widen), turn + widen + 1) for turn in turns):
             if few or np.ptp(fast[around]) > SHARP * np.max(np.abs(a[around])):

@@ -67,7 +67,9 @@ def test_a_sharp_turn_is_left_out_however_fast_it_is_and_a_smooth_one_is_not(run
 def test_where_samples_are_few_every_turn_is_left_out(run: Recording):
     """One sample of the wrong sign left a UR5's joint fifty times its noise, where a period of the band had ten samples."""
     position = 0.3 * np.sin(2.0 * np.pi * (np.arange(4000) - np.array([[250.3], [250.5]])) / 1000.0)
-    for band, left_out in ((4.0, False), (0.99 * RATE / FEW_SAMPLES, False), (1.01 * RATE / FEW_SAMPLES, True)):
+    few = RATE / FEW_SAMPLES
+    # The widest is of positions that are not filtered.
+    for band, left_out in ((4.0, False), (0.99 * few, False), (1.01 * few, True), (0.2 * RATE, True)):
         part, fast = turning(run, position, (band, band))
         for joint in range(2):
             assert len(fast[joint]) > 3
