@@ -331,9 +331,13 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
     variation = found.after.variation
     varied = np.zeros(len(joints)) if variation is None else variation.mean_squares(found.training.joints)
     own = dict(zip(joints, varied.tolist(), strict=True))
-    # What the noise of the positions makes does, and where that is all that does it is no effect's to remove.
+    # What the noise of the positions makes does repeat; on joints where nothing else does, no effect need remove it.
     made = dict(zip(joints, noise_torque(found.training, found.after.value).tolist(), strict=True))
-    of_positions = {fit.joint: made[fit.joint] for fit in found.fit_after if 0.0 < fit.missing <= made[fit.joint]}
+    of_positions = {
+        fit.joint: made[fit.joint]
+        for fit in found.fit_after
+        if fit.joint in left and 0.0 < fit.missing <= made[fit.joint]
+    }
     proxies = []
     before, whole = rms_of(search.start.value, search.uncorrected), rms_of(found.after.value, found.training)
     labels = [item.label(search.scene) for item in search.chosen]
@@ -363,7 +367,7 @@ def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
             why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"
             proxies.append(decision.refused(why))
         elif decision.label in labels and (excused or (found.unexplained and owner in (None, found.unexplained.joint))):
-            # Its repetitions are no more than one.
+            # Repetitions of a motion prove no more than one run of it.
             place = labels.index(decision.label)
             p_value = examine_moments(search.step.without(place), search.chosen[place]).p_value
             if p_value * search.tried > criteria.family_error:
