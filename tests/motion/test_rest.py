@@ -54,8 +54,7 @@ def turning(
 def test_a_sharp_turn_is_left_out_however_fast_it_is_and_a_smooth_one_is_not(run: Recording):
     """A few turns that no sample showed to be slow left most of a wrist's residual, and were a delay and a spring to it."""
     time = np.arange(4000) / RATE
-    # Turns between two samples, and no nearer to one.
-    smooth = 0.3 * np.sin(2.0 * np.pi * (np.arange(4000) - 250.5) / 1000.0)
+    smooth = 0.3 * np.sin(2.0 * np.pi * 0.7 * time + 0.3)
     # The acceleration is five times as large on one side of a turn as on the other.
     side = np.where(np.sin(2.0 * np.pi * 2.0 * time + 0.2) > 0.0, 5.0, 1.0)
     sharp = np.cumsum(side * np.sin(2.0 * np.pi * 2.0 * time + 0.2)) / RATE
