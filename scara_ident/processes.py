@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
 from scara_ident.errors import ScaraIdentError
-from scara_ident.threads import forget_threads, one_blas_thread, one_thread, works_alone
+from scara_ident.threads import one_blas_thread, one_thread, works_alone
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -37,7 +37,7 @@ def map_in_order(
     """Apply a function to items, several at a time, and give the results in the order of the items.
 
     Workers are forked, so that the function may hold what cannot be sent to another process; where the system cannot
-    fork, the items are worked on one after the other. Each worker has one BLAS thread.
+    fork, the items are worked on one after the other. Each worker has one thread.
 
     Parameters
     ----------
@@ -53,7 +53,12 @@ def map_in_order(
         with one_blas_thread():
             yield from map(work, wanted)
         return
-    with _forked(count, lambda place: work(wanted[place])) as workers:
+
+    def beside_others(place: int) -> Result:
+        with one_thread():
+            return work(wanted[place])
+
+    with _forked(count, beside_others) as workers:
         places, found = iter(range(len(wanted))), dict[int, tuple[bool, Any]]()
         given = {
             worker: [place for _ in range(AHEAD) if (place := _give(worker, places)) is not None] for worker in workers
@@ -89,11 +94,7 @@ def beside(work: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
         yield work
         return
 
-    def alone(_: int) -> Result:
-        forget_threads()
-        return work()
-
-    with _forked(1, alone) as (worker,):
+    with _forked(1, lambda _: work()) as (worker,):
         worker.send(0)
         taken = cache(lambda: _taken(worker))
         yield lambda: _result(*taken())

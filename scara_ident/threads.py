@@ -65,9 +65,9 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(max_workers=THREADS - 1, initializer=busy)
 
 
-def forget_threads() -> None:
-    """Forget the threads of the process that this one was forked from, which it does not have."""
-    _pool.cache_clear()
+# A forked process does not have the threads of its parent: what they are given there waits for ever, and is kept.
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 @contextmanager

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import pickle
 import signal
+import threading
 import time
+import weakref
 from threading import Thread
 
 import pytest
@@ -15,6 +18,7 @@ from scara_ident import processes
 from scara_ident.errors import ScaraIdentError
 from scara_ident.processes import available_cores, beside, halved, map_in_order, own_process
 from scara_ident.threads import one_thread, side_by_side
+from tests.shared import PATIENCE
 
 
 @pytest.mark.parametrize("processes", [1, 2, 3])
@@ -63,6 +67,41 @@ def test_what_is_done_beside_is_done_in_another_process_on_threads_of_its_own():
         process, squares = result()
     assert process != os.getpid()
     assert squares == [0, 1, 4, 9, 16]
+
+
+class Large:
+    """What a task holds, whose memory is to be free once it is done."""
+
+
+def test_a_worker_keeps_nothing_of_what_it_has_done():
+    def work(item: int) -> bool:
+        held = Large()
+        side_by_side(lambda one: one is not None, [held] * 3)
+        gone = weakref.ref(held)
+        del held
+        gc.collect()
+        return gone() is None
+
+    # The caller has threads by now, which its workers do not have.
+    assert side_by_side(abs, [-1, 2]) == [1, 2]
+    assert list(map_in_order(work, range(4), 2)) == [True] * 4
+    with beside(lambda: work(0)) as result:
+        assert result()
+
+
+def test_workers_beside_each_other_have_one_thread_each_and_one_alone_has_its_own_two():
+    def work(_: int = 0) -> int:
+        return len(set(side_by_side(lambda _: (time.sleep(0.01), threading.get_ident())[1], range(8))))
+
+    assert side_by_side(abs, [-1, 2]) == [1, 2]
+    assert list(map_in_order(work, range(4), 2)) == [1] * 4
+
+    def meet() -> int:
+        both = threading.Barrier(2)
+        return len(set(side_by_side(lambda _: (both.wait(PATIENCE), threading.get_ident())[1], range(2))))
+
+    with beside(meet) as result:
+        assert result() == 2
 
 
 def test_without_fork_what_is_done_beside_is_done_here(monkeypatch: pytest.MonkeyPatch):
