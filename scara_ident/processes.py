@@ -60,9 +60,11 @@ def map_in_order(
 
     with _forked(count, beside_others) as workers:
         places, found = iter(range(len(wanted))), dict[int, tuple[bool, Any]]()
-        given = {
-            worker: [place for _ in range(AHEAD) if (place := _give(worker, places)) is not None] for worker in workers
-        }
+        given = {worker: list[int]() for worker in workers}
+        # One to each before any has two: they may be as few as there are workers.
+        for worker in [*workers] * AHEAD:
+            if (place := _give(worker, places)) is not None:
+                given[worker].append(place)
         for place in range(len(wanted)):
             while place not in found:
                 for worker in wait([worker for worker in workers if given[worker]]):

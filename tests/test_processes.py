@@ -35,6 +35,10 @@ def test_the_work_is_done_in_other_processes_where_there_may_be_several():
     assert set(map_in_order(lambda _: os.getpid(), range(4), 1)) == {os.getpid()}
 
 
+def test_as_many_items_as_workers_go_to_one_each():
+    assert len(set(map_in_order(lambda _: os.getpid(), range(2), 2))) == 2
+
+
 def test_without_fork_the_items_are_worked_on_here(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(processes.multiprocessing, "get_all_start_methods", lambda: ["spawn"])
     assert set(map_in_order(lambda _: os.getpid(), range(4), 2)) == {os.getpid()}
