@@ -244,7 +244,7 @@ def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], aske
     told = worth_recording(design.tells)
     if not told:
         _removed(folder)
-        others = "; ".join(f"{item.text}: {item.experiment}" for item in left)
+        others = "; ".join(f"{item.question.text}: {item.remedy}" for item in design.tells)
         words = f"No motion within the limits would tell. What would: {others}."
         return _note(folder, replace(asked, state="untold", words=words))
     _written(folder, design)

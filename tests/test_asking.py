@@ -114,6 +114,23 @@ def test_only_a_motion_that_makes_surer_is_recorded():
     assert worth_recording(told) == told[1:]
 
 
+def test_where_no_motion_tells_it_says_the_experiment_of_what_stays_hidden(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    first = questions(open_diagnosis())[0]
+    general = replace(first, kind="below_limit", text="what these hardly show", experiment="record another motion")
+    faint = Told(general, 1.0, 8.0, tuple(Shown(item, 0.5, {}) for item in general.suspects))
+    design = type("Design", (), {"tells": (faint,)})()
+    monkeypatch.setattr(asking, "design_excitation", lambda *_, **__: design)
+    found = ask(folder, QUICK)
+    assert found.state == "untold"
+    assert found.words == (
+        f"No motion within the limits would tell. What would: what these hardly show: {faint.remedy}."
+    )
+    assert general.suspects[0].candidate.effect.experiment in faint.remedy
+    assert general.experiment not in faint.remedy
+
+
 def test_where_nothing_is_open_it_says_so_and_no_motion_is_left(folder: Path, monkeypatch: pytest.MonkeyPatch):
     (folder / "next").mkdir()
     (folder / "next" / "trajectory.csv").write_text("an old one", encoding="utf-8")

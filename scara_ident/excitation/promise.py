@@ -96,11 +96,15 @@ class Told:
         """Say what the motion does not tell, and what would; nothing where it tells all."""
         if self.settled:
             return ""
-        unshown = self.hidden[:MOST_NAMED]
         which = listed([item.label for item in self.hidden], MOST_NAMED) or self.question.text
+        return f"Would not tell: {which}. What would: {self.remedy}."
+
+    @property
+    def remedy(self) -> str:
+        """Say what tells what the motion does not; of several effects the experiment of each, of the first few."""
+        unshown = self.hidden[:MOST_NAMED]
         experiments = dict.fromkeys(item.candidate.effect.experiment for item in unshown)
-        what = "; ".join(experiments) if len(self.question.suspects) > 1 and unshown else self.question.experiment
-        return f"Would not tell: {which}. What would: {what}."
+        return "; ".join(experiments) if len(self.question.suspects) > 1 and unshown else self.question.experiment
 
     def entry(self) -> dict[str, object]:
         """Return it as plain values."""
