@@ -62,9 +62,9 @@ def map_in_order(
         places, found = iter(range(len(wanted))), dict[int, tuple[bool, Any]]()
         given = {worker: list[int]() for worker in workers}
         # One to each before any has two: they may be as few as there are workers.
-        for worker in [*workers] * AHEAD:
-            if (place := _give(worker, places)) is not None:
-                given[worker].append(place)
+        for one in [*workers] * AHEAD:
+            if (more := _give(one, places)) is not None:
+                given[one].append(more)
         for place in range(len(wanted)):
             while place not in found:
                 for worker in wait([worker for worker in workers if given[worker]]):
