@@ -113,9 +113,13 @@ def direction(arm: Path, model: str, training: Sequence[Recording], others: Sequ
     }
 
 
-def _ratio(left: float, removed: float) -> float:
-    """Return the root of what is left as a share of that and what was removed; infinite where more came than is left."""
-    return float(np.sqrt(left / (left + removed))) if left + removed > 0.0 else float("inf")
+def _ratio(left: float, removed: float) -> float | None:
+    """Return the root of what is left as a share of that and what was removed; None where more came than is left."""
+    return float(np.sqrt(left / (left + removed))) if left + removed > 0.0 else None
+
+
+def _number(ratio: float | None) -> str:
+    return "worse" if ratio is None else f"{ratio:.3f}"
 
 
 def _evidence(diagnosis: Diagnosis) -> dict[str, str]:
@@ -147,9 +151,9 @@ def told(arm: str, both: list[dict[str, Any]]) -> str:
             other = "found" if (item["effect"], item["joint"]) in named[1 - place] else "not found"
             if other == "not found" and label in both[1 - place]["tentative"]:
                 other = "tentative"
-            below = f"{sum(ratio < HOLDS for ratio in ratios)} of {len(ratios)}"
+            below = f"{sum(ratio is not None and ratio < HOLDS for ratio in ratios)} of {len(ratios)}"
             words = ", ".join(item["parameters"].values())
-            lines.append(f"| {half} | {one['verdict']} | {label} | {words} | {item['ratio']:.3f} | {below} | {other} |")
+            lines.append(f"| {half} | {one['verdict']} | {label} | {words} | {_number(item['ratio'])} | {below} | {other} |")
     lines += ["", "| joint | unseen error, first half | second half |", "|---|---|---|"]
     for joint in both[0]["unseen_rms"]:
         cells = [
