@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from scara_ident.diagnosis.criteria import CRITERIA
+
 NOT_SINGLE = ("none", "pair", "triple", "unlisted")
 SEVERAL = ("pair", "triple")
 Item = dict[str, Any]
@@ -68,11 +70,16 @@ def right(item: Item) -> bool:
 
 def wrong(item: Item) -> list[str]:
     """Return the effects named that are not there, nor in one or a group with one that is, nor in how runs differ."""
+    return [found["effect"] for found in not_there(item)]
+
+
+def not_there(item: Item) -> list[Item]:
+    """Return what was found of the effects that `wrong` names."""
     true = {(each["effect"], each["joint"]) for each in item["true"]}
     names = {each["effect"] for each in item["true"]}
     variation = item.get("conditions", {}).get("variation", {})
     return [
-        found["effect"]
+        found
         for found in item["found"]
         if (found["effect"], found["joint"]) not in true
         and not names & set(found["group"])
@@ -253,12 +260,25 @@ def confusion(items: Sequence[Item]) -> None:
         print(f"  {names:28} " + ", ".join(f"{name} {count}" for name, count in counts.most_common()))
 
 
+def _borne_out(items: Sequence[Item]) -> None:
+    """Tell which of the believed effects the recordings held out speak against."""
+    false = [found for item in items for found in not_there(item)]
+    true = [found for item in items for found in item["found"] if found not in false]
+    for words, found in (("there", true), ("not there", false)):
+        gains = [each["held_out_gain"] for each in found if each.get("held_out_gain") is not None]
+        _share(
+            f"believed effects that are {words}: the recordings held out speak against it",
+            [gain < -CRITERIA.least_gain for gain in gains],
+        )
+
+
 def _summary(items: Sequence[Item], limits: dict[str, float]) -> None:
     none = [item for item in items if item["kind"] == "none"]
     single = [item for item in items if item["kind"] not in NOT_SINGLE]
     above = [item for item in single if above_limit(item, limits)]
     print()
     _share("a believed effect that is not there, all sets", [bool(wrong(item)) for item in items])
+    _borne_out(items)
     _share("with nothing missing: a believed effect", [bool(wrong(item)) for item in none])
     _share("with nothing missing: `unexplained`", [item["verdict"] == "unexplained" for item in none])
     _share("right effect and joint, above the detection limit", [right(item) for item in above])

@@ -153,7 +153,9 @@ def told(arm: str, both: list[dict[str, Any]]) -> str:
                 other = "tentative"
             below = f"{sum(ratio is not None and ratio < HOLDS for ratio in ratios)} of {len(ratios)}"
             words = ", ".join(item["parameters"].values())
-            lines.append(f"| {half} | {one['verdict']} | {label} | {words} | {_number(item['ratio'])} | {below} | {other} |")
+            lines.append(
+                f"| {half} | {one['verdict']} | {label} | {words} | {_number(item['ratio'])} | {below} | {other} |"
+            )
     lines += ["", "| joint | unseen error, first half | second half |", "|---|---|---|"]
     for joint in both[0]["unseen_rms"]:
         cells = [

@@ -26,6 +26,7 @@ from scara_ident.diagnosis.found_effect import (
     not_found,
     uncounted_correction,
 )
+from scara_ident.diagnosis.held_out_gain import held_out_gains, spoken_against
 from scara_ident.diagnosis.held_out_states import HeldOut, held_out_states
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.model_selection import Outcome, Unexplained, rms_of, select_model
@@ -247,10 +248,12 @@ def diagnose(
     held = held_out_states(found, after.value, after.weights, held_out)
     notes += held.notes
     validation_before = observe(base, held.data)
+    validation_after = _with_effects(found, held, validation_before)
+    gains = held_out_gains(found, after, validation_after, validation_before)
     whole = found.whole(step)
     parameters = physical_parameters(whole) if whole.chosen else PhysicalParameters((), (), ())
     readings = direct_readings(found, families, criteria.rotor_inertia_std)
-    effects = found_effects(found, step, parameters, readings)
+    effects = found_effects(found, step, parameters, readings, gains)
     notes += not_found(readings, effects)
     refused = (*outcome.demoted, *outcome.suspected)
     notes += [f"{item.label} is not counted: {item.why}" for item in refused]
@@ -267,7 +270,6 @@ def diagnose(
     uncounted = uncounted_correction(found, parameters)
     if uncounted is not None:
         notes.append(f"{uncounted}; corrected in the data, not counted as an effect")
-    validation_after = _with_effects(found, held, validation_before)
     in_held_out = held_out_events(after.value, outcome.training, validation_after)
     unsure = unsure_of_others(after, validation_after)
     apart = np.zeros(robot.n)
@@ -295,6 +297,8 @@ def diagnose(
         apart,
         criteria,
     )
+    told = {item.label: item.held_out for item in effects if item.held_out is not None}
+    shown = spoken_against(shown, told, criteria)
     verdict = _verdict(outcome.unexplained is not None, bool(effects), shown)
     return Diagnosis(
         verdict,

@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.confounding import Confounder, confounders
 from scara_ident.diagnosis.effect_parameters import Coefficients, PhysicalParameters
+from scara_ident.diagnosis.held_out_gain import HeldOutGain
 from scara_ident.diagnosis.model_selection import rms_of
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep
@@ -40,6 +41,8 @@ class FoundEffect:
         As a term of the model; None where it was taken out of the recordings.
     direct : mapping of str to Parameter
         Those of its parameters that a channel of its own, as of a second encoder, tells without this fit.
+    held_out : HeldOutGain or None
+        What it changes on recordings that no choice has seen; None where there are none in which it acts.
     """
 
     effect: str
@@ -54,6 +57,7 @@ class FoundEffect:
     after: Mapping[str, float | None]
     candidate: Candidate | None = None
     direct: Mapping[str, Parameter] = field(default_factory=dict)
+    held_out: HeldOutGain | None = None
 
     @property
     def label(self) -> str:
@@ -95,7 +99,11 @@ def said(values: Mapping[str, Parameter]) -> str:
 
 
 def found_effects(
-    found: Search, step: SelectionStep, parameters: PhysicalParameters, readings: Readings
+    found: Search,
+    step: SelectionStep,
+    parameters: PhysicalParameters,
+    readings: Readings,
+    held_out: Mapping[str, HeldOutGain],
 ) -> list[FoundEffect]:
     """Return the effects that came in, in that order, with their parameters and what cannot be told from them."""
     scene = found.scene
@@ -137,6 +145,7 @@ def found_effects(
                 dict(zip(scene.robot.joints, now, strict=True)),
                 None if candidate.corrects_data else candidate,
                 readings.get((candidate.effect.name, candidate.joint(scene)), {}),
+                held_out.get(candidate.label(scene)),
             )
         )
         before = now

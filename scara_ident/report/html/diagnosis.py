@@ -12,6 +12,7 @@ import numpy as np
 
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.found_effect import FoundEffect
+from scara_ident.diagnosis.held_out_gain import HeldOutGain, words_against
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.manners import several
@@ -132,6 +133,12 @@ def _said(effect: FoundEffect) -> str:
     return words if effect.joint is None else f"{words} on {effect.joint}"
 
 
+def _held_out(gain: HeldOutGain, context: DiagnosisContext) -> str:
+    if gain.against(context.diagnosis.search.step.criteria):
+        return f"It is not borne out: {words_against(gain, context.unit(gain.joint))}."
+    return f"On recordings that no choice has seen it removes {max(gain.share, 0.0):.0%}."
+
+
 def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]:
     helps, voting = effect.votes
     gains = ", ".join(
@@ -147,6 +154,8 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
         f"fitted to, helps in {helps} of {voting} trajectories that excite it, and would come about by chance with p {'' if p_value.startswith('<') else '= '}{p_value}. "
         f"Rms on the training recordings: {gains}."
     )
+    if effect.held_out is not None:
+        words += f" {_held_out(effect.held_out, context)}"
     rows: list[list[Cell | str]] = [
         [
             name(label),
