@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.held_out_gain import HeldOutGain
 
 NOT_SINGLE = ("none", "pair", "triple", "unlisted")
 SEVERAL = ("pair", "triple")
+# Of what `HeldOutGain.entry` tells, in the order of its fields.
+FIELDS = ("gain", "size", "std", "joint", "without", "with")
 Item = dict[str, Any]
 # What stands behind an effect that is named where runs differ: it is there, in each run or day with another size.
 BEHIND = {"time_delay": "delay", "torque_gain_mismatch": "scale"}
@@ -265,11 +267,12 @@ def _borne_out(items: Sequence[Item]) -> None:
     false = [found for item in items for found in not_there(item)]
     true = [found for item in items for found in item["found"] if found not in false]
     for words, found in (("there", true), ("not there", false)):
-        gains = [each["held_out_gain"] for each in found if each.get("held_out_gain") is not None]
+        told = [each["held_out"] for each in found if each.get("held_out")]
+        gains = [HeldOutGain(*(own[name] for name in FIELDS)) for own in told if own["std"] is not None]
         _share(
-            f"believed effects that are {words}: the recordings held out speak against it",
-            [gain < -CRITERIA.least_gain for gain in gains],
+            f"believed effects that are {words}: borne out by the recordings held out", [x.borne_out() for x in gains]
         )
+        _share(f"believed effects that are {words}: these speak against it", [x.against() for x in gains])
 
 
 def _summary(items: Sequence[Item], limits: dict[str, float]) -> None:

@@ -163,7 +163,7 @@ def _found(effect: Item) -> Item:
         "parameters": {name: [value["value"], value["std"]] for name, value in effect["parameters"].items()},
         "p_value": effect["p_value"],
         "gain": effect["gain"],
-        "held_out_gain": effect["held_out_gain"],
+        "held_out": effect["held_out"],
     }
 
 

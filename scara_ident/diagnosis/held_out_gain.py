@@ -6,14 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.search import Search
-from scara_ident.diagnosis.selection_step import observed
+from scara_ident.diagnosis.selection_step import moments_of, observed
 from scara_ident.estimation import Estimate
-from scara_ident.estimation.information import Information
+from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.least_squares import told_value_and_weights
 from scara_ident.estimation.observations import Observations
 
@@ -27,6 +28,9 @@ class HeldOutGain:
     share : float
         What it removes of the weighted squared error, as a share of that and what it leaves on its joint, as
         `FoundEffect.gain`; below zero where the error is larger with it.
+    size, std : float
+        How much of the change that it makes to the predicted torque those recordings show, 1 where all of it: below a half the
+        error is larger with it. Infinite std where it changes nothing there.
     joint : str
         On which it changes most.
     without, rms : float
@@ -34,13 +38,25 @@ class HeldOutGain:
     """
 
     share: float
+    size: float
+    std: float
     joint: str
     without: float
     rms: float
 
+    def entry(self) -> dict[str, object]:
+        """Return it as plain values."""
+        std = self.std if np.isfinite(self.std) else None
+        shown = {"gain": self.share, "size": self.size, "std": std}
+        return {**shown, "joint": self.joint, "without": self.without, "with": self.rms}
+
     def against(self, criteria: SelectionCriteria = CRITERIA) -> bool:
-        """Whether it makes the error larger by more than an effect must remove to be believed."""
-        return self.share < -criteria.least_gain
+        """Whether it surely makes the error larger."""
+        return 0.5 - self.size > criteria.least_final_size * self.std
+
+    def borne_out(self, criteria: SelectionCriteria = CRITERIA) -> bool:
+        """Whether it surely shows there, and makes the error smaller."""
+        return self.size > max(0.5, criteria.least_size * self.std)
 
 
 def held_out_gains(
@@ -59,19 +75,27 @@ def held_out_gains(
         Of the model with the effects found, corrected as the training recordings were.
     uncorrected : Observations
         Of the base model, not corrected.
+
+    Notes
+    -----
+    Of a torque that lacks the change d, ``e . d / d . d`` is the least-squares estimate of how much of it is there, with the
+    sandwich variance of blocks of time (White 1980; Liang and Zeger 1986), those of one moment of a motion as one.
     """
     if not held_out.data.recordings:
         return {}
     joints = found.scene.robot.joints
-    whole = _squares(held_out.by_joint, after.value, after.weights)
+    errors = _errors(held_out.joints, after.value)
+    whole = _squares(errors, after.weights)
     gains = {}
-    for label, own, value, others in _each_left_out(found, held_out, uncorrected):
-        without = _squares(others, value, after.weights)
+    for label, own, others in _each_left_out(found, held_out, uncorrected):
+        without = _squares(others, after.weights)
         removed, left = float(np.sum(without - whole)), float(np.sum(whole if own is None else whole[own]))
-        largest = int(np.argmax(np.abs(without - whole)))
-        rms, before = held_out.by_joint[largest].rms(after.value), others[largest].rms(value)
-        if left > 0.0 or removed > 0.0:
-            gains[label] = HeldOutGain(removed / (max(removed, 0.0) + left), joints[largest], before, rms)
+        place = int(np.argmax(np.abs(without - whole)))
+        count = max(1.0, float(np.sum(held_out.joints[place].counts)))
+        before, now = (float(np.sqrt(np.sum(each[place] ** 2) / count)) for each in (others, errors))
+        size, std = _shown(held_out, others, errors, after.weights)
+        share = removed / (max(removed, 0.0) + left) if left > 0.0 or removed > 0.0 else 0.0
+        gains[label] = HeldOutGain(share, size, std, joints[place], before, now)
     return gains
 
 
@@ -79,23 +103,30 @@ def spoken_against(
     shown: Sequence[Evidence], gains: Mapping[str, HeldOutGain], criteria: SelectionCriteria = CRITERIA
 ) -> tuple[Evidence, ...]:
     """Take back that a residual is noise on a joint where an effect found makes the recordings held out worse."""
-    why = {item.joint: f"{label}: {words_against(item)}" for label, item in gains.items() if item.against(criteria)}
+    why = {
+        item.joint: f"{100.0 * item.size:.0f} ± {100.0 * item.std:.2g} % of {label} shows on the recordings held out"
+        for label, item in gains.items()
+        if item.against(criteria)
+    }
     return tuple(
         replace(item, shown=False, by="", why=why[item.joint]) if item.shown and item.joint in why else item
         for item in shown
     )
 
 
-def words_against(gain: HeldOutGain, unit: str = "") -> str:
-    """Say how recordings held out speak against an effect, in the unit of the joint if it is given."""
-    error, least = (f"{size:.3g} {unit}".rstrip() for size in (gain.rms, gain.without))
-    return f"on the recordings held out {gain.joint} has an error of {error} with it and {least} without it"
+def words_of(gain: HeldOutGain, unit: str) -> str:
+    """Say what recordings held out show of an effect, in the unit of the joint that it changes most."""
+    error, least = (f"{size:.3g} {unit}" for size in (gain.rms, gain.without))
+    errors = f"the error of {gain.joint} is {error} with it and {least} without it"
+    if not np.isfinite(gain.std):
+        return f"it does not show on the recordings held out: {errors}"
+    return f"{100.0 * gain.size:.0f} ± {100.0 * gain.std:.2g} % of it shows on the recordings held out: {errors}"
 
 
 def _each_left_out(
     found: Search, held_out: Observations, uncorrected: Observations
-) -> Iterator[tuple[str, int | None, Array, Sequence[Information]]]:
-    """Give each effect's label and joint with the parameters fitted without it, and the rows held out for them."""
+) -> Iterator[tuple[str, int | None, list[Array]]]:
+    """Give each effect's label and joint with the errors held out of all else, fitted to the training without it."""
     scene, start = found.scene, uncorrected.parameters
     for place, candidate in enumerate(found.chosen):
         stop = start + len(candidate.effect.columns(scene, candidate.member))
@@ -104,14 +135,44 @@ def _each_left_out(
         if any(np.any(rows.table[:-1][np.isin(rows.columns, columns)]) for rows in held_out.joints):
             value, _ = told_value_and_weights(observed(found.step.without(place)))
             value = np.insert(value, np.full(len(columns), columns[0]), 0.0)
-            yield candidate.label(scene), candidate.member.joint, value, held_out.by_joint
+            yield candidate.label(scene), candidate.member.joint, _errors(held_out.joints, value)
     if found.correction is not None:
         step = replace(found.step, columns=found.step.columns.beside(found.uncorrected))
         value, _ = told_value_and_weights(observed(step))
         candidate = found.correction.candidate
-        yield candidate.label(scene), candidate.member.joint, value, held_out.with_torque(uncorrected.data).by_joint
+        joints = held_out.with_torque(uncorrected.data).joints
+        yield candidate.label(scene), candidate.member.joint, _errors(joints, value)
 
 
-def _squares(joints: Sequence[Information], value: Array, weights: Array) -> Array:
-    """Return the weighted sum of squares that parameters leave on each joint, shape (n,)."""
-    return np.array([weight**2 * item.residual_sum(value) for item, weight in zip(joints, weights, strict=True)])
+def _errors(joints: Sequence[JointRows], value: Array) -> list[Array]:
+    """Return what parameters leave of every joint's rows."""
+    return [rows.table[-1] - value[rows.columns] @ rows.table[:-1] for rows in joints]
+
+
+def _squares(errors: Sequence[Array], weights: Array) -> Array:
+    """Return the weighted sum of squares of each joint, shape (n,)."""
+    return np.array([weight**2 * float(own @ own) for own, weight in zip(errors, weights, strict=True)])
+
+
+def _shown(
+    held_out: Observations, without: Sequence[Array], whole: Sequence[Array], weights: Array
+) -> tuple[float, float]:
+    """Return how much of the change that an effect makes is seen, and its standard deviation by moments of motions."""
+    joints, data = held_out.joints, held_out.data
+    of_block = np.zeros((2, len(joints[0].starts) - 1))
+    for rows, before, after, weight in zip(joints, without, whole, weights, strict=True):
+        change = before - after
+        of_block += [weight**2 * _by_block(own * change, rows.starts) for own in (before, change)]
+    # What a model lacks besides is the same in all repetitions of a moment.
+    motion = np.array([data.trajectories.index(label) for label in data.labels])[held_out.owner]
+    _, place = np.unique(np.column_stack([motion, moments_of(data)]), axis=0, return_inverse=True)
+    shown, made = (np.bincount(place.reshape(-1), own) for own in of_block)
+    total, moments = float(np.sum(made)), np.count_nonzero(made)
+    if total == 0.0 or moments < 2:
+        return (float(np.sum(shown)) / total if total > 0.0 else 0.0), np.inf
+    size = float(np.sum(shown)) / total
+    return size, float(np.sqrt(np.sum((shown - size * made) ** 2) * moments / (moments - 1.0))) / total
+
+
+def _by_block(values: Array, starts: NDArray[np.intp]) -> Array:
+    return np.diff(np.append(0.0, np.cumsum(values))[starts])

@@ -11,7 +11,7 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.effect_parameters import RotorInertia
 from scara_ident.diagnosis.evidence import Evidence, least_found
-from scara_ident.diagnosis.held_out_gain import words_against
+from scara_ident.diagnosis.held_out_gain import words_of
 from scara_ident.diagnosis.model_selection import Unexplained, rms_of
 from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.diagnosis.questions import suspects_in_model
@@ -71,7 +71,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
                 ],
                 "p_value": effect.p_value,
                 "gain": effect.gain,
-                "held_out_gain": None if effect.held_out is None else effect.held_out.share,
+                "held_out": None if effect.held_out is None else effect.held_out.entry(),
                 "helps_in": list(effect.votes),
                 "training": {"before": dict(effect.before), "after": dict(effect.after)},
                 "suspect": suspects[effect.candidate].entry() if effect.candidate in suspects else None,
@@ -291,12 +291,13 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     for effect in diagnosis.effects:
         where = f" on {effect.joint}" if effect.joint else ""
         values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())
-        held_out = effect.held_out
-        against = held_out is not None and held_out.against(diagnosis.search.step.criteria)
+        held_out, criteria = effect.held_out, diagnosis.search.step.criteria
+        against = held_out is not None and held_out.against(criteria)
         found.append(f"{'In doubt:' if against else 'Found'} {effect.effect}{where}: {effect.description}; {values}.")
-        if held_out is not None and against:
+        if held_out is not None and not held_out.borne_out(criteria):
             unit = diagnosis.robot.torque_unit(diagnosis.robot.joints.index(held_out.joint))
-            found.append(f"Not borne out: {words_against(held_out, unit)}; record further motions to fit.")
+            instead = "; record further motions to fit" if against else ""
+            found.append(f"{'Not borne out' if against else 'Not confirmed'}: {words_of(held_out, unit)}{instead}.")
         found += [_directly(name, parameter, effect.parameters[name]) for name, parameter in effect.direct.items()]
         if effect.confounded_with:
             others = ", ".join(confounder.label for confounder in effect.confounded_with)

@@ -12,7 +12,7 @@ import numpy as np
 
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.found_effect import FoundEffect
-from scara_ident.diagnosis.held_out_gain import HeldOutGain, words_against
+from scara_ident.diagnosis.held_out_gain import HeldOutGain, words_of
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.manners import several
@@ -134,9 +134,10 @@ def _said(effect: FoundEffect) -> str:
 
 
 def _held_out(gain: HeldOutGain, context: DiagnosisContext) -> str:
-    if gain.against(context.diagnosis.search.step.criteria):
-        return f"It is not borne out: {words_against(gain, context.unit(gain.joint))}."
-    return f"On recordings that no choice has seen it removes {max(gain.share, 0.0):.0%}."
+    criteria, words = context.diagnosis.search.step.criteria, words_of(gain, context.unit(gain.joint))
+    if gain.borne_out(criteria):
+        return f"No choice has seen the recordings held out; there it removes {gain.share:.0%}, and {words}."
+    return f"It is {'not borne out' if gain.against(criteria) else 'not confirmed'}: {words}."
 
 
 def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]:
