@@ -51,7 +51,7 @@ def even_evidence(
     found = []
     for j, item in enumerate(shown):
         loud = _loudest(squares[:, j], rows[:, j], partial(_of_joint, made, j), criteria)
-        if item.shown and loud is not None:
+        if item.shown and loud is not None and _throughout(training, j, after.value, loud[0], criteria):
             place, ratio = loud
             own = after.variation.joints[j] if after.variation is not None else None
             differing = own is not None and _as_runs_differ(
@@ -62,6 +62,30 @@ def even_evidence(
                 item = replace(item, shown=False, by="", why=why)
         found.append(item)
     return tuple(found)
+
+
+def _throughout(observations: Observations, joint: int, value: Array, place: int, criteria: SelectionCriteria) -> bool:
+    """Whether a recording leaves more than all others do in most blocks of time, not in the few of a burst of noise.
+
+    The logarithms of what blocks leave are compared (Welch 1947): bursts raise their variance, and their mean but little.
+    """
+    from scipy.special import stdtr
+
+    rows = observations.joints[joint]
+    left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
+    squares = np.diff(np.append(0.0, np.cumsum(left**2))[rows.starts])
+    filled = (squares > 0.0) & (rows.counts > 0)
+    level = np.log(squares[filled] / rows.counts[filled])
+    loud = observations.owner[filled] == place
+    sides = [level[loud], level[~loud]]
+    if min(map(len, sides)) < 2:
+        return True
+    variances = np.array([np.var(side, ddof=1) / len(side) for side in sides])
+    if not np.any(variances):
+        return True
+    freedom = np.sum(variances) ** 2 / np.sum(variances**2 / [len(side) - 1.0 for side in sides])
+    score = (np.mean(sides[0]) - np.mean(sides[1])) / np.sqrt(np.sum(variances))
+    return float(stdtr(freedom, -score)) * len(observations.each) < criteria.significant
 
 
 def _of_joint(made: Callable[[int], Array], joint: int, place: int) -> float:

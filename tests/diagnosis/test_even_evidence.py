@@ -10,6 +10,7 @@ import pytest
 from scara_ident.diagnosis.even_evidence import LEAST_ALIKE, even_evidence
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.estimation import wls
+from scara_ident.estimation.observations import Observations
 from tests.diagnosis.made import observed, virtual_runs
 from tests.estimation.test_run_variation import runs
 
@@ -36,6 +37,27 @@ def test_what_one_recording_leaves_more_of_than_all_others_is_no_noise():
     )
     # Of a single recording nothing is said.
     assert even_evidence(SHOWN, after, louder.of([2])) == SHOWN
+
+
+def test_a_burst_of_noise_in_one_recording_is_no_recording_apart():
+    """Torque with heavy tails: `undecided` by one burst, with nothing missing."""
+    training = observed(virtual_runs())
+    after = wls(training)
+    rows = training.joints[1]
+    left = rows.table[-1] - after.value[rows.columns] @ rows.table[:-1]
+    (blocks,) = np.nonzero(training.owner == 2)
+
+    def with_louder(some: np.ndarray, factor: float) -> Observations:
+        inside = np.repeat(np.isin(np.arange(len(training.owner)), some), np.diff(rows.starts))
+        table = rows.table.copy()
+        table[-1] += np.where(inside, (factor - 1.0) * left, 0.0)
+        return replace(training, joints=(training.joints[0], replace(rows, table=table)))
+
+    # As much in all, once in a tenth of its blocks and once in most of them.
+    few, most = blocks[: max(1, len(blocks) // 10)], blocks[: 9 * len(blocks) // 10]
+    assert even_evidence(SHOWN, after, with_louder(few, 8.0)) == SHOWN
+    _, second = even_evidence(SHOWN, after, with_louder(most, 8.0 * np.sqrt(len(few) / len(most))))
+    assert not second.shown
 
 
 def test_runs_that_differ_leave_more_and_less():
