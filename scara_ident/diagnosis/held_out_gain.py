@@ -117,10 +117,12 @@ def spoken_against(
 def words_of(gain: HeldOutGain, unit: str) -> str:
     """Say what recordings held out show of an effect, in the unit of the joint that it changes most."""
     error, least = (f"{size:.3g} {unit}" for size in (gain.rms, gain.without))
-    errors = f"the error of {gain.joint} is {error} with it and {least} without it"
-    if not np.isfinite(gain.std):
-        return f"it does not show on the recordings held out: {errors}"
-    return f"{100.0 * gain.size:.0f} ± {100.0 * gain.std:.2g} % of it shows on the recordings held out: {errors}"
+    shown = (
+        f"{100.0 * gain.size:.0f} ± {100.0 * gain.std:.2g} % of it shows"
+        if np.isfinite(gain.std)
+        else "it does not show"
+    )
+    return f"{shown}; the error of {gain.joint} is {error} with it and {least} without it"
 
 
 def _each_left_out(

@@ -297,7 +297,8 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         if held_out is not None and not held_out.borne_out(criteria):
             unit = diagnosis.robot.torque_unit(diagnosis.robot.joints.index(held_out.joint))
             instead = "; record further motions to fit" if against else ""
-            found.append(f"{'Not borne out' if against else 'Not confirmed'}: {words_of(held_out, unit)}{instead}.")
+            verdict = "Not borne out" if against else "Not confirmed"
+            found.append(f"{verdict} by the recordings held out: {words_of(held_out, unit)}{instead}.")
         found += [_directly(name, parameter, effect.parameters[name]) for name, parameter in effect.direct.items()]
         if effect.confounded_with:
             others = ", ".join(confounder.label for confounder in effect.confounded_with)

@@ -68,10 +68,10 @@ def test_an_effect_that_is_there_in_both_removes_most_of_what_is_held_out(effect
     # The delay that is found is of small delays.
     assert item.held_out.size == pytest.approx(1.0, abs=0.15)
     said = repr(_effect_words(item, DiagnosisContext(result))[0])
-    assert f"there it removes {item.held_out.share:.0%}, and {words_of(item.held_out, 'N m')}." in said
+    assert f"no choice has seen, it removes {item.held_out.share:.0%}; {words_of(item.held_out, 'N m')}." in said
     summary = diagnosis_dict(result)["summary"]
     assert any(line.startswith(f"Found {item.effect}") for line in summary)
-    assert not any("shows on the recordings held out" in line for line in summary)
+    assert not any("by the recordings held out" in line for line in summary)
 
 
 def test_the_error_without_it_is_that_of_a_fit_of_all_else_to_what_was_fitted():
@@ -140,10 +140,13 @@ def test_one_that_is_not_there_in_what_is_held_out_is_in_doubt():
         k for k, line in enumerate(content["summary"]) if line.startswith("In doubt: position_dependent_friction on")
     ]
     words = words_of(gain, "N m")
-    assert content["summary"][place + 1] == f"Not borne out: {words}; record further motions to fit."
+    assert (
+        content["summary"][place + 1]
+        == f"Not borne out by the recordings held out: {words}; record further motions to fit."
+    )
     assert [item["held_out"] for item in content["effects"]] == [gain.entry()]
     said = repr(_effect_words(result.effects[0], DiagnosisContext(result))[0])
-    assert f"It is not borne out: {words}." in said
+    assert f"It is not borne out by the recordings held out: {words}." in said
 
 
 def test_what_is_left_is_not_called_noise_then(monkeypatch: pytest.MonkeyPatch):
@@ -190,7 +193,7 @@ def test_where_an_effect_changes_nothing_it_is_not_confirmed():
     gain = HeldOutGain(0.0, 0.0, np.inf, "joint1", 0.1, 0.1)
     assert not gain.borne_out()
     assert not gain.against()
-    assert words_of(gain, "N m").startswith("it does not show on the recordings held out: ")
+    assert words_of(gain, "N m").startswith("it does not show; the error of joint1 ")
     assert gain.entry()["std"] is None
 
 
@@ -200,7 +203,7 @@ def test_one_that_is_neither_shown_nor_refuted_is_said_to_be_unconfirmed():
     unsure = replace(result, effects=(replace(result.effects[0], held_out=gain),))
     summary = diagnosis_dict(unsure)["summary"]
     assert any(line.startswith("Found position_dependent_friction") for line in summary)
-    assert f"Not confirmed: {words_of(gain, 'N m')}." in summary
-    assert "It is not confirmed: 60 ± 40 % of it shows" in repr(
+    assert f"Not confirmed by the recordings held out: {words_of(gain, 'N m')}." in summary
+    assert "It is not confirmed by the recordings held out: 60 ± 40 % of it shows" in repr(
         _effect_words(unsure.effects[0], DiagnosisContext(unsure))[0]
     )

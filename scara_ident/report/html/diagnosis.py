@@ -136,8 +136,8 @@ def _said(effect: FoundEffect) -> str:
 def _held_out(gain: HeldOutGain, context: DiagnosisContext) -> str:
     criteria, words = context.diagnosis.search.step.criteria, words_of(gain, context.unit(gain.joint))
     if gain.borne_out(criteria):
-        return f"No choice has seen the recordings held out; there it removes {gain.share:.0%}, and {words}."
-    return f"It is {'not borne out' if gain.against(criteria) else 'not confirmed'}: {words}."
+        return f"On the recordings held out, which no choice has seen, it removes {gain.share:.0%}; {words}."
+    return f"It is not {'borne out' if gain.against(criteria) else 'confirmed'} by the recordings held out: {words}."
 
 
 def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]:
