@@ -105,18 +105,22 @@ def found_effects(
     readings: Readings,
     held_out: Mapping[str, HeldOutGain],
 ) -> list[FoundEffect]:
-    """Return the effects that came in, in that order, with their parameters and what cannot be told from them."""
+    """Return the effects that came in, in that order, with their parameters and what cannot be told from them.
+
+    What was taken out of the data in several steps is one effect, as it came in first.
+    """
     scene = found.scene
     groups = confounders(step, found.decisions, found.first, found.doubtful) if found.chosen else []
     labels = [item.label(scene) for item in found.chosen]
-    results = []
+    results: list[FoundEffect] = []
     before = rms_of(found.start.value, found.uncorrected)
     for item in found.steps:
         decision = item.decision
         candidate = decision.candidate
         now, otherwise = item.rms, ""
         if candidate.corrects_data and found.correction is not None:
-            if uncounted_correction(found, parameters) is not None:
+            listed = any(result.candidate is None for result in results)
+            if listed or uncounted_correction(found, parameters) is not None:
                 before = now
                 continue
             values: Mapping[str, Parameter] = candidate.effect.parameters(

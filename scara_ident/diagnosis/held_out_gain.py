@@ -104,7 +104,7 @@ def spoken_against(
 ) -> tuple[Evidence, ...]:
     """Take back that a residual is noise on a joint where an effect found makes the recordings held out worse."""
     why = {
-        item.joint: f"{100.0 * item.size:.0f} ± {100.0 * item.std:.2g} % of {label} shows on the recordings held out"
+        item.joint: f"{shown_of(item, label)} on the recordings held out"
         for label, item in gains.items()
         if item.against(criteria)
     }
@@ -114,15 +114,17 @@ def spoken_against(
     )
 
 
+def shown_of(gain: HeldOutGain, what: str = "it") -> str:
+    """Say how much of an effect recordings held out show."""
+    if not np.isfinite(gain.std):
+        return f"{what} does not show"
+    return f"{100.0 * gain.size:.0f} ± {100.0 * gain.std:.2g} % of {what} shows"
+
+
 def words_of(gain: HeldOutGain, unit: str) -> str:
     """Say what recordings held out show of an effect, in the unit of the joint that it changes most."""
     error, least = (f"{size:.3g} {unit}" for size in (gain.rms, gain.without))
-    shown = (
-        f"{100.0 * gain.size:.0f} ± {100.0 * gain.std:.2g} % of it shows"
-        if np.isfinite(gain.std)
-        else "it does not show"
-    )
-    return f"{shown}; the error of {gain.joint} is {error} with it and {least} without it"
+    return f"{shown_of(gain)}; the error of {gain.joint} is {error} with it and {least} without it"
 
 
 def _each_left_out(

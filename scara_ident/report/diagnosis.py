@@ -11,7 +11,8 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.effect_parameters import RotorInertia
 from scara_ident.diagnosis.evidence import Evidence, least_found
-from scara_ident.diagnosis.held_out_gain import words_of
+from scara_ident.diagnosis.found_effect import FoundEffect
+from scara_ident.diagnosis.held_out_gain import shown_of, words_of
 from scara_ident.diagnosis.model_selection import Unexplained, rms_of
 from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.diagnosis.questions import suspects_in_model
@@ -279,6 +280,22 @@ def _not_shown(evidence: Sequence[Evidence]) -> list[str]:
     return found
 
 
+def _found(effect: FoundEffect, diagnosis: Diagnosis) -> list[str]:
+    """Say what an effect is and how large, and what the recordings held out show of it."""
+    gain, criteria = effect.held_out, diagnosis.search.step.criteria
+    values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())
+    said = f"{effect.title}: {effect.description}; {values}"
+    if gain is None:
+        return [f"Found {said}."]
+    if gain.borne_out(criteria):
+        return [f"Found {said}; {shown_of(gain)} on the recordings held out."]
+    words = words_of(gain, diagnosis.robot.torque_unit(diagnosis.robot.joints.index(gain.joint)))
+    if gain.against(criteria):
+        instead = "record further motions to fit"
+        return [f"In doubt: {said}.", f"Not borne out by the recordings held out: {words}; {instead}."]
+    return [f"Found {said}.", f"Not confirmed by the recordings held out: {words}."]
+
+
 def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Return the result in words."""
     found = []
@@ -289,16 +306,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         found.append(f"Undecided: these recordings cannot tell whether {more}.")
         found += _not_shown(diagnosis.evidence)
     for effect in diagnosis.effects:
-        where = f" on {effect.joint}" if effect.joint else ""
-        values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())
-        held_out, criteria = effect.held_out, diagnosis.search.step.criteria
-        against = held_out is not None and held_out.against(criteria)
-        found.append(f"{'In doubt:' if against else 'Found'} {effect.effect}{where}: {effect.description}; {values}.")
-        if held_out is not None and not held_out.borne_out(criteria):
-            unit = diagnosis.robot.torque_unit(diagnosis.robot.joints.index(held_out.joint))
-            instead = "; record further motions to fit" if against else ""
-            verdict = "Not borne out" if against else "Not confirmed"
-            found.append(f"{verdict} by the recordings held out: {words_of(held_out, unit)}{instead}.")
+        found += _found(effect, diagnosis)
         found += [_directly(name, parameter, effect.parameters[name]) for name, parameter in effect.direct.items()]
         if effect.confounded_with:
             others = ", ".join(confounder.label for confounder in effect.confounded_with)

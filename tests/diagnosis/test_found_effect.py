@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.found_effect import not_found
+from scara_ident.diagnosis.effect_parameters import physical_parameters
+from scara_ident.diagnosis.found_effect import found_effects, not_found
 from scara_ident.effects import Parameter, effects_named
 from scara_ident.effects.measurement import shifted
 from scara_ident.robot.robot import load_robot
@@ -43,3 +46,15 @@ def test_what_a_second_encoder_tells_of_an_effect_that_was_not_added_is_said() -
     assert not_found(readings, []) == [
         "joint_elasticity of joint1 was not added, but a channel of its own tells stiffness 2.001e+04 +- 2e+02 N m/rad"
     ]
+
+
+def test_a_delay_that_was_taken_out_in_two_steps_is_one_effect() -> None:
+    """It stood in `effects` twice, each time with all of it."""
+    runs = [shifted(run, -0.008) for run in exact_runs()]
+    search = diagnose(load_robot(), runs, bands=BANDS, catalogue=effects_named("time_delay")).search
+    (first,) = search.steps
+    twice = replace(search, steps=(first, replace(first, rms=(0.0, 0.0))))
+    parameters = physical_parameters(twice.whole(twice.step))
+    (effect,) = found_effects(twice, twice.step, parameters, {}, {})
+    assert effect.effect == "time_delay"
+    assert tuple(effect.after.values()) == tuple(first.rms)

@@ -11,7 +11,7 @@ import pytest
 
 from scara_ident.diagnosis import Diagnosis, diagnose
 from scara_ident.diagnosis.evidence import Evidence
-from scara_ident.diagnosis.held_out_gain import HeldOutGain, held_out_gains, spoken_against, words_of
+from scara_ident.diagnosis.held_out_gain import HeldOutGain, held_out_gains, shown_of, spoken_against, words_of
 from scara_ident.diagnosis.selection_step import observed
 from scara_ident.effects.friction import PositionDependentFriction
 from scara_ident.effects.measurement import TimeDelay
@@ -70,7 +70,8 @@ def test_an_effect_that_is_there_in_both_removes_most_of_what_is_held_out(effect
     said = repr(_effect_words(item, DiagnosisContext(result))[0])
     assert f"no choice has seen, it removes {item.held_out.share:.0%}; {words_of(item.held_out, 'N m')}." in said
     summary = diagnosis_dict(result)["summary"]
-    assert any(line.startswith(f"Found {item.effect}") for line in summary)
+    (line,) = [line for line in summary if line.startswith(f"Found {item.effect}")]
+    assert line.endswith(f"; {shown_of(item.held_out)} on the recordings held out.")
     assert not any("by the recordings held out" in line for line in summary)
 
 
