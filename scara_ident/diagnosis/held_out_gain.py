@@ -93,7 +93,7 @@ def held_out_gains(
         place = int(np.argmax(np.abs(without - whole)))
         count = max(1.0, float(np.sum(held_out.joints[place].counts)))
         before, now = (float(np.sqrt(np.sum(each[place] ** 2) / count)) for each in (others, errors))
-        size, std = _shown(held_out, others, errors, after.weights)
+        size, std = _shown(held_out, others, errors, after)
         share = removed / (max(removed, 0.0) + left) if left > 0.0 or removed > 0.0 else 0.0
         gains[label] = HeldOutGain(share, size, std, joints[place], before, now)
     return gains
@@ -118,7 +118,8 @@ def shown_of(gain: HeldOutGain, what: str = "it") -> str:
     """Say how much of an effect recordings held out show."""
     if not np.isfinite(gain.std):
         return f"{what} does not show"
-    return f"{100.0 * gain.size:.0f} ± {100.0 * gain.std:.2g} % of {what} shows"
+    percent = 100.0 * gain.std
+    return f"{100.0 * gain.size:.0f} ± {percent:.{'2g' if percent < 10.0 else '0f'}} % of {what} shows"
 
 
 def words_of(gain: HeldOutGain, unit: str) -> str:
@@ -159,13 +160,18 @@ def _squares(errors: Sequence[Array], weights: Array) -> Array:
 
 
 def _shown(
-    held_out: Observations, without: Sequence[Array], whole: Sequence[Array], weights: Array
+    held_out: Observations, without: Sequence[Array], whole: Sequence[Array], after: Estimate
 ) -> tuple[float, float]:
-    """Return how much of the change that an effect makes is seen, and its standard deviation by moments of motions."""
+    """Return how much of the change that an effect makes is seen, and its standard deviation.
+
+    By moments of motions, and by what the training leaves unsure of the parameters: motions that are faster than it tell
+    how far those go wrong there, not whether the effect is.
+    """
     joints, data = held_out.joints, held_out.data
-    of_block = np.zeros((2, len(joints[0].starts) - 1))
-    for rows, before, after, weight in zip(joints, without, whole, weights, strict=True):
-        change = before - after
+    of_block, pull = np.zeros((2, len(joints[0].starts) - 1)), np.zeros(held_out.parameters)
+    for rows, before, now, weight in zip(joints, without, whole, after.weights, strict=True):
+        change = before - now
+        pull[rows.columns] += weight**2 * (rows.table[:-1] @ change)
         of_block += [weight**2 * _by_block(own * change, rows.starts) for own in (before, change)]
     # What a model lacks besides is the same in all repetitions of a moment.
     motion = np.array([data.trajectories.index(label) for label in data.labels])[held_out.owner]
@@ -175,7 +181,10 @@ def _shown(
     if total == 0.0 or moments < 2:
         return (float(np.sum(shown)) / total if total > 0.0 else 0.0), np.inf
     size = float(np.sum(shown)) / total
-    return size, float(np.sqrt(np.sum((shown - size * made) ** 2) * moments / (moments - 1.0))) / total
+    scatter = float(np.sum((shown - size * made) ** 2)) * moments / (moments - 1.0)
+    known = np.isfinite(np.diag(after.covariance))
+    unsure = float(pull[known] @ after.covariance[np.ix_(known, known)] @ pull[known])
+    return size, float(np.sqrt(scatter + max(0.0, unsure))) / total
 
 
 def _by_block(values: Array, starts: NDArray[np.intp]) -> Array:

@@ -116,7 +116,13 @@ def test_the_error_without_it_is_that_of_a_fit_of_all_else_to_what_was_fitted():
             part = slice(joint.starts[k], joint.starts[k + 1])
             scores[moment] = scores.get(moment, 0.0) + np.sum(a[part] - size * b[part])
     assert 3 < len(scores) <= (len(held.owner) + 3) // 2 + 3
-    std = np.sqrt(sum(score**2 for score in scores.values()) * len(scores) / (len(scores) - 1)) / sum(map(np.sum, made))
+    scatter = sum(score**2 for score in scores.values()) * len(scores) / (len(scores) - 1)
+    # And what the parameters' errors make of it: those of the prediction along the change.
+    pull = np.zeros(len(result.after.value))
+    for w, joint, a, b in zip(result.after.weights, held.joints, old, new, strict=True):
+        for k, column in enumerate(joint.columns):
+            pull[column] += w**2 * joint.table[k] @ (a - b)
+    std = np.sqrt(scatter + pull @ result.after.covariance @ pull) / sum(map(np.sum, made))
     assert gain.std == pytest.approx(std, rel=2e-3)
 
 
@@ -188,6 +194,11 @@ def test_what_was_shown_is_taken_back_on_the_joint_that_is_worse_and_only_there(
 def test_what_is_sure_enough_is_said_and_nothing_else(size: float, std: float, borne_out: bool, against: bool):
     gain = HeldOutGain(0.0, size, std, "joint1", 0.1, 0.1)
     assert (gain.borne_out(), gain.against()) == (borne_out, against)
+
+
+def test_percentages_have_two_digits_and_no_powers_of_ten():
+    said = [shown_of(HeldOutGain(0.0, 0.62, std, "joint1", 0.1, 0.1)) for std in (0.0012, 0.011, 0.17, 2.6)]
+    assert said == [f"62 ± {percent} % of it shows" for percent in ("0.12", "1.1", "17", "260")]
 
 
 def test_where_an_effect_changes_nothing_it_is_not_confirmed():
