@@ -18,7 +18,7 @@ from scara_ident.effects.measurement import TimeDelay
 from scara_ident.estimation.observations import Observations
 from scara_ident.recording.recording import Recording
 from scara_ident.report.diagnosis import diagnosis_dict
-from scara_ident.report.html.diagnosis import DiagnosisContext, _effect_words
+from scara_ident.report.html.diagnosis import DiagnosisContext, _effect_words, _verdict
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
 from tests.diagnosis.made import BANDS, NOISE, multisine
@@ -154,6 +154,15 @@ def test_one_that_is_not_there_in_what_is_held_out_is_in_doubt():
     assert [item["held_out"] for item in content["effects"]] == [gain.entry()]
     said = repr(_effect_words(result.effects[0], DiagnosisContext(result))[0])
     assert f"It is not borne out by the recordings held out: {words}." in said
+
+
+def test_it_is_not_what_the_model_lacked():
+    result, gain = contradicted()
+    usual = replace(result, verdict="unexplained", effects=(replace(result.effects[0], held_out=None),))
+    doubted = replace(usual, effects=(replace(usual.effects[0], held_out=gain),))
+    said, less = (_verdict(item, ())[0] for item in (usual, doubted))
+    assert said.startswith("Not all explained: the model lacked position dependent friction on joint1, and something")
+    assert less.startswith("Not all explained: something")
 
 
 def test_what_is_left_is_not_called_noise_then(monkeypatch: pytest.MonkeyPatch):

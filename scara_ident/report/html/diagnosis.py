@@ -357,7 +357,9 @@ def _picture(context: DiagnosisContext) -> Gains | None:
 
 def _verdict(diagnosis: Diagnosis, summary: Sequence[str]) -> tuple[str, ...]:
     """The verdict in a sentence, then what it rests on."""
-    found = " and ".join(_said(effect) for effect in diagnosis.effects)
+    criteria = diagnosis.search.step.criteria
+    sure = [item for item in diagnosis.effects if item.held_out is None or not item.held_out.against(criteria)]
+    found = " and ".join(_said(effect) for effect in sure)
     if diagnosis.verdict in ("complete", "undecided"):
         # The first of the sentences says so already.
         return tuple(summary)
