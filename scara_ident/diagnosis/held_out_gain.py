@@ -14,6 +14,7 @@ from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import moments_of, observed
 from scara_ident.estimation import Estimate
+from scara_ident.estimation.another_run import variance_of_another_run
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.least_squares import told_value_and_weights
 from scara_ident.estimation.observations import Observations
@@ -164,14 +165,16 @@ def _shown(
 ) -> tuple[float, float]:
     """Return how much of the change that an effect makes is seen, and its standard deviation.
 
-    By moments of motions, and by what the training leaves unsure of the parameters: motions that are faster than it tell
-    how far those go wrong there, not whether the effect is.
+    By moments of motions; by what the training leaves unsure of the parameters, for motions that are faster than it tell how
+    far those go wrong there, not whether the effect is; and by what runs were seen to differ by.
     """
     joints, data = held_out.joints, held_out.data
     of_block, pull = np.zeros((2, len(joints[0].starts) - 1)), np.zeros(held_out.parameters)
+    changes: list[Array] = []
     for rows, before, now, weight in zip(joints, without, whole, after.weights, strict=True):
         change = before - now
         pull[rows.columns] += weight**2 * (rows.table[:-1] @ change)
+        changes.append(weight**2 * change)
         of_block += [weight**2 * _by_block(own * change, rows.starts) for own in (before, change)]
     # What a model lacks besides is the same in all repetitions of a moment.
     motion = np.array([data.trajectories.index(label) for label in data.labels])[held_out.owner]
@@ -184,7 +187,10 @@ def _shown(
     scatter = float(np.sum((shown - size * made) ** 2)) * moments / (moments - 1.0)
     known = np.isfinite(np.diag(after.covariance))
     unsure = float(pull[known] @ after.covariance[np.ix_(known, known)] @ pull[known])
-    return size, float(np.sqrt(scatter + max(0.0, unsure))) / total
+    apart = 0.0
+    if after.variation is not None:
+        apart = variance_of_another_run(after.variation, held_out, after.value, changes)
+    return size, float(np.sqrt(scatter + max(0.0, unsure) + apart)) / total
 
 
 def _by_block(values: Array, starts: NDArray[np.intp]) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 
 from scara_ident.arrays import Array
@@ -28,10 +30,42 @@ def of_another_run(variation: RunVariation, observations: Observations, value: A
         N m (N); zero where runs do not differ, or no samples are kept.
     """
     found = np.zeros(len(variation.joints))
+    for joint, std, directions in _told(variation, observations, value):
+        found[joint] = np.sqrt(np.sum(std[:, None] ** 2 * directions**2) / observations.joints[joint].samples)
+    return found
+
+
+def variance_of_another_run(
+    variation: RunVariation, observations: Observations, value: Array, signals: Sequence[Array]
+) -> float:
+    """Return the variance of the sum of products with signals that is expected of the torque by which further runs lie off.
+
+    Parameters
+    ----------
+    variation : RunVariation
+    observations : Observations
+    value : ndarray, shape (p,)
+        As of `of_another_run`.
+    signals : sequence of ndarray, shape (N,)
+        On the rows of each joint.
+
+    Returns
+    -------
+    float
+        Each run being one draw of each kind of difference.
+    """
+    total, runs = 0.0, len(observations.data.recordings)
+    for joint, std, directions in _told(variation, observations, value):
+        run = np.repeat(observations.owner, np.diff(observations.joints[joint].starts))
+        for size, direction in zip(std, directions, strict=True):
+            total += float(np.sum((size * np.bincount(run, direction * signals[joint], runs)) ** 2))
+    return total
+
+
+def _told(variation: RunVariation, observations: Observations, value: Array) -> Iterator[tuple[int, Array, Array]]:
+    """Give joints on which runs differ, by which standard deviation, and what one unit of each does on their rows."""
     if not observations.raw:
-        return found
+        return
     for joint, (item, rows) in enumerate(zip(variation.joints, observations.joints, strict=True)):
         if item is not None and rows.table.shape[1] and rows.sizes is None:
-            directions = directions_of(observations, joint, rows, value)
-            found[joint] = np.sqrt(np.sum(item.std[:, None] ** 2 * directions**2) / rows.samples)
-    return found
+            yield joint, item.std, directions_of(observations, joint, rows, value)

@@ -15,6 +15,7 @@ from scara_ident.diagnosis.held_out_gain import HeldOutGain, held_out_gains, sho
 from scara_ident.diagnosis.selection_step import observed
 from scara_ident.effects.friction import PositionDependentFriction
 from scara_ident.effects.measurement import TimeDelay
+from scara_ident.estimation.another_run import variance_of_another_run
 from scara_ident.estimation.observations import Observations
 from scara_ident.recording.recording import Recording
 from scara_ident.report.diagnosis import diagnosis_dict
@@ -122,7 +123,10 @@ def test_the_error_without_it_is_that_of_a_fit_of_all_else_to_what_was_fitted():
     for w, joint, a, b in zip(result.after.weights, held.joints, old, new, strict=True):
         for k, column in enumerate(joint.columns):
             pull[column] += w**2 * joint.table[k] @ (a - b)
-    std = np.sqrt(scatter + pull @ result.after.covariance @ pull) / sum(map(np.sum, made))
+    assert result.after.variation is not None
+    signals = [w**2 * (a - b) for w, a, b in zip(result.after.weights, old, new, strict=True)]
+    apart = variance_of_another_run(result.after.variation, held, result.after.value, signals)
+    std = np.sqrt(scatter + pull @ result.after.covariance @ pull + apart) / sum(map(np.sum, made))
     assert gain.std == pytest.approx(std, rel=2e-3)
 
 
