@@ -12,8 +12,6 @@ from scara_ident.diagnosis.held_out_gain import HeldOutGain
 
 NOT_SINGLE = ("none", "pair", "triple", "unlisted")
 SEVERAL = ("pair", "triple")
-# Of what `HeldOutGain.entry` tells, in the order of its fields.
-FIELDS = ("gain", "size", "std", "joint", "without", "with")
 Item = dict[str, Any]
 # What stands behind an effect that is named where runs differ: it is there, in each run or day with another size.
 BEHIND = {"time_delay": "delay", "torque_gain_mismatch": "scale"}
@@ -267,8 +265,7 @@ def _borne_out(items: Sequence[Item]) -> None:
     false = [found for item in items for found in not_there(item)]
     true = [found for item in items for found in item["found"] if found not in false]
     for words, found in (("there", true), ("not there", false)):
-        told = [each["held_out"] for each in found if each.get("held_out")]
-        gains = [HeldOutGain(*(own[name] for name in FIELDS)) for own in told if own["std"] is not None]
+        gains = [HeldOutGain.of_entry(each["held_out"]) for each in found if each.get("held_out")]
         _share(
             f"believed effects that are {words}: borne out by the recordings held out", [x.borne_out() for x in gains]
         )

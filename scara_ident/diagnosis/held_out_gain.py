@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,12 @@ class HeldOutGain:
         std = self.std if np.isfinite(self.std) else None
         shown = {"gain": self.share, "size": self.size, "std": std}
         return {**shown, "joint": self.joint, "without": self.without, "with": self.rms}
+
+    @staticmethod
+    def of_entry(entry: Mapping[str, Any]) -> HeldOutGain:
+        """Return what an entry tells."""
+        std = np.inf if entry["std"] is None else entry["std"]
+        return HeldOutGain(entry["gain"], entry["size"], std, entry["joint"], entry["without"], entry["with"])
 
     def against(self, criteria: SelectionCriteria = CRITERIA) -> bool:
         """Whether it surely makes the error larger."""

@@ -21,7 +21,7 @@ from scara_ident.model.terms import Friction
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
-# An effect as ``diagnosis.json`` has it: ``effect``, ``joint`` and ``parameters`` with ``value`` and ``std``.
+# An effect as ``diagnosis.json`` has it: ``effect``, ``joint``, ``parameters`` with ``value`` and ``std``, and ``held_out``.
 Entry = Mapping[str, Any]
 
 
@@ -163,6 +163,7 @@ def identified_model(found: Identification | Diagnosis) -> IdentifiedModel:
                 "effect": item.effect,
                 "joint": item.joint,
                 "parameters": {name: dict(vars(parameter)) for name, parameter in item.parameters.items()},
+                "held_out": None if item.held_out is None else item.held_out.entry(),
             }
             for item in found.effects
         )

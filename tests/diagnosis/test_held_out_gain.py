@@ -220,6 +220,7 @@ def test_where_an_effect_changes_nothing_it_is_not_confirmed():
     assert not gain.against()
     assert words_of(gain, "N m").startswith("it does not show; the error of joint1 ")
     assert gain.entry()["std"] is None
+    assert HeldOutGain.of_entry(gain.entry()) == gain
 
 
 def test_one_that_is_neither_shown_nor_refuted_is_said_to_be_unconfirmed():

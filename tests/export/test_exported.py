@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from scara_ident.diagnosis.held_out_gain import HeldOutGain
 from scara_ident.errors import ScaraIdentError
 from scara_ident.export import exported
 from scara_ident.export.exported import export_model, write_exported
@@ -52,6 +53,25 @@ def test_what_the_recordings_leave_open_is_said_beside_and_in_the_file(models, t
     assert f"the {said}" in done.notes
     code = [text for name, text in done.files.items() if name.endswith((".h", ".py", ".yaml"))]
     assert all(f"The {said}." in text for text in code)
+
+
+@pytest.mark.parametrize("to", ["c", "mjcf"])
+def test_an_effect_that_recordings_held_out_speak_against_is_said_beside_and_in_the_file(models, to):
+    gain = HeldOutGain(-0.3, 0.1, 0.05, "joint1", 0.02, 0.03)
+    entries = tuple(
+        {"effect": name, "joint": joint, "parameters": {}, "held_out": told}
+        for name, joint, told in (
+            ("spring", "joint1", gain.entry()),
+            ("base_tilt", None, replace(gain, size=1.0).entry()),
+            ("stribeck", "joint2", None),
+        )
+    )
+    done = export_model(replace(models["scara", False], found=entries), to)
+    said = "spring of joint1 is in doubt: 10 ± 5 % of it shows on the recordings held out"
+    assert [note for note in done.notes if "in doubt" in note] == [said]
+    code = [text for name, text in done.files.items() if name.endswith((".h", ".py"))]
+    assert code
+    assert all(f"{said[0].upper()}{said[1:]}." in text for text in code)
 
 
 def test_nothing_is_written_where_a_file_fails(models, tmp_path, monkeypatch):
