@@ -72,8 +72,7 @@ def _throughout(observations: Observations, joint: int, value: Array, place: int
     from scipy.special import stdtr
 
     rows = observations.joints[joint]
-    left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
-    squares = np.diff(np.append(0.0, np.cumsum(left**2))[rows.starts])
+    squares = rows.by_block(rows.left(value) ** 2)
     filled = (squares > 0.0) & (rows.counts > 0)
     level = np.log(squares[filled] / rows.counts[filled])
     loud = observations.owner[filled] == place
@@ -135,7 +134,7 @@ def _as_runs_differ(
     runs = len(item.of_run)
     if runs < LEAST_ALIKE or item.directions.shape[1] != joint.table.shape[1]:
         return False
-    left = joint.table[-1] - value[joint.columns] @ joint.table[:-1]
+    left = joint.left(value)
     rest = left - np.sum(np.repeat(item.of_run, np.diff(item.bounds), axis=0).T * item.directions, axis=0)
     of_run = list(zip(item.bounds[:-1], item.bounds[1:], strict=True))
     before, after = (np.array([np.sum(each[start:stop] ** 2) for start, stop in of_run]) for each in (left, rest))

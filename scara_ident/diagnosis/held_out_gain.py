@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
@@ -159,7 +158,7 @@ def _each_left_out(
 
 def _errors(joints: Sequence[JointRows], value: Array) -> list[Array]:
     """Return what parameters leave of every joint's rows."""
-    return [rows.table[-1] - value[rows.columns] @ rows.table[:-1] for rows in joints]
+    return [rows.left(value) for rows in joints]
 
 
 def _squares(errors: Sequence[Array], weights: Array) -> Array:
@@ -182,7 +181,7 @@ def _shown(
         change = before - now
         pull[rows.columns] += weight**2 * (rows.table[:-1] @ change)
         changes.append(weight**2 * change)
-        of_block += [weight**2 * _by_block(own * change, rows.starts) for own in (before, change)]
+        of_block += [weight**2 * rows.by_block(own * change) for own in (before, change)]
     # What a model lacks besides is the same in all repetitions of a moment.
     motion = np.array([data.trajectories.index(label) for label in data.labels])[held_out.owner]
     _, place = np.unique(np.column_stack([motion, moments_of(data)]), axis=0, return_inverse=True)
@@ -198,7 +197,3 @@ def _shown(
     if after.variation is not None:
         apart = variance_of_another_run(after.variation, held_out, after.value, changes)
     return size, float(np.sqrt(scatter + max(0.0, unsure) + apart)) / total
-
-
-def _by_block(values: Array, starts: NDArray[np.intp]) -> Array:
-    return np.diff(np.append(0.0, np.cumsum(values))[starts])

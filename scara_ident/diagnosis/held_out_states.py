@@ -93,7 +93,7 @@ def _acting(
     ]
     rows = CandidateColumns(one).rows(here, everywhere)
     stop = np.cumsum([one.parameters, *(len(next(iter(item.values()))) for item in rows)])
-    left = [item.table[-1] - value[item.columns] @ item.table[:-1] for item in one.joints]
+    left = [item.left(value) for item in one.joints]
     added = [
         {joint: value[a:b] @ part for joint, part in item.items()}
         for item, a, b in zip(rows, stop[:-1], stop[1:], strict=True)

@@ -73,7 +73,7 @@ def _dwarfs(step: SelectionStep, decision: Decision, variation: RunVariation) ->
         return False
     joints = with_columns(step.observations, step.columns.rows(step.scene, step.chosen))
     rows, value = joints[joint], step.model.root @ step.model.projected
-    left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
+    left = rows.left(value)
     removed = decision.gain * float(left @ left) / rows.samples
     return removed >= step.criteria.alike**2 * float(variation.mean_squares(joints)[joint])
 

@@ -39,7 +39,7 @@ def assumed_variation(
             # At rest throughout.
             found.append(None)
             continue
-        noise = float(np.sqrt(np.mean((rows.table[-1] - value[rows.columns] @ rows.table[:-1]) ** 2)))
+        noise = float(np.sqrt(np.mean(rows.left(value) ** 2)))
         directions = directions_of(observations, joint, rows, value)
         offset = ASSUMED_OFFSET * float(np.sqrt(np.mean(directions[KINDS.index("torque scale")] ** 2)))
         std = np.array([ASSUMED_FRICTION, scale, offset, ASSUMED_DELAY])

@@ -97,7 +97,7 @@ def _scores(rows: JointRows, weight: float, root: Array, value: Array) -> _Score
     turn, factor = np.linalg.qr(root[rows.columns].T)
     together = np.empty((len(factor) + 1, rows.table.shape[1]))
     np.matmul(factor, rows.table[:-1], out=together[:-1])
-    together[-1] = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
+    together[-1] = rows.left(value)
     products = weight**2 * block_products(together, rows.starts)
     return _Scores(turn, products[:, :-1, -1], products[:, :-1, :-1])
 

@@ -59,9 +59,17 @@ class JointRows:
         """Samples that all rows stand for."""
         return float(np.sum(self.counts))
 
+    def left(self, value: Array) -> Array:
+        """Return what parameters of the model, shape (p,), leave of the torque of every row, shape (N,)."""
+        return np.asarray(self.table[-1] - value[self.columns] @ self.table[:-1])
+
+    def by_block(self, values: Array) -> Array:
+        """Return the sums over each block of values of the rows, shape (blocks,)."""
+        return np.diff(np.append(0.0, np.cumsum(values))[self.starts])
+
     def rms(self, value: Array) -> float:
         """Return the rms of what parameters leave of the torque, as the triangular factor has it; 0 without rows."""
-        left = self.table[-1] - value[self.columns] @ self.table[:-1]
+        left = self.left(value)
         return float(np.sqrt(left @ left / self.samples)) if self.samples else 0.0
 
     def part(self, blocks: NDArray[np.intp]) -> JointRows:

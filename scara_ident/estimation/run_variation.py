@@ -256,7 +256,7 @@ def run_variation(
 
     def of_joint(joint: int, rows: JointRows) -> _Sums | None:
         directions = directions_of(observations, joint, rows, value)
-        left = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
+        left = rows.left(value)
         return _sums(directions, left, rows.starts, firsts)
 
     sums = side_by_side(of_joint, range(len(joints)), joints)

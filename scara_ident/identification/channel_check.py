@@ -221,7 +221,7 @@ def _held_out(observations: Observations) -> tuple[Array, float]:
         parts = tuple(rows.part(fitted) for rows in observations.joints)
         value = weighted_value(replace(observations, joints=parts, owner=owner[fitted]).by_joint)
         for j, rows in enumerate(observations.joints):
-            residual = rows.table[-1] - value[rows.columns] @ rows.table[:-1]
+            residual = rows.left(value)
             total = np.concatenate([[0.0], np.cumsum(residual**2)])
             squares[piece == which, j] = np.diff(total[rows.starts])[piece == which]
     counts = np.array([rows.counts for rows in observations.joints]).T

@@ -74,3 +74,14 @@ def test_consecutive_blocks_are_the_same_memory_and_others_keep_their_order():
     assert np.array_equal(found.table, item.table[:, [15, 16, 17, 0, 1, 2, 3, 4, 5, 9, 10, 11]])
     assert found.starts.tolist() == [0, 3, 6, 9, 12]
     assert item.part(np.zeros(0, dtype=np.intp)).table.shape == (4, 0)
+
+
+def test_what_parameters_leave_is_the_torque_less_their_columns_and_is_summed_block_by_block():
+    item, value = rows(5), np.array([1.0, 9.0, -2.0, 0.5, 9.0])
+    item = JointRows(COLUMNS, item.table, np.array([0, 3, 3, 20, 21]), np.ones(4))
+    a, b, c, torque = item.table
+    left = item.left(value)
+    assert left == pytest.approx(torque - a + 2.0 * b - 0.5 * c)
+    assert item.rms(value) == pytest.approx(np.sqrt(np.sum(left**2) / 4.0))
+    expected = [np.sum(left[:3]), 0.0, np.sum(left[3:20]), left[20]]
+    assert item.by_block(left) == pytest.approx(np.array(expected))

@@ -188,7 +188,7 @@ def block_shares(observations: Observations, plain: Estimate, columns: Sequence[
     scores = np.zeros((observations.blocks, len(places)))
     for rows, weight in zip(observations.joints, plain.weights, strict=True):
         influence = weight * (inverse[:, rows.columns] @ rows.table[:-1])
-        residual = weight * (rows.table[-1] - plain.value[rows.columns] @ rows.table[:-1])
+        residual = weight * rows.left(plain.value)
         for b, (start, stop) in enumerate(pairwise(rows.starts)):
             shares[b] += influence[:, start:stop] @ influence[:, start:stop].T
             scores[b] += influence[:, start:stop] @ residual[start:stop]
