@@ -5,20 +5,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Literal
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.audit import left_open
-from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
-from scara_ident.diagnosis.correction import corrected
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
-from scara_ident.diagnosis.even_evidence import even_evidence
-from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence, unsure_of_others
+from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.found_effect import (
     FoundEffect,
     direct_readings,
@@ -26,22 +19,19 @@ from scara_ident.diagnosis.found_effect import (
     not_found,
     uncounted_correction,
 )
-from scara_ident.diagnosis.held_out_gain import held_out_gains, spoken_against
-from scara_ident.diagnosis.held_out_states import HeldOut, held_out_states
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
-from scara_ident.diagnosis.model_selection import Outcome, Unexplained, rms_of, select_model
+from scara_ident.diagnosis.model_selection import Outcome, Unexplained, select_model
 from scara_ident.diagnosis.screening import Dependence
 from scara_ident.diagnosis.search import Search, SearchTask
-from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.diagnosis.tentative import TentativeEffect, tentative_effects
+from scara_ident.diagnosis.validation import validated
+from scara_ident.diagnosis.verdict import Verdict, verdict_of, weighed_evidence
 from scara_ident.diagnosis.work import first, searching
 from scara_ident.effects import Effect, EffectTerm
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.estimation import Estimate
-from scara_ident.estimation.another_run import of_another_run
-from scara_ident.estimation.noise_bias import noise_signals
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import robust_fit
 from scara_ident.identification.arguments import Recordings, model_of, recordings_of
@@ -49,7 +39,6 @@ from scara_ident.identification.channel_check import channel_faults
 from scara_ident.identification.clock_check import clock_drift
 from scara_ident.identification.events import Event, find_events, same_events, without_events
 from scara_ident.identification.identify import check_bands, check_held_out
-from scara_ident.identification.recording_check import held_out_events, own_uncertainty, without_stretches
 from scara_ident.identification.usable import check_rows, usable_in_bands, with_rows
 from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
@@ -57,7 +46,6 @@ from scara_ident.progress import Tell, Work, log_notes, silent
 from scara_ident.robot.robot import Robot
 from scara_ident.threads import one_blas_thread
 
-Verdict = Literal["complete", "explained", "unexplained", "undecided"]
 _LOG = logging.getLogger(__name__)
 # Dependences that are handed on: further ones are pairs that only repeat the first.
 NAMED_DEPENDENCES = 12
@@ -244,71 +232,29 @@ def diagnose(
     found, after = outcome.search, outcome.after
     step = replace(found.step, weights=after.weights)
     held_out, useless = with_rows(held_out.at(found.bands), needed=False)
-    notes += [note for note in useless if note not in notes]
-    held = held_out_states(found, after.value, after.weights, held_out)
-    notes += held.notes
-    validation_before = observe(base, held.data)
-    validation_after = _with_effects(found, held, validation_before)
-    gains = held_out_gains(found, after, validation_after, validation_before)
+    held = validated(outcome, held_out)
     whole = found.whole(step)
     parameters = physical_parameters(whole) if whole.chosen else PhysicalParameters((), (), ())
     readings = direct_readings(found, families, criteria.rotor_inertia_std)
-    effects = found_effects(found, step, parameters, readings, gains)
-    notes += not_found(readings, effects)
+    effects = found_effects(found, step, parameters, readings, held.gains)
     refused = (*outcome.demoted, *outcome.suspected)
+    events += held.events
+    notes += [note for note in (*useless, *held.notes) if note not in notes]
+    notes += not_found(readings, effects)
     notes += [f"{item.label} is not counted: {item.why}" for item in refused]
-    drift = clock_drift(after.value, outcome.training)
-    notes += [] if drift is None else [drift]
-    left = outcome.unexplained
-    if left is not None and robot.reduction[robot.joints.index(left.joint)] == 1.0:
-        notes.append(
-            f"{left.joint}: no reduction is stated, and of a motor behind a gear or a screw no ripple is looked for; "
-            "state it in robot.yaml"
-        )
-    if after.variation is not None:
-        notes += after.variation.sentences(robot, None if left is None else left.joint)
-    uncounted = uncounted_correction(found, parameters)
-    if uncounted is not None:
-        notes.append(f"{uncounted}; corrected in the data, not counted as an effect")
-    in_held_out = held_out_events(after.value, outcome.training, validation_after)
-    unsure = unsure_of_others(after, validation_after)
-    apart = np.zeros(robot.n)
-    if after.variation is not None:
-        apart = of_another_run(after.variation, validation_after, after.value)
-    in_held_out = tuple(own_uncertainty(event, dict(zip(robot.joints, unsure, strict=True))) for event in in_held_out)
-    # Where something stays unexplained that is why a whole recording is, and no event.
-    in_held_out = tuple(
-        event
-        for event in in_held_out
-        if event.kind != "unknown" or np.isfinite(event.score) or outcome.unexplained is None
-    )
-    events += in_held_out
+    notes += _remarks(outcome, parameters)
     notes += [event.sentence(robot) for event in events]
     log_notes(_LOG, notes)
-    undisturbed = without_stretches(validation_after, in_held_out)
-    doubtful = (*outcome.suspected, *left_open(found, after.weights, outcome.demoted))
-    made = partial(noise_signals, outcome.training, after.value)
-    shown = evidence(found, outcome.residuals, outcome.fit_after, outcome.small, doubtful, criteria, made)
-    shown = held_out_evidence(
-        even_evidence(shown, after, outcome.training, criteria),
-        rms_of(after.value, outcome.training),
-        rms_of(after.value, undisturbed),
-        unsure,
-        apart,
-        criteria,
-    )
-    told = {item.label: item.held_out for item in effects if item.held_out is not None}
-    shown = spoken_against(shown, told, criteria)
-    verdict = _verdict(outcome.unexplained is not None, bool(effects), shown)
+    shown = weighed_evidence(outcome, held, effects, criteria)
     return Diagnosis(
-        verdict,
+        verdict_of(outcome, effects, shown),
         found,
         found.start,
         after,
         found.uncorrected,
         outcome.training,
-        validation_before,
-        validation_after,
+        held.before,
+        held.after,
         outcome.fit_before,
         outcome.fit_after,
         tuple(effects),
@@ -338,21 +284,21 @@ def _without_events(task: SearchTask, observations: Observations, *, free: bool)
     return select_model(replace(task, progress=left), without_events(observations, remaining), free=free), remaining
 
 
-def _verdict(unexplained: bool, found: bool, shown: Sequence[Evidence]) -> Verdict:
-    if unexplained:
-        return "unexplained"
-    if not all(item.shown for item in shown):
-        return "undecided"
-    return "explained" if found else "complete"
-
-
-def _with_effects(found: Search, held: HeldOut, before: Observations) -> Observations:
-    """Return held-out observations, corrected as the training ones were, with the effects found."""
-    if not before.data.recordings:
-        return replace(before, model=found.model)
-    if found.correction is not None:
-        data = corrected(before.data, found.correction.candidate, found.correction.value)
-        before = before.with_torque(data)
-    scene = replace(held.scene, columns=columns_at_hand(before))
-    step = replace(found.step, scene=scene, columns=CandidateColumns(before), chosen=held.chosen)
-    return observed_at_every_sample(step)
+def _remarks(outcome: Outcome, parameters: PhysicalParameters) -> list[str]:
+    """Return what else there is to say of a search and what it leaves, in words."""
+    found, after, left = outcome.search, outcome.after, outcome.unexplained
+    robot, notes = found.scene.robot, []
+    drift = clock_drift(after.value, outcome.training)
+    if drift is not None:
+        notes.append(drift)
+    if left is not None and robot.reduction[robot.joints.index(left.joint)] == 1.0:
+        notes.append(
+            f"{left.joint}: no reduction is stated, and of a motor behind a gear or a screw no ripple is looked for; "
+            "state it in robot.yaml"
+        )
+    if after.variation is not None:
+        notes += after.variation.sentences(robot, None if left is None else left.joint)
+    uncounted = uncounted_correction(found, parameters)
+    if uncounted is not None:
+        notes.append(f"{uncounted}; corrected in the data, not counted as an effect")
+    return notes

@@ -67,7 +67,7 @@ class HeldOutGain:
 
 
 def held_out_gains(
-    found: Search, after: Estimate, held_out: Observations, uncorrected: Observations
+    found: Search, after: Estimate, held_out: Observations, uncorrected: Observations, quiet: Array
 ) -> Mapping[str, HeldOutGain]:
     """Return what each effect found changes on recordings held out, by its label; those that act in none left out.
 
@@ -82,6 +82,8 @@ def held_out_gains(
         Of the model with the effects found, corrected as the training recordings were.
     uncorrected : Observations
         Of the base model, not corrected.
+    quiet : ndarray, shape (blocks,)
+        0 for blocks of time that count for nothing in ``held_out``, as an event is there, 1 for others.
 
     Notes
     -----
@@ -94,7 +96,7 @@ def held_out_gains(
     errors = _errors(held_out.joints, after.value)
     whole = _squares(errors, after.weights)
     gains = {}
-    for label, own, others in _each_left_out(found, held_out, uncorrected):
+    for label, own, others in _each_left_out(found, held_out, uncorrected, quiet):
         without = _squares(others, after.weights)
         removed, left = float(np.sum(without - whole)), float(np.sum(whole if own is None else whole[own]))
         place = int(np.argmax(np.abs(without - whole)))
@@ -136,7 +138,7 @@ def words_of(gain: HeldOutGain, unit: str) -> str:
 
 
 def _each_left_out(
-    found: Search, held_out: Observations, uncorrected: Observations
+    found: Search, held_out: Observations, uncorrected: Observations, quiet: Array
 ) -> Iterator[tuple[str, int | None, list[Array]]]:
     """Give each effect's label and joint with the errors held out of all else, fitted to the training without it."""
     scene, start = found.scene, uncorrected.parameters
@@ -152,7 +154,7 @@ def _each_left_out(
         step = replace(found.step, columns=found.step.columns.beside(found.uncorrected))
         value, _ = told_value_and_weights(observed(step))
         candidate = found.correction.candidate
-        joints = held_out.with_torque(uncorrected.data).joints
+        joints = held_out.with_torque(uncorrected.data).faded(quiet).joints
         yield candidate.label(scene), candidate.member.joint, _errors(joints, value)
 
 

@@ -160,6 +160,10 @@ class Observations(Frozen):
             rested += np.count_nonzero(rest[:, part.trim : part.samples - part.trim], axis=1)
         return tuple(float(share) for share in rested / np.maximum(used + rested, 1.0))
 
+    def faded(self, shares: Array) -> Observations:
+        """Return the observations with each block counting for a share of its samples, shares of shape (blocks,)."""
+        return replace(self, joints=tuple(joint.faded(shares) for joint in self.joints))
+
     def with_torque(self, data: PreparedData) -> Observations:
         """Return observations of the same motion with the torque of other data."""
         joints = []

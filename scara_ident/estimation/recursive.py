@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,7 +87,7 @@ def rls(
         return least_squares(observations, equal, "rls", prior=prior), history
     # What each block still weighs at the end.
     remaining = forgetting ** (np.sum(counts) - np.cumsum(counts))
-    remembered = replace(observations, joints=tuple(joint.faded(remaining) for joint in observations.joints))
+    remembered = observations.faded(remaining)
     old = None if prior is None else _faded(prior, float(forgetting ** np.sum(counts)))
     return least_squares(remembered, equal, "rls", prior=old), history
 

@@ -12,6 +12,7 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.observations import Observations
 from scara_ident.identification.events import Event, find_events
 from scara_ident.model.base_parameters import standard_regressor
+from scara_ident.motion.prepared import PreparedData
 
 # A recording is not explained where its error is this many times that of the fitted ones, and of the worst of these.
 WORSE, WORSE_THAN_ALL = 2.0, 1.5
@@ -78,20 +79,22 @@ def own_uncertainty(event: Event, unsure: Mapping[str, float]) -> Event:
     return replace(event, kind="parameters unsure") if theirs and unnamed else event
 
 
-def without_stretches(observations: Observations, events: Sequence[Event]) -> Observations:
-    """Return observations without the blocks of time in which events are, whole recordings aside; for errors alone."""
+def quiet_blocks(data: PreparedData, events: Sequence[Event]) -> Array:
+    """Return 0 for each block of time in which an event is, whole recordings aside, and 1 for all others, shape (blocks,)."""
     stretches = [event for event in events if np.isfinite(event.score)]
-    if not stretches:
-        return observations
     kept: list[bool] = []
-    for item in observations.data.recordings:
+    for item in data.recordings:
         own = [event for event in stretches if event.recording == item.name]
         for part in (part for part in item.stretches if part.usable):
             ends = part.stretch.time[np.minimum(part.blocks, part.samples - 1)] - item.recording.time[0]
             kept += [not any(event.start <= b and event.stop >= a for event in own) for a, b in pairwise(ends)]
-    blocks = np.flatnonzero(kept)
-    joints = tuple(rows.part(blocks) for rows in observations.joints)
-    return replace(observations, joints=joints, owner=observations.owner[blocks])
+    return np.array(kept, dtype=float)
+
+
+def without_stretches(observations: Observations, events: Sequence[Event]) -> Observations:
+    """Return observations whose blocks of time in which events are count for nothing, see `quiet_blocks`; for errors alone."""
+    shares = quiet_blocks(observations.data, events)
+    return observations if np.all(shares) else observations.faded(shares)
 
 
 def payload_share(value: Array, item: Observations, noise: Array) -> float:

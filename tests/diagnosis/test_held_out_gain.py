@@ -136,7 +136,8 @@ def contradicted() -> tuple[Diagnosis, HeldOutGain]:
     value = result.after.value.copy()
     value[len(result.before.value) :] *= -1.0
     after = replace(result.after, value=value)
-    (gain,) = held_out_gains(result.search, after, result.validation_after, result.validation_before).values()
+    held = result.validation_after
+    (gain,) = held_out_gains(result.search, after, held, result.validation_before, np.ones(len(held.owner))).values()
     return replace(result, effects=(replace(result.effects[0], held_out=gain),)), gain
 
 
@@ -173,7 +174,7 @@ def test_what_is_left_is_not_called_noise_then(monkeypatch: pytest.MonkeyPatch):
     usual = found(UNEVEN, UNEVEN)
     assert usual.evidence[0].shown
     gain = contradicted()[1]
-    module = sys.modules["scara_ident.diagnosis.diagnose"]
+    module = sys.modules["scara_ident.diagnosis.validation"]
     monkeypatch.setattr(module, "held_out_gains", lambda *_: {usual.effects[0].label: gain})
     result = found.__wrapped__(UNEVEN, UNEVEN)
     assert not result.evidence[0].shown
@@ -184,7 +185,7 @@ def test_what_is_left_is_not_called_noise_then(monkeypatch: pytest.MonkeyPatch):
 def test_without_recordings_held_out_nothing_is_said():
     result = found(UNEVEN, UNEVEN)
     none = replace(result.validation_after, data=replace(result.validation_after.data, recordings=()))
-    assert held_out_gains(result.search, result.after, none, result.validation_before) == {}
+    assert held_out_gains(result.search, result.after, none, result.validation_before, np.ones(0)) == {}
     alone = replace(result, effects=(replace(result.effects[0], held_out=None),))
     assert [item["held_out"] for item in diagnosis_dict(alone)["effects"]] == [None]
     assert "held out" not in repr(_effect_words(alone.effects[0], DiagnosisContext(alone))[0])

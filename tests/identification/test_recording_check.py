@@ -8,7 +8,7 @@ import numpy as np
 
 from scara_ident.identification.events import Event
 from scara_ident.identification.identify import identify
-from scara_ident.identification.recording_check import own_uncertainty, without_stretches
+from scara_ident.identification.recording_check import own_uncertainty, quiet_blocks, without_stretches
 from scara_ident.robot.robot import load_robot
 from tests.truth.pushes import pushed
 from tests.truth.scenes import formula_run
@@ -48,6 +48,11 @@ def test_a_push_in_a_held_out_recording_is_no_other_payload():
     rest = without_stretches(found.validation, found.events)
     value = found.estimate.value
     assert rest.joints[0].rms(value) < 0.5 * found.validation.joints[0].rms(value)
+    # Its blocks stay where they were, and count for nothing.
+    quiet = quiet_blocks(found.validation.data, found.events)
+    assert np.array_equal(rest.owner, found.validation.owner)
+    assert np.array_equal(rest.joints[0].counts, quiet * found.validation.joints[0].counts)
+    assert 0.8 < np.mean(quiet) < 1.0
     assert without_stretches(found.validation, ()) is found.validation
 
 

@@ -1,0 +1,93 @@
+"""What recordings that no choice has seen say of the model that the others led to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
+from scara_ident.diagnosis.correction import corrected
+from scara_ident.diagnosis.evidence import unsure_of_others
+from scara_ident.diagnosis.held_out_gain import HeldOutGain, held_out_gains
+from scara_ident.diagnosis.held_out_states import HeldOut, held_out_states
+from scara_ident.diagnosis.model_selection import Outcome
+from scara_ident.diagnosis.search import Search
+from scara_ident.diagnosis.selection_step import observed_at_every_sample
+from scara_ident.estimation.another_run import of_another_run
+from scara_ident.estimation.observations import Observations, observe
+from scara_ident.identification.events import Event
+from scara_ident.identification.recording_check import held_out_events, own_uncertainty, quiet_blocks
+from scara_ident.motion.prepared import PreparedData
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """What recordings held out say; without any it is empty.
+
+    Attributes
+    ----------
+    before, after : Observations
+        Of the base model, and of the model with the effects found, corrected as the training recordings were.
+    events : tuple of Event
+        What stands out in them.
+    undisturbed : Observations
+        ``after`` without the stretches of events.
+    gains : mapping of str to HeldOutGain
+        By the label of each effect found.
+    unsure : ndarray, shape (n,)
+        Rms error that a right model has there, N m (N), see `unsure_of_others`.
+    apart : ndarray, shape (n,)
+        Rms torque by which runs were found to differ, N m (N).
+    notes : tuple of str
+    """
+
+    before: Observations
+    after: Observations
+    events: tuple[Event, ...]
+    undisturbed: Observations
+    gains: Mapping[str, HeldOutGain]
+    unsure: Array
+    apart: Array
+    notes: tuple[str, ...]
+
+
+def validated(outcome: Outcome, data: PreparedData) -> Validation:
+    """Predict recordings held out.
+
+    Parameters
+    ----------
+    outcome : Outcome
+    data : PreparedData
+        The recordings held out, in the bands of the search.
+    """
+    found, model = outcome.search, outcome.after
+    robot, value = found.scene.robot, model.value
+    held = held_out_states(found, value, model.weights, data)
+    before = observe(found.base, held.data)
+    after = _with_effects(found, held, before)
+    unsure = unsure_of_others(model, after)
+    apart = np.zeros(robot.n) if model.variation is None else of_another_run(model.variation, after, value)
+    of_joint = dict(zip(robot.joints, unsure, strict=True))
+    events = [own_uncertainty(event, of_joint) for event in held_out_events(value, outcome.training, after)]
+    if outcome.unexplained is not None:
+        # That something stays unexplained is why a whole recording is, and no event.
+        events = [event for event in events if event.kind != "unknown" or np.isfinite(event.score)]
+    quiet = quiet_blocks(held.data, events)
+    undisturbed = after if np.all(quiet) else after.faded(quiet)
+    gains = held_out_gains(found, model, undisturbed, before, quiet)
+    return Validation(before, after, tuple(events), undisturbed, gains, unsure, apart, held.notes)
+
+
+def _with_effects(found: Search, held: HeldOut, before: Observations) -> Observations:
+    """Return held-out observations, corrected as the training ones were, with the effects found."""
+    if not before.data.recordings:
+        return replace(before, model=found.model)
+    if found.correction is not None:
+        data = corrected(before.data, found.correction.candidate, found.correction.value)
+        before = before.with_torque(data)
+    scene = replace(found.scene, columns=columns_at_hand(before))
+    step = replace(found.step, scene=scene, columns=CandidateColumns(before), chosen=held.chosen)
+    return observed_at_every_sample(step)

@@ -1,0 +1,54 @@
+"""The verdict, and whether what is left on each joint was shown to be noise once all that speaks against it is heard."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Literal
+
+from scara_ident.diagnosis.audit import left_open
+from scara_ident.diagnosis.criteria import SelectionCriteria
+from scara_ident.diagnosis.even_evidence import even_evidence
+from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
+from scara_ident.diagnosis.found_effect import FoundEffect
+from scara_ident.diagnosis.held_out_gain import spoken_against
+from scara_ident.diagnosis.model_selection import Outcome, rms_of
+from scara_ident.diagnosis.validation import Validation
+from scara_ident.estimation.noise_bias import noise_signals
+
+Verdict = Literal["complete", "explained", "unexplained", "undecided"]
+
+
+def weighed_evidence(
+    outcome: Outcome, held_out: Validation, effects: Sequence[FoundEffect], criteria: SelectionCriteria
+) -> tuple[Evidence, ...]:
+    """Return for each joint whether what is left was shown to be noise, and by what.
+
+    Every witness that may speak against it is asked in turn, and the first that does is the one that is told: what the search
+    left open, what is left of the training recordings, one of them beside all others, those held out, and there each effect.
+
+    Parameters
+    ----------
+    outcome : Outcome
+    held_out : Validation
+    effects : sequence of FoundEffect
+    criteria : SelectionCriteria
+    """
+    found, after = outcome.search, outcome.after
+    doubtful = (*outcome.suspected, *left_open(found, after.weights, outcome.demoted))
+    made = partial(noise_signals, outcome.training, after.value)
+    shown = evidence(found, outcome.residuals, outcome.fit_after, outcome.small, doubtful, criteria, made)
+    shown = even_evidence(shown, after, outcome.training, criteria)
+    training, others = (rms_of(after.value, item) for item in (outcome.training, held_out.undisturbed))
+    shown = held_out_evidence(shown, training, others, held_out.unsure, held_out.apart, criteria)
+    gains = {item.label: item.held_out for item in effects if item.held_out is not None}
+    return spoken_against(shown, gains, criteria)
+
+
+def verdict_of(outcome: Outcome, effects: Sequence[FoundEffect], shown: Sequence[Evidence]) -> Verdict:
+    """Return the verdict: nothing is called noise that was not shown to be, on every joint."""
+    if outcome.unexplained is not None:
+        return "unexplained"
+    if not all(item.shown for item in shown):
+        return "undecided"
+    return "explained" if effects else "complete"
