@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.held_out_gain import HeldOutGain, shown_of
 from scara_ident.export.c_header import c_header, c_name
 from scara_ident.export.casadi_module import casadi_module
 from scara_ident.export.forms import FORMS, Said, friction_said, offset_said, possible_standard, said_by, with_code
@@ -131,16 +130,7 @@ def about_lines(found: IdentifiedModel, said: Said) -> tuple[str, ...]:
 
 def _open(found: IdentifiedModel) -> tuple[str, ...]:
     """Say which parameters the recordings do not tell, and which effects those held out speak against."""
-    return (*_undetermined(found), *_doubted(found))
-
-
-def _doubted(found: IdentifiedModel) -> list[str]:
-    told = [(item, HeldOutGain.of_entry(item["held_out"])) for item in found.found if item.get("held_out")]
-    return [
-        f"{item['effect']}{' of ' + item['joint'] if item['joint'] else ''} is in doubt: {shown_of(gain)} on the recordings held out"
-        for item, gain in told
-        if gain.against()
-    ]
+    return (*_undetermined(found), *found.doubts)
 
 
 def _undetermined(found: IdentifiedModel) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.diagnosis.held_out_gain import HeldOutGain, shown_of
 from scara_ident.effects import EffectTerm
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.estimation.estimate import joint_errors
@@ -83,6 +84,16 @@ class IdentifiedModel:
         """Effects that were found and taken out of the recordings."""
         in_model = {term.name for term in self.model.terms}
         return tuple(item["effect"] for item in self.found if item["effect"] not in in_model)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """In words, which of the effects found the recordings held out speak against."""
+        told = [(item, HeldOutGain.of_entry(item["held_out"])) for item in self.found if item.get("held_out")]
+        return tuple(
+            f"{item['effect']}{' of ' + item['joint'] if item['joint'] else ''} is in doubt: {shown_of(gain)} on the recordings held out"
+            for item, gain in told
+            if gain.against()
+        )
 
     @property
     def information(self) -> Information:

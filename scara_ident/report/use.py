@@ -131,6 +131,7 @@ def _harm_said(joints: Sequence[str], rms: Mapping[str, Array]) -> list[str]:
 def sentences(result: Use) -> list[str]:
     """Say in words what was won."""
     said = [_shares_said(result.rms()), *_harm_said(result.model.robot.joints, result.rms())]
+    said += [f"{doubt[0].upper()}{doubt[1:]}; it is in what is fed forward." for doubt in result.model.doubts]
     for name, rows in result.rollouts.items():
         place = int(np.argmin(np.abs(np.array(result.horizons) - 0.2)))
         if not np.all(np.isfinite(rows[place])):

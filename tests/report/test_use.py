@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scara_ident.diagnosis.held_out_gain import HeldOutGain
 from scara_ident.report.use import _cost_said, sentences, total, use_dict
 from scara_ident.simulation import parse_effect, virtual_arm
 from scara_ident.use import Use
@@ -68,3 +69,15 @@ def test_where_an_effect_fed_forward_makes_worse_it_is_said_of_the_joint() -> No
     rms = {"pid": np.full(2, 4.0), "effects": np.full(2, 2.0)}
     assert _cost_said(found, rms).endswith("without it 25%: it does harm, so leave it out of what is fed forward.")
     assert _cost_said(replace(found, not_fed=np.full(2, 1.9)), rms).endswith("without it 48%.")
+
+
+def test_an_effect_in_doubt_is_said_to_be_fed_forward_all_the_same() -> None:
+    made = result()
+    assert not any("in doubt" in words for words in sentences(made))
+    (spring,) = made.model.found
+    gain = HeldOutGain(-0.3, 0.1, 0.05, "joint1", 0.02, 0.03)
+    doubted = replace(made.model, found=({**spring, "held_out": gain.entry()},))
+    said = (
+        "Spring of joint1 is in doubt: 10 ± 5 % of it shows on the recordings held out; it is in what is fed forward."
+    )
+    assert said in sentences(replace(made, model=doubted))
