@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -13,23 +14,42 @@ from scara_ident.cli.console import output_console
 # What the arm has and the identifier is not told.
 HIDDEN = "transmission_loss:joint2:loss_coefficient=0.2"
 # Folders of the chapters' results.
-PARTS = ("base", "paper", "excite", "train", "test", "identify", "compare", "diagnose")
+PARTS = (
+    "base",
+    "paper",
+    "excite",
+    "train",
+    "test",
+    "identify",
+    "compare",
+    "diagnose",
+    "use",
+    "export",
+    "arms",
+    "fleet",
+)
+# Days on which each of the fleet's arms is recorded; from the last on one of them has what the first arm has.
+ARMS, DAYS, CHANGED = ("arm1", "arm2", "arm3"), ("2026-03-01", "2026-03-08"), "arm2"
 
 
 def demo(
     output: options.Folder = Path("demo-output"),
     seed: Annotated[int, typer.Option(min=0, help="Of noise and random starts.")] = 1,
 ) -> None:
-    """Run the whole story on the embedded arm: design, record, identify, compare, diagnose, report."""
+    """Run the whole story on the embedded arm: design, record, identify, compare, diagnose, use, export, and a fleet."""
     from scara_ident.cli.base import base
     from scara_ident.cli.compare import compare
     from scara_ident.cli.diagnose import diagnose
     from scara_ident.cli.excite import excite
+    from scara_ident.cli.export import export
+    from scara_ident.cli.fleet import fleet
     from scara_ident.cli.identify import identify
     from scara_ident.cli.paper import paper_in_short
     from scara_ident.cli.simulate import simulate
+    from scara_ident.cli.use import use
     from scara_ident.errors import ScaraIdentError
     from scara_ident.files import check_output
+    from scara_ident.fleet.folder import INSTALL
 
     check_output(output)
     for part in PARTS:
@@ -56,7 +76,32 @@ def demo(
     chapter("Every trajectory's parameters against every trajectory")
     compare([str(train)], output=output / "compare")
     chapter("What the model lacks")
-    diagnose([str(train)], validate=[str(test)], output=output / "diagnose")
-    chapter("Done")
+    found = output / "diagnose" / "diagnosis.json"
+    diagnose([str(train)], validate=[str(test)], output=found.parent)
     console.print(f"The arm really had {HIDDEN}: see {train / 'OJD_1.truth.json'}.", soft_wrap=True)
+    chapter("What the model wins, fed forward and in simulation")
+    use(found, recording=[str(test)], output=output / "use")
+    chapter("The arm as it was found, for a controller: one C header")
+    export(found, "c", output=output / "export")
+    chapter("Three arms, a week apart: one of them has changed")
+    if find_spec("distributed") is None:
+        console.print(f"Not shown: the engine of fleets is missing; {INSTALL}")
+    else:
+        _record_fleet(output / "arms", seed)
+        fleet(str(output / "arms"), output / "fleet")
+    chapter("Done")
     console.print(f"Open {output / 'diagnose' / 'report.html'}", soft_wrap=True)
+
+
+def _record_fleet(folder: Path, seed: int) -> None:
+    """Record the fleet's arms on every day, a sub-folder each."""
+    from scara_ident.simulation import parse_effect, simulate, virtual_arm, write_simulation
+    from scara_ident.simulation.named import named_motion
+
+    arm, loss = virtual_arm(), parse_effect(HIDDEN)
+    for place, name in enumerate(ARMS):
+        for k, day in enumerate(DAYS):
+            effects = [loss] if name == CHANGED and day == DAYS[-1] else []
+            for motion in ("OJD", "OJK", "CI"):
+                done = simulate(arm, named_motion(motion, arm.robot), effects=effects, seed=100 * seed + 10 * place + k)
+                write_simulation(done, folder / name / day)

@@ -54,14 +54,23 @@ def figure(diagnosis: Diagnosis) -> Figure:
 
 
 def tables(held: dict[str, Any], *, all_candidates: bool = False) -> list[Table]:
-    """Return errors before and after by joint, and the candidates, of the content of ``diagnosis.json``."""
+    """Return errors before and after by joint, and the candidates, of the content of ``diagnosis.json``.
+
+    Those that are no better than chance are counted, not named, unless all are wanted.
+    """
     errors = table("rms error within the band", "recordings", "joint", "before", "after", right=("before", "after"))
     for kind in ("training", "validation"):
         for joint, before in held[kind]["before"].items():
             errors.add_row(kind, joint, _number(before), _number(held[kind]["after"][joint]))
     rows = table("candidates", "candidate", "gain", "p", "why", right=("gain", "p"))
-    for row in held["candidates"] if all_candidates else held["candidates"][:MOST_CANDIDATES]:
+    tried = held["candidates"]
+    # One that chance explains says nothing that the others do not.
+    shown = tried if all_candidates else [row for row in tried if row["p_value"] < 1.0][:MOST_CANDIDATES]
+    for row in shown:
         rows.add_row(row["label"], f"{row['gain']:.1%}", f"{row['p_value']:.0e}", row["why"])
+    others = len(tried) - len(shown)
+    if others:
+        rows.add_row(f"{others} others" if shown else f"all {others}", "", "", "none of them believed")
     return [errors, rows]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scara_ident.report.told.diagnosis import tables
 from tests.results import Results
 
 
@@ -26,3 +27,21 @@ def test_it_predicts_with_the_effect(results: Results):
     q, v, a = np.zeros((3, 2))
     moved = found.predict([1.0, 0.0], v, a) - found.predict(q, v, a)
     assert moved == pytest.approx([found.to_frame()["value"][0], 0.0], abs=1e-3)
+
+
+def test_candidates_no_better_than_chance_are_counted_and_not_named():
+    errors = {"before": {"joint1": 0.2}, "after": {"joint1": 0.1}}
+    tried = [
+        {"label": f"effect {k}", "gain": 0.1, "p_value": p, "why": "because"}
+        for k, p in enumerate((1e-9, 0.3, 1.0, 1.0))
+    ]
+    held = {"training": errors, "validation": errors, "candidates": tried}
+
+    def labels(content: dict, *, everything: bool = False) -> list[str]:
+        return list(tables(content, all_candidates=everything)[1].columns[0].cells)
+
+    assert labels(held) == ["effect 0", "effect 1", "2 others"]
+    assert labels({**held, "candidates": tried[2:]}) == ["all 2"]
+    assert labels(held, everything=True) == [f"effect {k}" for k in range(4)]
+    many = {**held, "candidates": 12 * tried[:1]}
+    assert labels(many) == [*(8 * ["effect 0"]), "4 others"]
