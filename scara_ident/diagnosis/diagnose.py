@@ -20,7 +20,8 @@ from scara_ident.diagnosis.found_effect import (
     uncounted_correction,
 )
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
-from scara_ident.diagnosis.model_selection import Outcome, Unexplained, select_model
+from scara_ident.diagnosis.model_selection import select_model
+from scara_ident.diagnosis.outcome import Outcome, Unexplained
 from scara_ident.diagnosis.screening import Dependence
 from scara_ident.diagnosis.search import Search, SearchTask
 from scara_ident.diagnosis.tentative import TentativeEffect, tentative_effects

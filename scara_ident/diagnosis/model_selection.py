@@ -3,104 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
-from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision, hopeless
-from scara_ident.diagnosis.audit import outdone, superfluous, suspected, unsettled
+from scara_ident.diagnosis.audit import outdone, superfluous, unsettled
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.choice import fitted_beside, more_than_chance
 from scara_ident.diagnosis.criteria import SelectionCriteria
-from scara_ident.diagnosis.evidence import coloured_shares
-from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
-from scara_ident.diagnosis.moments import examine_moments
 from scara_ident.diagnosis.noise_check import noise_objection
-from scara_ident.diagnosis.screening import Dependence, screen
+from scara_ident.diagnosis.outcome import Outcome, outcome_of
+from scara_ident.diagnosis.proxies import proxies
 from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search
-from scara_ident.diagnosis.selection_step import SelectionStep, observed, observed_at_every_sample
+from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.work import first, next_of
-from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.bands import HIGHEST_BAND, choose_bands
 from scara_ident.estimation.explained_power import EXPLAINED, sample
-from scara_ident.estimation.least_squares import told_value_and_weights, value_and_weights
-from scara_ident.estimation.noise_bias import noise_torque
+from scara_ident.estimation.least_squares import told_value_and_weights
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.estimation.residuals import Residuals
 from scara_ident.motion.prepared import PreparedData
 
 # Of what is suspected, and others may stand for.
 TOO_LITTLE = "{0.label} would remove {0.gain:.0%} of what is left, but the recordings hold too little of it to tell it from others"
-
-
-@dataclass(frozen=True)
-class Unexplained:
-    """A repeatable remainder that no effect explains.
-
-    Attributes
-    ----------
-    joint : str
-    signals : tuple of str
-        What it depends on; empty where no signal or pair of signals shows it.
-    rms : float
-        Its size within the band, N m or N.
-    explained : float
-        Share of the squared residual that the signals explain on held-out trajectories.
-    """
-
-    joint: str
-    signals: tuple[str, ...]
-    rms: float
-    explained: float
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """A search and what is left after it.
-
-    Attributes
-    ----------
-    search : Search
-    after : Estimate
-        With the effects found.
-    training : Observations
-        Of the training recordings, as corrected, with the effects found.
-    residuals : Residuals
-        What is left of them, without what runs differ by.
-    fit_before, fit_after : tuple of LackOfFit
-        Per joint; empty without repetitions.
-    dependences : tuple of Dependence
-        What the remainder depends on, ranked.
-    unexplained : Unexplained or None
-    small : tuple of float
-        What is too small on each joint to be called a remainder, where one is significant; 0 elsewhere. N m or N.
-    repeating : frozenset of str
-        Joints on which more repeats than noise, however small beside the torque, of however few moments or frequencies.
-    demoted : tuple of Decision
-        On effects that were found and are not believed, with why.
-    suspected : tuple of Decision
-        On what would be let in beside those that are, did the recordings hold enough of it, with why it is not.
-    """
-
-    search: Search
-    after: Estimate
-    training: Observations
-    residuals: Residuals
-    fit_before: tuple[LackOfFit, ...]
-    fit_after: tuple[LackOfFit, ...]
-    dependences: tuple[Dependence, ...]
-    unexplained: Unexplained | None
-    small: tuple[float, ...]
-    repeating: frozenset[str]
-    demoted: tuple[Decision, ...] = ()
-    suspected: tuple[Decision, ...] = ()
-
-    @cached_property
-    def hinted(self) -> Sequence[Decision]:
-        """What is suspected beside the effects that stayed, asked for more than once."""
-        return suspected(self.search, self.after.weights)
 
 
 def select_model(task: SearchTask, observations: Observations, *, free: bool) -> Outcome:
@@ -139,7 +64,7 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
             break
         columns, found = more, again
     left("testing what is left")
-    return _without_proxies(replace(task, progress=left), columns, _outcome(task, found))
+    return _without_proxies(replace(task, progress=left), columns, outcome_of(task, found))
 
 
 def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
@@ -204,86 +129,6 @@ def _new(found: Search, before: Search) -> bool:
     return any(item.effect.band(item.member) > 0.0 and item.label(found.scene) not in labels for item in found.chosen)
 
 
-def _outcome(task: SearchTask, found: Search) -> Outcome:
-    """Say what a search leaves."""
-    training = observed_at_every_sample(found.step)
-    before = found.uncorrected.residuals(found.start.value)
-    after, left = found.start, before
-    if training is not found.uncorrected:
-        after = wls(training)
-        left = training.residuals(after.value)
-    joints, criteria = task.model.robot.joints, task.criteria
-    least = dict.fromkeys(joints, criteria.remainder)
-    least_share = dict.fromkeys(joints, criteria.least_remainder)
-    if after.variation:
-        # What a run differs by from the others is no remainder of the model; of second order something of it is left.
-        deviations = after.variation.deviations(training, after.value)
-        left = Residuals(left.data, tuple(a + b for a, b in zip(left.predicted, deviations, strict=True)))
-        differing = after.variation.sizes(task.model.robot)
-        least |= dict.fromkeys(differing, criteria.remainder_of_runs)
-        least_share |= dict.fromkeys(differing, criteria.least_remainder_of_runs)
-    fit_after, dependences = lack_of_fit(left), screen(task.model, left, criteria)
-    # What is spread evenly over frequency is no motion's doing even where it repeats: an encoder's steps do, and what a
-    # controller makes of them.
-    coloured = dict(zip(joints, coloured_shares(left).tolist(), strict=True))
-    above = [fit for fit in fit_after if _above_noise(fit, criteria)]
-    repeating = [fit for fit in above if fit.p_value < criteria.significant]
-    depending = [
-        item for item in dependences if item.p_value < criteria.significant and item.explained > least[item.joint]
-    ]
-    made, small = np.zeros(len(joints)), np.zeros(len(joints))
-    if depending or any(fit.p_value < criteria.significant for fit in fit_after):
-        # What the positions' noise does to the columns may repeat too; and what is small beside the torque is not called one.
-        torque = [item.torque_rms if item.rows else 0.0 for item in training.by_joint]
-        made = noise_torque(training, after.value)
-        small = np.maximum(made, np.array(list(least_share.values())) * torque)
-    least_rms, of_positions = (dict(zip(joints, each.tolist(), strict=True)) for each in (small, made))
-    repeating = [
-        fit
-        for fit in repeating
-        if fit.missing > least_rms[fit.joint]
-        and (
-            coloured[fit.joint] > criteria.colour_of_remainder
-            or fit.missing > criteria.far_above_noise * max(fit.noise, of_positions[fit.joint])
-        )
-    ]
-    depending = [item for item in depending if item.rms > least_rms[item.joint]]
-    unexplained = _unexplained(repeating, depending, criteria)
-    # An effect may stand for that all the same.
-    names = frozenset(
-        fit.joint for fit in above if coloured[fit.joint] > criteria.least_colour or fit.p_value < criteria.significant
-    )
-    fit_before = fit_after if left is before else lack_of_fit(before)
-    return Outcome(
-        found, after, training, left, fit_before, fit_after, dependences, unexplained, tuple(small.tolist()), names
-    )
-
-
-def _unexplained(
-    repeating: Sequence[LackOfFit], depending: Sequence[Dependence], criteria: SelectionCriteria
-) -> Unexplained | None:
-    """Return the remainder on the joint that shows it most."""
-    if depending:
-        top = depending[0]
-        # A pair must say clearly more than its better half.
-        for other in depending[1:]:
-            if (
-                other.joint == top.joint
-                and len(other.signals) == 1
-                and other.explained > criteria.alone * top.explained
-            ):
-                top = other
-                break
-        return Unexplained(top.joint, top.signals, top.rms, top.explained)
-    if repeating:
-        return Unexplained(repeating[0].joint, (), repeating[0].missing, 0.0)
-    return None
-
-
-def _above_noise(fit: LackOfFit, criteria: SelectionCriteria) -> bool:
-    return fit.missing > criteria.remainder_to_noise * fit.noise
-
-
 def _widest(data: PreparedData) -> float:
     return max(band or np.inf for band in data.bands)
 
@@ -293,18 +138,18 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
     demoted: dict[str, Decision] = {}
     left = task.progress
     for _ in range(task.criteria.most_demotions):
-        proxies = [*_proxies(found, task.criteria), *_unstable(found, tuple(demoted.values()))]
-        if not proxies:
+        refused = [*proxies(found, task.criteria), *_unstable(found, tuple(demoted.values()))]
+        if not refused:
             break
-        demoted |= {item.label: item for item in reversed(proxies)}
+        demoted |= {item.label: item for item in reversed(refused)}
         now, left = next_of(left)
         again = search(replace(task, progress=now), columns, without=tuple(demoted), known=found.search)
-        found = _outcome(task, again)
+        found = outcome_of(task, again)
     else:
         # No further search, but nothing is believed that does not stand.
         while unstable := _unstable(found, tuple(demoted.values())):
             demoted |= {item.label: item for item in unstable}
-            found = _outcome(task, found.search.without([item.label for item in unstable]))
+            found = outcome_of(task, found.search.without([item.label for item in unstable]))
     short = [item.refused(TOO_LITTLE.format(item)) for item in found.hinted]
     return replace(found, demoted=tuple(demoted.values()), suspected=tuple(short))
 
@@ -316,66 +161,3 @@ def _unstable(found: Outcome, demoted: Sequence[Decision]) -> list[Decision]:
         *superfluous(search, weights, found.hinted),
         *outdone(search, weights, demoted),
     ]
-
-
-def _proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
-    """Return the decisions on effects that remove little of a remainder most of which stays, with why."""
-    # Not to believe an effect less is asked than to say that something is left: it may stand for what is too small, too.
-    left = found.repeating | ({found.unexplained.joint} if found.unexplained else set())
-    if not left or not found.fit_after:
-        return []
-    search = found.search
-    joints = search.base.robot.joints
-    noise = {fit.joint: fit.noise for fit in found.fit_after}
-    # What runs differ by does not repeat, however much of the residual it is.
-    variation = found.after.variation
-    varied = np.zeros(len(joints)) if variation is None else variation.mean_squares(found.training.joints)
-    own = dict(zip(joints, varied.tolist(), strict=True))
-    # What the noise of the positions makes does repeat; on joints where nothing else does, no effect need remove it.
-    made = dict(zip(joints, noise_torque(found.training, found.after.value).tolist(), strict=True))
-    of_positions = {
-        fit.joint: made[fit.joint]
-        for fit in found.fit_after
-        if fit.joint in left and 0.0 < fit.missing <= made[fit.joint]
-    }
-    proxies = []
-    before, whole = rms_of(search.start.value, search.uncorrected), rms_of(found.after.value, found.training)
-    labels = [item.label(search.scene) for item in search.chosen]
-    for step in search.steps:
-        after, decision = step.rms, step.decision
-        old_rms, new_rms = before, after
-        if decision.label in labels:
-            # Beside all others, of which those that came later may have removed what was left when it came in.
-            fitted = observed(search.step.without(labels.index(decision.label)))
-            old_rms, new_rms = rms_of(value_and_weights(fitted)[0], fitted), whole
-        elif decision.candidate.corrects_data:
-            fitted = observed(replace(search.step, columns=search.step.columns.beside(search.uncorrected)))
-            old_rms, new_rms = rms_of(value_and_weights(fitted)[0], fitted), whole
-        owner = decision.candidate.joint(search.scene)
-        repeats = beyond = removed = 0.0
-        for joint, old, new in zip(joints, old_rms, new_rms, strict=True):
-            if joint in noise and owner in (joint, None) and old is not None and new is not None:
-                most = (old**2 - own[joint]) / noise[joint] ** 2 - 1.0
-                repeats += max(0.0, most)
-                beyond += max(0.0, most - (of_positions.get(joint, 0.0) / noise[joint]) ** 2)
-                removed += (old**2 - new**2) / noise[joint] ** 2
-        before = after
-        short = removed < criteria.least_of_repeatable * repeats
-        excused = short and owner in of_positions and removed >= criteria.least_of_repeatable * beyond
-        if (owner is None or owner in left) and short and not (excused and decision.label in labels):
-            share = max(0.0, removed / repeats)
-            why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"
-            proxies.append(decision.refused(why))
-        elif decision.label in labels and (excused or (found.unexplained and owner in (None, found.unexplained.joint))):
-            # Repetitions of a motion prove no more than one run of it.
-            place = labels.index(decision.label)
-            p_value = examine_moments(search.step.without(place), search.chosen[place]).p_value
-            if p_value * search.tried > criteria.family_error:
-                why = f"what is left repeats: with repetitions of a motion counted once p = {p_value:.1e}"
-                proxies.append(decision.refused(why))
-    return proxies
-
-
-def rms_of(value: Array, observations: Observations) -> tuple[float | None, ...]:
-    """Return the rms of each joint over recordings, within the band; None without rows."""
-    return tuple(item.rms(value) if item.rows else None for item in observations.by_joint)

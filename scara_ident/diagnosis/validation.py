@@ -13,7 +13,7 @@ from scara_ident.diagnosis.correction import corrected
 from scara_ident.diagnosis.evidence import unsure_of_others
 from scara_ident.diagnosis.held_out_gain import HeldOutGain, held_out_gains
 from scara_ident.diagnosis.held_out_states import HeldOut, held_out_states
-from scara_ident.diagnosis.model_selection import Outcome
+from scara_ident.diagnosis.outcome import Outcome
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.estimation.another_run import of_another_run

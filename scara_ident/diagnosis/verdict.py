@@ -12,7 +12,7 @@ from scara_ident.diagnosis.even_evidence import even_evidence
 from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.held_out_gain import spoken_against
-from scara_ident.diagnosis.model_selection import Outcome, rms_of
+from scara_ident.diagnosis.outcome import Outcome, rms_of
 from scara_ident.diagnosis.validation import Validation
 from scara_ident.estimation.noise_bias import noise_signals
 

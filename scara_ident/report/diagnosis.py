@@ -13,8 +13,8 @@ from scara_ident.diagnosis.effect_parameters import RotorInertia
 from scara_ident.diagnosis.evidence import Evidence, least_found
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.held_out_gain import shown_of, words_of
-from scara_ident.diagnosis.model_selection import Unexplained, rms_of
 from scara_ident.diagnosis.next_steps import next_steps
+from scara_ident.diagnosis.outcome import Unexplained, rms_of
 from scara_ident.diagnosis.questions import suspects_in_model
 from scara_ident.diagnosis.torque_noise import noise_density
 from scara_ident.effects import Parameter

@@ -9,7 +9,7 @@ import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.correction import corrected, taken_out
-from scara_ident.diagnosis.model_selection import rms_of
+from scara_ident.diagnosis.outcome import rms_of
 from scara_ident.effects import Member
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.estimation import wls

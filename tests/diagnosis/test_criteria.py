@@ -21,7 +21,7 @@ from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, complete, exact_runs, residuals_of, step_beside, with_torque
 
 PACKAGE = Path(scara_ident.__file__).parent
-DECIDING = ("acceptance", "candidate_tests", "confounding", "model_selection", "search")
+DECIDING = ("acceptance", "candidate_tests", "confounding", "model_selection", "outcome", "proxies", "search")
 # How many columns are worked on at once, and rounding.
 NUMERICS = {"_COLUMNS", "_RANK"}
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.model_selection import rms_of
+from scara_ident.diagnosis.outcome import rms_of
 from scara_ident.effects import CATALOGUE, Coefficient, Effect, effects_named
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted

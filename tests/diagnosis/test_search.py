@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
-from scara_ident.diagnosis.model_selection import rms_of
+from scara_ident.diagnosis.outcome import rms_of
 from scara_ident.diagnosis.search import (
     SearchTask,
     columns_at_hand,

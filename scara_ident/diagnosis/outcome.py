@@ -1,0 +1,176 @@
+"""What a search leaves: whether it is noise, and on which joint something is left over."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.audit import suspected
+from scara_ident.diagnosis.criteria import SelectionCriteria
+from scara_ident.diagnosis.evidence import coloured_shares
+from scara_ident.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
+from scara_ident.diagnosis.screening import Dependence, screen
+from scara_ident.diagnosis.search import Search, SearchTask
+from scara_ident.diagnosis.selection_step import observed_at_every_sample
+from scara_ident.estimation import Estimate, wls
+from scara_ident.estimation.noise_bias import noise_torque
+from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.residuals import Residuals
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """A repeatable remainder that no effect explains.
+
+    Attributes
+    ----------
+    joint : str
+    signals : tuple of str
+        What it depends on; empty where no signal or pair of signals shows it.
+    rms : float
+        Its size within the band, N m or N.
+    explained : float
+        Share of the squared residual that the signals explain on held-out trajectories.
+    """
+
+    joint: str
+    signals: tuple[str, ...]
+    rms: float
+    explained: float
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A search and what is left after it.
+
+    Attributes
+    ----------
+    search : Search
+    after : Estimate
+        With the effects found.
+    training : Observations
+        Of the training recordings, as corrected, with the effects found.
+    residuals : Residuals
+        What is left of them, without what runs differ by.
+    fit_before, fit_after : tuple of LackOfFit
+        Per joint; empty without repetitions.
+    dependences : tuple of Dependence
+        What the remainder depends on, ranked.
+    unexplained : Unexplained or None
+    small : tuple of float
+        What is too small on each joint to be called a remainder, where one is significant; 0 elsewhere. N m or N.
+    repeating : frozenset of str
+        Joints on which more repeats than noise, however small beside the torque, of however few moments or frequencies.
+    demoted : tuple of Decision
+        On effects that were found and are not believed, with why.
+    suspected : tuple of Decision
+        On what would be let in beside those that are, did the recordings hold enough of it, with why it is not.
+    """
+
+    search: Search
+    after: Estimate
+    training: Observations
+    residuals: Residuals
+    fit_before: tuple[LackOfFit, ...]
+    fit_after: tuple[LackOfFit, ...]
+    dependences: tuple[Dependence, ...]
+    unexplained: Unexplained | None
+    small: tuple[float, ...]
+    repeating: frozenset[str]
+    demoted: tuple[Decision, ...] = ()
+    suspected: tuple[Decision, ...] = ()
+
+    @cached_property
+    def hinted(self) -> Sequence[Decision]:
+        """What is suspected beside the effects that stayed, asked for more than once."""
+        return suspected(self.search, self.after.weights)
+
+
+def outcome_of(task: SearchTask, found: Search) -> Outcome:
+    """Say what a search leaves."""
+    training = observed_at_every_sample(found.step)
+    before = found.uncorrected.residuals(found.start.value)
+    after, left = found.start, before
+    if training is not found.uncorrected:
+        after = wls(training)
+        left = training.residuals(after.value)
+    joints, criteria = task.model.robot.joints, task.criteria
+    least = dict.fromkeys(joints, criteria.remainder)
+    least_share = dict.fromkeys(joints, criteria.least_remainder)
+    if after.variation:
+        # What a run differs by from the others is no remainder of the model; of second order something of it is left.
+        deviations = after.variation.deviations(training, after.value)
+        left = Residuals(left.data, tuple(a + b for a, b in zip(left.predicted, deviations, strict=True)))
+        differing = after.variation.sizes(task.model.robot)
+        least |= dict.fromkeys(differing, criteria.remainder_of_runs)
+        least_share |= dict.fromkeys(differing, criteria.least_remainder_of_runs)
+    fit_after, dependences = lack_of_fit(left), screen(task.model, left, criteria)
+    # What is spread evenly over frequency is no motion's doing even where it repeats: an encoder's steps do, and what a
+    # controller makes of them.
+    coloured = dict(zip(joints, coloured_shares(left).tolist(), strict=True))
+    above = [fit for fit in fit_after if _above_noise(fit, criteria)]
+    repeating = [fit for fit in above if fit.p_value < criteria.significant]
+    depending = [
+        item for item in dependences if item.p_value < criteria.significant and item.explained > least[item.joint]
+    ]
+    made, small = np.zeros(len(joints)), np.zeros(len(joints))
+    if depending or any(fit.p_value < criteria.significant for fit in fit_after):
+        # What the positions' noise does to the columns may repeat too; and what is small beside the torque is not called one.
+        torque = [item.torque_rms if item.rows else 0.0 for item in training.by_joint]
+        made = noise_torque(training, after.value)
+        small = np.maximum(made, np.array(list(least_share.values())) * torque)
+    least_rms, of_positions = (dict(zip(joints, each.tolist(), strict=True)) for each in (small, made))
+    repeating = [
+        fit
+        for fit in repeating
+        if fit.missing > least_rms[fit.joint]
+        and (
+            coloured[fit.joint] > criteria.colour_of_remainder
+            or fit.missing > criteria.far_above_noise * max(fit.noise, of_positions[fit.joint])
+        )
+    ]
+    depending = [item for item in depending if item.rms > least_rms[item.joint]]
+    unexplained = _unexplained(repeating, depending, criteria)
+    # An effect may stand for that all the same.
+    names = frozenset(
+        fit.joint for fit in above if coloured[fit.joint] > criteria.least_colour or fit.p_value < criteria.significant
+    )
+    fit_before = fit_after if left is before else lack_of_fit(before)
+    return Outcome(
+        found, after, training, left, fit_before, fit_after, dependences, unexplained, tuple(small.tolist()), names
+    )
+
+
+def _unexplained(
+    repeating: Sequence[LackOfFit], depending: Sequence[Dependence], criteria: SelectionCriteria
+) -> Unexplained | None:
+    """Return the remainder on the joint that shows it most."""
+    if depending:
+        top = depending[0]
+        # A pair must say clearly more than its better half.
+        for other in depending[1:]:
+            if (
+                other.joint == top.joint
+                and len(other.signals) == 1
+                and other.explained > criteria.alone * top.explained
+            ):
+                top = other
+                break
+        return Unexplained(top.joint, top.signals, top.rms, top.explained)
+    if repeating:
+        return Unexplained(repeating[0].joint, (), repeating[0].missing, 0.0)
+    return None
+
+
+def _above_noise(fit: LackOfFit, criteria: SelectionCriteria) -> bool:
+    return fit.missing > criteria.remainder_to_noise * fit.noise
+
+
+def rms_of(value: Array, observations: Observations) -> tuple[float | None, ...]:
+    """Return the rms of each joint over recordings, within the band; None without rows."""
+    return tuple(item.rms(value) if item.rows else None for item in observations.by_joint)

@@ -1,0 +1,145 @@
+"""Effects that stand for what is not in the catalogue: they remove little of a remainder most of which stays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.criteria import SelectionCriteria
+from scara_ident.diagnosis.moments import examine_moments
+from scara_ident.diagnosis.outcome import Outcome, rms_of
+from scara_ident.diagnosis.search import Step
+from scara_ident.diagnosis.selection_step import SelectionStep, observed
+from scara_ident.estimation.least_squares import value_and_weights
+from scara_ident.estimation.noise_bias import noise_torque
+
+ByJoint = tuple[float | None, ...]
+
+
+@dataclass(frozen=True)
+class _NotRepeating:
+    """What of a joint's residual does not count as repeating.
+
+    Attributes
+    ----------
+    noise : float
+        Rms of what differs between repetitions, N m or N.
+    differing : float
+        Mean square of what runs differ by.
+    of_positions : float
+        Rms of what the noise of the positions makes, where nothing else is left; 0 elsewhere.
+    """
+
+    noise: float
+    differing: float
+    of_positions: float
+
+
+@dataclass(frozen=True)
+class _Removal:
+    """Squares over those of the noise: what an effect removes, what repeats without it, and of that what no noise makes."""
+
+    removed: float
+    repeating: float
+    beyond: float
+
+
+def proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
+    """Return the decisions on effects that remove little of a remainder most of which stays, with why.
+
+    Nor is one believed beside a remainder that is significant only since motions were repeated.
+
+    Parameters
+    ----------
+    found : Outcome
+    criteria : SelectionCriteria
+    """
+    # Not to believe an effect less is asked than to say that something is left: it may stand for what is too small, too.
+    left = found.repeating | ({found.unexplained.joint} if found.unexplained else set())
+    if not left or not found.fit_after:
+        return []
+    search, rest = found.search, _not_repeating(found, left)
+    labels = [item.label(search.scene) for item in search.chosen]
+    refused = []
+    for step, without, beside in _each_without(found, labels):
+        decision = step.decision
+        owner = decision.candidate.joint(search.scene)
+        removal = _removal(
+            rest, dict(zip(search.base.robot.joints, zip(without, beside, strict=True), strict=True)), owner
+        )
+        short = removal.removed < criteria.least_of_repeatable * removal.repeating
+        kept = decision.label in labels
+        # On a joint where nothing but what the positions' noise makes is left, no effect need remove that.
+        noisy = owner is not None and owner in rest and rest[owner].of_positions > 0.0
+        excused = short and noisy and removal.removed >= criteria.least_of_repeatable * removal.beyond
+        if short and (owner is None or owner in left) and not (excused and kept):
+            share = max(0.0, removal.removed / removal.repeating)
+            why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"
+            refused.append(decision.refused(why))
+        elif kept and (excused or (found.unexplained and owner in (None, found.unexplained.joint))):
+            once = _only_repeated(search.step, labels.index(decision.label), criteria)
+            refused += [decision.refused(once)] if once else []
+    return refused
+
+
+def _not_repeating(found: Outcome, left: frozenset[str] | set[str]) -> Mapping[str, _NotRepeating]:
+    """Return it for each joint of which repetitions tell."""
+    joints, variation = found.search.base.robot.joints, found.after.variation
+    varied = np.zeros(len(joints)) if variation is None else variation.mean_squares(found.training.joints)
+    differing = dict(zip(joints, varied.tolist(), strict=True))
+    made = dict(zip(joints, noise_torque(found.training, found.after.value).tolist(), strict=True))
+    return {
+        fit.joint: _NotRepeating(
+            fit.noise,
+            differing[fit.joint],
+            made[fit.joint] if fit.joint in left and 0.0 < fit.missing <= made[fit.joint] else 0.0,
+        )
+        for fit in found.fit_after
+    }
+
+
+def _each_without(found: Outcome, labels: list[str]) -> Iterator[tuple[Step, ByJoint, ByJoint]]:
+    """Give each step with the rms of every joint without its effect, and with it.
+
+    Of one that is still in the model that is beside all others, of which those that came later may have removed what was left
+    when it came in; of one that went again, when it came in.
+    """
+    search = found.search
+    before, whole = rms_of(search.start.value, search.uncorrected), rms_of(found.after.value, found.training)
+    for step in search.steps:
+        fitted = None
+        if step.decision.label in labels:
+            fitted = observed(search.step.without(labels.index(step.decision.label)))
+        elif step.decision.candidate.corrects_data:
+            fitted = observed(replace(search.step, columns=search.step.columns.beside(search.uncorrected)))
+        if fitted is None:
+            yield step, before, step.rms
+        else:
+            yield step, rms_of(value_and_weights(fitted)[0], fitted), whole
+        before = step.rms
+
+
+def _removal(
+    rest: Mapping[str, _NotRepeating], errors: Mapping[str, tuple[float | None, float | None]], owner: str | None
+) -> _Removal:
+    """Return what an effect removes, over its joint or all of them, by the rms without it and with it."""
+    removed = repeating = beyond = 0.0
+    for joint, (without, beside) in errors.items():
+        if joint in rest and owner in (joint, None) and without is not None and beside is not None:
+            own, square = rest[joint], rest[joint].noise ** 2
+            most = (without**2 - own.differing) / square - 1.0
+            repeating += max(0.0, most)
+            beyond += max(0.0, most - own.of_positions**2 / square)
+            removed += (without**2 - beside**2) / square
+    return _Removal(removed, repeating, beyond)
+
+
+def _only_repeated(step: SelectionStep, place: int, criteria: SelectionCriteria) -> str | None:
+    """Say so where only repetitions make an effect significant: those of a motion prove no more than one run of it."""
+    p_value = examine_moments(step.without(place), step.chosen[place]).p_value
+    if p_value * step.tried <= criteria.family_error:
+        return None
+    return f"what is left repeats: with repetitions of a motion counted once p = {p_value:.1e}"
