@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects import EffectTerm
@@ -193,21 +194,28 @@ def _told(found: IdentifiedModel, missing: Sequence[tuple[Term, list[int], str]]
         yield name, "it was taken out of the recordings"
 
 
-def _adjustable(form: Form, found: IdentifiedModel) -> tuple[Array, Array]:
-    """Return the places of friction and offset that the format has, and what they may not fall below."""
+def _adjustable(form: Form, found: IdentifiedModel) -> tuple[NDArray[np.intp], Array]:
+    """Return the places of friction and offset that the format has, and what they may not fall below.
+
+    Of friction that the recordings leave open nothing is said. An offset that they leave open beside the bodies, as on an
+    axis that goes up and down, is told once those are what is written.
+    """
     places: list[int] = []
     lower: list[float] = []
     for term in found.model.terms:
         start = found.model.place(term).start
         for k in range(len(term.columns)):
             friction = isinstance(term, Friction) and _has(form, term.powers[k % len(term.powers)])
-            if (friction or (isinstance(term, Offset) and form.offset)) and not found.undetermined[start + k]:
+            if (friction and not found.undetermined[start + k]) or (isinstance(term, Offset) and form.offset):
                 places.append(start + k)
                 lower.append(0.0 if form.bodies and form.powers is not None and friction else -np.inf)
-    return np.array(places, dtype=np.intp), np.array(lower)
+    kept = np.array(places, dtype=np.intp)
+    told = ~found.information.select(kept).solve().undetermined if len(kept) else np.zeros(0, dtype=bool)
+    told |= ~found.undetermined[kept]
+    return kept[told], np.array(lower)[told]
 
 
-def _fitted(information: Information, value: Array, places: Array, lower: Array) -> Array:
+def _fitted(information: Information, value: Array, places: NDArray[np.intp], lower: Array) -> Array:
     """Return the parameters at some places that fit best beside all others."""
     from scipy.optimize import lsq_linear
 

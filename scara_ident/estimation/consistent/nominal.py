@@ -19,8 +19,10 @@ THINNEST = 1e-3
 BALL_RADIUS = 0.25
 # Length of an arm that has no second joint to take a length from, m.
 DEFAULT_LENGTH = 0.4
-# A rotor of unknown inertia is given this share of what its joint moves at the zero position.
+# A rotor of unknown inertia is given this share of what its joint moves at the zero position. That is a guess, and its
+# distance from it weighs so little beside those of bodies, which the URDF gives: of rotors of arms it is off by ten times.
 ROTOR_SHARE = 0.1
+GUESS_WEIGHT = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +35,8 @@ class Nominal:
         Positive definite, in the order of the robot's joints.
     armature : ndarray, shape (n,)
         Positive, kg m^2 or kg.
+    rotor_weights : ndarray, shape (n,)
+        Of the rotors' distances from it, beside those of bodies: 1, and `GUESS_WEIGHT` where it was guessed.
     to_standard : ndarray, shape (11 n, 11 n)
         Takes bodies and rotors relative to nominal (see `relative`) to the standard parameters.
     notes : tuple of str
@@ -41,6 +45,7 @@ class Nominal:
 
     pseudo_inertia: Array
     armature: Array
+    rotor_weights: Array
     to_standard: Array
     notes: tuple[str, ...]
 
@@ -78,7 +83,8 @@ def nominal(robot: Robot) -> Nominal:
             f"rotor inertia of {names}: not in the URDF; where torque does not determine it, it is taken near "
             f"{ROTOR_SHARE:.0%} of what the joint moves"
         )
-    return Nominal(stacked, armature, _to_standard(stacked, armature), tuple(notes))
+    weights = np.where(unknown, GUESS_WEIGHT, 1.0)
+    return Nominal(stacked, armature, weights, _to_standard(stacked, armature), tuple(notes))
 
 
 def _physical(matrix: Array, mass: float, radius: float) -> tuple[Array, str]:

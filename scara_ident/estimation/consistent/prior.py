@@ -6,7 +6,7 @@ robot dynamic identification: a convex programming approach")
     D(P | P0) = tr(P0^-1 P) - log det(P0^-1 P) - 4,
 
 which depends on neither frame nor unit and is infinite for a body that cannot exist. Each rotor has the same
-divergence of numbers, a/a0 - log(a/a0) - 1.
+divergence of numbers, a/a0 - log(a/a0) - 1, times a weight that is small where a0 is a guess.
 
 **Prior weight.** Near the nominal arm the divergence is half the squared length of the bodies' difference from nominal,
 as matrices relative to nominal. In that length every direction has a standard deviation s that the data leave it, and
@@ -33,6 +33,7 @@ from scara_ident.errors import EstimationError
 from scara_ident.estimation.consistent.bodies import PACKED_IDENTITY, unpack
 from scara_ident.estimation.consistent.constraints import Cone
 from scara_ident.estimation.consistent.problem import Unknowns
+from scara_ident.model.terms import Offset
 
 # The data distinguish a direction from nominal at this many standard deviations; then the prior moves it by this share
 # of one.
@@ -40,6 +41,8 @@ SIGNIFICANT = 4.0
 MOST_BIAS = 0.05
 # No arm differs from its nominal one by more than this factor; a larger standard deviation distinguishes nothing.
 FARTHEST = 1e5
+# What is constant is rather this share of the torque.
+OFFSET_SHARE = 0.1
 # Singular values below this share of the largest are made of rounding.
 ROUNDING = 1e-12
 
@@ -73,6 +76,7 @@ def prior_rows(u: Unknowns, rows: Array, target: Array, weight: float) -> Array:
         Rows W on x less its reference; the prior is ``|W (x - reference)|^2``.
     """
     scales = np.ones(u.size)
+    scales[10 * u.n : 11 * u.n] = 1.0 / np.sqrt(u.nominal.rotor_weights)
     scales[11 * u.n :] = _other_scales(u, rows, target)
     scaled = rows * scales
     left, singular, right = np.linalg.svd(scaled, full_matrices=False)
@@ -87,29 +91,42 @@ def prior_rows(u: Unknowns, rows: Array, target: Array, weight: float) -> Array:
 
 
 def _other_scales(u: Unknowns, rows: Array, target: Array) -> Array:
-    """Size of the other columns' unknowns: their torque limit's, or that at which one makes the whole torque."""
+    """Size of the other columns' unknowns: their torque limit's, or that at which one makes the whole torque.
+
+    A constant torque, beside which a vertical axis does not tell its mass, is rather a tenth of it.
+    """
     size = np.linalg.norm(rows[:, 11 * u.n :], axis=0)
     torque = float(np.linalg.norm(target))
     scales = np.where(size > 0.0, torque / np.where(size > 0.0, size, 1.0), 1.0)
     column = np.argmax(u.to_parameters[:, 11 * u.n :] != 0.0, axis=0)
     scales[np.isin(column, u.bounded)] = 1.0
+    for term in u.model.terms:
+        if isinstance(term, Offset):
+            place = u.model.place(term)
+            scales[(column >= place.start) & (column < place.stop)] *= OFFSET_SHARE
     return np.where(scales > 0.0, scales, 1.0)
 
 
-def divergence(x: Array, weight: float = 1.0) -> float:
+def divergence(x: Array, weight: float = 1.0, rotors: Array | float = 1.0) -> float:
     """Return the divergence of bodies and rotors relative to nominal, shape (11 n,), from the nominal arm.
 
     With ``weight`` on the traces the nominal arm is 1/weight times as heavy, and the result differs by a constant.
+    ``rotors`` are the weights of the rotors' divergences, shape (n,).
     """
     n = len(x) // 11
     bodies = np.linalg.eigvalsh(unpack(x[: 10 * n].reshape(n, 10)))
     values = np.concatenate([bodies.ravel(), x[10 * n :]])
     if np.any(values <= 0.0):
         return np.inf
-    return float(np.sum(weight * values - np.log(values) - 1.0))
+    return float(_each(n, rotors) @ (weight * values - np.log(values) - 1.0))
 
 
-def nearest_to_nominal(start: Array, free: Array, limits: Sequence[Cone] = ()) -> Array:
+def _each(n: int, rotors: Array | float) -> Array:
+    """Return the weights of the four eigenvalues of every body, and of the rotors."""
+    return np.append(np.ones(4 * n), np.broadcast_to(rotors, n))
+
+
+def nearest_to_nominal(start: Array, free: Array, limits: Sequence[Cone] = (), rotors: Array | float = 1.0) -> Array:
     """Find the bodies nearest to nominal along free directions.
 
     This is not left to cvxpy: Clarabel with ``log_det`` takes 85 ms on the arm of UR5 and 33 ms on SCARA03, where these
@@ -123,6 +140,8 @@ def nearest_to_nominal(start: Array, free: Array, limits: Sequence[Cone] = ()) -
         Directions along which nothing changes that torque depends on.
     limits : sequence of Cone, optional
         Bounds of masses and centres of mass, on the 11 n unknowns.
+    rotors : ndarray, shape (n,), optional
+        Weights of the rotors' divergences.
 
     Returns
     -------
@@ -141,19 +160,27 @@ def nearest_to_nominal(start: Array, free: Array, limits: Sequence[Cone] = ()) -
     # The share of its weight at which the nominal arm is as heavy as the start.
     heavy = 5.0 * n / max(5.0 * n, float(np.tile(PACKED_IDENTITY, n) @ start[: 10 * n] + start[10 * n :].sum()))
     while heavy < 1.0:
-        x = _newton(x, free, limits, weights[0], heavy, ROUGH)
+        x = _newton(x, free, limits, rotors, weights[0], heavy, ROUGH)
         heavy *= STRIDE
     for weight in weights:
-        x = _newton(x, free, limits, weight, 1.0, PRECISION)
+        x = _newton(x, free, limits, rotors, weight, 1.0, PRECISION)
     return x
 
 
-def _newton(start: Array, free: Array, limits: Sequence[Cone], weight: float, heavy: float, precision: float) -> Array:
+def _newton(
+    start: Array,
+    free: Array,
+    limits: Sequence[Cone],
+    rotors: Array | float,
+    weight: float,
+    heavy: float,
+    precision: float,
+) -> Array:
     n = len(start) // 11
     directions = unpack(np.moveaxis(free[: 10 * n].reshape(n, 10, -1), 2, 1))
-    x, value = start, _value(start, limits, weight, heavy)
+    x, value = start, _value(start, limits, rotors, weight, heavy)
     for _ in range(MOST_STEPS):
-        gradient, root, local = _slopes(x, n, directions, free, limits, weight, heavy)
+        gradient, root, local = _slopes(x, n, directions, free, limits, rotors, weight, heavy)
         triangular = np.asarray(np.linalg.qr(root, mode="r"))
         half = np.linalg.solve(triangular.T, gradient)
         step = -np.linalg.solve(triangular, half)
@@ -161,11 +188,11 @@ def _newton(start: Array, free: Array, limits: Sequence[Cone], weight: float, he
         change = free @ step
         if decrement < precision * max(1.0, abs(value)):
             # The last step squares what error is left, and too little is gained to measure it.
-            return x + change if np.isfinite(_value(x + change, limits, weight, heavy)) else x
-        length = 1.0 if weight else _length(np.tensordot(local, step, axes=(1, 0)), change, x, heavy)
+            return x + change if np.isfinite(_value(x + change, limits, rotors, weight, heavy)) else x
+        length = 1.0 if weight else _length(np.tensordot(local, step, axes=(1, 0)), change, x, rotors, heavy)
         while True:
             trial = x + length * change
-            new = _value(trial, limits, weight, heavy)
+            new = _value(trial, limits, rotors, weight, heavy)
             if new < value:
                 break
             length *= 0.5
@@ -180,7 +207,7 @@ def _newton(start: Array, free: Array, limits: Sequence[Cone], weight: float, he
     )
 
 
-def _length(local: Array, change: Array, x: Array, heavy: float) -> float:
+def _length(local: Array, change: Array, x: Array, rotors: Array | float, heavy: float) -> float:
     """Length of the step that makes the divergence smallest along it.
 
     Near the edge Newton's own length only doubles the distance from it; along a line the divergence is a sum of
@@ -188,25 +215,26 @@ def _length(local: Array, change: Array, x: Array, heavy: float) -> float:
     """
     n = len(local)
     rates = np.concatenate([np.linalg.eigvalsh(local).ravel(), change[10 * n :] / x[10 * n :]])
-    linear = heavy * float(np.tile(PACKED_IDENTITY, n) @ change[: 10 * n] + change[10 * n :].sum())
+    each = _each(n, rotors)
+    linear = heavy * float(np.tile(PACKED_IDENTITY, n) @ change[: 10 * n] + each[4 * n :] @ change[10 * n :])
     fastest = float(np.min(rates))
     low, high = 0.0, (1.0 / -fastest if fastest < 0.0 else 1e12)
     length = min(1.0, 0.5 * high)
     for _ in range(LINE_STEPS):
         share = rates / (1.0 + length * rates)
-        slope = linear - float(share.sum())
+        slope = linear - float(each @ share)
         if slope > 0.0:
             high = length
         else:
             low = length
-        trial = length - slope / max(float(share @ share), np.finfo(float).tiny)
+        trial = length - slope / max(float(each @ share**2), np.finfo(float).tiny)
         # Newton along the line where it stays between the bounds, their middle in ratio where not.
         length = trial if low < trial < high else (np.sqrt(low * high) if low > 0.0 else 0.1 * high)
     return float(length)
 
 
-def _value(x: Array, limits: Sequence[Cone], weight: float, heavy: float) -> float:
-    value = divergence(x, heavy)
+def _value(x: Array, limits: Sequence[Cone], rotors: Array | float, weight: float, heavy: float) -> float:
+    value = divergence(x, heavy, rotors)
     if weight == 0.0 or not np.isfinite(value):
         return value
     for limit in limits:
@@ -218,19 +246,26 @@ def _value(x: Array, limits: Sequence[Cone], weight: float, heavy: float) -> flo
 
 
 def _slopes(
-    x: Array, n: int, directions: Array, free: Array, limits: Sequence[Cone], weight: float, heavy: float
+    x: Array,
+    n: int,
+    directions: Array,
+    free: Array,
+    limits: Sequence[Cone],
+    rotors: Array | float,
+    weight: float,
+    heavy: float,
 ) -> tuple[Array, Array, Array]:
     """Gradient along the free directions, a square root of the Hessian as rows, and the directions seen from x."""
     inverse_root = np.linalg.inv(np.linalg.cholesky(unpack(x[: 10 * n].reshape(n, 10))))
     # In the metric of the point itself, each direction is a symmetric matrix per body.
     local = inverse_root[:, None] @ directions @ np.swapaxes(inverse_root, 1, 2)[:, None]
-    rotors = free[10 * n :]
-    own = rotors / x[10 * n :, None]
+    weights = _each(n, rotors)[4 * n :]
+    own = free[10 * n :] / x[10 * n :, None]
     trace = np.trace(local, axis1=2, axis2=3)
-    linear = np.tile(PACKED_IDENTITY, n) @ free[: 10 * n] + rotors.sum(axis=0)
-    gradient = heavy * linear - trace.sum(axis=0) - own.sum(axis=0)
+    linear = np.tile(PACKED_IDENTITY, n) @ free[: 10 * n] + weights @ free[10 * n :]
+    gradient = heavy * linear - trace.sum(axis=0) - weights @ own
     count = free.shape[1]
-    rows = [np.moveaxis(local, 1, 3).reshape(16 * n, count), own]
+    rows = [np.moveaxis(local, 1, 3).reshape(16 * n, count), np.sqrt(weights)[:, None] * own]
     for limit in limits:
         slope, root_of_hessian = _barrier(limit, x)
         gradient = gradient + weight * (slope @ limit.matrix @ free)

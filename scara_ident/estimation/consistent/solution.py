@@ -235,7 +235,8 @@ def nearest_arm(
     if standard_prior is not None:
         rows.append(standard_prior.rows @ u.nominal.to_standard)
     result = x.copy()
-    result[u.rigid] = nearest_to_nominal(x[u.rigid], _unseen(np.vstack(rows)), u.arm[2 * u.n :])
+    unseen = _unseen(np.vstack(rows))
+    result[u.rigid] = nearest_to_nominal(x[u.rigid], unseen, u.arm[2 * u.n :], u.nominal.rotor_weights)
     return result
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import null_space
@@ -26,7 +27,7 @@ def random_bodies(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def arm(bodies: np.ndarray, rotors: np.ndarray) -> Nominal:
-    return Nominal(bodies, rotors, _to_standard(bodies, rotors), ())
+    return Nominal(bodies, rotors, np.ones(len(rotors)), _to_standard(bodies, rotors), ())
 
 
 def relative(nominal: Nominal, bodies: np.ndarray, rotors: np.ndarray) -> np.ndarray:
@@ -51,14 +52,15 @@ def test_the_divergence_is_its_definition():
     assert divergence(x) == np.inf
 
 
-def test_the_nearest_bodies_are_those_of_a_general_solver():
+@pytest.mark.parametrize("trust", [(1.0, 1.0), (0.01, 1.0)])
+def test_the_nearest_bodies_are_those_of_a_general_solver(trust):
     import cvxpy as cp
 
     rng = np.random.default_rng(1)
     nominal = arm(random_bodies(rng, N), np.array([0.5, 0.1]))
     start = relative(nominal, random_bodies(rng, N), np.array([0.7, 0.3]))
     held = rng.standard_normal((12, 11 * N))
-    found = nearest_to_nominal(start, null_space(held))
+    found = nearest_to_nominal(start, null_space(held), rotors=np.array(trust))
     np.testing.assert_allclose(held @ found, held @ start, rtol=1e-10)
 
     bodies, rotors = [cp.Variable((4, 4), symmetric=True) for _ in range(N)], cp.Variable(N)
@@ -74,10 +76,10 @@ def test_the_nearest_bodies_are_those_of_a_general_solver():
             rotors,
         ]
     )
-    cost = sum(cp.trace(b) - cp.log_det(b) for b in bodies) + cp.sum(rotors) - cp.sum(cp.log(rotors))
+    cost = sum(cp.trace(b) - cp.log_det(b) for b in bodies) + np.array(trust) @ (rotors - cp.log(rotors))
     cp.Problem(cp.Minimize(cost), [held @ x == held @ start]).solve(cp.CLARABEL)
     np.testing.assert_allclose(found, x.value, atol=2e-4 * np.abs(found).max())
-    assert divergence(found) <= divergence(x.value) + 1e-6
+    assert divergence(found, 1.0, np.array(trust)) <= divergence(x.value, 1.0, np.array(trust)) + 1e-6
 
 
 @settings(max_examples=15)
