@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
-from scara_ident.estimation import Estimate, History, JointError
+from scara_ident.estimation import Estimate, History, JointError, wls
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, physical_consistency
 from scara_ident.estimation.consistent.feasibility import PhysicalConsistency
 from scara_ident.estimation.consistent.options import ConsistentOptions
@@ -211,9 +211,11 @@ def identify(
     notes += more
     progress("estimating", 0.7)
     estimate, history = estimate_by(method, training, options)
-    # Both of the same samples.
-    plain = estimate if training.kept is None else estimate_by(method, training.kept, options)[0]
-    differs = None if robust is None else disagreement(plain, robust)
+    differs = None
+    if robust is not None:
+        # Both of the same samples, and neither held by what an arm can have.
+        plain = estimate if method == "wls" and training.kept is None else wls(training.in_memory)
+        differs = disagreement(plain, robust)
     events += () if faults else held_out_events(estimate.value, training, validated)
     drift = None if faults else clock_drift(estimate.value, training.in_memory)
     notes += event_notes(robot, events) + [said for said in (differs, drift) if said is not None]
