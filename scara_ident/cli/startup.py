@@ -37,7 +37,7 @@ def begin_soon() -> None:
 
 
 @contextmanager
-def read_beside(arm: Robot, needed: Words, *others: Words) -> Iterator[Callable[[], list[Usable]]]:
+def read_beside(arm: Robot, *each: Words) -> Iterator[Callable[[], list[Usable]]]:
     """Read recordings in another process while what works on them is loaded; yields what waits for them.
 
     Many or long ones are read here, when they are waited for.
@@ -45,19 +45,17 @@ def read_beside(arm: Robot, needed: Words, *others: Words) -> Iterator[Callable[
     Parameters
     ----------
     arm : Robot
-    needed : sequence of path or str
-        At least one of them has to be usable, see `read_usable`.
-    *others : sequence of path or str
-        None of them has.
+    *each : sequence of path or str
+        Of each that names any, at least one has to be usable, see `read_usable`.
     """
     from scara_ident.processes import beside
     from scara_ident.recording.paths import recording_paths
     from scara_ident.recording.recording import read_usable
 
     def read() -> list[Usable]:
-        return [read_usable(needed, arm), *(read_usable(words, arm, needed=False) for words in others)]
+        return [read_usable(words, arm) for words in each]
 
-    paths = (path for words in (needed, *others) for path in recording_paths(words))
+    paths = (path for words in each for path in recording_paths(words))
     # Polars in a process that is forked from one that used it waits for threads that are not there.
     if "polars" in sys.modules or sum(path.stat().st_size for path in paths if path.is_file()) > SMALL:
         yield read

@@ -45,7 +45,7 @@ def use(
     arm = model.robot
     motion = None if trajectory is None else named_motion(trajectory, arm)
     with progress() as work:
-        given, useless = read_usable(recording or (), arm, needed=False)
+        given, useless = read_usable(recording or (), arm)
         found = run(model, motion, given, seed=seed, progress=work)
     content = use_dict(found)
     console = result_console(content, json)

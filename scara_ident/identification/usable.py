@@ -39,7 +39,7 @@ def usable_in_bands(
     recordings : sequence of Recording
         At least one of them is left.
     validation : sequence of Recording, optional
-        Take no part in the choice of bands; all of them may go.
+        Take no part in the choice of bands; where there are any, at least one is left.
     bands : sequence of float or None, one per joint, optional
         Hz; chosen from the recordings by default.
     alike : bool, optional
@@ -56,13 +56,13 @@ def usable_in_bands(
     UsageError
         If there are no recordings.
     RecordingError
-        If none of the recordings has effort and four samples in a row.
+        If none of the recordings, or of those held out, has effort and four samples in a row, or none of the latter has rows.
     """
     if not recordings:
         raise UsageError("no recordings to identify from")
     keep_freed()
-    data, useless = usable_data(recordings, needed=True)
-    held_out, more = usable_data(validation, needed=False)
+    data, useless = usable_data(recordings)
+    held_out, more = usable_data(validation)
     notes = [*useless, *more, *data_notes(data, held_out)]
     useless = []
     if bands is None:
@@ -70,6 +70,8 @@ def usable_in_bands(
         bands, notes = chosen.bands, [*notes, *chosen.notes]
     data, short = with_rows(data.at(bands), needed=True)
     held_out, more = with_rows(held_out.at(bands), needed=False)
+    if validation and not held_out.recordings:
+        raise RecordingError(f"{more[0]}, and nothing else is held out")
     return data, held_out, [*notes, *useless, *short, *more]
 
 
@@ -87,19 +89,13 @@ def _bands_of(model: TorqueModel, data: PreparedData, *, alike: bool) -> tuple[B
         data, useless = left, [*useless, *short]
 
 
-def usable_data(recordings: Sequence[Recording], *, needed: bool) -> tuple[PreparedData, list[str]]:
+def usable_data(recordings: Sequence[Recording]) -> tuple[PreparedData, list[str]]:
     """Make recordings ready, without those that have no effort or no four samples in a row, and say which.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    needed : bool
-        Whether at least one has to be left.
 
     Raises
     ------
     RecordingError
-        That of the first recording, if one is needed and none is left.
+        That of the first recording, if none is left.
     """
     kept, notes, errors = [], [], []
     for recording in recordings:
@@ -111,7 +107,7 @@ def usable_data(recordings: Sequence[Recording], *, needed: bool) -> tuple[Prepa
             notes.append(f"{error}; left out")
         else:
             kept.append(item)
-    if needed and not kept:
+    if errors and not kept:
         raise errors[0]
     return PreparedData(tuple(kept), kept[0].bands if kept else ()), notes
 

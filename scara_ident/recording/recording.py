@@ -354,10 +354,8 @@ def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: b
     return tuple(read_recording(path, robot, need_effort=need_effort) for path in recording_paths(words))
 
 
-def read_usable(
-    words: Sequence[Path | str], robot: Robot, *, needed: bool = True
-) -> tuple[tuple[Recording, ...], list[str]]:
-    """Read recordings with effort, without those that cannot be used, and say which; at least one if it is needed.
+def read_usable(words: Sequence[Path | str], robot: Robot) -> tuple[tuple[Recording, ...], list[str]]:
+    """Read recordings with effort, without those that cannot be used, and say which; at least one of those that are named.
 
     Raises
     ------
@@ -371,7 +369,7 @@ def read_usable(
         except RecordingError as error:
             errors.append(error)
             notes.append(f"{error}; left out")
-    if needed and errors and not found:
+    if errors and not found:
         raise errors[0]
     return tuple(found), notes
 

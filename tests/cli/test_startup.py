@@ -54,9 +54,9 @@ print(gc.get_freeze_count())
 ARM = load_robot()
 
 
-def where(words: Sequence[Path | str], arm: Robot, *, needed: bool = True) -> tuple[int, bool]:
-    """Stands for reading: where it is done, and whether it has to give a recording."""
-    return os.getpid(), needed
+def where(words: Sequence[Path | str], arm: Robot) -> tuple[int, int]:
+    """Stands for reading: where it is done, and how much is to be read."""
+    return os.getpid(), len(words)
 
 
 @pytest.fixture(autouse=True)
@@ -71,19 +71,20 @@ def test_small_recordings_are_read_in_another_process_and_large_ones_here(
     path = tmp_path / "OJK_1.csv"
     path.write_text("time\n0\n", encoding="utf-8")
     with read_beside(ARM, [path], [], [str(tmp_path)]) as wanted:
-        (there, *flags), *others = wanted()
-    assert (flags, [needed for _, needed in others]) == ([True], [False, False])
-    assert {there} == {process for process, _ in others} != {os.getpid()}
+        read = wanted()
+    assert [count for _, count in read] == [1, 0, 1]
+    assert {process for process, _ in read} != {os.getpid()}
+    assert len({process for process, _ in read}) == 1
     monkeypatch.setattr(startup, "SMALL", 6)
     with read_beside(ARM, [path]) as wanted:
-        assert wanted() == [(os.getpid(), True)]
+        assert wanted() == [(os.getpid(), 1)]
 
 
 def test_what_has_threads_that_a_fork_would_lack_reads_here(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recording, "read_usable", where)
     monkeypatch.setitem(sys.modules, "polars", sys)
     with read_beside(ARM, []) as wanted:
-        assert wanted() == [(os.getpid(), True)]
+        assert wanted() == [(os.getpid(), 0)]
 
 
 def test_what_is_wrong_with_a_recording_reaches_who_waits_for_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -76,8 +76,10 @@ def test_a_useless_recording_is_left_out_with_a_note(robot: Robot, kind: str):
     held = identify(robot, good, model="basic", bands=(4.0, 4.0), validation=[bad, moving(robot, "c_1", 3)])
     assert list(held.validation_errors()) == ["c_1"]
     assert any(kind in note for note in held.notes)
-    alone = identify(robot, good, model="basic", bands=(4.0, 4.0), validation=[bad])
-    assert alone.validation_errors() == {}
+    # Nothing is left of what somebody asked for: it was a note, and the result said that nothing had been held out.
+    for work in (identify, diagnose):
+        with pytest.raises(RecordingError, match=kind):
+            work(robot, good, model="basic", bands=(4.0, 4.0), validation=[bad])
 
 
 @pytest.mark.parametrize("kind", KINDS[:3])
@@ -152,9 +154,11 @@ def test_a_trajectory_that_is_too_short_alone_is_not_compared(robot: Robot):
 
 def test_the_parts(robot: Robot):
     bad, good = useless(robot)["no effort was recorded"], moving(robot, "a_1", 1)
-    data, notes = usable_data([bad, good], needed=True)
+    data, notes = usable_data([bad, good])
     assert (len(data.recordings), len(notes)) == (1, 1)
-    assert usable_data([bad], needed=False)[0].recordings == ()
+    assert usable_data([])[0].recordings == ()
+    with pytest.raises(RecordingError, match="no effort was recorded"):
+        usable_data([bad])
     assert with_rows(data, needed=True)[0] is data
     short = prepare([cut(good, slice(0, 60))], (2.0, 2.0))
     assert with_rows(short, needed=True)[0] is short
