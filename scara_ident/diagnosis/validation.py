@@ -88,6 +88,6 @@ def _with_effects(found: Search, held: HeldOut, before: Observations) -> Observa
     if found.correction is not None:
         data = corrected(before.data, found.correction.candidate, found.correction.value)
         before = before.with_torque(data)
-    scene = replace(found.scene, columns=columns_at_hand(before))
+    scene = replace(held.scene, columns=columns_at_hand(before))
     step = replace(found.step, scene=scene, columns=CandidateColumns(before), chosen=held.chosen)
     return observed_at_every_sample(step)
