@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 COUNT = 2 * np.pi / (4096 * 100)
 
 
-def columns(samples: int = 4000, interval: float = 1e-3, seed: int = 0) -> dict[str, NDArray[np.float64]]:
-    """Return the columns of a faultless recording within the SCARA03's limits."""
+def columns(
+    samples: int = 4000, interval: float = 1e-3, seed: int = 0, time: NDArray[np.float64] | None = None
+) -> dict[str, NDArray[np.float64]]:
+    """Return the columns of a faultless recording within the SCARA03's limits, sampled at times that may be given."""
     random = np.random.default_rng(seed)
-    time = interval * np.arange(samples)
+    time = interval * np.arange(samples) if time is None else time
+    samples = len(time)
     made = {"time": time}
     for joint, (middle, amplitude, frequency) in {"joint1": (1.5, 1.2, 0.35), "joint2": (0.1, 1.0, 0.45)}.items():
         phase = 2 * np.pi * frequency * time

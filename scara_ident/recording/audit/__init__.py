@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 
-from scara_ident.recording.audit import clock, effort, lost_samples, position
+from scara_ident.recording.audit import clock, effort, lost_samples, position, stamps
 from scara_ident.recording.audit.samples import Finding, Samples
 
 _LOG = logging.getLogger(__name__)
@@ -20,6 +20,9 @@ CHECKS = (
     position.impossible_sizes,
     clock.clock_unit,
     clock.time_order,
+    clock.enough,
+    stamps.late_stamps,
+    stamps.coinciding,
     clock.enough,
     clock.sampling,
     position.position_unit,

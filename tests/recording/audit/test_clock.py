@@ -148,9 +148,8 @@ def test_time_that_never_advances_is_refused(read):
 
 
 def test_jitter_is_said_with_its_size(read):
-    made = columns()
-    made["time"] += 1e-3 * np.random.default_rng(1).uniform(-0.2, 0.2, 4000)
-    finding = only(read(made), "jitter")
+    time = 1e-3 * (np.arange(4000) + np.random.default_rng(1).uniform(-0.2, 0.2, 4000))
+    finding = only(read(columns(time=time)), "jitter")
     # The difference of two uniform deviates of half-width 0.2 has a standard deviation of 0.2 sqrt(2/3).
     assert "varies by 16 %" in finding.message
 

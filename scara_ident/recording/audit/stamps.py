@@ -1,0 +1,133 @@
+"""Time stamps beside the positions: samples that are even under stamps that are not, and rows that all but coincide.
+
+A log often stamps a sample when it arrives. The positions tell: under the right times each lies on the polynomial through
+its neighbours, under others it lies off by the way that the joint makes in the error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.manners import several
+from scara_ident.recording.audit.samples import GAP_STEPS, Finding, Samples
+
+Checked = tuple[Samples, list[Finding]]
+
+# A stamp is off an even clock from this share of the interval on.
+OFF = 0.05
+# Samples on either side over which the even clock is the median of the stamps, and over which a lost sample shows.
+REACH, LOST_REACH = 50, 4
+# Of fewer samples than twice that reach and more no even clock is told.
+ENOUGH = 4 * REACH
+# The misfit under even times is below this share of that under the stamps: by chance both are as large.
+BETTER = 0.5
+# A misfit counts up to so many times the usual one: where stamps all but coincide it knows no bounds.
+MOST = 100.0
+# Fewer rows of moving joints say nothing.
+LEAST_ROWS = 5
+# A joint moves where it goes this share of its rms way over five samples.
+MOVING = 0.2
+# A step below this share of the interval lies within the noise of the clock, and differences over it are noise.
+COINCIDING = 0.1
+
+
+def late_stamps(samples: Samples) -> Checked:
+    """Take the samples as even where the positions say that only their stamps are not."""
+    step = np.diff(samples.time)
+    if samples.count < ENOUGH or np.max(np.abs(step - samples.interval)) <= OFF * samples.interval:
+        return samples, []
+    even = _even_clock(samples.time)
+    off = np.abs(samples.time - even) > OFF * samples.interval
+    if not np.any(off) or np.min(np.diff(even)) <= 0.0 or not _evener(samples, even, off):
+        return samples, []
+    count, worst = int(np.count_nonzero(off)), float(np.max(np.abs(samples.time - even)))
+    first = samples.where(int(np.argmax(off)))
+    said = (
+        f"the time stamps of {several(count, 'row')} lie up to {1e3 * worst:.3g} ms off an even clock, first in {first}, and the "
+        "positions do not: the samples are taken as even"
+    )
+    return replace(samples, time=even), [Finding("late_stamps", said, count)]
+
+
+def coinciding(samples: Samples) -> Checked:
+    """Keep the first of rows whose stamps all but coincide."""
+    near = np.concatenate([[False], np.diff(samples.time) < COINCIDING * samples.interval])
+    if not np.any(near):
+        return samples, []
+    count, first = int(np.count_nonzero(near)), samples.where(int(np.argmax(near)))
+    said = (
+        f"{several(count, 'row')} follow{'s' if count == 1 else ''} the one before within {COINCIDING:.0%} of the sampling "
+        f"interval, first {first}: left out"
+    )
+    return samples.kept(~near), [Finding("coinciding", said, count)]
+
+
+def _even_clock(time: Array) -> Array:
+    """Return the times of samples that are even between gaps but for those lost, as near as can be to the stamps."""
+    from scipy.ndimage import median_filter, minimum_filter1d, uniform_filter1d
+
+    # Over many samples an interval is known better than by one step.
+    interval = float(np.median(time[2 * REACH :] - time[: -2 * REACH])) / (2 * REACH)
+    steps = (time - time[0]) / interval - np.arange(len(time))
+    steps = median_filter(steps, 2 * LOST_REACH + 1, mode="mirror")
+    # What is late for a while comes back; what is lost stays.
+    lost = _lost(minimum_filter1d(steps, REACH, mode="nearest", origin=-(REACH // 2)))
+    even = interval * (np.arange(len(time)) + lost)
+    # A clock that drifts is even all the same, and behind a gap it starts anew.
+    edges = np.flatnonzero(np.diff(lost) >= GAP_STEPS - 1.0) + 1
+    off = [median_filter(part, 2 * REACH + 1, mode="mirror") for part in np.split(time - even, edges)]
+    smooth = [uniform_filter1d(part, 2 * REACH + 1, mode="mirror") for part in off]
+    return np.asarray(even + np.concatenate(smooth))
+
+
+def _lost(ahead: Array) -> Array:
+    """Return how many samples were lost before each, by how far stamps are ahead of as many intervals, in these."""
+    lost, level = np.zeros(len(ahead)), float(ahead[0])
+    total = 0.0
+    for k, value in enumerate(ahead.tolist()):
+        jump = round(value - level - total)
+        if jump > 0:
+            total += jump
+        level += (value - total - level) / REACH
+        lost[k] = total
+    return lost
+
+
+def _evener(samples: Samples, even: Array, off: NDArray[np.bool_]) -> bool:
+    """Whether the positions fit even times better than the stamps, where these differ."""
+    stencil = np.convolve(off, np.ones(5), "same") > 0.0
+    gap = np.diff(even, prepend=even[0]) > GAP_STEPS * samples.interval
+    whole = np.convolve(gap, np.ones(5), "same") == 0.0
+    used = np.flatnonzero((stencil & whole)[2:-2])
+    positions = samples.position[~samples.idle()]
+    by_stamp, by_even, rows = 0.0, 0.0, 0
+    for position in positions:
+        # A joint that stands still says nothing.
+        way = np.abs(position[4:] - position[:-4])
+        moving = used[way[used] > MOVING * np.sqrt(np.mean(way**2))]
+        if len(moving) < LEAST_ROWS:
+            continue
+        misfits = [_misfit(time, position, moving) for time in (samples.time, even)]
+        usual = min(float(np.median(item)) for item in misfits)
+        if usual > 0.0:
+            stamped, evened = (float(np.sum(np.minimum(item / usual, MOST))) for item in misfits)
+            by_stamp, by_even, rows = by_stamp + stamped, by_even + evened, rows + len(moving)
+    return rows > 0 and by_even < BETTER * by_stamp
+
+
+def _misfit(time: Array, position: Array, used: NDArray[np.intp]) -> Array:
+    """Return the squared distance of positions from the cubic through two neighbours on either side, shape (rows,)."""
+    around = [used, used + 1, used + 3, used + 4]
+    times, here = [time[place] for place in around], time[used + 2]
+    found = position[used + 2].copy()
+    for k, place in enumerate(around):
+        weight = np.ones(len(used))
+        for other, own in enumerate(times):
+            if other != k:
+                weight *= (here - own) / (times[k] - own)
+        found -= weight * position[place]
+    return np.asarray(found**2)
