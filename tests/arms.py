@@ -137,7 +137,7 @@ SWING_FRICTION = ((0.4, 0.3, 0.0, 0.0, 0.1), (0.2, 0.1, 0.0, 0.0, -0.05))
 
 
 def swing(robot: Robot, name: str = "swing_1", seed: int = 0, seconds: float = 12.0, rate: float = 500.0) -> Recording:
-    """Sums of sines of a two-joint arm, with Coulomb and viscous friction and an offset, without noise."""
+    """Sums of sines of an arm of one or two joints, with Coulomb and viscous friction and an offset, without noise."""
     time = np.arange(round(seconds * rate)) / rate
     q, v, a = sines(np.random.default_rng(seed), time, robot.n)
-    return recording(robot, name, time, q, recorded_torque(robot, q, v, a, SWING_FRICTION))
+    return recording(robot, name, time, q, recorded_torque(robot, q, v, a, SWING_FRICTION[: robot.n]))

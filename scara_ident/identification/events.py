@@ -311,7 +311,8 @@ def _per_force(robot: Robot, item: Binned, bins: Sequence[int]) -> Iterator[Arra
     for k in bins:
         q = configurations(robot.model, item.state[0][back, k : k + 1])[:, 0]
         jacobian = pin.computeFrameJacobian(robot.model, model_data, q, place, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        yield -(jacobian[:3][:, robot.order] * robot.row_scale).T
+        # Of a single joint it comes as a vector.
+        yield -(jacobian.reshape(6, -1)[:3, robot.order] * robot.row_scale).T
 
 
 def tool_force(robot: Robot, item: Binned, start: int, stop: int) -> tuple[Array, float]:

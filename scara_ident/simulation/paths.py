@@ -78,7 +78,9 @@ class Tool:
         full = pin.integrate(model, pin.neutral(model), inner)
         last = model.njoints - 1
         pin.computeJointJacobians(model, data, full)
-        jacobian = pin.getJointJacobian(model, data, last, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)[:, robot.order]
+        whole = pin.getJointJacobian(model, data, last, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        # Of a single joint it comes as a vector.
+        jacobian = whole.reshape(6, -1)[:, robot.order]
         placement = data.oMi[last]
         arm = placement.rotation @ self.point
         linear = jacobian[:3] - pin.skew(arm) @ jacobian[3:]

@@ -301,7 +301,8 @@ def tool_force(observer: ContactObserver, observed: Observed, threshold: Array, 
     for k in places[:: max(1, len(places) // STATES)]:
         q = momentum.configuration(observed.position[:, k])
         jacobian = pin.computeFrameJacobian(robot.model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        turned = (jacobian[:3][:, robot.order] * robot.row_scale).T
+        # Of a single joint it comes as a vector.
+        turned = (jacobian.reshape(6, -1)[:3, robot.order] * robot.row_scale).T
         rows.append(turned / threshold[:, k, None])
         rights.append(observed.torque[:, k] / threshold[:, k])
     matrix, right = np.concatenate(rows), np.concatenate(rights)

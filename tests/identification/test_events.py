@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -135,3 +136,23 @@ def test_of_very_many_events_the_strongest_are_said():
     assert notes[-1] == "5 more events are listed in the result"
     assert event_notes(ROBOT, events[:2]) == [event.sentence(ROBOT) for event in events[:2]]
     assert event_notes(ROBOT, []) == []
+
+
+def test_an_arm_of_a_single_joint_has_events_too(tmp_path: Path):
+    """Pinocchio gives its Jacobian as a vector: it ended in an internal error."""
+    urdf = Path(__file__).parents[2] / "urdf" / "scara03.urdf"
+    (tmp_path / "robot.yaml").write_text(
+        f"urdf: {urdf}\neffort_side: motor\njoints: {{joint1: {{reduction: 100}}}}\nlocked: {{joint2: 0.3}}\n",
+        encoding="utf-8",
+    )
+    robot, rng = load_robot(tmp_path / "robot.yaml"), np.random.default_rng(5)
+    plain = [noisy(swing(robot, f"swing{k}", seed=k, seconds=15.0, rate=250.0), rng, 0.01) for k in range(4)]
+    assert plain[0].effort is not None
+    effort = plain[0].effort.copy()
+    effort[0, (plain[0].time > START) & (plain[0].time < STOP)] += 0.3
+    observations = observe(
+        build_model(robot, "complete"), prepare([replace(plain[0], effort=effort), *plain[1:]], (8.0,))
+    )
+    (event,) = find_events(observations, robust_fit(observations).value)
+    assert (event.recording, event.joints) == ("swing0", ("joint1",))
+    assert event.start == pytest.approx(START, abs=0.15)
