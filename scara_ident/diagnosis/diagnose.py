@@ -24,6 +24,7 @@ from scara_ident.diagnosis.model_selection import select_model
 from scara_ident.diagnosis.outcome import Outcome, Unexplained
 from scara_ident.diagnosis.screening import Dependence
 from scara_ident.diagnosis.search import Search, SearchTask
+from scara_ident.diagnosis.standing_lines import standing_lines, tentative_lines
 from scara_ident.diagnosis.tentative import TentativeEffect, tentative_effects
 from scara_ident.diagnosis.validation import validated
 from scara_ident.diagnosis.verdict import Verdict, verdict_of, weighed_evidence
@@ -246,7 +247,12 @@ def diagnose(
     notes += _remarks(outcome, parameters)
     notes += [event.sentence(robot) for event in events]
     log_notes(_LOG, notes)
-    shown = weighed_evidence(outcome, held, effects, criteria)
+    # Where something is known to be left over no more is to be said of it.
+    lines = (None,) * robot.n if outcome.unexplained is not None else standing_lines(outcome.residuals, criteria)
+    shown = weighed_evidence(outcome, held, effects, lines, criteria)
+    believed = {(item.effect, item.joint) for item in effects}
+    tentative = tentative_effects(found, refused, believed)
+    told = believed | {(item.effect, item.joint) for item in tentative}
     return Diagnosis(
         verdict_of(outcome, effects, shown),
         found,
@@ -259,7 +265,7 @@ def diagnose(
         outcome.fit_before,
         outcome.fit_after,
         tuple(effects),
-        tentative_effects(found, refused, {(item.effect, item.joint) for item in effects}),
+        (*tentative, *tentative_lines(lines, found, families, told)),
         shown,
         aliases(base),
         outcome.unexplained,

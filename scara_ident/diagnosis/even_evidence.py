@@ -135,7 +135,7 @@ def _as_runs_differ(
     if runs < LEAST_ALIKE or item.directions.shape[1] != joint.table.shape[1]:
         return False
     left = joint.left(value)
-    rest = left - np.sum(np.repeat(item.of_run, np.diff(item.bounds), axis=0).T * item.directions, axis=0)
+    rest = left - item.off
     of_run = list(zip(item.bounds[:-1], item.bounds[1:], strict=True))
     before, after = (np.array([np.sum(each[start:stop] ** 2) for start, stop in of_run]) for each in (left, rest))
     share = np.divide(after, before, out=np.ones(runs), where=before > 0.0)

@@ -105,21 +105,38 @@ def _strongest_frequency(
     cut: float | None,
 ) -> float | None:
     """Return the strongest line between two frequencies, Hz, of residuals that have nothing above a third one."""
+    found = lines_in_time(residuals, rate, reach[1], criteria, cut)
+    return _strongest([line for line in found if line.position >= reach[0]])
+
+
+def lines_in_time(
+    residuals: Sequence[Array], rate: float, highest: float, criteria: SelectionCriteria, cut: float | None = None
+) -> list[Line]:
+    """Return the lines of residuals up to a frequency, Hz, whatever their phase in each recording.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, each of shape (N_r,)
+        See `whitened`.
+    rate, highest : float
+        Samples per second, and Hz.
+    criteria : SelectionCriteria
+    cut : float, optional
+        Hz above which the residuals have nothing.
+    """
     width = frequency_width(residuals, rate)
-    lowest, highest = criteria.least_line_periods * 0.5 * width, reach[1]
+    lowest = criteria.least_line_periods * 0.5 * width
     if highest < NARROWEST_RANGE * lowest:
-        return None
+        return []
     frequencies = np.arange(lowest, highest, width / POINTS_PER_WIDTH)
-    power = frequency_spectrum(residuals, rate, frequencies, highest=cut)
-    found = lines(
+    return lines(
         frequencies,
-        power,
+        frequency_spectrum(residuals, rate, frequencies, highest=cut),
         width,
         degrees=2 * len(residuals),
         neighbours=NEIGHBOURS_IN_TIME,
         significance=criteria.line_significance,
     )
-    return _strongest([line for line in found if line.position >= reach[0]])
 
 
 def _strongest(found: Sequence[Line]) -> float | None:

@@ -13,6 +13,8 @@ from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.held_out_gain import spoken_against
 from scara_ident.diagnosis.outcome import Outcome, rms_of
+from scara_ident.diagnosis.standing_lines import StandingLine, without_lines
+from scara_ident.diagnosis.steady_evidence import steady_evidence
 from scara_ident.diagnosis.validation import Validation
 from scara_ident.estimation.noise_bias import noise_signals
 
@@ -20,25 +22,34 @@ Verdict = Literal["complete", "explained", "unexplained", "undecided"]
 
 
 def weighed_evidence(
-    outcome: Outcome, held_out: Validation, effects: Sequence[FoundEffect], criteria: SelectionCriteria
+    outcome: Outcome,
+    held_out: Validation,
+    effects: Sequence[FoundEffect],
+    lines: Sequence[StandingLine | None],
+    criteria: SelectionCriteria,
 ) -> tuple[Evidence, ...]:
     """Return for each joint whether what is left was shown to be noise, and by what.
 
     Every witness that may speak against it is asked in turn, and the first that does is the one that is told: what the search
-    left open, what is left of the training recordings, one of them beside all others, those held out, and there each effect.
+    left open, what is left of the training recordings, lines in it, one of them beside all others, its parts beside each other,
+    those held out, and there each effect.
 
     Parameters
     ----------
     outcome : Outcome
     held_out : Validation
     effects : sequence of FoundEffect
+    lines : sequence of StandingLine or None
+        For each joint.
     criteria : SelectionCriteria
     """
     found, after = outcome.search, outcome.after
     doubtful = (*outcome.suspected, *left_open(found, after.weights, outcome.demoted))
     made = partial(noise_signals, outcome.training, after.value)
     shown = evidence(found, outcome.residuals, outcome.fit_after, outcome.small, doubtful, criteria, made)
+    shown = without_lines(shown, lines, found)
     shown = even_evidence(shown, after, outcome.training, criteria)
+    shown = steady_evidence(shown, after, outcome.training, criteria)
     training, others = (rms_of(after.value, item) for item in (outcome.training, held_out.undisturbed))
     shown = held_out_evidence(shown, training, others, held_out.unsure, held_out.apart, criteria)
     gains = {item.label: item.held_out for item in effects if item.held_out is not None}

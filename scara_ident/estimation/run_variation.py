@@ -65,6 +65,11 @@ class JointVariation:
     bounds: NDArray[np.intp]
     unsure: Array
 
+    @property
+    def off(self) -> Array:
+        """By how much the rows of every run lie off those of the mean run, shape (N,)."""
+        return np.asarray(np.sum(np.repeat(self.of_run, np.diff(self.bounds), axis=0).T * self.directions, axis=0))
+
     @cached_property
     def shrinking(self) -> tuple[tuple[Array, Array], ...]:
         """For each run orthonormal rows (r, N) and the share that stays of what lies along them (r,)."""
@@ -169,12 +174,8 @@ class RunVariation:
 
     def mean_squares(self, joints: Sequence[JointRows]) -> Array:
         """Return the mean square of that over the samples that the rows of each joint stand for, shape (n,)."""
-        found = np.zeros(len(self.joints))
-        for joint, (item, rows) in enumerate(zip(self.joints, joints, strict=True)):
-            if item is not None:
-                off = np.repeat(item.of_run, np.diff(item.bounds), axis=0).T * item.directions
-                found[joint] = float(np.sum(np.sum(off, axis=0) ** 2) / np.sum(rows.counts))
-        return found
+        parts = zip(self.joints, joints, strict=True)
+        return np.array([0.0 if item is None else np.sum(item.off**2) / np.sum(rows.counts) for item, rows in parts])
 
     def covariance(self, inverse: Array, joints: Sequence[JointRows], weights: Array) -> Array:
         """Return what the differences add to the covariance of a least-squares estimate, shape (p, p).
@@ -246,17 +247,40 @@ def run_variation(
         Whether the offsets of two runs are told too: by two, other differences may be the parameters'.
     """
     runs = len(observations.data.recordings)
-    # Where blocks are triangular factors, or no samples are kept, the rows are not beside those that directions are made of.
-    few = runs < (2 if of_two else LEAST_RUNS)
-    if few or not observations.raw or any(rows.sizes is not None for rows in joints):
+    if runs < (2 if of_two else LEAST_RUNS):
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
+    return variation_between(observations, joints, value, firsts)
+
+
+def variation_between(
+    observations: Observations,
+    joints: Sequence[JointRows],
+    value: Array,
+    firsts: NDArray[np.intp],
+    known: RunVariation | None = None,
+) -> RunVariation:
+    """Estimate how groups of blocks that follow each other differ.
+
+    Parameters
+    ----------
+    observations, joints, value
+        See `run_variation`.
+    firsts : ndarray of int, shape (groups + 1,)
+        The block with which each group begins, and the number of blocks.
+    known : RunVariation, optional
+        What runs differ by, which is taken off before.
+    """
+    # Where blocks are triangular factors, or no samples are kept, the rows are not beside those that directions are made of.
+    if not observations.raw or any(rows.sizes is not None for rows in joints):
+        return RunVariation((None,) * len(joints))
     # Made once, and not in two threads.
     _ = observations.late(value[: observations.parameters])
 
     def of_joint(joint: int, rows: JointRows) -> _Sums | None:
         directions = directions_of(observations, joint, rows, value)
-        left = rows.left(value)
+        item = None if known is None else known.joints[joint]
+        left = rows.left(value) - (0.0 if item is None else item.off)
         return _sums(directions, left, rows.starts, firsts)
 
     sums = side_by_side(of_joint, range(len(joints)), joints)
