@@ -102,11 +102,11 @@ def hopeless(candidate: Candidate, examination: Examination, scene: Scene, crite
 def _small(
     candidate: Candidate, examination: Examination, scene: Scene, gain: float, criteria: SelectionCriteria
 ) -> str | None:
-    # What is taken out of the recordings is taken out however small it is.
-    small = None if candidate.corrects_data else candidate.effect.negligible(scene, candidate.member, examination.value)
-    if small is not None:
+    # What is taken out of the recordings is taken out however small it is, and however little it removes where it is not.
+    small = candidate.effect.negligible(scene, candidate.member, examination.value)
+    if small is not None and not candidate.corrects_data:
         return small
-    if gain < criteria.least_gain:
+    if gain < criteria.least_gain and (small is not None or not candidate.corrects_data or gain <= 0.0):
         return (
             f"below the detection limit: removes {max(gain, 0.0):.1%} of the squared residual, "
             f"{criteria.least_gain:.0%} is asked"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.search import Search
@@ -96,13 +97,13 @@ def held_out_gains(
     errors = _errors(held_out.joints, after.value)
     whole = _squares(errors, after.weights)
     gains = {}
-    for label, own, others in _each_left_out(found, held_out, uncorrected, quiet):
+    for label, own, others, beside in _each_left_out(found, after, held_out, uncorrected, quiet):
         without = _squares(others, after.weights)
         removed, left = float(np.sum(without - whole)), float(np.sum(whole if own is None else whole[own]))
         place = int(np.argmax(np.abs(without - whole)))
         count = max(1.0, float(np.sum(held_out.joints[place].counts)))
         before, now = (float(np.sqrt(np.sum(each[place] ** 2) / count)) for each in (others, errors))
-        size, std = _shown(held_out, others, errors, after)
+        size, std = _shown(held_out, others, beside, after)
         share = removed / (max(removed, 0.0) + left) if left > 0.0 or removed > 0.0 else 0.0
         gains[label] = HeldOutGain(share, size, std, joints[place], before, now)
     return gains
@@ -138,10 +139,11 @@ def words_of(gain: HeldOutGain, unit: str) -> str:
 
 
 def _each_left_out(
-    found: Search, held_out: Observations, uncorrected: Observations, quiet: Array
-) -> Iterator[tuple[str, int | None, list[Array]]]:
-    """Give each effect's label and joint with the errors held out of all else, fitted to the training without it."""
+    found: Search, after: Estimate, held_out: Observations, uncorrected: Observations, quiet: Array
+) -> Iterator[tuple[str, int | None, list[Array], list[Array]]]:
+    """Give each effect's label and joint with the errors held out of all else, fitted to the training without it, and with it."""
     scene, start = found.scene, uncorrected.parameters
+    errors = _errors(held_out.joints, after.value)
     for place, candidate in enumerate(found.chosen):
         stop = start + len(candidate.effect.columns(scene, candidate.member))
         columns = np.arange(start, stop)
@@ -149,13 +151,19 @@ def _each_left_out(
         if any(np.any(rows.table[:-1][np.isin(rows.columns, columns)]) for rows in held_out.joints):
             value, _ = told_value_and_weights(observed(found.step.without(place)))
             value = np.insert(value, np.full(len(columns), columns[0]), 0.0)
-            yield candidate.label(scene), candidate.member.joint, _errors(held_out.joints, value)
+            yield candidate.label(scene), candidate.member.joint, _errors(held_out.joints, value), errors
     if found.correction is not None:
         step = replace(found.step, columns=found.step.columns.beside(found.uncorrected))
         value, _ = told_value_and_weights(observed(step))
         candidate = found.correction.candidate
         joints = held_out.with_torque(uncorrected.data).faded(quiet).joints
-        yield candidate.label(scene), candidate.member.joint, _errors(joints, value)
+        # Both of the recordings as they are: what correcting makes of their noise would count as half of the effect.
+        here = replace(scene, value=after.value[: uncorrected.parameters], columns=columns_at_hand(uncorrected))
+        (made,) = CandidateColumns(uncorrected).rows(here, [candidate])
+        beside = _errors(joints, after.value)
+        for j, rows in made.items():
+            beside[j] = beside[j] - np.repeat(quiet, np.diff(joints[j].starts)) * (found.correction.value @ rows)
+        yield candidate.label(scene), candidate.member.joint, _errors(joints, value), beside
 
 
 def _errors(joints: Sequence[JointRows], value: Array) -> list[Array]:
