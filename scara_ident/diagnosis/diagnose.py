@@ -225,7 +225,7 @@ def diagnose(
     faults = channel_faults(observations)
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))
-    notes[:0] = robot.notes
+    notes[:0] = (*robot.notes, *base.notes)
     known = frozenset(unloaded)
     families = tuple(item.knowing(known) for item in (available_effects() if catalogue is None else catalogue))
     task = SearchTask(base, families, criteria, searching(work, band_given=given))

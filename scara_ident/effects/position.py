@@ -74,4 +74,6 @@ class Spring(Effect):
 def offset_of(scene: Scene, joint: int) -> int | None:
     """Return the place of the joint's torque offset among the model's columns, None without one."""
     offset = next((term for term in scene.model.terms if isinstance(term, Offset)), None)
-    return None if offset is None else scene.model.place(offset).start + joint
+    if offset is None or joint not in offset.places:
+        return None
+    return int(scene.model.place(offset).start) + offset.places.index(joint)

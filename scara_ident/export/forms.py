@@ -146,7 +146,7 @@ def friction_said(found: IdentifiedModel, value: Array) -> JointFriction:
 def offset_said(found: IdentifiedModel, value: Array) -> Array:
     """Return the torque offsets among parameters, recorded side, shape (n,)."""
     term = next((term for term in found.model.terms if isinstance(term, Offset)), None)
-    return np.zeros(found.robot.n) if term is None else value[found.model.place(term)]
+    return np.zeros(found.robot.n) if term is None else term.of_joints(value[found.model.place(term)])
 
 
 def _base(form: Form, term: RigidBody, standard: Array) -> Array:

@@ -52,7 +52,7 @@ def ros2_text(found: IdentifiedModel, value: Array, armature: Array, urdf: str, 
             table = own.reshape(robot.n, -1)
             friction |= {WORDS[power]: table[:, k].tolist() for k, power in enumerate(term.powers)}
         elif isinstance(term, Offset):
-            offset = own.tolist()
+            offset = term.of_joints(own).tolist()
     inertia = _mean_inertia(found, value)
     pace = 2.0 * np.pi * LOOP
     gains = {

@@ -196,7 +196,7 @@ def identify(
     check_rows(training)
     faults = channel_faults(training)
     refuse_exchanged(faults)
-    notes[:0] = robot.notes
+    notes[:0] = (*robot.notes, *equation.notes)
     notes += [str(fault) for fault in faults]
     progress("looking for events", 0.6)
     # With a wrong sign or exchanged joints nothing is explained anywhere.

@@ -13,6 +13,7 @@ from scara_ident.arrays import Array
 from scara_ident.manners import Frozen
 from scara_ident.model import MODELS
 from scara_ident.model.terms import Column, Friction, Offset, RigidBody, Term
+from scara_ident.model.terms.friction import offset
 from scara_ident.model.terms.rigid_body import rigid_body
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
@@ -56,6 +57,11 @@ class TorqueModel(Frozen):
     def rigid_body(self) -> RigidBody:
         """The rigid-body term."""
         return next(term for term in self.terms if isinstance(term, RigidBody))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """In words, what the model leaves out as no recording tells it."""
+        return tuple(note for term in self.terms if isinstance(term, Offset) for note in term.notes())
 
     def place(self, term: Term) -> slice:
         """Return where a term's columns stand among the p."""
@@ -127,7 +133,7 @@ def build_model(robot: Robot, name: str = "complete") -> TorqueModel:
 
 def complete(robot: Robot) -> TorqueModel:
     """Return rigid bodies, rotors, friction to the third power of speed and offset."""
-    return TorqueModel("complete", robot, (rigid_body(robot), Friction(robot), Offset(robot)))
+    return TorqueModel("complete", robot, (rigid_body(robot), Friction(robot), offset(robot)))
 
 
 def reduced(robot: Robot) -> TorqueModel:
@@ -140,4 +146,4 @@ def reduced(robot: Robot) -> TorqueModel:
 
 def basic(robot: Robot) -> TorqueModel:
     """Return rigid bodies, rotors, Coulomb and viscous friction and offset."""
-    return TorqueModel("basic", robot, (rigid_body(robot), Friction(robot, (0, 1)), Offset(robot)))
+    return TorqueModel("basic", robot, (rigid_body(robot), Friction(robot, (0, 1)), offset(robot)))

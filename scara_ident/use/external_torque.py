@@ -91,7 +91,7 @@ class ExternalTorque:
                     # Of the joint's velocity, where the term has the drive's.
                     self._friction[power] = robot.drive_sign * value[k :: len(term.powers)]
             elif isinstance(term, Offset):
-                self._offset = value
+                self._offset = term.of_joints(value)
             elif not isinstance(term, RigidBody):
                 if _of_position_and_velocity(term, robot.n):
                     self._others.append((term, value))

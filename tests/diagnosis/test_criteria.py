@@ -69,6 +69,8 @@ def test_what_they_stand_behind_keeps_its_order():
                 "remainder_to_noise": 1e3,
                 "least_remainder": 1.0,
                 "least_power": 2.0,
+                # However little of it is white, or changes within recordings.
+                "least_colour": 1.0,
             },
             "complete",
             [],
@@ -102,7 +104,7 @@ def test_what_may_be_left_over_is_obeyed():
     lenient = replace(none, remainder=min(1.5 * share, 1.01), remainder_to_noise=1e3)
     # What may be left over is nothing in particular, and what surely repeats no noise either.
     assert spring_diagnosed(lenient).verdict == "undecided"
-    assert spring_diagnosed(replace(lenient, least_remainder=1.0)).verdict == "complete"
+    assert spring_diagnosed(replace(lenient, least_remainder=1.0, least_colour=1.0)).verdict == "complete"
     assert spring_diagnosed(replace(lenient, remainder=0.5 * lenient.remainder)).verdict == "unexplained"
 
 

@@ -33,14 +33,15 @@ def panda() -> Robot:
     return build_robot(RobotDescription(urdf=urdf, joints=joints), urdf)
 
 
-def scara_with_quill() -> Robot:
+def scara_with_quill(gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> Robot:
     """Return the SCARA03 with its prismatic joint and a reversing gear."""
     joints = {
         "joint1": JointDescription(reduction=-100.0),
         "joint2": JointDescription(),
         "joint3": JointDescription(reduction=50.0),
     }
-    return build_robot(RobotDescription(urdf=embedded_urdf(), effort_side="motor", joints=joints), embedded_urdf())
+    description = RobotDescription(urdf=embedded_urdf(), effort_side="motor", joints=joints, gravity=gravity)
+    return build_robot(description, embedded_urdf())
 
 
 def rigid_model(robot: Robot) -> TorqueModel:

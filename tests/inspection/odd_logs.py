@@ -275,7 +275,7 @@ LOGS = (
     Log("time of day over midnight", csv(MADE | {"time": stamps("%H:%M:%S.%f", 1_700_006_398.5)}), exact=1e-8, clock=2e-6),
     Log("dates in Parquet", parquet(MADE | {"time": pl.Series(1e9 * (TIME + 1.7e9)).cast(pl.Int64).cast(pl.Datetime("ns"))}), clock=5e-7),
     Log("text of tenths of a second", csv(MADE | {"time": [word[:-5] for word in stamps("%Y-%m-%d %H:%M:%S.%f")]}), refused="record time with more digits"),
-    Log("jitter", parquet(MADE | {"time": JITTER}), made=MADE | {"time": JITTER}, note="time stamps are used"),
+    Log("jitter", parquet(MADE | {"time": JITTER}), note="the samples are taken as even", clock=1e-3),
     Log("a gap", parquet(MADE | {"time": GAP}), made=MADE | {"time": GAP}, note="the recording is cut there"),
     Log("time that runs back", parquet(MADE | {"time": np.where(TIME > 2.0, TIME - 1.0, TIME)}), refused="sort the rows by time"),
     Log("no time", parquet(without(MADE, "time")), refused="name its column and unit"),

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.model.base_parameters import constant_torques
 from scara_ident.model.terms.constraints import BrakingPolynomial, Constraint
 from scara_ident.model.terms.term import Column, Filled, StateTorque, per_speed
 from scara_ident.motion.motion import Motion
@@ -107,34 +108,67 @@ class Friction(Filled):
 
 @dataclass(frozen=True, eq=False)
 class Offset(Filled):
-    """A constant torque on every joint: offset of the measurement or friction that differs by direction."""
+    """A constant torque on joints: offset of the measurement or friction that differs by direction.
+
+    Attributes
+    ----------
+    robot : Robot
+    left_out : tuple of int
+        Joints without one, by their places; see `offset`.
+    """
 
     robot: Robot
+    left_out: tuple[int, ...] = ()
 
     @property
     def name(self) -> str:
         """Name of the term."""
         return "offset"
 
+    @property
+    def places(self) -> tuple[int, ...]:
+        """The joints that have one."""
+        return tuple(j for j in range(self.robot.n) if j not in self.left_out)
+
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """One column per joint, ``p_o1 ..``."""
+        """One column per joint that has one, ``p_o1 ..``."""
+        joints = self.robot.joints
         return tuple(
-            Column(f"p_o{i + 1}", joint, self.robot.torque_unit(i), f"torque offset of {joint}")
-            for i, joint in enumerate(self.robot.joints)
+            Column(f"p_o{j + 1}", joints[j], self.robot.torque_unit(j), f"torque offset of {joints[j]}")
+            for j in self.places
         )
 
     @property
     def pattern(self) -> NDArray[np.bool_]:
         """Each joint's offset acts on that joint only."""
-        return np.eye(self.robot.n, dtype=bool)
+        return np.eye(self.robot.n, dtype=bool)[:, list(self.places)]
 
     def fill(self, motion: Motion, rows: Sequence[Array]) -> None:
         """Write ones."""
         for row in rows:
             row.fill(1.0)
 
+    def of_joints(self, value: Array) -> Array:
+        """Return the constant torque of every joint, shape (n,), of the term's parameters; zero where there is none."""
+        torque = np.zeros(self.robot.n)
+        torque[list(self.places)] = value
+        return torque
+
     def state_torque(self, value: Array) -> StateTorque:
         """Return the constant."""
-        constant = np.array(value)
+        constant = self.of_joints(value)
         return lambda q, v, a: constant
+
+    def notes(self) -> tuple[str, ...]:
+        """Say of which joints no offset is told, and why."""
+        return tuple(
+            f"{self.robot.joints[j]}: what it carries weighs the same wherever the arm is, so that no recording tells an offset of "
+            "its torque from that weight; all of it is taken for weight, and masses are off by the offset over gravity if there is one"
+            for j in self.left_out
+        )
+
+
+def offset(robot: Robot) -> Offset:
+    """Return the offsets that torque can tell from the bodies' weight: those of axes that go up and down are not among them."""
+    return Offset(robot, constant_torques(robot))

@@ -8,9 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scara_ident.effects.spanned import random_motion
+from scara_ident.model.base_parameters import constant_torques
+from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.model.terms import Friction, Offset
+from scara_ident.model.terms.friction import offset
+from scara_ident.model.terms.rigid_body import rigid_body
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import Link, motion, write_urdf
+from tests.excitation.made import scara_with_quill
 
 LINKS = (Link(), Link(kind="prismatic", axis=(1, 0, 0), xyz=(0.1, 0, 0)), Link(axis=(0, 1, 0)))
 
@@ -99,3 +105,33 @@ def test_the_offset_is_one_on_its_joint(robot: Robot):
 def test_patterns_are_where_entries_are(robot: Robot):
     for term in (Friction(robot), Friction(robot, (0, 1)), Offset(robot)):
         np.testing.assert_array_equal(np.any(term.regressor(made()) != 0.0, axis=2), term.pattern)
+
+
+def test_an_axis_that_goes_up_and_down_has_no_offset_of_its_own(robot: Robot):
+    """Its weight is a constant torque as well: mass, inertia and offset of a SCARA's arm were all undetermined for it."""
+    quill = scara_with_quill()
+    assert constant_torques(quill) == (2,)
+    term = offset(quill)
+    assert [column.name for column in term.columns] == ["p_o1", "p_o2"]
+    assert [column.joint for column in term.columns] == list(quill.joints[:2])
+    moved = random_motion(quill, np.random.default_rng(1), 200)
+    rows = term.regressor(moved)
+    assert rows.shape == (3, 2, 200)
+    np.testing.assert_array_equal(np.any(rows != 0.0, axis=2), term.pattern)
+    np.testing.assert_array_equal(term.of_joints(np.array([0.2, -0.1])), [0.2, -0.1, 0.0])
+    np.testing.assert_array_equal(term.state_torque(np.array([0.2, -0.1]))(*np.zeros((3, 3))), [0.2, -0.1, 0.0])
+    (note,) = term.notes()
+    assert note.startswith(f"{quill.joints[2]}: what it carries weighs the same wherever the arm is")
+    # Every parameter is told by motion; with an offset of that joint six of them are not.
+    for model, missing in ((build_model(quill), 0), (whole_model(quill), 1)):
+        columns = model.regressor(moved).transpose(2, 0, 1).reshape(600, -1)
+        rank = np.linalg.matrix_rank(columns / np.linalg.norm(columns, axis=0), tol=1e-8 * np.sqrt(600))
+        assert len(model.names) - rank == missing
+    # Across gravity, or without any, or turning, an axis has one.
+    for gravity in ((0.0, -9.81, 0.0), (0.0, 0.0, 0.0)):
+        assert constant_torques(scara_with_quill(gravity)) == ()
+    assert constant_torques(load_robot()) == constant_torques(load_robot("ur5")) == ()
+
+
+def whole_model(robot: Robot) -> TorqueModel:
+    return TorqueModel("complete", robot, (rigid_body(robot), Friction(robot), Offset(robot)))
