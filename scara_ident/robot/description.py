@@ -169,6 +169,11 @@ class RecordingDescription(BaseModel):
     link_position: MotionDescription | None = None
 
 
+def _none_given(value: Any) -> Any:
+    """A key with nothing behind it is none, as for the others."""
+    return {} if value is None else value
+
+
 class RobotDescription(BaseModel):
     """The contents of ``robot.yaml``."""
 
@@ -177,7 +182,7 @@ class RobotDescription(BaseModel):
     urdf: Annotated[Path, BeforeValidator(_urdf)]
     effort_side: Literal["motor", "joint"] | None = None
     joints: dict[str, JointDescription | None] | None = None
-    locked: dict[str, Finite] = Field(default_factory=dict)
+    locked: Annotated[dict[str, Finite], BeforeValidator(_none_given)] = Field(default_factory=dict)
     gravity: Annotated[tuple[Finite, Finite, Finite], BeforeValidator(_three)] | None = None
     recording: RecordingDescription | None = None
 

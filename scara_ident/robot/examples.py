@@ -12,8 +12,14 @@ PACKAGE = "example-robot-data"
 
 
 def is_name(source: Path, folder: Path = Path()) -> bool:
-    """Tell whether a word is a robot's name: one word without a suffix, and no file in the folder it is read from."""
-    return len(source.parts) == 1 and not source.suffix and not (folder / source).exists()
+    """Tell whether a word is a robot's name: one word without a suffix, and no file in the folder it is read from.
+
+    A folder of that name, as results are kept in, hides no robot that there is.
+    """
+    if len(source.parts) != 1 or source.suffix:
+        return False
+    here = folder / source
+    return not here.exists() or (here.is_dir() and _plain(source.name) in example_robots())
 
 
 def urdf_of(source: Path) -> Path:

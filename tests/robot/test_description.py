@@ -50,8 +50,9 @@ def test_a_full_description_is_read(tmp_path: Path):
 
 
 def test_everything_but_the_urdf_is_optional(tmp_path: Path):
-    found = read_description(described(tmp_path, "urdf: arm.urdf\n"))
-    assert (found.effort_side, found.joints, found.locked, found.gravity) == (None, None, {}, None)
+    for text in ("urdf: arm.urdf\n", "urdf: arm.urdf\neffort_side:\njoints:\nlocked:\ngravity:\n"):
+        found = read_description(described(tmp_path, text))
+        assert (found.effort_side, found.joints, found.locked, found.gravity) == (None, None, {}, None)
 
 
 @pytest.mark.parametrize(

@@ -46,14 +46,19 @@ def test_an_unknown_name_is_answered_with_similar_ones():
         load_robot("xyzzy")
 
 
-def test_files_and_folders_come_before_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_files_come_before_names_and_folders_of_results_do_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     assert is_name(Path("ur5"))
     assert not is_name(Path("arms/ur5"))
     assert not is_name(Path("ur5.yaml"))
     Path("ur5").mkdir()
-    with pytest.raises(RobotError, match="ur5: is a folder"):
-        load_robot("ur5")
+    assert load_robot("ur5").n == 6
+    Path("nothing").mkdir()
+    with pytest.raises(RobotError, match="nothing: is a folder"):
+        load_robot("nothing")
+    Path("panda").write_text("urdf: nowhere.urdf\n")
+    with pytest.raises(RobotError, match="nowhere"):
+        load_robot("panda")
 
 
 def test_a_robot_description_may_name_one_unless_a_file_of_that_name_lies_beside_it(
