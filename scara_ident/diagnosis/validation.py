@@ -70,8 +70,8 @@ def validated(outcome: Outcome, data: PreparedData) -> Validation:
     after = _with_effects(found, held, before)
     unsure = unsure_of_others(model, after)
     apart = np.zeros(robot.n) if model.variation is None else of_another_run(model.variation, after, value)
-    of_joint = dict(zip(robot.joints, unsure, strict=True))
-    events = [own_uncertainty(event, of_joint) for event in held_out_events(value, outcome.training, after)]
+    known = [dict(zip(robot.joints, each, strict=True)) for each in (unsure, apart)]
+    events = [own_uncertainty(event, *known) for event in held_out_events(value, outcome.training, after)]
     if outcome.unexplained is not None:
         # That something stays unexplained is why a whole recording is, and no event.
         events = [event for event in events if event.kind != "unknown" or np.isfinite(event.score)]

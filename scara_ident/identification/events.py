@@ -59,10 +59,11 @@ class Event:
         Where it shows, the strongest first.
     rms : float
         Of the residual on the first of them, N m or N.
-    kind : {"contact", "push", "other payload", "parameters unsure", "unknown"}
+    kind : {"contact", "push", "other payload", "parameters unsure", "runs differ", "unknown"}
         ``contact``: a constant force at the tool explains it; ``push``: it loads the inner joints only, as a force on a
         link before the tool does; ``other payload``: of a whole recording, a body on the last link does; ``parameters unsure``: the
-        fitted recordings tell the parameters so badly that they err there by as much; ``unknown``: none.
+        fitted recordings tell the parameters so badly that they err there by as much; ``runs differ``: those fitted were seen to
+        differ from one another as much; ``unknown``: none.
     score : float
         By how much it stands out: from 1 on an event, infinite for a whole recording.
     held_out : bool

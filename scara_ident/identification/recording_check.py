@@ -18,7 +18,7 @@ from scara_ident.motion.prepared import PreparedData
 WORSE, WORSE_THAN_ALL = 2.0, 1.5
 # Another payload explains at least this share of its squared residual.
 PAYLOAD_FITS = 0.7
-# An error within so many of the standard deviations that the parameters make is theirs: 95 %.
+# An error within so many of the standard deviations that the parameters, or what runs differ by, make is theirs: 95 %.
 UNSURE_STDS = 2.0
 # Samples of a recording that a payload is fitted to.
 SAMPLES = 1500
@@ -64,8 +64,8 @@ def held_out_events(value: Array, training: Observations, held_out: Observations
     return (*found, *(event for event in within if event.recording not in whole_ones))
 
 
-def own_uncertainty(event: Event, unsure: Mapping[str, float]) -> Event:
-    """Return an event as no event of its recording where the parameters' own uncertainty makes as much of it.
+def own_uncertainty(event: Event, unsure: Mapping[str, float], apart: Mapping[str, float]) -> Event:
+    """Return an event as no event of its recording where what is known of the arm makes as much of it.
 
     Parameters
     ----------
@@ -73,10 +73,15 @@ def own_uncertainty(event: Event, unsure: Mapping[str, float]) -> Event:
         Of recordings held out; only a whole one of kind ``unknown`` is changed.
     unsure : mapping of str to float
         Rms error of each joint that a right model has there, known as it is.
+    apart : mapping of str to float
+        Rms torque by which runs were found to differ.
     """
-    theirs = event.rms <= UNSURE_STDS * unsure[event.joints[0]]
-    unnamed = event.kind == "unknown" and np.isinf(event.score)
-    return replace(event, kind="parameters unsure") if theirs and unnamed else event
+    if event.kind != "unknown" or np.isfinite(event.score):
+        return event
+    theirs, of_runs = UNSURE_STDS * unsure[event.joints[0]], UNSURE_STDS * apart[event.joints[0]]
+    if event.rms <= theirs:
+        return replace(event, kind="parameters unsure")
+    return replace(event, kind="runs differ") if event.rms <= np.hypot(theirs, of_runs) else event
 
 
 def quiet_blocks(data: PreparedData, events: Sequence[Event]) -> Array:

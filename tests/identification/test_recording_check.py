@@ -56,10 +56,13 @@ def test_a_push_in_a_held_out_recording_is_no_other_payload():
     assert without_stretches(found.validation, ()) is found.validation
 
 
-def test_what_parameters_err_by_is_no_event_of_a_recording():
+def test_what_parameters_err_by_or_runs_differ_by_is_no_event_of_a_recording():
     whole = Event("run", 0.0, 9.0, ("joint2", "joint1"), 18.4, "unknown", held_out=True)
-    unsure = {"joint1": 0.0, "joint2": 15.7}
-    assert own_uncertainty(whole, unsure).kind == "parameters unsure"
-    assert own_uncertainty(whole, {**unsure, "joint2": 5.0}) == whole
+    unsure, alike = {"joint1": 0.0, "joint2": 15.7}, {"joint1": 9.0, "joint2": 0.0}
+    assert own_uncertainty(whole, unsure, alike).kind == "parameters unsure"
+    known = {**unsure, "joint2": 5.0}
+    assert own_uncertainty(whole, known, alike) == whole
+    # `complete` stood beside an unknown event of all of a recording, of an arm whose friction differed by 5 % from run to run.
+    assert own_uncertainty(whole, known, {**alike, "joint2": 8.0}).kind == "runs differ"
     for other in (replace(whole, kind="other payload"), replace(whole, score=2.0)):
-        assert own_uncertainty(other, unsure) == other
+        assert own_uncertainty(other, unsure, {**alike, "joint2": 20.0}) == other
