@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.acceptance import Decision, hopeless
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters
@@ -94,6 +94,38 @@ def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[
         best = max(others, key=lambda item: item.examination.held_out)
         if best.examination.held_out >= enough:
             result.append(own.refused(f"{best.label}, which is not believed, does as well in its place"))
+    return result
+
+
+def beaten_by_impossible(found: Search, weights: Array) -> list[Decision]:
+    """Return the decisions on effects in whose place one that no arm has explains more, with why.
+
+    It explains much beside them too: what the arm has is like that one, is none of the catalogue, and they stand for it.
+
+    Parameters
+    ----------
+    found : Search
+    weights : ndarray, shape (n,)
+        See `unsettled`.
+    """
+    step, criteria = replace(found.step, weights=weights), found.step.criteria
+    rivals = [
+        item
+        for item in best_of_each(found.decisions).values()
+        if item.examination.p_value * found.tried <= criteria.family_error
+        and item.gain >= criteria.least_gain
+        and hopeless(item.candidate, item.examination, found.scene, criteria) is not None
+    ]
+    result = []
+    for place, candidate in enumerate(step.chosen if rivals else ()):
+        near = [item.candidate for item in rivals if item.candidate.member.joint == candidate.member.joint]
+        if near:
+            beside = step.without(place)
+            own, *others = beside.judge([candidate, *near])
+            # What is believed has its best nonlinear parameters.
+            best = max(beside.refine(others), key=lambda item: item.examination.held_out)
+            if best.examination.held_out > own.examination.held_out:
+                result.append(own.refused(f"{best.label} explains more in its place, and is none: {best.why}"))
     return result
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.diagnosis.acceptance import Decision, hopeless
-from scara_ident.diagnosis.audit import outdone, superfluous, unsettled
+from scara_ident.diagnosis.audit import beaten_by_impossible, outdone, superfluous, unsettled
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.choice import fitted_beside, more_than_chance
 from scara_ident.diagnosis.criteria import SelectionCriteria
@@ -159,5 +159,6 @@ def _unstable(found: Outcome, demoted: Sequence[Decision]) -> list[Decision]:
     return [
         *unsettled(search, weights),
         *superfluous(search, weights, found.hinted),
+        *beaten_by_impossible(search, weights),
         *outdone(search, weights, demoted),
     ]

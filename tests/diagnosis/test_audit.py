@@ -9,7 +9,15 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from scara_ident.diagnosis import audit
-from scara_ident.diagnosis.audit import left_open, outdone, superfluous, suspected, uncertain, unsettled
+from scara_ident.diagnosis.audit import (
+    beaten_by_impossible,
+    left_open,
+    outdone,
+    superfluous,
+    suspected,
+    uncertain,
+    unsettled,
+)
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA
@@ -238,3 +246,40 @@ def test_what_looks_like_noise_and_is_not_believed_is_not_shown_to_be_noise(vote
     if verdict == "undecided":
         (doubted,) = [item for item in result.evidence if not item.shown]
         assert doubted.joint == "joint1" and doubted.why.startswith("roughness of joint1 would remove ")
+
+
+class Impossible(Spring):
+    """A torque over the angle that no arm is said to have."""
+
+    name = "impossible"
+
+    def columns(self, scene, member):
+        return super().columns(scene, member)[:1]
+
+    def signal_columns(self, signals, member):
+        return [np.sin(1.2 * (signals.motion.q[member.place] - 1.57))]
+
+    def inadmissible(self, scene, member, value, std):
+        return "no arm has it"
+
+    def parameters(self, scene, member, value, covariance):
+        return {}
+
+
+@pytest.mark.parametrize(("share", "believed"), [(0.0, True), (0.2, True), (1.0, False)])
+def test_what_no_arm_has_refuses_what_stands_for_it(share: float, believed: bool):
+    """A cable's hysteresis was believed a spring, though a presliding of a part of the friction explained twice as much."""
+    made = with_torque(
+        exact_runs(2, 3),
+        0,
+        lambda motion: 0.03 * ((1.0 - share) * motion.q[0] + share * np.sin(1.2 * (motion.q[0] - 1.57))),
+    )
+    found = searched(made, Spring(), Impossible(), bands=BANDS)
+    (chosen,) = found.chosen
+    assert chosen.effect.name == "spring"
+    refused = beaten_by_impossible(found, found.step.weights)
+    assert [item.label for item in refused] == ([] if believed else ["spring of joint1"])
+    if not believed:
+        assert refused[0].why == "impossible of joint1 explains more in its place, and is none: no arm has it"
+        assert not refused[0].accepted
+    assert beaten_by_impossible(found.without(["spring of joint1"]), found.step.weights) == []
