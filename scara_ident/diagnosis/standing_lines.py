@@ -23,6 +23,9 @@ from scara_ident.effects.spectra import HIGHEST_FREQUENCY_SHARE, frequency_spect
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.threads import side_by_side
 
+# Between two frequencies of a recording of its own length a line has this share of its power at the nearer one.
+LEAST_SEEN = 0.7
+
 
 @dataclass(frozen=True)
 class StandingLine:
@@ -86,11 +89,29 @@ def standing_lines(residuals: Residuals, criteria: SelectionCriteria = CRITERIA)
         if not pieces or squares == 0.0:
             return None
         moving = np.concatenate(fade)
-        line = _largest(j, pieces, data.stretches[0].rate, data.bands[j], squares / len(moving), criteria)
+        within, rate, band = squares / len(moving), data.stretches[0].rate, data.bands[j]
+        if not _may_have(pieces, rate, band, within, criteria):
+            return None
+        line = _largest(j, pieces, rate, band, within, criteria)
         # Faded out at rest a line is as much smaller.
         return None if line is None else replace(line, amplitude=line.amplitude / float(np.mean(moving)))
 
     return tuple(side_by_side(of_joint, range(len(data.bands))))
+
+
+def _may_have(
+    pieces: Sequence[Array], rate: float, band: float | None, within: float, criteria: SelectionCriteria
+) -> bool:
+    """Whether the largest powers of the recordings reach what is asked of a line; of noise alone they are far from it."""
+    largest, samples = np.zeros(2), sum(map(len, pieces))
+    for piece in pieces:
+        count = len(piece)
+        window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(count) + 0.5) / count)
+        shape = piece - np.average(piece, weights=window)
+        power = 0.5 * (np.abs(np.fft.rfft(window * shape)) * 2.0 / np.sum(window)) ** 2
+        edge = len(power) if band is None else int(np.searchsorted(np.fft.rfftfreq(count, 1.0 / rate), band, "right"))
+        largest += count * np.array([np.max(power[:edge], initial=0.0), np.max(power[edge:], initial=0.0)])
+    return bool(np.any(largest > LEAST_SEEN * samples * within * np.array([criteria.least_colour, 1.0])))
 
 
 def _largest(

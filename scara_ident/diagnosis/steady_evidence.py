@@ -62,13 +62,13 @@ def steady_evidence(
 
 
 def _parted(owner: NDArray[np.intp], parts: int) -> NDArray[np.intp] | None:
-    """Return where the parts of every recording begin, and the number of blocks; None where parts would be too short."""
+    """Return where the parts of every recording begin, and the number of blocks; None where none is long enough for two."""
     edges = np.append(np.flatnonzero(np.diff(owner, prepend=-1)), len(owner))
-    if np.min(np.diff(edges), initial=len(owner)) < LEAST_BLOCKS * parts:
+    counts = np.clip(np.diff(edges) // LEAST_BLOCKS, 1, parts)
+    if np.max(counts, initial=1) < 2:
         return None
-    inner = [
-        np.linspace(a, b, parts, endpoint=False).astype(np.intp) for a, b in zip(edges[:-1], edges[1:], strict=True)
-    ]
+    bounds = zip(edges[:-1], edges[1:], counts, strict=True)
+    inner = [np.linspace(first, last, count, endpoint=False).astype(np.intp) for first, last, count in bounds]
     return np.append(np.concatenate(inner), len(owner))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.evidence import Evidence
-from scara_ident.diagnosis.steady_evidence import PARTS, steady_evidence
+from scara_ident.diagnosis.steady_evidence import LEAST_BLOCKS, _parted, steady_evidence
 from scara_ident.estimation import wls
 from scara_ident.recording.recording import Recording
 from tests.diagnosis.made import exact_runs, observed, with_torque
@@ -55,7 +55,7 @@ def test_what_changes_within_recordings_is_no_noise(kind: str, period: float):
 
 def test_a_little_of_it_is_let_pass():
     """A quarter of the power may be what it likes."""
-    assert told(changing(0.002, 9.0)) == SHOWN
+    assert told(changing(0.001, 9.0)) == SHOWN
 
 
 def test_what_runs_differ_by_is_none_of_it():
@@ -74,5 +74,13 @@ def test_nothing_is_asked_where_nothing_was_shown_or_parts_are_too_short():
     training = observed(changing(0.05, 9.0))
     doubted = tuple(replace(item, shown=False) for item in SHOWN)
     assert steady_evidence(doubted, wls(training), training) == doubted
-    few = replace(training, owner=np.arange(len(training.owner)) // (4 * min(PARTS) - 1))
+    few = replace(training, owner=np.arange(len(training.owner)) // (2 * LEAST_BLOCKS - 1))
     assert steady_evidence(SHOWN, wls(training), few) == SHOWN
+
+
+def test_a_short_recording_keeps_none_of_the_others_from_being_parted():
+    owner = np.repeat([0, 1, 2], [40, 5, 9])
+    parted = _parted(owner, 4)
+    assert parted is not None
+    assert parted.tolist() == [0, 10, 20, 30, 40, 45, 49, 54]
+    assert _parted(np.repeat([0, 1], [7, 7]), 4) is None
