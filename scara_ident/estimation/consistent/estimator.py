@@ -150,11 +150,13 @@ def _estimate(
             plain.information.regressor_factor.T @ (plain.information.regressor_factor @ plain.noise_bias)
         )
         covariance += np.outer(bias, bias)
-    # What constraints leave a parameter less than that of is rounding: they hold it.
+    # What constraints leave a parameter less than that of is rounding: they hold it. Where it is held is as sure as the data
+    # alone make it: had they been others, the constraint would not have held it, or elsewhere.
     alone = _inverse_along(information, np.eye(len(value)), u.sizes(value))
     held = np.diag(inverse) < DIGITS**2 * np.diag(alone)
     covariance[held] = covariance[:, held] = 0.0
-    covariance[np.diag_indices_from(covariance)] = np.where(undetermined, np.inf, np.diag(covariance))
+    variance = np.where(held & np.isfinite(np.diag(plain.covariance)), np.diag(plain.covariance), np.diag(covariance))
+    covariance[np.diag_indices_from(covariance)] = np.where(undetermined, np.inf, variance)
     return ConsistentEstimate(
         model=observations.model,
         method="consistent",
