@@ -155,3 +155,21 @@ def _scanned() -> EntryPoints:
 
 def _owner(point: EntryPoint) -> str:
     return f"the package {point.dist.name}" if point.dist is not None else point.value
+
+
+def package_of(error: BaseException) -> str | None:
+    """Return the package that adds to this one and in whose code an error arose; None where it is no such package's."""
+    everything = _scanned()
+    points = (
+        point
+        for group in everything.groups
+        if group.startswith("scara_ident.")
+        for point in everything.select(group=group)
+    )
+    owners = {point.module.partition(".")[0]: _owner(point) for point in points}
+    found, trace = None, error.__traceback__
+    while trace is not None:
+        module = str(trace.tb_frame.f_globals.get("__name__", "")).partition(".")[0]
+        found = owners.get(module, found) if module != "scara_ident" else found
+        trace = trace.tb_next
+    return found

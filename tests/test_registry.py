@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from scara_ident.errors import PluginWarning, ScaraIdentError, UsageError
 from scara_ident.identification import ESTIMATORS
 from scara_ident.model import MODELS
 from scara_ident.recording.files import IMPORTERS
-from scara_ident.registry import Registry
+from scara_ident.registry import Registry, package_of
 from tests.plugins.made import make_installed
 
 GROUP = "scara_ident.shapes"
@@ -93,3 +93,21 @@ def test_everything_built_in_is_there(registry: Registry[object]):
     assert len(ours) >= 3
     for name in ours:
         assert registry.get(name) is not None
+
+
+def test_an_error_in_a_packages_code_names_it(shapes: Registry[float], tmp_path: Path):
+    """A fault of somebody's own effect was an internal error of ours, to be reported."""
+    make_installed(tmp_path, "moons", GROUP, {"moon": "moons:area"}, "def area(inner):\n    return inner()\n")
+    shapes.refresh()
+    area: Callable[[Callable[[], float]], float] = shapes.get("moon")  # type: ignore[assignment]
+
+    def fails() -> float:
+        raise ZeroDivisionError
+
+    for inner in (fails, lambda: 1 // 0):
+        with pytest.raises(ZeroDivisionError) as caught:
+            area(inner)
+        assert package_of(caught.value) == "the package moons"
+    with pytest.raises(ZeroDivisionError) as caught:
+        fails()
+    assert package_of(caught.value) is None

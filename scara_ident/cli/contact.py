@@ -31,6 +31,7 @@ def contact(
     from scara_ident.export.result import read_identified
     from scara_ident.files import write_json
     from scara_ident.recording.recording import read_usable
+    from scara_ident.recording.shared_samples import shared_samples
     from scara_ident.use.contact import contact_observer, contacts_dict, look_for_contact
 
     check_report(output, "contact")
@@ -40,6 +41,11 @@ def contact(
         arm = known.robot
         quiet, notes = read_usable(free, arm)
         watched, more = read_usable(recordings, arm)
+        more += [
+            f"{other.path}: {share:.0%} of its samples are those of {first.path}, given as free of contact; a contact in it is in the "
+            "thresholds too, and may not be found"
+            for other, first, share in shared_samples(quiet, watched)
+        ]
         work("taking thresholds", READING_SHARE)
         observer = contact_observer(known, quiet, rate=rate, bandwidth=bandwidth)
         work("looking for contact", 0.5)

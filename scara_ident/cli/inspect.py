@@ -60,8 +60,10 @@ def inspect(
         write_text(target, found.description)
     if json:
         print_json(inspection_dict(found, target))
-        return
-    _show(output_console(), found, target)
+    else:
+        _show(output_console(), found, target)
+    if robot is not None and found.recording is None:
+        raise ScaraIdentError(found.refusal or f"{file}: {'; '.join(found.problems)}")
 
 
 def inspection_dict(found: Inspection, written: Path | None) -> dict[str, Any]:

@@ -32,6 +32,7 @@ from scara_ident.cli.paper import paper
 from scara_ident.cli.simulate import simulate
 from scara_ident.cli.use import use
 from scara_ident.errors import ScaraIdentError
+from scara_ident.registry import package_of
 
 # Exit status after Ctrl-C, as shells have it; typer gives it back for a command that was interrupted.
 INTERRUPTED = 130
@@ -136,13 +137,15 @@ def run(arguments: list[str]) -> int:
         _complain(f"{'' if where is None else f'{where}: '}{error.strerror or error}{'; make room' if full else ''}")
         return 1
     except Exception as error:
-        # A fault of ours: one line for the user, the whole trace for who wants to report it.
+        # A fault of ours, or of a package that adds to it: one line for the user, the whole trace for who wants to report it.
         if os.environ.get("SCARA_IDENT_TRACEBACK"):
             raise
-        _complain(
-            f"internal error, {type(error).__name__}: {' '.join(str(error).split())}; please report it with what "
-            "SCARA_IDENT_TRACEBACK=1 prints"
-        )
+        what = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        package = package_of(error)
+        if package is None:
+            _complain(f"internal error, {what}; please report it with what SCARA_IDENT_TRACEBACK=1 prints")
+        else:
+            _complain(f"{package} failed with {what}; mend it or leave it out (SCARA_IDENT_TRACEBACK=1 says more)")
         return 1
 
 

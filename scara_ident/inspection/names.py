@@ -132,6 +132,11 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
         found = ["effort"]
     signals = [quantity for quantity in found if quantity != "time"]
     quantity = signals[-1] if signals else found[-1] if found else None
+    # Of a path the last name says what it is: the clock of a group of positions is no position.
+    ending = [token[0].lower() for token in _TOKEN.finditer(_without_accents(name.rpartition("/")[2]))]
+    told = {_WORDS[part] for word in ending for part in _parts(word) if part in _WORDS}
+    if "/" in name and alone and told == {"time"}:
+        quantity = "time"
     # A unit such as U/min is no minimum.
     outside = {token[0].lower() for token in _TOKEN.finditer(_BRACKETS.sub("", name))}
     if OTHER & set(spoken) & outside or (quantity == "time" and (joint is not None or number is not None)):

@@ -27,6 +27,7 @@ from scara_ident.threads import one_blas_thread
 
 # A joint slower than this share of its velocity limit counts as at rest, where friction is unknown.
 REST_SHARE = 3e-3
+SIGNALS = ("position", "velocity", "acceleration", "effort")
 # Samples that the size of the noise is averaged over.
 NOISE_SAMPLES = 1e6
 # The given noise counts as this many samples, so that the first ones do not decide.
@@ -71,6 +72,8 @@ class OnlineSettings:
         for name in ("rate", "block", "memory", "dependent", "false_alarms", "window"):
             if not getattr(self, name) > 0:
                 raise UsageError(f"online: {name} is {getattr(self, name)}; expected a positive number")
+        if self.block != int(self.block):
+            raise UsageError(f"online: block is {self.block}; expected a whole number of samples")
         if self.forgetting not in ("directional", "exponential", "none"):
             raise UsageError(f"online: forgetting is {self.forgetting!r}; expected directional, exponential or none")
         if not 0.0 < self.renewal <= 1.0:
@@ -167,22 +170,47 @@ class OnlineIdentifier:
             Position, velocity and acceleration, in the order of the robot's joints; what is not measured is filtered
             as the torque is.
         effort : array_like, shape (n,)
-            Torque on the recorded side.
+            Torque on the recorded side. A sample with a number that is not finite is lost, and its time counts.
 
         Returns
         -------
         Alarm or None
             Where a change is told with this sample.
+
+        Raises
+        ------
+        UsageError
+            If the shapes are not these.
         """
         row = self._buffer[self._filled]
-        row[0], row[1], row[2], row[3] = q, v, a, effort
+        for place, signal in enumerate((q, v, a, effort)):
+            if np.shape(signal) != row.shape[1:]:
+                raise UsageError(f"online: {SIGNALS[place]} of shape {np.shape(signal)}; expected {row.shape[1:]}")
+            row[place] = signal
+        if not np.isfinite(row).all():
+            self._samples += 1
+            return None
         self._filled += 1
         return self._absorb() if self._filled == len(self._buffer) else None
 
     def update_block(self, q: Array, v: Array, a: Array, effort: Array) -> list[Alarm]:
-        """Take in many samples, shape (n, N) each; the result is that of one after the other, bit for bit."""
+        """Take in many samples, shape (n, N) each; the result is that of one after the other, bit for bit.
+
+        Raises
+        ------
+        UsageError
+            If the shapes are not these.
+        """
         found: list[Alarm] = []
+        shapes = {np.shape(signal) for signal in (q, v, a, effort)}
+        if len(shapes) > 1 or len(shape := next(iter(shapes))) != 2 or shape[0] != self.model.robot.n:
+            told = ", ".join(map(str, sorted(shapes)))
+            raise UsageError(f"online: signals of shapes {told}; expected ({self.model.robot.n}, N) of each")
         signals = np.array([q, v, a, effort], dtype=float)
+        finite = np.isfinite(signals).all(axis=(0, 1))
+        if not finite.all():
+            signals = signals[:, :, finite]
+            self._samples += int(np.count_nonzero(~finite))
         start, count = 0, signals.shape[2]
         while start < count:
             size = min(count - start, len(self._buffer) - self._filled)
@@ -224,7 +252,15 @@ class OnlineIdentifier:
         return np.sqrt(np.diag(self.covariance))
 
     def forget(self, share: float) -> None:
-        """Let all that is known weigh only a share, as when a part was exchanged."""
+        """Let all that is known weigh only a share, as when a part was exchanged.
+
+        Raises
+        ------
+        UsageError
+            If the share is not above 0 and up to 1.
+        """
+        if not 0.0 < share <= 1.0:
+            raise UsageError(f"online: a share of {share}; expected one above 0 and up to 1")
         self._memory = self._memory.forgotten(share, np.zeros((0, self._memory.parameters + 1)), "exponential")
         self._averages = Averages.none(self._causes)
 
@@ -247,7 +283,7 @@ class OnlineIdentifier:
             with place.open("wb") as file:
                 np.savez(file, allow_pickle=False, **state)
 
-        write_whole(path, write)
+        write_whole(Path(path), write)
 
     @classmethod
     def restore(cls, path: Path, model: TorqueModel) -> OnlineIdentifier:
@@ -308,15 +344,18 @@ class OnlineIdentifier:
         return rows, moving
 
     def _absorb(self) -> Alarm | None:
-        with one_blas_thread():
-            each, moving = self._rows()
-            rows = np.concatenate(each)
-            old = self._memory.forgotten(self._keep, rows, self.settings.forgetting)
-            new = old.absorbed(rows)
-            alarm = self._innovated(old, new, each, moving) if moving and old.determined else None
+        try:
+            with one_blas_thread():
+                each, moving = self._rows()
+                rows = np.concatenate(each)
+                old = self._memory.forgotten(self._keep, rows, self.settings.forgetting)
+                new = old.absorbed(rows)
+                alarm = self._innovated(old, new, each, moving) if moving and old.determined else None
+        finally:
+            # Of a block that cannot be absorbed the next ones know nothing.
+            self._samples += self._filled
+            self._filled = 0
         self._memory = new
-        self._samples += self._filled
-        self._filled = 0
         if alarm is not None:
             self.forget(self.settings.renewal)
         return alarm

@@ -57,3 +57,15 @@ def test_json_alone_and_nothing_where_nothing_is(command, folder: Path, result_f
 def test_what_is_missing_is_one_line(command, folder: Path, result_file: Path):
     assert command("contact", folder / "OJD_2.parquet", result_file).status == 2
     assert command("contact", folder / "OJD_2.parquet", result_file, "--free", folder / "none.csv").status == 2
+
+
+def test_where_what_is_watched_is_in_the_thresholds_that_is_said(command, folder: Path, result_file: Path):
+    """Its own contacts raised them, none was found, and nothing was said."""
+    said = "given as free of contact; a contact in it is in the thresholds too"
+    words = ["contact", folder / "OJD_2.parquet", result_file, "--free", folder / "OJD_1.parquet", "--free"]
+    answer = command(*words, folder / "OJD_2.parquet")
+    assert answer.status == 0
+    assert said in " ".join((answer.out + answer.err).split())
+    other = command(*words, folder / "CI_1.csv")
+    assert other.status == 0
+    assert said not in " ".join((other.out + other.err).split())

@@ -75,6 +75,8 @@ def test_json_on_stdout_is_all_there_is(log, capsys):
         (("log_1.csv", "--robot", "absent.yaml"), 2, "no such robot description"),
         (("empty.mat",), 1, "empty"),
         (("log_1.csv", "--urdf", "U", "--output", "log_1.csv"), 1, "log_1.csv"),
+        # A mapping that does not fit the file is no success, though all that is in the file is shown.
+        (("log_1.csv", "--robot", "other.yaml"), 1, "no column"),
         ((), 2, "FILE"),
     ],
 )
@@ -83,6 +85,7 @@ def test_wrong_words_and_files_end_in_a_line_and_nothing_written(
 ):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty.mat").write_bytes(b"")
+    (tmp_path / "other.yaml").write_text(f"urdf: {embedded_urdf()}\neffort_side: motor\n")
     before = sorted(path.name for path in tmp_path.iterdir())
     words = [str(embedded_urdf()) if word == "U" else word for word in words]
     found, _, err = answer(capsys, *words)

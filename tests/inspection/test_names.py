@@ -99,3 +99,9 @@ def test_other_numbers_of_columns_say_nothing():
     columns = table("position", "effort")
     assert told(columns, (3,)) == []
     assert told({"column_0": np.zeros(600)} | columns) == []
+
+
+@pytest.mark.parametrize("name", ["position/time", "arm/torque/time [s]", "pos/Time (ms)"])
+def test_the_clock_of_a_group_is_no_position(name: str):
+    assert meaning(name).quantity == "time"
+    assert meaning(name.replace("ime", "orque")).quantity != "time"

@@ -100,7 +100,9 @@ def test_a_file_that_is_no_state_or_of_another_model_is_refused(tmp_path: Path):
         OnlineIdentifier.restore(tmp_path / "state.npz", build_model(load_robot()))
 
 
-@pytest.mark.parametrize("change", [{"rate": 0.0}, {"forgetting": "slow"}, {"renewal": 2.0}, {"false_alarms": -1.0}])
+@pytest.mark.parametrize(
+    "change", [{"rate": 0.0}, {"block": 1.5}, {"forgetting": "slow"}, {"renewal": 2.0}, {"false_alarms": -1.0}]
+)
 def test_settings_that_mean_nothing_are_refused(change):
     with pytest.raises(UsageError, match="online"):
         replace(SETTINGS, **change)
@@ -153,3 +155,55 @@ def test_a_change_is_seen_within_a_second_of_motion_and_named(kind, joint):
     assert alarms and alarms[0].sample - part <= RATE
     assert (alarms[0].effect, alarms[0].joint) == (kind, joint)
     assert alarms[0].size > 0.0 and alarms[0].unit in ("1", "kg")
+
+
+def test_a_sample_that_is_not_finite_is_lost_and_its_time_counts(tmp_path: Path):
+    """One NaN poisoned all that was known, silently, and then no call came back."""
+    states = signals(3.0)
+    effort = torque(states, truth())
+    bad = effort.copy()
+    bad[0, [5, 700]] = np.nan, np.inf
+    kept = np.isfinite(bad[0])
+    expected = fed([signal[:, kept] for signal in states], effort[:, kept])
+    whole, single = fed(states, bad), OnlineIdentifier(model(), NOISE, SETTINGS)
+    for k in range(effort.shape[1]):
+        single.update(*(signal[:, k] for signal in states), bad[:, k])
+    for online in (whole, single):
+        np.testing.assert_array_equal(online.value, expected.value)
+        assert online.samples == effort.shape[1]
+    whole.save(str(tmp_path / "state.npz"))
+    np.testing.assert_array_equal(OnlineIdentifier.restore(tmp_path / "state.npz", model()).value, whole.value)
+
+
+def test_shapes_and_shares_that_mean_nothing_are_refused():
+    online, (q, v, a) = OnlineIdentifier(model(), NOISE, SETTINGS), signals(0.1)
+    effort = torque((q, v, a), truth())
+    with pytest.raises(UsageError, match=r"effort of shape \(\); expected \(2,\)"):
+        online.update(q[:, 0], v[:, 0], a[:, 0], 1.0)
+    with pytest.raises(UsageError, match=r"position of shape \(3,\); expected \(2,\)"):
+        online.update(np.zeros(3), v[:, 0], a[:, 0], effort[:, 0])
+    for wrong in ((q.T, v.T, a.T, effort.T), (q, v, a, effort[:, 1:]), (q[:, 0], v[:, 0], a[:, 0], effort[:, 0])):
+        with pytest.raises(UsageError, match=r"expected \(2, N\) of each"):
+            online.update_block(*wrong)
+    for share in (0.0, 2.0, np.nan):
+        with pytest.raises(UsageError, match="share"):
+            online.forget(share)
+    assert online.samples == 0
+
+
+def test_a_block_that_cannot_be_absorbed_does_not_end_it(monkeypatch: pytest.MonkeyPatch):
+    states = signals(3.0)
+    effort = torque(states, truth())
+    online = fed(states, effort)
+    known, std = online.value, online.std
+
+    def fails(*_: object) -> None:
+        raise np.linalg.LinAlgError("did not converge")
+
+    with monkeypatch.context() as context:
+        context.setattr(OnlineIdentifier, "_rows", fails)
+        with pytest.raises(np.linalg.LinAlgError):
+            online.update_block(*(signal[:, :64] for signal in states), effort[:, :64])
+    online.update_block(*(signal[:, :320] for signal in states), effort[:, :320])
+    assert np.all(np.abs(online.value - known) < 3.0 * std)
+    assert np.all(online.std < std)
