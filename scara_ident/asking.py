@@ -61,6 +61,8 @@ class Asked:
         How often each question was asked before.
     recorded : str
         Hash of the recordings alone: what was asked counts once something new is there, not where limits are others.
+    left_out : tuple of str
+        Recordings that cannot be used, and why.
     """
 
     inputs: str
@@ -69,6 +71,7 @@ class Asked:
     asked: tuple[str, ...] = ()
     times: Mapping[str, int] = field(default_factory=dict)
     recorded: str = ""
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -154,8 +157,7 @@ def ask(folder: Path, settings: Settings, work: Work | None = None) -> Asked:
         fresh = Asked(inputs, times=times, recorded=recorded)
         if not recordings:
             return _first(folder, settings, fresh, work)
-        _diagnosed(folder, settings, recordings, work.part(0.0, 0.6))
-        before = fresh
+        before = replace(fresh, left_out=_diagnosed(folder, settings, recordings, work.part(0.0, 0.6)))
         _note(folder, before)
     work("designing the next motion", 0.6)
     return _designed(folder, settings, recordings, before, work.part(0.6, 1.0))
@@ -191,8 +193,9 @@ def read_asked(folder: Path) -> Asked | None:
         return None
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        return Asked(**{**content, "asked": tuple(content["asked"])})
-    except (ValueError, TypeError, KeyError):
+        lists = {name: tuple(content.get(name, ())) for name in ("asked", "left_out")}
+        return Asked(**{**content, **lists})
+    except (ValueError, TypeError, AttributeError):
         raise ScaraIdentError(f"{path}: not what ask writes; remove it to begin again") from None
 
 
@@ -212,7 +215,8 @@ def _first(folder: Path, settings: Settings, asked: Asked, work: Work) -> Asked:
     return _note(folder, replace(asked, state="record", words=words))
 
 
-def _diagnosed(folder: Path, settings: Settings, recordings: Sequence[Path], work: Work) -> None:
+def _diagnosed(folder: Path, settings: Settings, recordings: Sequence[Path], work: Work) -> tuple[str, ...]:
+    """Diagnose what is recorded, and return what of it cannot be used."""
     read, useless = read_usable(recordings, settings.robot)
     found = diagnose(settings.robot, read, model=settings.model, progress=work)
     context = DiagnosisContext(found)
@@ -220,6 +224,7 @@ def _diagnosed(folder: Path, settings: Settings, recordings: Sequence[Path], wor
     with written_together(folder) as place:
         diagnosis_report(place / "report.html", context)
         write_json(place / "diagnosis.json", {**content, "notes": [*useless, *content["notes"]]})
+    return tuple(useless)
 
 
 def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], asked: Asked, work: Work) -> Asked:

@@ -139,6 +139,17 @@ def test_where_nothing_is_open_it_says_so_and_no_motion_is_left(folder: Path, mo
     assert not (folder / "next" / "trajectory.csv").exists()
 
 
+def test_a_recording_that_cannot_be_used_is_told_each_time(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """It was left out, and only the notes of the diagnosis said so."""
+    (folder / "recordings" / "junk_1.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    monkeypatch.setattr(asking, "still_open", lambda *_: [])
+    first, again = ask(folder, QUICK), ask(folder, QUICK)
+    assert first.left_out == again.left_out
+    (note,) = first.left_out
+    assert "junk_1.csv" in note
+    assert note.endswith("left out")
+
+
 def test_what_was_asked_counts_when_something_was_recorded_not_when_limits_are_others(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ):

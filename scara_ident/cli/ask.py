@@ -48,6 +48,8 @@ def ask(
         raise UsageError("--effect is what the virtual arm has; give --virtual with it")
     if not folder.exists():
         raise UsageError(f"{folder}: no such folder; make it, with recordings/ in it or empty for a first motion")
+    if (folder / "recordings").is_file():
+        raise UsageError(f"{folder / 'recordings'}: is a file; recordings lie in a folder of that name")
     check_output(folder)
     arm = load_robot(robot)
     within = limits(arm)
@@ -59,6 +61,7 @@ def ask(
     while True:
         with progress() as work:
             found = run(folder, settings, work)
+        console.note(found.left_out)
         console.print(found.words)
         if found.state == "record" and within.clearance is not None:
             console.note(within.clearance.notes)

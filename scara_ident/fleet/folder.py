@@ -114,7 +114,15 @@ def list_fleet(folder: str) -> tuple[tuple[RecordingFile, ...], tuple[Fault, ...
     fs, root = file_system(folder)
     with suppress(FileNotFoundError):
         fs.invalidate_cache()
-    if not fs.isdir(root):
+    try:
+        there = fs.isdir(root)
+    except OSError:
+        raise
+    except Exception as error:
+        # The library of each store has errors of its own, such as for keys that are not there.
+        said = " ".join(str(error).split())
+        raise UsageError(f"{folder}: cannot be read ({type(error).__name__}: {said}); check address and keys") from None
+    if not there:
         raise UsageError(f"{folder}: no such folder")
     arms = sorted(item["name"].rstrip("/") for item in fs.ls(root, detail=True) if item["type"] == "directory")
     arms = [path for path in arms if not PurePosixPath(path).name.startswith(".")]

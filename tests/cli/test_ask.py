@@ -29,5 +29,12 @@ def test_a_folder_that_is_not_there_is_not_made(command, tmp_path: Path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_file_in_the_place_of_the_recordings_is_said(command, tmp_path: Path):
+    (tmp_path / "recordings").write_text("none")
+    result = command("ask", tmp_path, *QUICK)
+    assert result.status == 2 and "recordings: is a file" in result.err
+    assert [path.name for path in tmp_path.iterdir()] == ["recordings"]
+
+
 def test_effects_are_those_of_the_virtual_arm(command, tmp_path: Path):
     assert "--virtual" in command("ask", tmp_path, "--effect", "spring").err

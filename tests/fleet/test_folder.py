@@ -85,3 +85,23 @@ def test_a_key_is_that_of_the_content(tmp_path: Path):
         content_key(str(tmp_path / "none"))
     with ExitStack() as copies:
         assert fetched(str(tmp_path / "a"), copies) == tmp_path / "a"
+
+
+def test_a_store_that_does_not_answer_is_one_line(monkeypatch: pytest.MonkeyPatch):
+    """Without keys it was an internal error, to be reported."""
+
+    class NoCredentialsError(Exception):
+        pass
+
+    class Store:
+        def invalidate_cache(self) -> None:
+            pass
+
+        def isdir(self, root: str) -> bool:
+            raise NoCredentialsError("Unable to locate\ncredentials")
+
+    monkeypatch.setattr("scara_ident.fleet.folder.file_system", lambda _: (Store(), "bucket"))
+    with pytest.raises(
+        UsageError, match=r"^s3://bucket: cannot be read \(NoCredentialsError: Unable to locate credentials\)"
+    ):
+        list_fleet("s3://bucket")
