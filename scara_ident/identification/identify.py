@@ -214,7 +214,11 @@ def identify(
     differs = None
     if robust is not None:
         # Both of the same samples, and neither held by what an arm can have.
-        plain = estimate if method == "wls" and training.kept is None else wls(training.in_memory)
+        plain = estimate
+        if isinstance(estimate, ConsistentEstimate):
+            plain = wls(training.in_memory)
+        elif training.kept is not None:
+            plain, _ = estimate_by(method, training.kept, options)
         differs = disagreement(plain, robust)
     events += () if faults else held_out_events(estimate.value, training, validated)
     drift = None if faults else clock_drift(estimate.value, training.in_memory)
