@@ -23,6 +23,8 @@ from scara_ident.effects.spectra import HIGHEST_FREQUENCY_SHARE, frequency_spect
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.threads import side_by_side
 
+# Rates that differ by more than this share are not looked at together.
+SAME_RATE = 0.01
 # Between two frequencies of a recording of its own length a line has this share of its power at the nearer one.
 LEAST_SEEN = 0.7
 
@@ -81,6 +83,9 @@ def standing_lines(residuals: Residuals, criteria: SelectionCriteria = CRITERIA)
         pieces, squares, fade = [], 0.0, []
         for part, predicted, banded in zip(data.stretches, residuals.predicted, residuals.banded, strict=True):
             if not part.usable or part.samples <= 4 * part.trim or not np.any(part.used[j]):
+                continue
+            # A frequency of one rate is another one of others.
+            if abs(part.rate - data.stretches[0].rate) > SAME_RATE * part.rate:
                 continue
             inside = slice(part.trim, part.samples - part.trim)
             fade.append(part.fade[j][inside])

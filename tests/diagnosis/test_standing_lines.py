@@ -100,6 +100,20 @@ def test_within_the_band_a_line_counts_by_its_share(size: float, there: bool):
         assert second.share == pytest.approx(0.5 * size**2 / (1.0 + 0.5 * size**2), rel=0.15)
 
 
+def test_recordings_of_another_rate_do_not_move_a_line():
+    """Their samples, taken for those of the first rate, would have the line at another frequency."""
+    slow = [run for run in plain() if run.name.startswith("F2")]
+    halved = [
+        replace(run, time=run.time[::2], position=run.position[:, ::2], effort=run.effort[:, ::2])
+        for run in (with_tone(run, 7.3, 0.05, 0.4) for run in slow)
+        if run.effort is not None
+    ]
+    whole = [with_tone(run, 7.3, 0.05, 0.4) for run in plain() if run.name.startswith("F1")]
+    _, line = standing_lines(left_of([*whole, *halved]))
+    assert line is not None
+    assert line.frequency == pytest.approx(7.3, abs=0.02)
+
+
 def test_what_is_known_is_not_listed_again():
     found = diagnosed(7.3, 0.05)
     lines = (None, StandingLine(1, 7.3, 0.05, 0.9, True, 1e-20))
