@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.manners import listed
+from scara_ident.manners import listed, several
 from scara_ident.recording.audit import Finding
 from scara_ident.recording.audit.samples import GAP_STEPS
 
@@ -17,7 +17,7 @@ TOGETHER = 0.5
 
 
 def on_one_clock(
-    columns: Mapping[str, Array], time: str, wanted: Sequence[str]
+    columns: Mapping[str, Array], time: str, wanted: Sequence[str], beside: Sequence[str] = ()
 ) -> tuple[dict[str, Array], tuple[Finding, ...]]:
     """Put channels onto the clock of those that most of them share.
 
@@ -28,40 +28,50 @@ def on_one_clock(
     time : str
         Column of the clock.
     wanted : sequence of str
-        Channels that are needed together; the others only keep their rows.
+        Channels that are needed together.
+    beside : sequence of str
+        Channels that may lack: they take no part in the choice of the clock, and NaN stands in their gaps.
 
     Returns
     -------
     columns : dict of str to ndarray, shape (M,)
         Of the rows that hold the most channels. The others' values stand beside them where they have the same time, and
         are interpolated where they have not, by Hermite's cubic with slopes of second-order differences. Rows that lie
-        in a gap of another channel are left out.
+        in a gap of another channel that is needed are left out, and those up to a step before or behind all of another
+        channel.
     findings : tuple of Finding
         One where something was interpolated, or one that only says that messages were joined.
     """
-    here = {name: np.isfinite(columns[name]) for name in wanted}
-    groups = [names for names in _groups(here) if any(here[name].any() for name in names)]
+    here = {name: np.isfinite(columns[name]) for name in (*wanted, *beside)}
+    groups = [
+        names for names in _groups({name: here[name] for name in wanted}) if any(here[name].any() for name in names)
+    ]
     if not groups:
         return dict(columns), ()
     clock = max(groups, key=lambda names: (len(names), -int(here[names[0]].sum())))
     rows = np.any([here[name] for name in clock], axis=0)
     result = {name: values[rows] for name, values in columns.items()}
     keep = np.ones(int(rows.sum()), dtype=bool)
+    apart = [names for names in groups if names is not clock]
+    lacking = [
+        names
+        for names in _groups({name: here[name] for name in beside if here[name].any()})
+        if not _together(here[names[0]], rows)
+    ]
     resampled: list[str] = []
-    for names in groups:
-        if names is clock:
-            continue
+    for names in (*apart, *lacking):
         own = np.any([here[name] for name in names], axis=0)
         stamps, first = np.unique(columns[time][own], return_index=True)
         for name in names:
             values, exact, inside = _at(result[time], stamps, columns[name][own][first])
-            result[name] = values
-            keep &= inside
+            result[name] = np.where(inside, values, np.nan)
+            # One that may lack cuts no more rows than another phase of the same clock costs it at its ends.
+            keep &= inside if names in apart else inside | ~_at_ends(result[time], stamps)
             if not exact:
                 resampled.append(name)
-    if len(groups) > 1:
+    if not keep.all():
         result = {name: values[keep] for name, values in result.items()}
-    return result, _findings(groups, clock, resampled, int(np.count_nonzero(~keep)))
+    return result, _findings(1 + len(apart) + len(lacking), clock, resampled, int(np.count_nonzero(~keep)))
 
 
 def _groups(here: Mapping[str, NDArray[np.bool_]]) -> list[list[str]]:
@@ -69,14 +79,17 @@ def _groups(here: Mapping[str, NDArray[np.bool_]]) -> list[list[str]]:
     groups: list[list[str]] = []
     for name, rows in here.items():
         for group in groups:
-            other = here[group[0]]
-            if np.count_nonzero(rows & other) >= TOGETHER * max(1, min(rows.sum(), other.sum())):
+            if _together(rows, here[group[0]]):
                 group.append(name)
                 break
         else:
             # What is empty throughout is refused by the audit, beside the others.
             groups.append([name]) if rows.any() or not groups else groups[0].append(name)
     return groups
+
+
+def _together(rows: NDArray[np.bool_], other: NDArray[np.bool_]) -> bool:
+    return bool(np.count_nonzero(rows & other) >= TOGETHER * max(1, min(rows.sum(), other.sum())))
 
 
 def _at(time: Array, stamps: Array, values: Array) -> tuple[Array, bool, NDArray[np.bool_]]:
@@ -97,14 +110,20 @@ def _at(time: Array, stamps: Array, values: Array) -> tuple[Array, bool, NDArray
     return low + (high - low) * rise + bend, False, inside
 
 
-def _findings(
-    groups: Sequence[Sequence[str]], clock: Sequence[str], resampled: Sequence[str], lost: int
-) -> tuple[Finding, ...]:
-    if len(groups) < 2:
+def _at_ends(time: Array, stamps: Array) -> NDArray[np.bool_]:
+    """Tell which times lie before the first or behind the last of others by no more than a step of theirs."""
+    step = np.median(np.diff(stamps)) if len(stamps) > 1 else 0.0
+    before, behind = stamps[0] - time, time - stamps[-1]
+    found: NDArray[np.bool_] = ((before > 0) & (before <= step)) | ((behind > 0) & (behind <= step))
+    return found
+
+
+def _findings(groups: int, clock: Sequence[str], resampled: Sequence[str], lost: int) -> tuple[Finding, ...]:
+    if groups < 2:
         return ()
     if not resampled:
-        said = f"{len(groups)} groups of channels stand in rows of their own with the same times: joined"
-        return (Finding("joined", said, len(groups)),)
-    cut = f"; {lost} rows in gaps of theirs left out" if lost else ""
+        said = f"{groups} groups of channels stand in rows of their own with the same times: joined"
+        return (Finding("joined", said, groups),)
+    cut = f"; {several(lost, 'row')} in gaps of theirs left out" if lost else ""
     said = f"{listed(resampled, 3)} were sampled apart from {clock[0]}: interpolated onto its clock{cut}"
     return (Finding("resampled", said, len(resampled)),)

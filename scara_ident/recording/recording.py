@@ -266,10 +266,12 @@ def recording_of(
     refuse_missing(path, names, [channel.column for channel in needed], channels)
     optional, findings = optional_channels(path, channels, names, () if need_effort else ("effort",))
     second = {k: place for k, place in enumerate(channels.link_position) if place.column in names}
-    wanted = [channel.column for channel in (*needed, *chain.from_iterable(optional.values()), *second.values())]
-    columns = read(wanted)
+    extra = (*chain.from_iterable(optional.values()), *second.values())
+    columns = read([channel.column for channel in (*needed, *extra)])
     if shared_clock:
-        columns, joined = on_one_clock(columns, channels.time.column, [channel.column for channel in needed[1:]])
+        asked = [channel.column for channel in needed[1:]]
+        beside = [channel.column for channel in extra]
+        columns, joined = on_one_clock(columns, channels.time.column, asked, beside)
         findings += joined
 
     def rows(wanted: Sequence[Channel]) -> Array:

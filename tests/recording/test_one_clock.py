@@ -65,3 +65,23 @@ def test_nothing_is_interpolated_over_a_gap():
 def test_a_channel_that_is_empty_stays_for_the_audit():
     found, _ = on_one_clock(ARM | {"c": np.full(200, np.nan)}, "time", ["a", "b", "c"])
     assert np.isnan(found["c"]).all()
+
+
+def test_a_channel_that_may_lack_comes_along_where_its_rows_are_others():
+    """Joints in messages of their own: the velocity of each stands in its own rows, as its position does."""
+    other = T + 0.004
+    first, second = ARM | {"va": np.cos(T)}, {"time": other, "c": np.sin(other), "d": T, "vc": np.cos(other)}
+    found, (said,) = on_one_clock(interleaved(first, second), "time", ["a", "b", "c", "d"], ["va", "vc"])
+    assert said.message.startswith("c, d, vc were sampled apart from a")
+    assert np.isfinite(found["vc"]).all()
+    np.testing.assert_allclose(found["vc"][1:-1], np.cos(found["time"])[1:-1], rtol=0, atol=0.01**3)
+
+
+def test_a_gap_in_what_may_lack_costs_no_row():
+    other = np.delete(T + 0.004, np.arange(50, 90))
+    parts = interleaved(ARM | {"empty": np.full(200, np.nan)}, {"time": other, "v": other})
+    found, (said,) = on_one_clock(parts, "time", ["a", "b"], ["v", "empty"])
+    assert len(found["time"]) == 199
+    assert said.kind == "resampled"
+    assert np.count_nonzero(np.isnan(found["v"])) == 41
+    assert np.isnan(found["empty"]).all()
