@@ -20,6 +20,7 @@ from scara_ident.arrays import Array
 from scara_ident.effects.in_state import follows_state
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, deviation
 from scara_ident.effects.signals import Scene, Signals
+from scara_ident.errors import ScaraIdentError
 from scara_ident.model.prediction import states
 from scara_ident.model.terms import Column
 from scara_ident.model.terms.term import StateTorque
@@ -134,7 +135,7 @@ class Effect(ABC):
 
     def regressor(self, signals: Signals, member: Member) -> Array:
         """Return the columns of a member, shape (n, k, N), on the side of the recorded torque."""
-        columns = list(self.signal_columns(signals, member))
+        columns = self._named(signals, member)
         result = np.zeros((signals.scene.robot.n, len(columns), signals.motion.samples))
         for k, column in enumerate(columns):
             result[member.place if np.ndim(column) == 1 else slice(None), k] = column
@@ -142,7 +143,14 @@ class Effect(ABC):
 
     def by_joint(self, signals: Signals, member: Member) -> dict[int, list[Array]]:
         """Return the k columns of a member, (N,) each, on every joint that they act on, by the joint's place."""
-        columns = [np.asarray(column) for column in self.signal_columns(signals, member)]
+        columns = [np.asarray(column) for column in self._named(signals, member)]
+        shapes = (signals.motion.samples,), (signals.scene.robot.n, signals.motion.samples)
+        for k, column in enumerate(columns):
+            if column.shape not in shapes:
+                raise ScaraIdentError(
+                    f"effect {self.name}: column {k} has shape {column.shape}; expected {shapes[0]} for the member's joint or "
+                    f"{shapes[1]} for all joints"
+                )
         return {
             joint: [column if column.ndim == 1 else column[joint] for column in columns]
             for joint in self.rows(signals.scene, member)
@@ -150,12 +158,18 @@ class Effect(ABC):
 
     def fill(self, signals: Signals, member: Member, rows: Sequence[Array]) -> None:
         """Write the columns into those of each joint: (k, N) where they act, (0, N) where they do not."""
-        columns = list(self.signal_columns(signals, member))
+        columns = self._named(signals, member)
         for joint in self.rows(signals.scene, member):
-            if len(columns) != len(rows[joint]):
-                raise ValueError(f"effect {self.name}: {len(rows[joint])} coefficients, but {len(columns)} columns")
             for k, column in enumerate(columns):
                 rows[joint][k] = column if np.ndim(column) == 1 else column[joint]
+
+    def _named(self, signals: Signals, member: Member) -> list[Array]:
+        """Return the columns of a member, one for each that `columns` describes."""
+        columns = list(self.signal_columns(signals, member))
+        described = len(self.columns(signals.scene, member))
+        if len(columns) != described:
+            raise ScaraIdentError(f"effect {self.name}: {described} coefficients, but {len(columns)} columns")
+        return columns
 
     def rows(self, scene: Scene, member: Member) -> list[int]:
         """Return the places of the joints whose torque the columns act on."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
-from scara_ident.errors import UsageError
+from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation import Estimate, History, JointError, wls
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, physical_consistency
 from scara_ident.estimation.consistent.feasibility import PhysicalConsistency
@@ -278,11 +278,26 @@ def check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequenc
 def estimate_by(
     method: str, observations: Observations, options: ConsistentOptions | None = None
 ) -> tuple[Estimate, History | None]:
-    """Estimate by a method given by name; the options are those of ``consistent``."""
+    """Estimate by a method given by name; the options are those of ``consistent``.
+
+    Raises
+    ------
+    EstimationError
+        If the method, as one of a package, returns something else than an estimate of the model's p parameters, or such
+        an estimate and a `History`.
+    """
     estimator = ESTIMATORS.get(method)
     more: dict[str, Any] = {"options": options} if method == "consistent" else {}
     found = estimator(observations, **more)
-    return found if isinstance(found, tuple) else (found, None)
+    estimate, history = found if isinstance(found, tuple) and len(found) == 2 else (found, None)
+    if not isinstance(estimate, Estimate):
+        raise EstimationError(f"method {method!r} returned {type(estimate).__name__}; expected an Estimate")
+    p = observations.parameters
+    for name, shape in (("value", (p,)), ("covariance", (p, p)), ("undetermined", (p,))):
+        given = np.shape(getattr(estimate, name))
+        if given != shape:
+            raise EstimationError(f"method {method!r} returned {name} of shape {given}; the model asks for {shape}")
+    return estimate, history
 
 
 def check_held_out(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:

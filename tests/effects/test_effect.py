@@ -18,6 +18,7 @@ from scara_ident.effects import (
     Signals,
     SpectralLine,
 )
+from scara_ident.errors import ScaraIdentError
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import EFFECTS
 from tests.arms import example_urdf
@@ -84,13 +85,31 @@ def test_limits_are_said_with_the_coefficient():
     assert [Hook().inadmissible(scene, member, np.array([x]), std) for x in (-0.19, 0.0, 2.19)] == [None] * 3
 
 
-def test_columns_that_no_coefficient_names_are_an_error():
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (lambda time: [time, time], "effect hook: 1 coefficients, but 2 columns"),
+        (lambda time: [time[1:]], r"effect hook: column 0 has shape \(9,\); expected \(10,\)"),
+        (lambda time: [time[None]], r"effect hook: column 0 has shape \(1, 10\); expected .* or \(2, 10\)"),
+    ],
+)
+def test_columns_that_do_not_fit_are_an_error(made, said):
+    class Torn(Hook):
+        def signal_columns(self, signals, member):
+            return made(signals.time)
+
+    scene, item = scene_of(load_robot()), moving(load_robot(), 0.02)
+    with pytest.raises(ScaraIdentError, match=said):
+        Torn().by_joint(Signals(scene, item), Member(0, (0.1,)))
+
+
+def test_columns_that_no_coefficient_names_are_an_error_in_a_model_too():
     class Torn(Hook):
         def signal_columns(self, signals, member):
             return [signals.time, signals.time]
 
     scene, item = scene_of(load_robot()), moving(load_robot(), 0.02)
-    with pytest.raises(ValueError, match="effect hook: 1 coefficients, but 2 columns"):
+    with pytest.raises(ScaraIdentError, match="effect hook: 1 coefficients, but 2 columns"):
         EffectTerm(Torn(), Member(0, (0.1,)), scene).fill(
             item, [np.empty((1, item.samples)), np.empty((0, item.samples))]
         )

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from scara_ident.errors import RecordingError, UsageError
+from scara_ident.errors import EstimationError, RecordingError, UsageError
 from scara_ident.estimation import ols
 from scara_ident.estimation.observations import observe
+from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.identify import (
     Identification,
     identify,
@@ -299,6 +300,25 @@ def test_bad_requests_are_refused(robot: Robot, clean: Recording):
         identify(robot, [clean], model="magic")
     with pytest.raises(RecordingError, match="no effort"):
         identify(robot, [replace(clean, effort=None)])
+
+
+@pytest.mark.parametrize(
+    ("spoiled", "said"),
+    [
+        (lambda estimate: estimate.value, "method 'own' returned ndarray; expected an Estimate"),
+        (
+            lambda estimate: replace(estimate, value=estimate.value[1:]),
+            r"'own' returned value of shape \(14,\); .* \(15,\)",
+        ),
+        (lambda estimate: replace(estimate, covariance=np.eye(3)), r"'own' returned covariance of shape \(3, 3\)"),
+    ],
+)
+def test_a_packages_method_that_returns_something_else_is_named(
+    robot: Robot, clean: Recording, monkeypatch, spoiled, said
+):
+    monkeypatch.setitem(ESTIMATORS._built_in, "own", lambda observations: spoiled(ols(observations)))
+    with pytest.raises(EstimationError, match=said):
+        identify(robot, [clean], method="own")
 
 
 @pytest.mark.parametrize("bands", [[20.0], [np.nan, 20.0], [20.0, 0.0], [-5.0, 20.0]])
