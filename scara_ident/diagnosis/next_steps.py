@@ -100,7 +100,12 @@ def _steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
         *_confirmations(diagnosis),
         *_faint(diagnosis),
         *(
-            NextStep(f"{item.effect} or what absorbs it ({', '.join(item.absorbed_by)})", item.opened_by)
+            NextStep(
+                f"{item.effect} or what absorbs it ({', '.join(item.absorbed_by)})"
+                if item.absorbed_by
+                else f"{item.effect}, which changes no torque",
+                item.opened_by,
+            )
             for item in diagnosis.aliases
         ),
     )

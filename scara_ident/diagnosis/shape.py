@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects import Effect, Member, Signals
+from scara_ident.effects import Effect, Member, Scene, Signals
+from scara_ident.model.terms import Column
 from scara_ident.robot.robot import Robot
 
 # Knots over one signal, and over each of two.
@@ -33,6 +34,12 @@ class Shape(Effect):
     summary = "a curve over signals"
     signals: tuple[tuple[str, int], ...] = ()
     ranges: tuple[tuple[float, float], ...] = ()
+
+    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
+        """Name the heights of all hats."""
+        count = KNOTS if len(self.signals) == 1 else PAIR_KNOTS ** len(self.signals)
+        joint, unit = scene.robot.joints[member.place], scene.robot.torque_unit(member.place)
+        return tuple(Column(f"height{k}", joint, unit, f"height of hat {k}") for k in range(count))
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return every hat, or every product of two."""

@@ -68,7 +68,8 @@ def diagnosis_markdown(
         lines += ["", "## What no such recording can show", ""]
         lines += ["| effect | joints | absorbed by | opened by |", "|---|---|---|---|"]
         lines += [
-            f"| {row['effect']} | {', '.join(row['joints']) or '-'} | {', '.join(row['absorbed_by'])} | {row['opened_by']} |"
+            f"| {row['effect']} | {', '.join(row['joints']) or '-'} | {', '.join(row['absorbed_by']) or 'no torque at all'} | "
+            f"{row['opened_by']} |"
             for row in content["not_identifiable"]
         ]
     if content["worth"] is not None:

@@ -138,8 +138,13 @@ class OfTheArm(Spring):
 
     name = "of_the_arm"
 
+    coefficients = (Coefficient("stiffness", "N m/rad", "stiffness"),)
+
     def members(self, scene):
         return (Member(None),)
+
+    def columns(self, scene, member):
+        return Effect.columns(self, scene, member)
 
     def signal_columns(self, signals, member):
         turn = signals.motion.q[0] - MIDDLE

@@ -13,6 +13,7 @@ from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.next_steps import ASKED_MOTION, capital, next_steps
 from scara_ident.effects.position import Spring
 from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.diagnosis_markdown import diagnosis_markdown
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.asked import PAIR, open_diagnosis
 from tests.diagnosis.made import BANDS, exact_runs, with_torque
@@ -51,6 +52,12 @@ def test_what_no_motion_settles_names_the_experiment(lean):
     found = {item.question.partition(" or ")[0]: item.motion for item in next_steps(lean)}
     assert found["constant_payload"] == "recordings with and without the payload"
     assert "drive off" in found["asymmetric_coulomb"]
+
+
+def test_what_changes_no_torque_is_absorbed_by_nothing(lean):
+    found = replace(lean, aliases=(replace(lean.aliases[0], effect="own", absorbed_by=()),))
+    assert "own, which changes no torque" in {item.question for item in next_steps(found)}
+    assert "| no torque at all |" in diagnosis_markdown(found)
 
 
 def test_a_remainder_that_depends_on_a_signal_asks_for_a_motion_and_another_for_half_the_speed():
