@@ -43,11 +43,14 @@ def noise_bias(observations: Observations, weights: Array, value: Array) -> Arra
     """
     if max(noise_shares(observations.data), default=0.0) < NEGLIGIBLE:
         return None
-    again = informations(observations.model, noisier(observations.data))
-    if observations.kept is not None:
-        # What is compared is of the same samples.
-        value = weighted(observations.kept.by_joint, weights).solve().value
-    return np.asarray(weighted(again, weights).solve().value - value)
+    here = observations.in_memory
+    # The bias follows from the motion: a repetition has the same, and adds to what is known of it chance alone.
+    places = [here.data.labels.index(label) for label in dict.fromkeys(here.data.labels)]
+    again = informations(here.model, noisier(here.data).of(places))
+    # What is compared is of the same samples.
+    same = here is observations and len(places) == len(here.data.recordings)
+    once = value if same else weighted(here.of(places).by_joint, weights).solve().value
+    return np.asarray(weighted(again, weights).solve().value - once)
 
 
 def noise_torque(observations: Observations, value: Array) -> Array:

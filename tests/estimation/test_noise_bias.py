@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from scara_ident.estimation import wls
+from scara_ident.estimation.information import weighted
 from scara_ident.estimation.noise_bias import bias_sentence, noise_bias, noise_shares, noise_torque
+from scara_ident.estimation.observations import informations
+from scara_ident.motion.position_noise import noisier
 from scara_ident.motion.prepared import prepare
 from tests.diagnosis.made import exact_runs, observed
 
@@ -81,3 +84,14 @@ def test_where_nothing_is_moved_nothing_is_said():
 
 def test_without_a_band_nothing_can_be_said():
     assert noise_bias(observed(exact_runs()[:2], (None, None)), np.ones(2), np.zeros(15)) is None
+
+
+def test_a_repetition_adds_nothing():
+    """The bias follows from the motion: one recording of each trajectory tells what all of them do."""
+    seen, weights = observed(coarse(13), WIDE), np.array([50.0, 125.0])
+    assert len(set(seen.data.labels)) < len(seen.data.labels)
+    once = weighted(seen.by_joint, weights).solve().value
+    twice = weighted(informations(seen.model, noisier(seen.data)), weights).solve().value
+    found = noise_bias(seen, weights, once)
+    assert found is not None
+    assert found[:5] == pytest.approx((twice - once)[:5], rel=0.1)
