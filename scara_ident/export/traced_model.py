@@ -49,18 +49,13 @@ class TracedModel:
     friction: tuple[Scalar, ...]
 
 
-def unsaid_terms(model: TorqueModel) -> tuple[EffectTerm, ...]:
-    """Return the effects of a model that no code of the state can have."""
-    return tuple(term for term in model.terms if isinstance(term, EffectTerm) and not term.effect.of_state)
-
-
 def trace_model(model: TorqueModel, value: Array) -> TracedModel:
     """Trace a model with parameters ``value`` (p,); terms whose parameters are all zero are left out.
 
     Raises
     ------
     ValueError
-        If a term with other parameters does not follow from the state, see `unsaid_terms`.
+        If a term with other parameters does not follow from the state.
     """
     robot, n = model.robot, model.robot.n
     trace = Trace()

@@ -71,7 +71,7 @@ class PreparedStretch:
 
     def with_torque_of(self, stretch: Stretch) -> PreparedStretch:
         """Return it with a stretch that differs by its torque alone; what the motion decides is shared."""
-        shared = {name: made for name, made in self.__dict__.items() if name not in ("stretch", "smooth_torque")}
+        shared = {name: made for name, made in self.__dict__.items() if name != "stretch"}
         found = replace(self, stretch=stretch)
         found.__dict__.update(shared, motion=replace(self.motion, torque=stretch.torque))
         return found
@@ -166,11 +166,6 @@ class PreparedStretch:
     def smooth(self, joint: int, signal: Array) -> Array:
         """Return a signal of a joint's equation, shape (..., N), faded out towards rest and within the joint's band."""
         return low_pass(self.fade[joint] * signal, self.rate, self.bands[joint], self.steps[joint])
-
-    @made_once
-    def smooth_torque(self) -> Array:
-        """Recorded torque within the bands at every sample, shape (n, N)."""
-        return np.array([self.smooth(j, row) for j, row in enumerate(self.torque)])
 
 
 @dataclass(frozen=True, eq=False)
