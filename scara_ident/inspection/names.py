@@ -12,7 +12,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.inspection.values import ALIKE, slopes, time_unit
-from scara_ident.robot.units import find_unit, table_of
+from scara_ident.robot.units import ALSO, find_unit, table_of
 
 QUANTITIES = {
     "position": "position positions pos q jpos qpos angle angles ang theta encoder enc winkel drehwinkel lage",
@@ -63,8 +63,6 @@ _ENDINGS = {
     "nsec": "ns", "sec": "s", "seconds": "s", "rpm": "rpm", "nm": "N m", "amps": "A", "percent": "%",
     "grad": "deg", "degre": "deg", "degres": "deg", "prozent": "%",
 }  # fmt: skip
-# Units in brackets as they are also written.
-_ALSO = {"°": "deg", "°/s": "deg/s", "grad": "deg", "grad/s": "deg/s", "u/min": "rpm", "1/min": "rpm", "tr/min": "rpm"}
 # Columns without names, by how many a joint has: what slopes confirm comes first.
 BLOCKS = {3: ("position", "velocity", "effort"), 2: ("position", "effort")}
 # Units that their capitals tell from other words.
@@ -174,7 +172,7 @@ def _unit(name: str, words: Sequence[str], quantity: str) -> str | None:
         # A speed called deg is in deg/s.
         for ending in ("", "/s", "/s^2"):
             for table in tables:
-                unit = find_unit(_ALSO.get(word.lower(), word) + ending, table)
+                unit = find_unit(ALSO.get(word.lower(), word) + ending, table)
                 if unit is not None:
                     return unit.name
     return None

@@ -60,6 +60,14 @@ FORCE = _table(Unit("N", 1.0), Unit("mN", 1e-3), Unit("kN", 1e3), *DRIVE.values(
 TEMPERATURE = _table(Unit("degC", 1.0), Unit("K", 1.0, -273.15))
 
 
+# What units may stand in, in a table.
+BRACKETS = "[](){}<> "
+# Units as they are also written.
+ALSO = MappingProxyType(
+    {"°": "deg", "°/s": "deg/s", "grad": "deg", "grad/s": "deg/s", "u/min": "rpm", "1/min": "rpm", "tr/min": "rpm"}
+)
+
+
 def table_of(signal: str, *, linear: bool) -> Mapping[str, Unit]:
     """Return the units that a signal may have; the first is its SI unit.
 
@@ -85,6 +93,35 @@ def find_unit(word: str, table: Mapping[str, Unit]) -> Unit | None:
     """Find a unit by its name, whatever the blanks and the sign for micro: ``Nm`` and ``N m`` are one."""
     wanted = _plain(word)
     return next((unit for name, unit in table.items() if _plain(name) == wanted), None)
+
+
+def is_unit(word: str) -> bool:
+    """Tell whether a word, in brackets or not, is a unit of any channel."""
+    return any(_everywhere(word))
+
+
+def is_si(word: str) -> bool:
+    """Tell whether numbers in a unit are those in SI, whatever channel they are of."""
+    found = _everywhere(word)
+    return bool(found) and all(unit.factor == 1.0 and not unit.offset and not unit.needs_gain for unit in found)
+
+
+def _everywhere(word: str) -> list[Unit]:
+    bare = word.strip(BRACKETS)
+    tables = (
+        TIME,
+        ANGLE,
+        LENGTH,
+        ANGLE_RATE,
+        LENGTH_RATE,
+        ANGLE_ACCELERATION,
+        LENGTH_ACCELERATION,
+        TORQUE,
+        FORCE,
+        TEMPERATURE,
+    )
+    found = (find_unit(ALSO.get(bare.lower(), bare), table) for table in tables)
+    return [unit for unit in found if unit is not None]
 
 
 def _plain(word: str) -> str:

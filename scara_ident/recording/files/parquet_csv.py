@@ -5,28 +5,25 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.files import replacing, why_unwritten
 from scara_ident.memory import check_memory
 from scara_ident.quiet import quiet_stderr
-from scara_ident.recording.files.dates import is_date, seconds
+from scara_ident.recording.files.csv_layout import MISSING, CsvLayout, csv_layout
+from scara_ident.recording.files.dates import seconds
 from scara_ident.recording.files.files import check_file
 
 if TYPE_CHECKING:
     import polars as pl
 
 SUFFIXES = (".parquet", ".csv")
-# What loggers and spreadsheets write where there is no number.
-MISSING = ["NA", "N/A", "n/a", "na", "null", "None", "-"]
-SEPARATORS = ",;\t"
 # Of a word that is no number, this much is shown.
 LONGEST_WORD = 60
-# No header is as long, nor the row of a table.
-LONGEST_LINE = 1_000_000
 # Bytes of a number on its way into an array; of a word, where it is read as such.
 PER_VALUE = 24
 # A number takes two characters at least, and eight bytes; the file itself is in memory beside it.
@@ -58,9 +55,7 @@ def column_names(path: Path) -> tuple[str, ...]:
     check_file(path)
     try:
         if path.suffix.lower() == ".csv":
-            header = _csv_header(path)
-            unnamed = _is_data(header)
-            names = [f"column_{k + 1}" if unnamed else name.strip() for k, name in enumerate(header)]
+            names = list(csv_layout(path).names)
         else:
             with path.open("rb") as file, quiet_stderr():
                 names = list(pl.read_parquet_schema(file))
@@ -151,34 +146,31 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
     import polars as pl
 
     check_memory(path, CSV_FACTOR * path.stat().st_size)
-    header = _csv_header(path)
-    separator = _separator(path)
-    decimal_comma = separator == ";" and _has_decimal_comma(path)
-    if _is_data(header):
-        frame = pl.read_csv(
-            path, has_header=False, infer_schema=False, separator=separator, null_values=MISSING, glob=False
-        )
-        frame.columns = [f"column_{k + 1}" for k in range(frame.width)]
-        return _points(frame.select(names), decimal_comma=decimal_comma)
-    raw = {name.strip(): name for name in header if name.strip() in names}
+    layout = csv_layout(path)
+    # By place: names may be those of units too, and the reader's own differ by its version.
+    place = {name: layout.names.index(name) for name in names}
+    how: dict[str, Any] = {
+        "has_header": False,
+        "columns": sorted(place.values()),
+        "skip_lines": layout.first,
+        "separator": layout.separator,
+        "null_values": list(MISSING),
+        "glob": False,
+        "raise_if_empty": False,
+    }
+
+    def schema(kind: type[pl.DataType]) -> dict[str, type[pl.DataType]]:
+        return {str(k): kind if k in how["columns"] else pl.String for k in range(len(layout.names))}
+
     try:
-        frame = pl.read_csv(
-            path,
-            columns=list(raw.values()),
-            schema_overrides={name: pl.Float64 for name in raw.values()},
-            separator=separator,
-            decimal_comma=decimal_comma,
-            null_values=MISSING,
-            glob=False,
-        )
+        frame = pl.read_csv(path, schema=schema(pl.Float64), decimal_comma=layout.decimal_comma, **how)
     except pl.exceptions.ComputeError:
         # Something is not a number: read the words themselves, so that it can be named.
-        _refuse_long_rows(path, separator)
-        frame = pl.read_csv(
-            path, columns=list(raw.values()), infer_schema=False, separator=separator, null_values=MISSING, glob=False
-        )
-        frame = _points(frame, decimal_comma=decimal_comma)
-    return frame.rename({file_name: name for name, file_name in raw.items()})
+        _refuse_long_rows(path, layout)
+        frame = pl.read_csv(path, schema=schema(pl.String), **how)
+        if layout.decimal_comma:
+            frame = frame.with_columns(pl.all().str.replace(",", ".", literal=True))
+    return frame.select(pl.col(str(own)).alias(name) for name, own in place.items())
 
 
 def _check_parquet(path: Path, names: Sequence[str]) -> None:
@@ -198,12 +190,6 @@ def _check_parquet(path: Path, names: Sequence[str]) -> None:
 def _no_number(path: Path, name: str, kind: pl.DataType) -> RecordingError:
     hint = "time in seconds" if name == "time" else "numbers"
     return RecordingError(f"{path}: column {name!r} holds {kind}; it must hold {hint}")
-
-
-def _points(frame: pl.DataFrame, *, decimal_comma: bool) -> pl.DataFrame:
-    import polars as pl
-
-    return frame.with_columns(pl.all().str.replace(",", ".", literal=True)) if decimal_comma else frame
 
 
 def numbers(path: Path, series: pl.Series) -> Array:
@@ -233,59 +219,13 @@ def numbers(path: Path, series: pl.Series) -> Array:
     return values
 
 
-def _csv_header(path: Path) -> list[str]:
-    line = _first_lines(path, 1)[0]
-    return next(csv.reader([line.strip()], delimiter=_sign_between(line))) if line else []
-
-
-def _is_data(header: list[str]) -> bool:
-    """Tell whether the first line is numbers, and points in time, and so no header."""
-    words = [word for word in header if not _is_number(word)]
-    return len(words) < len(header) > 1 and all(is_date(word) for word in words)
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word.replace(",", "."))
-    except ValueError:
-        return False
-    return True
-
-
-def _separator(path: Path) -> str:
-    return _sign_between(_first_lines(path, 1)[0])
-
-
-def _first_lines(path: Path, count: int) -> list[str]:
-    """Return the first lines that are not empty, fewer than wanted filled up with empty ones."""
-    found: list[str] = []
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        while len(found) < count and (line := file.readline(LONGEST_LINE)):
-            if len(line) == LONGEST_LINE:
-                raise RecordingError(
-                    f"{path}: a line of more than {LONGEST_LINE} characters: not a table; save it again"
-                )
-            found += [line] if line.strip() else []
-    return [*found, *[""] * (count - len(found))]
-
-
-def _sign_between(header: str) -> str:
-    """Return what separates the names of a header; blanks only where nothing else does."""
-    sign = max(SEPARATORS, key=header.count)
-    return " " if sign not in header and " " in header.strip() else sign
-
-
-def _has_decimal_comma(path: Path) -> bool:
-    return "," in _first_lines(path, 2)[1]
-
-
-def _refuse_long_rows(path: Path, separator: str) -> None:
+def _refuse_long_rows(path: Path, layout: CsvLayout) -> None:
+    width = len(layout.names)
     with path.open(encoding="utf-8-sig", newline="", errors="replace") as file:
-        rows = (row for row in csv.reader(file, delimiter=separator) if row)
-        width = len(next(rows, []))
+        rows = csv.reader(islice(file, layout.first, None), delimiter=layout.separator)
         # A field longer than Python's parser takes is no number, and said to be none where it is wanted.
         with suppress(csv.Error):
-            for number, row in enumerate(rows, 1):
+            for number, row in enumerate((row for row in rows if row), 1):
                 if len(row) > width:
                     raise RecordingError(
                         f"{path}: row {number} has {len(row)} values for {width} columns; correct or remove it"
