@@ -16,7 +16,7 @@ def check(
         Path, typer.Argument(metavar="TRAJECTORY", help="trajectory.csv, or a recording, with effort or without.")
     ],
     result: options.Result,
-    robot: options.Robot = None,
+    robot: options.RobotMoved = None,
     ranges: options.Ranges = None,
     velocities: options.Velocities = None,
     accelerations: options.Accelerations = None,

@@ -17,7 +17,7 @@ def contact(
         list[str],
         typer.Option("--free", metavar="RECORDING", help="Without contact: thresholds are taken from it; repeatable."),
     ],
-    robot: options.Robot = None,
+    robot: options.RobotMoved = None,
     rate: Annotated[float, typer.Option(metavar="R", min=1e-6, help="False alarms per hour to allow.")] = 1.0,
     bandwidth: Annotated[
         float, typer.Option(metavar="HZ", min=0.01, help="Of the observer: wider is sooner, and noisier.")

@@ -22,7 +22,7 @@ SEARCHES_SHARE = 0.97
 
 @with_motion_limits
 def excite(
-    robot: options.Robot = None,
+    robot: options.RobotOfEarlier = None,
     model: options.ModelIfGiven = None,
     criterion: Annotated[
         Literal["logdet", "cond"] | None,
@@ -103,6 +103,7 @@ def excite(
     from scara_ident.excitation.output import check_rate, file_names
     from scara_ident.excitation.stopping import NOISE_BAND, noise_of, stopping
     from scara_ident.excitation.stopping import asked_std as read_asked
+    from scara_ident.export.result import read_robot
     from scara_ident.files import write_json
     from scara_ident.identification.identify import known_information
     from scara_ident.model.model import build_model
@@ -113,7 +114,6 @@ def excite(
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "excitation")
-    arm = load_robot(robot)
     if tell is not None and wanted:
         raise UsageError("--for and --tell: two goals of one motion; give one of them")
     if tell is not None and (criterion is not None or model is not None):
@@ -124,6 +124,8 @@ def excite(
     if noise and not asked_std:
         raise UsageError("--noise is for --asked-std; give both")
     asked = None if tell is None else read_diagnosis(tell)
+    earlier = tell or parameters
+    arm = (read_robot(earlier) if robot is None and earlier is not None else None) or load_robot(robot)
     equation = build_model(arm, (model or "complete") if asked is None else str(asked["model"]))
     goal = None if asked is not None else criterion_of(criterion or "logdet", equation, wanted or ())
     place = numbers(start, "--start")

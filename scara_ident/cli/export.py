@@ -21,10 +21,7 @@ def export(
             "header; casadi: a Python module; ros2: controllers' parameters.",
         ),
     ],
-    robot: Annotated[
-        Path | None,
-        typer.Option("--robot", metavar="FILE", help="Where the robot of the result is now, if its URDF has moved."),
-    ] = None,
+    robot: options.RobotMoved = None,
     output: options.Folder = Path("."),
     json: options.Json = False,
 ) -> None:

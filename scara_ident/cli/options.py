@@ -31,6 +31,23 @@ Robot = Annotated[
         help="robot.yaml, a URDF, or a robot of example-robot-data by its name, as ur5; default: the embedded SCARA03.",
     ),
 ]
+RobotOfEarlier = Annotated[
+    Path | None,
+    typer.Option(
+        "--robot",
+        metavar="FILE",
+        help="robot.yaml, a URDF, or a robot of example-robot-data by its name, as ur5; default: that of --tell or "
+        "--parameters, else the embedded SCARA03.",
+    ),
+]
+RobotMoved = Annotated[
+    Path | None,
+    typer.Option(
+        "--robot",
+        metavar="FILE",
+        help="Where the robot of the result is now, if its URDF has moved; default: that of the result.",
+    ),
+]
 Model = Annotated[
     str,
     typer.Option(

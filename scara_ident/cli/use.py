@@ -16,7 +16,7 @@ def use(
         Path,
         typer.Argument(metavar="RESULT", help="identification.json or diagnosis.json of `identify` or `diagnose`."),
     ],
-    robot: options.Robot = None,
+    robot: options.RobotMoved = None,
     trajectory: Annotated[
         str | None,
         typer.Option(

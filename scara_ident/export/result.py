@@ -72,9 +72,7 @@ def read_identified(path: Path | str, robot: Path | str | None = None, *, determ
     try:
         return _model_of(content, path, robot, determined)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise ScaraIdentError(
-            f"{path}: damaged, or of another version ({type(error).__name__}: {error}); make it again"
-        ) from error
+        raise _damaged(path, error) from error
 
 
 def _model_of(content: Mapping[str, Any], path: Path, robot: Path | str | None, determined: bool) -> IdentifiedModel:
@@ -135,6 +133,23 @@ def _rms(content: Mapping[str, Any], joints: Sequence[str]) -> Array:
     return found
 
 
+def read_robot(path: Path) -> Robot | None:
+    """Return the robot that an ``identification.json`` or ``diagnosis.json`` was found with; None where it names none.
+
+    Raises
+    ------
+    ScaraIdentError
+        In one line: the file cannot be read, or its robot is not to be had.
+    """
+    if (fault := path_fault(path)) is not None:
+        raise ScaraIdentError(fault)
+    content = _json(path)
+    try:
+        return _robot(content[KEY]["robot"], path) if isinstance(content, dict) and KEY in content else None
+    except (KeyError, TypeError) as error:
+        raise _damaged(path, error) from error
+
+
 def read_content(path: Path) -> dict[str, Any]:
     """Return what an ``identification.json`` or ``diagnosis.json`` holds.
 
@@ -145,17 +160,25 @@ def read_content(path: Path) -> dict[str, Any]:
     """
     if (fault := path_fault(path)) is not None:
         raise ScaraIdentError(fault)
-    try:
-        content = json.loads(read_text(path))
-    except OSError as error:
-        raise unreadable(path, error, "give an identification.json or diagnosis.json") from None
-    except (ValueError, RecursionError):
-        raise ScaraIdentError(f"{path}: not JSON; give an identification.json or diagnosis.json") from None
+    content = _json(path)
     if not isinstance(content, dict) or not {KEY, "model", "parameters"} <= set(content):
         raise ScaraIdentError(
             f"{path}: holds no model; give an identification.json or diagnosis.json, and make one of an earlier version again"
         )
     return content
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(read_text(path))
+    except OSError as error:
+        raise unreadable(path, error, "give an identification.json or diagnosis.json") from None
+    except (ValueError, RecursionError):
+        raise ScaraIdentError(f"{path}: not JSON; give an identification.json or diagnosis.json") from None
+
+
+def _damaged(path: Path, error: Exception) -> ScaraIdentError:
+    return ScaraIdentError(f"{path}: damaged, or of another version ({type(error).__name__}: {error}); make it again")
 
 
 def _robot_entry(robot: Robot) -> dict[str, Any]:

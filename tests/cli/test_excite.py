@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 from scara_ident.files import write_json
 from scara_ident.recording.recording import write_recording
 from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.robot.robot import embedded_urdf
 from tests.diagnosis.asked import PAIR, open_diagnosis, small_runs
 
 
@@ -126,6 +129,22 @@ def test_a_motion_is_designed_for_what_a_diagnosis_left_open(command, tmp_path: 
     assert first["question"] == PAIR and first["sigma_after"] > first["sigma_before"]
     assert all(limit["share"] <= 1.0 for limit in content["limits"].values())
     assert (tmp_path / "trajectory.csv").is_file() and (tmp_path / "report.html").is_file()
+
+
+@pytest.mark.slow
+def test_the_robot_is_that_of_the_diagnosis_where_none_is_given(command, tmp_path: Path):
+    """The embedded arm has the same name, and other limits."""
+    slow = tmp_path / "slow.urdf"
+    slow.write_text(re.sub(r'velocity="[^"]+"', 'velocity="0.5"', embedded_urdf().read_text()))
+    content = diagnosis_dict(open_diagnosis())
+    content["rebuild"]["robot"] |= {"urdf": str(slow), "sha256": sha256(slow.read_bytes()).hexdigest()}
+    write_json(tmp_path / "diagnosis.json", content)
+    words = ("--tell", tmp_path / "diagnosis.json", "--duration", "3", "--starts", "1", "--output", tmp_path)
+    assert command("excite", *words).status == 0
+    limits = json.loads((tmp_path / "excitation.json").read_text())["limits"]
+    assert limits["joint1.velocity"]["bound"] == pytest.approx(0.8 * 0.5)
+    slow.unlink()
+    assert "give --robot" in command("excite", *words).err
 
 
 def test_a_file_that_is_no_diagnosis_is_said(command, tmp_path: Path):
