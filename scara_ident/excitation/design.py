@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -100,15 +101,23 @@ class Design(Saved, told_by="design"):
         """Information of the trajectories and of what was known before."""
         return self.information if self.prior is None else merge([self.prior, self.information])
 
+    @cached_property
+    def unweighted(self) -> Information:
+        """Information of all trajectories with every row counted alike, as the paper's criteria have it."""
+        if np.all(self.weights == 1.0):
+            return self.information
+        each = zip(self.trajectories, self.samples, strict=True)
+        return merge([information_of(self.model, trajectory, samples) for trajectory, samples in each])
+
     @property
     def log_det(self) -> float:
-        """J_d: ln det(H^T H) of the trajectories alone."""
-        return self.information.log_det()
+        """J_d: ln det(H^T H) of the trajectories alone, of `unweighted`."""
+        return self.unweighted.log_det()
 
     @property
     def condition(self) -> float:
-        """J_k: cond(H^T H) of the trajectories alone, columns as they are."""
-        return self.information.condition()
+        """J_k: cond(H^T H) of the trajectories alone, columns as they are, of `unweighted`."""
+        return self.unweighted.condition()
 
     def motion(self, number: int = 0, rate: float = 1000.0) -> Motion:
         """Return samples of a trajectory with the torque that is foreseen for it."""

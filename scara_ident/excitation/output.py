@@ -146,7 +146,7 @@ def excitation_dict(design: Design, stopping: Stopping | None = None) -> dict[st
     """
     longest = max(design.trajectories, key=lambda each: each.duration)
     basis, effort = longest.basis, design.effort
-    scaled = scaled_condition(design.information)
+    scaled = scaled_condition(design.unweighted)
     criterion: dict[str, Any] = {"name": "tell" if design.tells else design.criterion.name}
     columns = design.criterion.columns if isinstance(design.criterion, (BlockLogDet, Condition)) else None
     if columns is not None:
@@ -193,7 +193,7 @@ def excitation_dict(design: Design, stopping: Stopping | None = None) -> dict[st
                 "joints": dict(zip(each.joints, each.series(), strict=True)),
             }
             for each, samples, file in zip(design.trajectories, design.samples, file_names(design, ".csv"), strict=True)
-            for alone in [information_of(design.model, each, samples, design.weights)]
+            for alone in [information_of(design.model, each, samples)]
         ],
         "search": {
             "seed": effort.seed,

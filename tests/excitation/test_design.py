@@ -195,7 +195,10 @@ def test_noise_of_the_torques_weights_the_rows(short):
     made = design_excitation(COMPLETE, **SHORT, torque_std=std, effort=QUICK)
     h = COMPLETE.regressor(made.trajectories[0].motion(400)) / std[:, None, None]
     stacked = h.transpose(2, 0, 1).reshape(-1, 15)
-    assert made.log_det == pytest.approx(np.linalg.slogdet(stacked.T @ stacked)[1], abs=1e-6)
+    assert made.information.log_det() == pytest.approx(np.linalg.slogdet(stacked.T @ stacked)[1], abs=1e-6)
+    # The paper's criteria count every row alike.
+    alike = information_of(COMPLETE, made.trajectories[0], 400)
+    assert (made.log_det, made.condition) == (pytest.approx(alike.log_det()), pytest.approx(alike.condition()))
     np.testing.assert_allclose(made.std(), np.sqrt(np.diag(np.linalg.inv(stacked.T @ stacked))), rtol=1e-6)
 
 

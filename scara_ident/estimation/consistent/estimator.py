@@ -47,9 +47,9 @@ class ConsistentEstimate(Estimate):
     """An estimate that belongs to an arm that can exist, and that arm.
 
     Where weighted least squares already belongs to one it is the estimate, and ``std`` is its standard deviation.
-    Where constraints hold the estimate, ``std`` is that of the directions in which it can still move: a parameter
-    fixed by active constraints has a standard deviation of 0, which says that the constraint and not the data
-    determines it. The curvature of the constraints is left out, which makes ``std`` rather too large than too small.
+    Where constraints hold the estimate, ``std`` is that of the directions in which it can still move, and a parameter that
+    active constraints hold is as sure as the data alone make it. The curvature of the constraints is left out, which makes
+    ``std`` rather too large than too small.
 
     Attributes
     ----------

@@ -11,6 +11,7 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.consistent.bodies import PACKED_IDENTITY, pack, packed_pseudo_inertia, unpacking
 from scara_ident.model.base_parameters import pseudo_inertia
 from scara_ident.robot.robot import Robot
+from scara_ident.robot.rotors import LINK_SHARE
 
 # A nominal body's smallest second moment about its centre of mass is at least this share of its largest: the
 # prior is then finite, and a plate or rod stays one to 3 % of its length.
@@ -19,9 +20,8 @@ THINNEST = 1e-3
 BALL_RADIUS = 0.25
 # Length of an arm that has no second joint to take a length from, m.
 DEFAULT_LENGTH = 0.4
-# A rotor of unknown inertia is given this share of what its joint moves at the zero position. That is a guess, and its
-# distance from it weighs so little beside those of bodies, which the URDF gives: of rotors of arms it is off by ten times.
-ROTOR_SHARE = 0.1
+# A guess of a rotor, see `Robot.rotor_guess`, is an order of magnitude: the distance from it weighs so little beside those
+# of bodies, which the URDF gives.
 GUESS_WEIGHT = 0.01
 
 
@@ -77,11 +77,14 @@ def nominal(robot: Robot) -> Nominal:
     armature = standard[10 * robot.n :].copy()
     unknown = ~(armature > 0.0)
     if np.any(unknown):
-        armature[unknown] = ROTOR_SHARE * _moved(robot, stacked)[unknown]
+        guess = robot.rotor_guess.armature
+        # Neither a limit nor a body of the URDF tells what a joint's rotor may be: the bodies taken in their place do.
+        guess = np.where(guess > 0.0, guess, LINK_SHARE * _moved(robot, stacked)) if np.any(guess <= 0.0) else guess
+        armature[unknown] = guess[unknown]
         names = ", ".join(name for name, is_unknown in zip(robot.joints, unknown, strict=True) if is_unknown)
         notes.append(
-            f"rotor inertia of {names}: not in the URDF; where torque does not determine it, it is taken near "
-            f"{ROTOR_SHARE:.0%} of what the joint moves"
+            f"rotor inertia of {names}: stated neither in the URDF nor in robot.yaml; where torque does not determine it, it is "
+            "taken near what a motor of that size has"
         )
     weights = np.where(unknown, GUESS_WEIGHT, 1.0)
     return Nominal(stacked, armature, weights, _to_standard(stacked, armature), tuple(notes))

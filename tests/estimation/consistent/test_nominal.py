@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,14 +29,18 @@ def test_nominal_bodies_are_positive_definite_and_give_back_the_standard_paramet
     np.testing.assert_allclose(standard[: 10 * found.n], given[: 10 * found.n], atol=1e-4 * size)
 
 
-def test_a_known_rotor_is_kept_and_an_unknown_one_is_a_tenth_of_what_its_joint_moves(tmp_path):
+def test_a_known_rotor_is_kept_and_an_unknown_one_is_guessed_as_everywhere(tmp_path):
     scara = load_robot()
     np.testing.assert_allclose(nominal(scara).armature, scara.reduction**2 * scara.rotor_inertia)
     assert nominal(scara).notes == ()
     robot = arm(tmp_path, Link(mass=2.0, com=(0.1, 0.0, 0.0), inertia=(0.1, 0.2, 0.3)))
+    robot = replace(robot, effort_limit=np.array([np.inf]))
     found = nominal(robot)
     assert found.armature[0] == pytest.approx(0.1 * (0.3 + 2.0 * 0.1**2))
-    assert "not in the URDF" in found.notes[0]
+    assert "stated neither in the URDF nor in robot.yaml" in found.notes[0]
+    np.testing.assert_allclose(nominal(ur5()).armature, ur5().rotor_guess.armature)
+    empty = arm(tmp_path, Link(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0, 0.0, 0.0)))
+    assert nominal(replace(empty, effort_limit=np.array([np.inf]))).armature[0] > 0.0
 
 
 def test_links_without_mass_extent_or_sense_are_replaced_and_told(tmp_path):
