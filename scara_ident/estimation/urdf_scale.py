@@ -35,7 +35,8 @@ def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, floa
     Returns
     -------
     dict of str to float
-        By joint; without those where it is not told from zero, or the identified torque is not that of the URDF in any scale.
+        By joint, negative where the signs are opposite; without those where it is not told from zero, or the identified
+        torque is not that of the URDF in any scale.
     """
     model = observations.model
     stated = urdf_values(model)
@@ -56,7 +57,7 @@ def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, floa
         variance = max(0.0, float(share @ estimate.covariance[np.ix_(own, own)] @ share))
         scale, std = float(share @ estimate.value[own]), float(np.sqrt(variance))
         left = float(np.linalg.norm(identified - scale * nominal))
-        if scale > SURE * std and left < MOST_LEFT * np.linalg.norm(identified):
+        if abs(scale) > SURE * std and left < MOST_LEFT * np.linalg.norm(identified):
             found[joint] = scale
     return found
 
@@ -71,6 +72,12 @@ def scale_sentence(scales: Mapping[str, float] | None, robot: Robot) -> str:
     if not scales:
         return f"{said}; the URDF's masses do not show in these torques."
     size = np.array(list(scales.values()))
+    turned = [joint for joint, scale in scales.items() if scale < 0.0]
+    if turned:
+        return (
+            f"{said}. Torques of the bodies have the opposite sign of the URDF's on {', '.join(turned)}: negate effort_gain there, "
+            "or the axis, unless gravity has another direction."
+        )
     middle = float(np.exp(np.median(np.log(size))))
     usual = (size > 1.0 / USUAL) & (size < USUAL)
     if np.all(usual):

@@ -14,6 +14,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.estimation.least_squares import weighted_value, wls
 from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.urdf_scale import urdf_scale
 from scara_ident.model.terms.friction import Friction
 from scara_ident.motion.prepared import PreparedData, PreparedStretch
 
@@ -72,8 +73,8 @@ class ChannelFault:
             )
         if self.mended > MENDED * self.error:
             return (
-                f"{names}: the effort, or the position, has the opposite sign: on every joint friction would feed energy "
-                "in; negate effort_gain in robot.yaml"
+                f"{names}: the effort, or the position, has the opposite sign: friction would feed energy in, and no joint "
+                "speaks against it; negate effort_gain in robot.yaml"
             )
         turn = {
             "effort": f"negate effort_gain of {names} in robot.yaml",
@@ -90,7 +91,8 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     A sign is suspected where friction would feed energy in, an exchange where two joints are hardly explained; only
     then are other readings tried. One counts if it leaves at most half of the error, on blocks of time that it was not
     fitted to and significantly more often than not, and the friction brakes. Where rows are not several times as many
-    as parameters nothing is said: an interpolating fit is good or bad by chance.
+    as parameters none is tried: an interpolating fit is good or bad by chance. All efforts turned round leave as much as they
+    do; see `_all_turned`.
 
     Parameters
     ----------
@@ -106,14 +108,13 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     held = observations.of(sorted(first.values()))
     model = observations.model
     joints = model.robot.joints
-    if any(0 < rows.table.shape[1] < ENOUGH_ROWS * len(rows.columns) for rows in held.joints):
-        return ()
+    few = any(0 < rows.table.shape[1] < ENOUGH_ROWS * len(rows.columns) for rows in held.joints)
     faults: list[ChannelFault] = []
     for _ in range(2 * len(joints)):
         fitted = weighted_value(held.by_joint)
         errors, pushing = _relative(fitted, held), _pushing(fitted, held)
-        suspects = _suspects(errors, pushing)
-        if not suspects:
+        suspects = [] if few else _suspects(errors, pushing)
+        if not suspects and not np.any(pushing):
             break
         left, score = _held_out(held)
         best: tuple[ChannelFault, Observations] | None = None
@@ -133,7 +134,7 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
             faults.append(best[0])
             held = best[1]
             continue
-        if np.all(pushing) and _net_power(held.data) < 0.0:
+        if np.any(pushing) and _all_turned(fitted, held, pushing):
             faults.append(ChannelFault("effort", tuple(joints), False, score, score))
         break
     return tuple(faults)
@@ -190,6 +191,20 @@ def _read_as(data: PreparedData, signal: Signal, joints: Sequence[int], exchange
 
     recordings = [replace(item, stretches=tuple(map(read, item.stretches))) for item in data.recordings]
     return replace(data, recordings=tuple(recordings))
+
+
+def _all_turned(value: Array, observations: Observations, pushing: NDArray[np.bool_]) -> bool:
+    """Tell whether every effort has the opposite sign, which leaves as much as the right one and so is told by no residual.
+
+    Friction pushes on some joint and brakes on none; and it pushes on all, with less energy fed in than none, or gravity and
+    inertia are the opposite of the URDF's wherever these tell.
+    """
+    if np.all(pushing) and _net_power(observations.data) < 0.0:
+        return True
+    if np.any(_pushing(-value, observations)):
+        return False
+    scales = urdf_scale(wls(observations), observations).values()
+    return bool(scales) and max(scales) < 0.0
 
 
 def _net_power(data: PreparedData) -> float:

@@ -33,7 +33,8 @@ def scale_note(recording: Recording, robot: Robot) -> str | None:
     Returns
     -------
     str or None
-        None where the URDF's torque explains too little of any joint's effort, or the scale is near 1.
+        None where the URDF's torque explains too little of any joint's effort, or the scale is near 1; a scale is negative
+        where the signs are opposite.
     """
     try:
         scales = _scales(recording, robot)
@@ -46,7 +47,8 @@ def scale_note(recording: Recording, robot: Robot) -> str | None:
     ]
     if not told:
         return None
-    return f"effort: by the URDF's masses, a recorded unit is roughly {', '.join(told)}: is effort_gain to be stated?"
+    asked = "to be stated" if min(scales.values()) > 0.0 else "to be stated, negative where the sign is opposite"
+    return f"effort: by the URDF's masses, a recorded unit is roughly {', '.join(told)}: is effort_gain {asked}?"
 
 
 def _scales(recording: Recording, robot: Robot) -> dict[int, float]:
@@ -67,6 +69,6 @@ def _scales(recording: Recording, robot: Robot) -> dict[int, float]:
         value = np.linalg.lstsq(with_urdf, effort, rcond=None)[0]
         without = np.linalg.lstsq(with_urdf[:, :-1], effort, rcond=None)[0]
         left = np.linalg.norm(effort - with_urdf @ value)
-        if value[-1] > 0.0 and left < MOST_LEFT * np.linalg.norm(effort - with_urdf[:, :-1] @ without):
+        if value[-1] and left < MOST_LEFT * np.linalg.norm(effort - with_urdf[:, :-1] @ without):
             scales[j] = float(1.0 / value[-1])
     return scales

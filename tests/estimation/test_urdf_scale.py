@@ -46,6 +46,14 @@ def test_the_scale_of_each_joint_is_told(arm, gains, said):
     assert re.search(said, scale_sentence(found, robot))
 
 
+def test_opposite_signs_are_said_first(arm):
+    robot, run = arm
+    found = scales(robot, run, (-1.0, -1.0))
+    assert list(found.values()) == pytest.approx((-1.0, -1.0), rel=0.02)
+    assert "the opposite sign of the URDF's on j1, j2: negate effort_gain there" in scale_sentence(found, robot)
+    assert "the opposite sign of the URDF's on j2: negate" in scale_sentence({"j1": 30.0, "j2": -1.0}, robot)
+
+
 def test_joints_that_differ_are_named(arm):
     said = scale_sentence({"j1": 1.1, "j2": 30.0}, arm[0])
     assert said.endswith("Torques of the bodies are 30 times the URDF's on j2: is effort_gain right?")

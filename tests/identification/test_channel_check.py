@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +17,9 @@ from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.paper import OJD, OJK
 from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import sampled, simulate, virtual_arm
+from tests.arms import PLANAR_2R, noisy, recorded_torque, recording, sines, write_urdf
 
 BANDS = (10.0, 10.0)
 
@@ -73,6 +76,21 @@ def test_an_axis_of_opposite_sign(recordings: tuple[Recording, ...]) -> None:
 
 def test_all_efforts_of_opposite_sign(recordings: tuple[Recording, ...]) -> None:
     assert found([turned(item, effort=(0, 1)) for item in recordings]) == [("effort", ("joint1", "joint2"), False)]
+
+
+@pytest.mark.parametrize("seconds", [20.0, 2.0])
+def test_all_efforts_of_opposite_sign_where_friction_shows_on_one_joint(tmp_path: Path, seconds: float) -> None:
+    """As of a robot that reports what its links do to the drives: gravity is the URDF's the other way round."""
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
+    rng, time = np.random.default_rng(1), np.arange(round(200.0 * seconds)) / 200.0
+    q, v, a = sines(rng, time, 2)
+    bodies = recorded_torque(robot, q, v, a, ((0.0,) * 5,) * 2)
+    friction = np.array([[1.0], [0.0]]) * np.sign(v)
+    model = build_model(robot, "basic")
+    # The last: gravity of another direction, as of an arm that hangs where the URDF has it stand.
+    for effort, said in ((bodies + friction, []), (-bodies - friction, [("j1", "j2")]), (friction - bodies, [])):
+        run = noisy(recording(robot, "run_1", time, q, effort), rng, 0.02)
+        assert [fault.joints for fault in channel_faults(observe(model, prepare([run], (8.0, 8.0))))] == said
 
 
 @pytest.mark.parametrize("signals", [("effort",), ("position",), ("effort", "position")])

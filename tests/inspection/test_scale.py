@@ -45,6 +45,12 @@ def test_currents_on_an_arm_that_carries_its_weight_have_a_scale(tmp_path: Path)
     assert "12 N m on j1, 0.25 N m on j2" in said
 
 
+def test_an_opposite_sign_is_told(tmp_path: Path):
+    urdf = write_urdf(tmp_path / "arm.urdf", PLANAR_2R)
+    (said,) = scale(inspect_file(recorded(urdf, tmp_path, (1.0, -1.0)), urdf=urdf).notes)
+    assert said.endswith("roughly -1 N m on j2: is effort_gain to be stated, negative where the sign is opposite?")
+
+
 def test_torques_are_not_remarked_on(tmp_path: Path):
     urdf = write_urdf(tmp_path / "arm.urdf", PLANAR_2R)
     assert scale(inspect_file(recorded(urdf, tmp_path, (1.0, 1.0)), urdf=urdf).notes) == []
