@@ -51,9 +51,11 @@ def made_by_noise(step: SelectionStep, decision: Decision) -> str | None:
         return None
     p_value = _left_of(found, left).p_value
     sure = p_value * step.tried <= criteria.family_error and decision.gain * share >= criteria.least_gain
-    if sure and share >= criteria.least_without_noise:
+    if share < criteria.least_without_noise:
+        return f"the noise of the positions makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
+    if sure:
         return None
-    return f"the noise of the positions makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
+    return f"the noise of the positions helps it: with that taken off, {share:.1%} of it is left and could be chance, p = {p_value:.1e}"
 
 
 def within_a_step(step: SelectionStep, candidate: Candidate) -> str | None:
@@ -133,7 +135,11 @@ def _share(found: Examination, left: Array) -> float:
 def _left_of(found: Examination, left: Array) -> Examination:
     """Return what is said of a candidate with the coefficients that are left of it."""
     tested = found.tested - found.value + left
-    p_value = significance(tested, found.covariance, found.freedom, found.products)
+    before, after = (
+        significance(each, found.covariance, found.freedom, found.products) for each in (found.tested, tested)
+    )
+    # The test knew the freedom of each direction, of which the least is kept: what changes is by how much that says.
+    p_value = min(1.0, found.p_value * after / before) if before > 0.0 else after
     return replace(found, value=left, tested=tested, p_value=p_value)
 
 

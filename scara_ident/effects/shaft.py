@@ -25,8 +25,8 @@ class CoupledShaft(Effect):
 
     With ``w = v_j + s v_k``, s = 1 or -1, its torque ``J dw/dt + viscous w + coulomb sign(w)`` loads joint j, and s times it
     loads joint k, both at the joint (Janot, Vandanjon, Gautier 2014, on the wrist of a TX40). It is named only
-    where inertia and friction are both seen: either alone has an effect of its own. Where the links' inertia spans that of
-    the shaft, as about parallel axes, friction is all that is left of it.
+    where friction is seen: inertia alone has an effect of its own. A short run tells friction on both joints well before the
+    inertia, and where the links' inertia spans that of the shaft, as about parallel axes, friction is all that is left of it.
     """
 
     way: Literal["sum", "difference"] = "sum"
@@ -81,14 +81,12 @@ class CoupledShaft(Effect):
         return found
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Say so where a part is negative, or one is not seen, so that another effect says all that is."""
+        """Say so where a part is negative, or no friction is seen, so that another effect says all that is."""
         first = self._first(scene, member)
         for item, x, spread in zip(self.coefficients[first:], value, std, strict=True):
             if x < -SEEN_STDS * spread:
                 return item.positive
         seen = value > SEEN_STDS * std
-        if first == 0 and not seen[0]:
-            return "no inertia that turns with both joints is seen"
         return None if np.any(seen[1 - first :]) else "no friction that turns with both joints is seen"
 
     def _first(self, scene: Scene, member: Member) -> int:

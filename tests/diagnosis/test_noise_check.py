@@ -78,6 +78,15 @@ def test_what_is_mostly_noise_is_not_believed_however_sure_the_rest_is(
     assert believed or "the noise of the positions makes it" in said
 
 
+def test_what_noise_takes_nothing_from_is_as_sure_as_before():
+    """A shaft of which all was left was no more believed: the freedom of its best direction was not in what was asked again."""
+    _, found = with_noise_once_and_twice(0.4, 0.02)
+    found = replace(found, p_value=1e-3 * significance(found.tested, found.covariance, found.freedom, found.products))
+    assert noise_check._left_of(found, found.value).p_value == pytest.approx(found.p_value)
+    less = noise_check._left_of(found, 0.5 * found.value)
+    assert found.p_value < less.p_value <= 1.0
+
+
 @pytest.mark.parametrize(("steps", "hidden"), [(0.4, True), (5.0, False)])
 def test_what_turns_within_a_step_of_the_encoder_is_not_believed(steps: float, hidden: bool):
     """Presliding over 0.4 steps mended the sign of friction that the steps spoil, and was believed (UR5, 12 and 15 bits)."""
