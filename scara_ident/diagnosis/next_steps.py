@@ -164,13 +164,20 @@ def _faint(diagnosis: Diagnosis) -> Iterator[NextStep]:
             hidden.setdefault(name, []).append(decision)
         elif decision.gain > 0.0 and _significant(decision, diagnosis) and possible(decision, diagnosis):
             faint.setdefault(name, []).append(decision)
-    for words, found in (
-        ("to judge {}, significant but not accepted ({})", faint),
-        ("to see {} at all, which these recordings cannot show", hidden),
-    ):
-        for members in list(found.values())[:MOST]:
-            labels = listed([member.label for member in members], MOST_LABELS, " and ")
-            yield NextStep(words.format(labels, members[0].why), members[0].candidate.effect.experiment)
+    for members in list(faint.values())[:MOST]:
+        yield NextStep(f"to judge {with_reasons(members)}", members[0].candidate.effect.experiment)
+    for members in list(hidden.values())[:MOST]:
+        labels = listed([member.label for member in members], MOST_LABELS, " and ")
+        said = f"to see {labels} at all, which these recordings cannot show"
+        yield NextStep(said, members[0].candidate.effect.experiment)
+
+
+def with_reasons(members: Sequence[Decision]) -> str:
+    """Name candidates that are significant and not accepted, with the reason of all or each with its own."""
+    said = "significant but not accepted"
+    if len({member.why for member in members[:MOST_LABELS]}) == 1:
+        return f"{listed([member.label for member in members], MOST_LABELS, ' and ')}, {said} ({members[0].why})"
+    return f"{listed([f'{member.label} ({member.why})' for member in members], MOST_LABELS, ' and ')}, {said}"
 
 
 def _significant(decision: Decision, diagnosis: Diagnosis) -> bool:

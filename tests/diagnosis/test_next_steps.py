@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.answerability import inquire
-from scara_ident.diagnosis.next_steps import ASKED_MOTION, capital, next_steps
+from scara_ident.diagnosis.next_steps import ASKED_MOTION, capital, next_steps, with_reasons
 from scara_ident.effects.position import Spring
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.diagnosis_markdown import diagnosis_markdown
@@ -89,6 +90,17 @@ def test_rivals_ask_for_a_motion_and_an_effect_for_the_experiment_that_shows_it(
     found = diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),))
     motions = {item.question: item.motion for item in next_steps(found)}
     assert motions["to confirm spring of joint2"] == Spring().experiment
+
+
+def test_each_candidate_has_its_own_reason():
+    first, second = (SimpleNamespace(label=f"spring of joint{k}", why=f"reason {k}") for k in (1, 2))
+    assert with_reasons([first]) == "spring of joint1, significant but not accepted (reason 1)"
+    second.why = first.why
+    assert with_reasons([first, second]).endswith(
+        "joint1 and spring of joint2, significant but not accepted (reason 1)"
+    )
+    second.why = "too small"
+    assert "joint1 (reason 1) and spring of joint2 (too small), significant" in with_reasons([first, second])
 
 
 def test_a_sentence_begins_with_a_capital_unless_it_begins_with_a_name():

@@ -367,4 +367,4 @@ def _verdict(diagnosis: Diagnosis, summary: Sequence[str]) -> tuple[str, ...]:
         return (f"Explained: the model lacked {found}; what is left is noise, or smaller than it.", *summary)
     lacks = f"the model lacked {found}, and something" if found else "something"
     where = f" on {diagnosis.unexplained.joint}" if diagnosis.unexplained else ""
-    return (f"Not all explained: {lacks}{where} repeats that no known effect accounts for.", *summary)
+    return (f"Not all explained: {lacks}{where} is left that no known effect accounts for.", *summary)

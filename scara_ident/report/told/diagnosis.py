@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.manners import several
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.told.words import table, text_of
 
@@ -70,7 +71,7 @@ def tables(held: dict[str, Any], *, all_candidates: bool = False) -> list[Table]
         rows.add_row(row["label"], f"{row['gain']:.1%}", f"{row['p_value']:.0e}", row["why"])
     others = len(tried) - len(shown)
     if others:
-        rows.add_row(f"{others} others" if shown else f"all {others}", "", "", "none of them believed")
+        rows.add_row(several(others, "other"), "", "", "not believed")
     return [errors, rows]
 
 
