@@ -41,7 +41,8 @@ def test_candidates_no_better_than_chance_are_counted_and_not_named():
         return list(tables(content, all_candidates=everything)[1].columns[0].cells)
 
     assert labels(held) == ["effect 0", "effect 1", "2 others"]
-    assert labels({**held, "candidates": tried[2:]}) == ["all 2"]
+    assert labels({**held, "candidates": tried[2:]}) == ["2 others"]
+    assert labels({**held, "candidates": tried[1:3]}) == ["effect 1", "1 other"]
     assert labels(held, everything=True) == [f"effect {k}" for k in range(4)]
     many = {**held, "candidates": 12 * tried[:1]}
     assert labels(many) == [*(8 * ["effect 0"]), "4 others"]
