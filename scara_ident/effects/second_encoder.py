@@ -49,8 +49,8 @@ def gear_stiffness(
     Returns
     -------
     Parameter or None
-        The standard deviation by blocks of time, and by the noise of the lag, which makes a gear look stiffer or softer. None
-        where no lag is seen.
+        The standard deviation by blocks of time, and by what of the lag no torque made, which makes a gear look stiffer or
+        softer. None where no lag is seen.
     """
     columns, torque, blocks, noise = [], [], [], 0.0
     runs = [item for item in recordings if item.recording.link_position is not None]
@@ -94,9 +94,12 @@ def gear_stiffness(
     alone = 1.0 / (float(np.sum(inverse[0] ** 2)) * len(right))
     share = noise**2 / (alone * scale[0] ** 2)
     stiffness = float(value[0] / scale[0])
-    std = float(np.hypot(np.sqrt(squares) / scale[0], share * stiffness))
     passed = right - table[:-1, 1:] @ value[1:]
     alike = float(np.corrcoef(passed, table[:-1, 0])[0, 1])
+    # What of the lag no torque made, be it noise or an encoder's error that repeats, makes a gear look softer by no more than
+    # the torque leaves of the lag: regressed the other way round, on the torque, the stiffness is so much larger.
+    softer = max(share, 1.0 / max(alike**2, LEAST_ALIKE) - 1.0)
+    std = float(np.hypot(np.sqrt(squares) / scale[0], softer * stiffness))
     if share > MOST_NOISE or not alike**2 > LEAST_ALIKE or not stiffness > LEAST_STDS * std:
         return None
     return Parameter(stiffness, std, "N/m" if scene.robot.prismatic[joint] else "N m/rad")
