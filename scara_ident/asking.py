@@ -19,7 +19,7 @@ from scara_ident.diagnosis.answerability import Inquiry, inquiry_of
 from scara_ident.diagnosis.questions import Question
 from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation.design import Design, design_excitation
-from scara_ident.excitation.known import read_diagnosis
+from scara_ident.excitation.known import read_diagnosis, read_parameters
 from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.output import excitation_dict, write_joint_trajectory, write_trajectory
 from scara_ident.excitation.promise import SURE, Told
@@ -242,6 +242,7 @@ def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], aske
         inquiry.scene.model,
         duration=settings.duration,
         tell=inquiry,
+        known=read_parameters(folder / "diagnosis.json", inquiry.scene.model),
         limits=settings.limits,
         effort=settings.effort,
         progress=_told(work),

@@ -137,7 +137,8 @@ def excite(
         own = harmonics_of(count, each / longest)
         check_size(own, arm.n, len(durations), round(SAMPLES * each / longest))
         check_rate(rate, own / each)
-    nominal = None if parameters is None else read_parameters(parameters, equation)
+    known_from = parameters or tell
+    nominal = None if known_from is None else read_parameters(known_from, equation)
     counted = PAPER_SAMPLES / longest
     std = None
     if asked_std:

@@ -15,7 +15,7 @@ from scara_ident.model.model import TorqueModel
 
 
 def read_parameters(path: Path, model: TorqueModel) -> dict[str, float]:
-    """Read the parameters of an ``identification.json``.
+    """Read the parameters of an ``identification.json``, or those of the model in a ``diagnosis.json``.
 
     Parameters
     ----------
@@ -36,7 +36,9 @@ def read_parameters(path: Path, model: TorqueModel) -> dict[str, float]:
     if (fault := path_fault(path)) is not None:
         raise ScaraIdentError(fault)
     try:
-        rows = json.loads(read_text(path))["parameters"]
+        content = json.loads(read_text(path))
+        # Behind those of the model a diagnosis lists the effects' own.
+        rows = content["parameters"][: len(model.names) if "verdict" in content else None]
         found = {str(row["name"]): float(row["value"]) for row in rows if not _undetermined(row)}
         if not np.isfinite(list(found.values())).all():
             raise ValueError("a value is not finite")

@@ -26,6 +26,13 @@ def test_what_an_identification_determined_is_known(tmp_path):
     assert found == {"P_d1": 16.0, "a01": 0.2}
 
 
+def test_of_a_diagnosis_those_of_the_model_are_known(tmp_path):
+    rows = [{"name": name, "value": float(k)} for k, name in enumerate((*MODEL.names, "loss_coefficient"))]
+    path = tmp_path / "diagnosis.json"
+    path.write_text(json.dumps({"verdict": "explained", "parameters": rows}), encoding="utf-8")
+    assert read_parameters(path, MODEL) == {name: float(k) for k, name in enumerate(MODEL.names)}
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
