@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 
-from scara_ident.recording.audit import clock, effort, lost_samples, position, stamps
+from scara_ident.recording.audit import clock, effort, held, lost_samples, position, stamps
 from scara_ident.recording.audit.samples import Finding, Samples
 
 _LOG = logging.getLogger(__name__)
@@ -21,12 +21,15 @@ CHECKS = (
     clock.clock_unit,
     clock.time_order,
     clock.enough,
+    # What the positions tell of the stamps is hidden by rows that repeat.
+    held.held_rows,
+    held.stale_positions,
+    clock.enough,
     stamps.late_stamps,
     stamps.coinciding,
     clock.enough,
     clock.sampling,
     position.position_unit,
-    clock.held_rows,
     position.whole_turns,
     position.spikes,
     lost_samples.restamped,

@@ -1,4 +1,4 @@
-"""Faults of the log itself: missing numbers, the clock, rows that repeat."""
+"""Faults of the log itself: missing numbers, the clock."""
 
 from __future__ import annotations
 
@@ -33,18 +33,6 @@ REPEATED_SHARE = 0.05
 LATE, STEADY, NEAR = 1.5, 0.1, 0.1
 # Below this, taking the interval as constant misplaces a position by less than a thirtieth of what it travels a sample.
 JITTER = 0.03
-# A joint moves where its speed is above this share of its rms speed over the recording.
-MOVING = 0.2
-# Rows on either side over which that speed is taken: enough for an encoder's steps to average out.
-MOVING_ROWS = 3
-# Rows that repeat every channel are a hold, not a coincidence of quantised channels, from this share of the moving rows
-# on and where most repetitions of the least repetitive channel fall on them.
-HELD_SHARE = 0.02
-HELD_OF_REPEATS = 0.5
-# All channels standing still for longer, and then jumping on, is a logger that stalled.
-FREEZE_SECONDS = 0.2
-# A jump out of a freeze is this many times longer than the steps beside it; an arm that rested moves off smoothly.
-FREEZE_JUMP = 3.0
 
 
 def enough(samples: Samples) -> Checked:
@@ -107,12 +95,12 @@ def time_order(samples: Samples) -> Checked:
     if len(back):
         before, here = int(back[0]), int(back[0]) + 1
         samples.refuse(
-            f"time runs backwards at row {samples.row[here]}, from {samples.time[before]:.6g} s to "
-            f"{samples.time[here]:.6g} s ({several(len(back), 'time')} in all); "
+            f"time runs backwards at row {samples.row[here]}, from {samples.clock(before)} to "
+            f"{samples.clock(here)} ({several(len(back), 'time')} in all); "
             "sort the rows by time, or cut the file there"
         )
     repeated = step == 0
-    differing = repeated & ~_repeats(samples)
+    differing = repeated & ~samples.repeats()
     total, others = int(repeated.sum()), int(differing.sum())
     if others > REPEATED_SHARE * samples.count:
         first = int(np.argmax(differing)) + 1
@@ -133,8 +121,9 @@ def sampling(samples: Samples) -> Checked:
     """Say how even the clock is, where samples are lost and where the recording has gaps."""
     step = np.diff(samples.time)
     median = float(np.median(step))
-    # A step over rows that were left out is none of the clock's.
-    step = np.where(step > LATE * median, step - median * (np.diff(samples.row) - 1), step)
+    # A step over rows that were left out is none of the clock's; where those were copies, no time went by in them.
+    left_out = np.minimum(median * (np.diff(samples.row) - 1), step - median)
+    step = np.where(step > LATE * median, step - left_out, step)
     gap = step > GAP_STEPS * median
     late = step > LATE * median
     unsteady = float(np.std(step[~late])) / median
@@ -167,56 +156,9 @@ def sampling(samples: Samples) -> Checked:
     return samples, found
 
 
-def held_rows(samples: Samples) -> Checked:
-    """Leave out rows that only repeat the row before although the arm moves.
-
-    A logger that is faster than its source repeats whole rows; one that stalls does so for long. Encoders repeat
-    themselves at low speed, but noisy efforts do not: without efforts nothing is judged.
-    """
-    if samples.effort is None:
-        return samples, []
-    same = _repeats(samples)
-    active = np.flatnonzero(~samples.idle())
-    if not same.any() or not len(active):
-        return samples, []
-    fresh = np.flatnonzero(np.concatenate(([True], ~same)))
-    if len(fresh) <= 4 * MOVING_ROWS:
-        return samples, []
-    moving = _moving(samples, active, fresh)
-
-    start, length = runs(same)
-    frozen = _frozen(samples, active, fresh, start, length)
-    keep = np.ones(samples.count, dtype=bool)
-    found = []
-    if frozen.any():
-        for first, rows in zip(start[frozen], length[frozen], strict=True):
-            keep[first + 1 : first + rows] = False
-        count, longest = int((~keep).sum()), int(np.argmax(np.where(frozen, length, 0)))
-        said = (
-            f"every channel stands still {several(int(frozen.sum()), 'time')} while the arm moves, the longest "
-            f"{samples.interval * length[longest]:.2g} s from {samples.where(int(start[longest]))}: "
-            f"{several(count, 'row')} left out"
-        )
-        found.append(Finding("freeze", said, count))
-
-    judged = keep[1:] & keep[:-1] & moving[1:] & moving[:-1]
-    if judged.any() and _is_hold(samples, same, judged):
-        held = np.concatenate(([False], same)) & keep
-        count = int(held.sum())
-        keep &= ~held
-        rate = 1.0 / float(np.median(np.diff(samples.time[keep])))
-        first = int(np.argmax(held))
-        said = (
-            f"{count} of {samples.count} rows repeat the row before in every channel while the arm moves, first "
-            f"{samples.where(first)}: left out, the source ran at about {rate:.4g} Hz"
-        )
-        found.append(Finding("held_samples", said, count))
-    return samples.kept(keep), found
-
-
 def _not_finite(samples: Samples) -> NDArray[np.bool_] | None:
     """Tell which samples lack a number, shape (N,); None where all have theirs, which the extremes tell at once."""
-    signals = [samples.time, *_channels(samples)]
+    signals = [samples.time, *samples.channels()]
     if all(signal.min() > -HUGE and signal.max() < HUGE for signal in signals):
         return None
     bad = np.zeros(samples.count, dtype=bool)
@@ -228,63 +170,3 @@ def _not_finite(samples: Samples) -> NDArray[np.bool_] | None:
 def _finite(signal: Array) -> NDArray[np.bool_]:
     finite: NDArray[np.bool_] = np.abs(signal) < HUGE
     return finite
-
-
-def _repeats(samples: Samples) -> NDArray[np.bool_]:
-    """Tell which samples repeat the one before in every channel, shape (N - 1,)."""
-    same = np.ones(samples.count - 1, dtype=bool)
-    for signal in _channels(samples):
-        same &= signal[1:] == signal[:-1]
-    return same
-
-
-def _channels(samples: Samples) -> list[Array]:
-    return [*samples.position, *(() if samples.effort is None else samples.effort)]
-
-
-def _moving(samples: Samples, active: NDArray[np.intp], fresh: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Tell during which samples a joint moves, shape (N,), from the `fresh` samples alone."""
-    count = len(fresh)
-    after = fresh[np.minimum(np.arange(count) + MOVING_ROWS, count - 1)]
-    before = fresh[np.maximum(np.arange(count) - MOVING_ROWS, 0)]
-    travel = samples.position[active][:, after] - samples.position[active][:, before]
-    speed = np.abs(travel) / np.maximum(samples.time[after] - samples.time[before], samples.interval)
-    moving = (speed > MOVING * np.sqrt(np.mean(speed**2, axis=1, keepdims=True))).any(axis=0)
-    over: NDArray[np.bool_] = np.repeat(moving, np.diff(np.concatenate((fresh, [samples.count]))))
-    return over
-
-
-def _frozen(
-    samples: Samples,
-    active: NDArray[np.intp],
-    fresh: NDArray[np.intp],
-    start: NDArray[np.intp],
-    length: NDArray[np.intp],
-) -> NDArray[np.bool_]:
-    """Tell which runs of equal rows are a stalled logger."""
-    end = start + length
-    last = samples.count - 1
-    long: NDArray[np.bool_] = (
-        (samples.time[np.minimum(end, last)] - samples.time[start] > FREEZE_SECONDS) & (start > 0) & (end <= last)
-    )
-    if not long.any():
-        return long
-    place = np.searchsorted(fresh, start)
-    previous, following = fresh[np.maximum(place - 1, 0)], np.minimum(end, last)
-    onward = fresh[np.minimum(place + 2, len(fresh) - 1)]
-    position = samples.position[active]
-    jump = np.abs(position[:, following] - position[:, start])
-    beside = np.maximum(
-        np.abs(position[:, start] - position[:, previous]), np.abs(position[:, onward] - position[:, following])
-    )
-    usual = np.sqrt(np.mean(np.diff(position[:, fresh], axis=1) ** 2, axis=1, keepdims=True))
-    frozen: NDArray[np.bool_] = long & (jump > FREEZE_JUMP * np.maximum(beside, usual)).any(axis=0)
-    return frozen
-
-
-def _is_hold(samples: Samples, same: NDArray[np.bool_], judged: NDArray[np.bool_]) -> bool:
-    share = float(np.mean(same[judged]))
-    if share < HELD_SHARE:
-        return False
-    least = min(float(np.mean((signal[1:] == signal[:-1])[judged])) for signal in _channels(samples))
-    return share > HELD_OF_REPEATS * least

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.manners import several
-from scara_ident.recording.audit.samples import IDLE_TRAVEL, Finding, Samples, joint_range, runs
+from scara_ident.recording.audit.samples import IDLE_TRAVEL, Finding, Samples, joint_range, levels, runs
 
 Checked = tuple[Samples, list[Finding]]
 
@@ -111,7 +111,7 @@ def coarse_effort(samples: Samples) -> Checked:
         return samples, []
     found = []
     for joint in np.flatnonzero(~samples.idle()).tolist():
-        values = np.unique(samples.effort[joint])
+        values = levels(samples.effort[joint])
         if not 1 < len(values) <= min(FEW_VALUES, samples.count // 10):
             continue
         torque = float(np.min(np.diff(values))) * abs(samples.robot.effort_gain[joint])

@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 # friction: the joint stands still and its servo hunts by a few counts.
 IDLE_TRAVEL = 1e-3
 
+# Numbers that differ by less than this share of their range are one: programs round them in the last digits.
+ROUNDED = 1e-9
+
+# A first time beyond this, s, is none of a run but that since an epoch: six digits of it are days.
+EPOCH = 1e6
 
 # A longer step in time, in median steps, is a gap: nothing is interpolated over it (motion.py cuts recordings there).
 GAP_STEPS = 5.0
@@ -89,9 +94,27 @@ class Samples:
         effort = None if self.effort is None else self.effort[:, keep]
         return Samples(self.source, self.robot, self.time[keep], self.position[:, keep], effort, self.row[keep])
 
+    def channels(self) -> list[Array]:
+        """Return all positions and efforts, each of shape (N,)."""
+        return [*self.position, *(() if self.effort is None else self.effort)]
+
+    def repeats(self) -> NDArray[np.bool_]:
+        """Tell which samples repeat the one before in every channel, shape (N - 1,)."""
+        same = np.ones(self.count - 1, dtype=bool)
+        for signal in self.channels():
+            same &= signal[1:] == signal[:-1]
+        return same
+
     def where(self, index: int) -> str:
         """Name a sample for a person: its row in the file and its time."""
-        return f"row {self.row[index]} ({self.time[index]:.6g} s)"
+        return f"row {self.row[index]} ({self.clock(index)})"
+
+    def clock(self, index: int) -> str:
+        """Name the time of a sample: as it stands in the file, or from the first sample on where that counts from an epoch."""
+        time, first = float(self.time[index]), float(self.time[0])
+        if abs(first) < EPOCH:
+            return f"{time:.6g} s"
+        return f"{time - first:.6g} s after the first"
 
     def refuse(self, reason: str) -> NoReturn:
         """Raise that this file cannot be used."""
@@ -112,6 +135,20 @@ def joint_range(robot: Robot) -> Array:
 def speed_limit(robot: Robot) -> Array:
     """Return the velocity limit of each joint, shape (n,); infinite where the URDF gives none or 0."""
     return np.where(robot.velocity_limit > 0, robot.velocity_limit, np.inf)
+
+
+def levels(values: Array) -> Array:
+    """Return the different values of a signal in order, those that differ by rounding alone once."""
+    found = np.unique(values)
+    apart = np.diff(found) > ROUNDED * (found[-1] - found[0])
+    return np.asarray(found[np.concatenate(([True], apart))])
+
+
+def resolution(values: Array) -> float:
+    """Return the smallest change of a signal from sample to sample; 0 where it never changes."""
+    change = np.abs(np.diff(values))
+    change = change[change > ROUNDED * np.ptp(values)]
+    return float(np.min(change)) if len(change) else 0.0
 
 
 def runs(same: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

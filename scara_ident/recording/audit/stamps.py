@@ -13,16 +13,13 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.manners import several
+from scara_ident.recording.audit.even_clock import ENOUGH, REACH, even_clocks
 from scara_ident.recording.audit.samples import GAP_STEPS, Finding, Samples
 
 Checked = tuple[Samples, list[Finding]]
 
 # A stamp is off an even clock from this share of the interval on.
 OFF = 0.05
-# Samples on either side over which the even clock is the median of the stamps, and over which a lost sample shows.
-REACH, LOST_REACH = 50, 4
-# Of fewer samples than twice that reach and more no even clock is told.
-ENOUGH = 4 * REACH
 # The misfit under even times is below this share of that under the stamps: by chance both are as large.
 BETTER = 0.5
 # A misfit counts up to so many times the usual one: where stamps all but coincide it knows no bounds.
@@ -40,10 +37,11 @@ def late_stamps(samples: Samples) -> Checked:
     step = np.diff(samples.time)
     if samples.count < ENOUGH or np.max(np.abs(step - samples.interval)) <= OFF * samples.interval:
         return samples, []
-    even = _even_clock(samples.time)
-    off = np.abs(samples.time - even) > OFF * samples.interval
-    if not np.any(off) or np.min(np.diff(even)) <= 0.0 or not _evener(samples, even, off):
+    judged = [(_evener(samples, even), even) for even in even_clocks(samples)]
+    share, even = min(judged, key=lambda item: item[0], default=(np.inf, samples.time))
+    if share > BETTER:
         return samples, []
+    off = np.abs(samples.time - even) > OFF * samples.interval
     count, worst = int(np.count_nonzero(off)), float(np.max(np.abs(samples.time - even)))
     first = samples.where(int(np.argmax(off)))
     said = (
@@ -66,46 +64,20 @@ def coinciding(samples: Samples) -> Checked:
     return samples.kept(~near), [Finding("coinciding", said, count)]
 
 
-def _even_clock(time: Array) -> Array:
-    """Return the times of samples that are even between gaps but for those lost, as near as can be to the stamps."""
-    from scipy.ndimage import median_filter, minimum_filter1d, uniform_filter1d
+def _evener(samples: Samples, even: Array) -> float:
+    """Return the misfit of the positions under even times as a share of that under the stamps, where these differ.
 
-    # Over many samples an interval is known better than by one step.
-    interval = float(np.median(time[2 * REACH :] - time[: -2 * REACH])) / (2 * REACH)
-    steps = (time - time[0]) / interval - np.arange(len(time))
-    steps = median_filter(steps, 2 * LOST_REACH + 1, mode="mirror")
-    # What is late for a while comes back; what is lost stays.
-    lost = _lost(minimum_filter1d(steps, REACH, mode="nearest", origin=-(REACH // 2)))
-    even = interval * (np.arange(len(time)) + lost)
-    # A clock that drifts is even all the same, and behind a gap it starts anew.
-    edges = np.flatnonzero(np.diff(lost) >= GAP_STEPS - 1.0) + 1
-    off = [median_filter(part, 2 * REACH + 1, mode="mirror") for part in np.split(time - even, edges)]
-    smooth = [uniform_filter1d(part, 2 * REACH + 1, mode="mirror") for part in off]
-    return np.asarray(even + np.concatenate(smooth))
-
-
-def _lost(ahead: Array) -> Array:
-    """Return how many samples were lost before each, by how far stamps are ahead of as many intervals, in these."""
-    lost, level = np.zeros(len(ahead)), float(ahead[0])
-    total = 0.0
-    for k, value in enumerate(ahead.tolist()):
-        jump = round(value - level - total)
-        if jump > 0:
-            total += jump
-        level += (value - total - level) / REACH
-        lost[k] = total
-    return lost
-
-
-def _evener(samples: Samples, even: Array, off: NDArray[np.bool_]) -> bool:
-    """Whether the positions fit even times better than the stamps, where these differ."""
+    It is infinite where nothing tells, and where the stamps fit better somewhere: there the clock is not the samples'.
+    """
+    off = np.abs(samples.time - even) > OFF * samples.interval
+    if not np.any(off) or np.min(np.diff(even)) <= 0.0:
+        return np.inf
     stencil = np.convolve(off, np.ones(5), "same") > 0.0
     gap = np.diff(even, prepend=even[0]) > GAP_STEPS * samples.interval
     whole = np.convolve(gap, np.ones(5), "same") == 0.0
     used = np.flatnonzero((stencil & whole)[2:-2])
-    positions = samples.position[~samples.idle()]
-    by_stamp, by_even, rows = 0.0, 0.0, 0
-    for position in positions:
+    by_stamp, by_even = np.zeros(samples.count), np.zeros(samples.count)
+    for position in samples.position[~samples.idle()]:
         # A joint that stands still says nothing.
         way = np.abs(position[4:] - position[:-4])
         moving = used[way[used] > MOVING * np.sqrt(np.mean(way**2))]
@@ -114,9 +86,14 @@ def _evener(samples: Samples, even: Array, off: NDArray[np.bool_]) -> bool:
         misfits = [_misfit(time, position, moving) for time in (samples.time, even)]
         usual = min(float(np.median(item)) for item in misfits)
         if usual > 0.0:
-            stamped, evened = (float(np.sum(np.minimum(item / usual, MOST))) for item in misfits)
-            by_stamp, by_even, rows = by_stamp + stamped, by_even + evened, rows + len(moving)
-    return rows > 0 and by_even < BETTER * by_stamp
+            for total, item in zip((by_stamp, by_even), misfits, strict=True):
+                total[moving] += np.minimum(item / usual, MOST)
+    if not np.any(by_stamp):
+        return np.inf
+    stretches = np.arange(0, samples.count, 2 * REACH)
+    if np.any(BETTER * np.add.reduceat(by_even, stretches) > np.add.reduceat(by_stamp, stretches)):
+        return np.inf
+    return float(np.sum(by_even) / np.sum(by_stamp))
 
 
 def _misfit(time: Array, position: Array, used: NDArray[np.intp]) -> Array:

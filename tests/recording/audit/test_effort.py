@@ -85,3 +85,15 @@ def test_an_effort_of_few_values_is_said(read, levels: int, said: bool):
     if said:
         assert "joint2.effort takes" in findings[0].message
         assert f"values only, {step:.3g} N m apart" in findings[0].message
+
+
+def test_values_that_differ_by_rounding_alone_are_one(read):
+    """0.014 and 0.013999999999999999 were two values, 3.57e-17 N m apart."""
+    made = columns()
+    step = np.max(np.abs(made["joint2.effort"])) / 7.0
+    counts = np.round(made["joint2.effort"] / step)
+    made["joint2.effort"][:] = np.where(
+        np.arange(len(counts)) % 3 == 0, counts * step, counts * step * (1.0 - 1e-16 * 2)
+    )
+    (finding,) = [item for item in read(made).findings if item.kind == "coarse_effort"]
+    assert f"takes {len(np.unique(counts))} values only, {step:.3g} N m apart" in finding.message
