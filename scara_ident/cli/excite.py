@@ -98,9 +98,9 @@ def excite(
         write_trajectory,
     )
     from scara_ident.excitation.criteria import criterion_of
-    from scara_ident.excitation.design import SAMPLES, check_size, durations_of, harmonics_of
     from scara_ident.excitation.known import read_diagnosis, read_parameters
     from scara_ident.excitation.output import check_rate, file_names
+    from scara_ident.excitation.size import SAMPLES, check_size, durations_of, harmonics_of
     from scara_ident.excitation.stopping import NOISE_BAND, noise_of, stopping
     from scara_ident.excitation.stopping import asked_std as read_asked
     from scara_ident.export.result import read_robot

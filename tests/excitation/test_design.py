@@ -15,7 +15,6 @@ from scara_ident.excitation import (
     InfeasibleLimits,
     Limits,
     block_of,
-    default_harmonics,
     design_excitation,
     information_of,
     limits_of,
@@ -301,12 +300,6 @@ def test_a_multisine_has_the_chosen_harmonics_alone():
     lines = np.abs(np.fft.rfft(q, axis=1))
     others = np.setdiff1d(np.arange(33), (0, 1, 2, 3, 5, 7))
     assert np.max(lines[:, others]) < 1e-10 * np.max(lines)
-
-
-def test_harmonics_are_fewer_for_more_joints():
-    assert default_harmonics(25.0, 2) == 40
-    assert default_harmonics(25.0, 6) == 13
-    assert default_harmonics(1.0, 2) == 5
 
 
 def test_ojd_breaks_the_limits_that_the_design_keeps():
