@@ -31,8 +31,11 @@ def identify(
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
     from scara_ident.cli.startup import read_beside
+    from scara_ident.errors import UsageError
     from scara_ident.robot.robot import load_robot
 
+    if friction != "auto" and method != "consistent":
+        raise UsageError(f"--friction {friction}: belongs to --method consistent; {method} holds friction to nothing")
     check_report(output, "identification")
     arm = load_robot(robot)
     with progress() as work:
@@ -52,7 +55,7 @@ def identify(
             method=method,
             validation=held_out,
             bands=None if band is None else [band] * arm.n,
-            options=ConsistentOptions(friction=friction),
+            options=ConsistentOptions(friction=friction) if method == "consistent" else None,
             progress=work.part(READING_SHARE, 1.0),
         )
     content = identification_dict(result)

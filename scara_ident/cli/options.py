@@ -113,7 +113,7 @@ Torques = Annotated[
 Jerks = Annotated[
     list[str] | None, typer.Option("--jerk", metavar="JOINT=J", help="Instead of robot.yaml's, rad/s^3 or m/s^3.")
 ]
-Share = Annotated[float, typer.Option("--share", help="Share of every joint's limits to use.")]
+Share = Annotated[float, typer.Option("--share", help="Share of every joint's limits to use, of those given here too.")]
 Floor = Annotated[
     float | None,
     typer.Option("--floor", metavar="Z", help="Height that the tool, and links with shapes, stay above, m."),

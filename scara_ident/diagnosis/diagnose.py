@@ -32,7 +32,7 @@ from scara_ident.diagnosis.work import first, searching
 from scara_ident.effects import Effect, EffectTerm
 from scara_ident.effects.aliases import Alias, aliases
 from scara_ident.effects.catalogue import available_effects
-from scara_ident.errors import RecordingError, UsageError
+from scara_ident.errors import ArgumentError, RecordingError, UsageError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import robust_fit
@@ -189,8 +189,8 @@ def diagnose(
     Raises
     ------
     UsageError
-        If a recording is both fitted and held out, one named as unloaded is not among those to fit, or a band is no
-        frequency that the slowest recording carries.
+        If a recording is both fitted and held out, one named as unloaded is not among those to fit, a band is no
+        frequency that the slowest recording carries, or the catalogue holds what is no effect.
     RecordingError
         If none of the recordings can be used, or they have fewer rows than the model has parameters (one of several that
         cannot be used is left out with a note), or channels are not what the mapping says (see `channel_faults`).
@@ -216,6 +216,10 @@ def diagnose(
     if bands is not None:
         check_bands(robot, bands, (*recordings, *validation))
     base = model_of(model, robot)
+    families = available_effects() if catalogue is None else tuple(catalogue)
+    other = next((item for item in families if not isinstance(item, Effect)), None)
+    if other is not None:
+        raise ArgumentError(f"catalogue: expected effects, as effects_named gives; found {other!r}")
     given = bands is not None
     if not given:
         work("choosing the band")
@@ -227,7 +231,7 @@ def diagnose(
         raise RecordingError("; ".join(str(fault) for fault in faults))
     notes[:0] = (*robot.notes, *base.notes)
     known = frozenset(unloaded)
-    families = tuple(item.knowing(known) for item in (available_effects() if catalogue is None else catalogue))
+    families = tuple(item.knowing(known) for item in families)
     task = SearchTask(base, families, criteria, searching(work, band_given=given))
     outcome, events = _without_events(task, observations, free=not given)
     work("comparing what was found with what else it could be", task.progress.stop)

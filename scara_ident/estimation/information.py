@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.errors import UsageError
 from scara_ident.estimation.blas import add_products, solve_rows
 from scara_ident.manners import Frozen
 
@@ -271,10 +272,18 @@ def merge(parts: Iterable[Information]) -> Information:
     ----------
     parts : iterable of Information
         At least one, all with the same parameters.
+
+    Raises
+    ------
+    UsageError
+        If there is none, or they are of different numbers of parameters.
     """
     items = list(parts)
     if not items:
-        raise ValueError("nothing to merge")
+        raise UsageError("nothing to merge: give the information of at least one set of rows")
+    counts = {item.parameters for item in items}
+    if len(counts) > 1:
+        raise UsageError(f"information about {' and '.join(map(str, sorted(counts)))} parameters cannot be merged")
     stacked = np.vstack([item.factor for item in items])
     return Information(triangular(stacked), sum(item.rows for item in items))
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import EstimationError
+from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, merge, residual_noise, weighted
@@ -53,13 +53,19 @@ def wls(observations: Observations, noise: Array | None = None) -> Estimate:
 
     Raises
     ------
+    UsageError
+        If there is not one number of noise for each joint.
     EstimationError
         If there is nothing to estimate from, or a joint's noise is not a positive number.
     """
     if noise is None:
         with one_blas_thread():
             return least_squares(observations, 1.0 / joint_noise(_joints(observations)), "wls")
-    for joint, sigma in zip(observations.model.robot.joints, noise, strict=True):
+    joints = observations.model.robot.joints
+    noise = np.asarray(noise)
+    if noise.shape != (len(joints),):
+        raise UsageError(f"noise has shape {noise.shape}; expected one number for each of {', '.join(joints)}")
+    for joint, sigma in zip(joints, noise, strict=True):
         if not 0.0 < sigma < np.inf:
             raise EstimationError(f"noise of joint {joint} is {sigma:g}; expected a positive number to weigh by")
     return least_squares(observations, 1.0 / noise, "wls")

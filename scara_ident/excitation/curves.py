@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -100,8 +100,10 @@ def make_basis(
     Raises
     ------
     UsageError
-        If the duration is not positive or there are too few harmonics to start and end at rest.
+        If the duration is not positive, there are too few harmonics to start and end at rest, or no such family.
     """
+    if family not in get_args(Family):
+        raise UsageError(f"family {family!r}: expected one of {', '.join(get_args(Family))}")
     if not (np.isfinite(duration) and duration > 0.0):
         raise UsageError(f"duration {duration:g} s: expected a positive number of seconds")
     wanted = tuple(range(1, harmonics + 1)) if isinstance(harmonics, int) else tuple(sorted(set(harmonics)))

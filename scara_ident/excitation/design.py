@@ -221,8 +221,6 @@ def design_excitation(
             "gather it with the same model"
         )
     effort = Effort() if effort is None else effort
-    if effort.starts < 1 or effort.rounds < 0:
-        raise UsageError(f"starts {effort.starts}, rounds {effort.rounds}: expected at least 1 and 0")
     limits = limits_of(robot) if limits is None else limits
     weights = _weights(torque_std, robot.n)
     nominal = nominal_parameters(model, known)

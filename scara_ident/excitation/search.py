@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from numbers import Integral
 
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.errors import ArgumentError, UsageError
 from scara_ident.excitation.criteria import Condition
 from scara_ident.excitation.interior_point import Minimum, Schedule, minimise, shrunk_inside
 from scara_ident.excitation.limits import InfeasibleLimits
@@ -55,12 +57,23 @@ class Effort:
     seed : int
     processes : int or None
         None: as many as there are cores.
+
+    Raises
+    ------
+    UsageError
+        If there is nothing to search from.
     """
 
     starts: int = 8
     rounds: int = 2
     seed: int = 0
     processes: int | None = None
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.starts, Integral) and isinstance(self.rounds, Integral)):
+            raise ArgumentError(f"starts {self.starts!r}, rounds {self.rounds!r}: expected whole numbers")
+        if self.starts < 1 or self.rounds < 0:
+            raise UsageError(f"starts {self.starts}, rounds {self.rounds}: expected at least 1 and 0")
 
 
 @dataclass(frozen=True)

@@ -201,7 +201,8 @@ def _rotors(robot: Robot, armature: Array, root: Element, content: bytes, told: 
         if not holders:
             yield from _armature_comment(robot, j, float(armature[j]), _joint(root, name), content)
             if armature[j] > 0.0:
-                homeless.append(f"{name}: {format_numbers([inertia])}")
+                # The comment has every digit.
+                homeless.append(f"{name}: {inertia:.4g}")
     if homeless and not told:
         yield (
             "a URDF has no place for rotor inertias, so a comment at the joint has the armature; to load them "

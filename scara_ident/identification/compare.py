@@ -12,6 +12,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.estimate import paper_criteria
+from scara_ident.estimation.information import Information
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.arguments import Recordings, model_of, recordings_of
 from scara_ident.identification.identify import check_bands, estimate_by
@@ -70,7 +71,8 @@ class Comparison(Saved, told_by="comparison"):
         ``errors[i, k, j]``: rms error on trajectory i, joint j, of the parameters from trajectory k.
     expected : ndarray, shape (t, t, n)
         The same as the covariance of the parameters and the error of i's own parameters predict it: where the
-        error is much larger, bias is at work and not noise.
+        error is much larger, bias is at work and not noise. Infinite where k leaves open a parameter that the joint
+        depends on: nothing is known then of what noise explains.
     notes : tuple of str
     """
 
@@ -161,9 +163,7 @@ def compare(
                     errors[i, k, j] = expected[i, k, j] = np.nan
                     continue
                 errors[i, k, j] = information.rms(summary.estimate.value)
-                factor = information.regressor_factor
-                covariance = summary.estimate.covariance
-                spread = np.inf if np.any(np.isinf(covariance)) else float(np.sum((factor @ covariance) * factor))
+                spread = _spread(information, summary.estimate.covariance)
                 expected[i, k, j] = np.sqrt(
                     information.rms(summaries[i].estimate.value) ** 2 + max(spread, 0.0) / information.rows
                 )
@@ -184,6 +184,14 @@ def _with_enough(observations: Observations) -> tuple[dict[str, Observations], l
         else:
             found[name] = own
     return found, notes
+
+
+def _spread(information: Information, covariance: Array) -> float:
+    """Return the power that a covariance of the parameters predicts over a joint's rows; infinite where one is open."""
+    factor = information.regressor_factor
+    seen = np.any(factor != 0.0, axis=0)
+    factor, own = factor[:, seen], covariance[np.ix_(seen, seen)]
+    return float(np.sum((factor @ own) * factor)) if np.all(np.isfinite(own)) else np.inf
 
 
 def _summary(name: str, observations: Observations, method: str, sigma: Array | None) -> TrajectorySummary:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
-from scara_ident.errors import EstimationError, UsageError
+from scara_ident.errors import ArgumentError, EstimationError, UsageError
 from scara_ident.estimation import Estimate, History, JointError, wls
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, physical_consistency
 from scara_ident.estimation.consistent.feasibility import PhysicalConsistency
@@ -161,8 +161,8 @@ def identify(
     Raises
     ------
     UsageError
-        If there are no recordings, the model or the method is unknown, a recording is both fitted and held out, or a band is no
-        frequency that the slowest recording carries; an `ArgumentError` where something of another kind is given.
+        If there are no recordings, the model or the method is unknown, a recording is both fitted and held out, a band is no frequency
+        that the slowest recording carries, or options are given to another method than ``consistent``; an `ArgumentError` where something of another kind is given.
     RecordingError
         If none of the recordings to fit can be used, or they have fewer rows than the model has parameters, or two joints are
         exchanged (see `channel_faults`). One of several that cannot be used, or one that is held out, is left out with a note.
@@ -183,6 +183,10 @@ def identify(
     recordings, validation = recordings_of(recordings, robot), recordings_of(validation, robot, "validation")
     if not recordings:
         raise UsageError("no recordings to identify from")
+    if not isinstance(options, ConsistentOptions | None):
+        raise ArgumentError(f"options: expected ConsistentOptions; found {type(options).__name__}")
+    if options is not None and method != "consistent":
+        raise UsageError(f"options: those of the method consistent; {method!r} takes none")
     ESTIMATORS.get(method)  # a package that cannot be loaded is named before the work, not after it
     check_held_out(recordings, validation)
     equation = model_of(model, robot)

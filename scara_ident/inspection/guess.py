@@ -140,7 +140,10 @@ def _find_time(result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping[
                 f"{name!r} stands still in {still:.0%} of the rows: the clock is too coarse; record time with more digits"
             )
             return
-    result.problems.append("no time found: name its column and unit under recording: time")
+    result.problems.append(
+        "no time found: name its column and unit under recording: time, or state the rate of even rows there: "
+        "time: {rate: 100}, in samples per second"
+    )
 
 
 def _find_signal(

@@ -182,7 +182,9 @@ def _by_description(path: Path, robot: Robot) -> Inspection:
     topics = _topics(path)
     names = column_names(path, channels.topic)
     numbers = _numbers(path, names, channels.topic)
-    places: dict[str, tuple[str, str | None]] = {channels.time.column: ("time", None)}
+    places: dict[str, tuple[str, str | None]] = {}
+    if channels.rate is None:
+        places[channels.time.column] = ("time", None)
     for signal in SIGNALS:
         places |= {c.column: (signal, joint) for c, joint in zip(channels.of(signal), robot.joints, strict=True)}
     columns = []

@@ -49,7 +49,7 @@ def description_text(guess: Guess, robot: Robot, described: Mapping[str, Any], u
     lines += _joints(guess, robot)
     if guess.locked and guess.joints:
         lines += ["", *_locked(guess)]
-    lines += ["", *_recording(described)]
+    lines += ["", *_recording(described, has_clock=guess.time is not None)]
     lines += ["", "# gravity: [0, 0, -9.81]   # in the base frame; state it if the base is not upright"]
     for kind, said in (("missing", guess.problems), ("note", guess.notes)):
         lines += [f"# {kind}: {_line(text)}" for text in said]
@@ -135,10 +135,14 @@ def _locked(guess: Guess) -> list[str]:
     return [said if open_ else "# Where these stood, rad or m, by the file.", f"locked: {{{places}}}"]
 
 
-def _recording(described: Mapping[str, Any]) -> list[str]:
+def _recording(described: Mapping[str, Any], *, has_clock: bool) -> list[str]:
+    state = [] if has_clock else ["# STATE the rate, samples per second, if the rows are even: no clock was found."]
+    if not described and state:
+        return [*state, "# recording:", "#   time: {rate: 100}"]
     if not described:
         return ["# Columns are time, <joint>.position, <joint>.effort, in SI: no key recording is needed."]
     lines = ["# Columns of the recordings and their units.", "recording:"]
+    lines += [*(f"  {line}" for line in state), *(["  # time: {rate: 100}"] if state else [])]
     for key, value in described.items():
         if not isinstance(value, dict):
             lines.append(f"  {key}: {json.dumps(value, ensure_ascii=False)}")

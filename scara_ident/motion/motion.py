@@ -87,7 +87,7 @@ class Stretch:
     source : slice
         Samples of the recording that it was made of.
     clipped : ndarray of bool, shape (n, N), or False
-        Where a torque is at the value at which the recording is clipped.
+        Where a torque is at the value at which the recording is clipped, or stuck most of the time.
     """
 
     name: str
@@ -177,7 +177,7 @@ def _uniform(recording: Recording, start: int, stop: int, step: float) -> Stretc
 
 
 def _clipped_at(recording: Recording, source: slice, grid: Array) -> NDArray[np.bool_] | bool:
-    """Tell where a grid has torques of clipped samples, from the values that the audit found to be clipped."""
+    """Tell where a grid has torques of clipped samples, from the values that the audit found to be clipped or stuck."""
     bounds = [finding.clipped for finding in recording.findings if finding.clipped is not None]
     if recording.effort is None or not bounds:
         return False

@@ -10,11 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
+from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.errors import UsageError
 from scara_ident.manners import Frozen
 from scara_ident.motion.low_pass import ROWS_AT_ONCE, low_pass, low_pass_every
 from scara_ident.motion.motion import Motion, Stretch, motion_of, stretches, torque_of, with_effort_of
@@ -286,14 +288,25 @@ def prepare(recordings: Sequence[Recording], bands: Bands = ()) -> PreparedData:
 
     Raises
     ------
+    UsageError
+        If bands are not one for each joint, or one is no frequency.
     RecordingError
         If a recording has no stretch that is long enough.
     """
     made = []
     for recording in recordings:
         chosen = tuple(bands) or (None,) * len(recording.joints)
+        _check_bands(chosen, recording.joints)
         made.append(PreparedRecording(recording, tuple(PreparedStretch(part, chosen) for part in stretches(recording))))
     return PreparedData(tuple(made), made[0].bands if made else tuple(bands))
+
+
+def _check_bands(bands: Bands, joints: Sequence[str]) -> None:
+    if len(bands) != len(joints):
+        raise UsageError(f"bands: {len(bands)} given; expected one for each of {', '.join(joints)}")
+    for joint, band in zip(joints, bands, strict=True):
+        if band is not None and not (isinstance(band, Real) and 0.0 < band < np.inf):
+            raise UsageError(f"band of {joint} is {band!r}; expected a frequency above 0 in Hz, or None")
 
 
 def block_seconds(bands: Sequence[float | None]) -> float:

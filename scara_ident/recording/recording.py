@@ -16,6 +16,7 @@ from scara_ident.errors import RecordingError
 from scara_ident.manners import Reported
 from scara_ident.recording.audit import Finding, Samples, audit
 from scara_ident.recording.columns import recording_columns
+from scara_ident.recording.even_rows import with_even_clock
 from scara_ident.recording.files import column_names, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
 from scara_ident.recording.files.parquet_rows import read_rows
@@ -148,7 +149,9 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
     names = column_names(path, channels.topic)
     placed = (channel.column for signal in SIGNALS for channel in channels.of(signal))
     used = [channels.time.column, *(column for column in placed if column in names)]
-    long = None if shared else long_file(path, channels.time.column, used)
+    # Without a clock it is not told where a long file has gaps.
+    whole = shared or channels.rate is not None
+    long = None if whole else long_file(path, channels.time.column, used)
     if long is not None:
         return _kept(long, robot, need_effort=need_effort)
 
@@ -262,9 +265,11 @@ def recording_of(
     RecordingError
         As `read_recording`.
     """
+    names, read, stated = with_even_clock(path, names, read, channels, shared_clock=shared_clock)
     needed = [channels.time, *channels.position, *(channels.effort if need_effort else ())]
     refuse_missing(path, names, [channel.column for channel in needed], channels)
     optional, findings = optional_channels(path, channels, names, () if need_effort else ("effort",))
+    findings += stated
     second = {k: place for k, place in enumerate(channels.link_position) if place.column in names}
     extra = (*chain.from_iterable(optional.values()), *second.values())
     columns = read([channel.column for channel in (*needed, *extra)])

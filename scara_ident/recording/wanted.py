@@ -51,6 +51,11 @@ def refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str], chan
         remedy = f"correct recording: {mapped} in the robot description"
     elif len(missing) == len(wanted) and path.exists():
         remedy = f"map its columns in the robot description; a first one writes: scara-ident inspect {quote(str(path))}"
+    elif missing == [channels.time.column]:
+        remedy = (
+            "name the column of time in the robot description, or state the rate of even rows, samples per second: "
+        )
+        remedy += "recording: {time: {rate: 100}}"
     raise RecordingError(f"{path}: no column {name!r}{more}; {guess}its {kind}: {shown}; {remedy}")
 
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from scara_ident.estimation.urdf_scale import scale_sentence
-from scara_ident.identification.compare import Comparison
+from scara_ident.identification.compare import Comparison, TrajectorySummary
+from scara_ident.manners import listed
 from scara_ident.model.urdf_values import urdf_values
 
 
@@ -111,11 +112,17 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, ...]:
     own = np.array([comparison.errors[i, i] for i in range(len(names))])
     # Ratios to each trajectory's own error, so that joints of different torque count the same.
     ratio = np.nanmean(comparison.errors / own[:, None], axis=(0, 2))
-    best, worst = int(np.argmin(ratio)), int(np.argmax(ratio))
-    found = [
-        f"Parameters from {names[best]} predict all trajectories best ({ratio[best]:.2f} times each one's own error), "
-        f"those from {names[worst]} worst ({ratio[worst]:.3g} times)."
-    ]
+    # A parameter left open may fit by luck what it is tried on, so such a fit is neither best nor explained.
+    open_ = np.any(np.isinf(comparison.expected), axis=(0, 2))
+    found = []
+    if np.count_nonzero(~open_) > 1:
+        best = int(np.argmin(np.where(open_, np.inf, ratio)))
+        worst = int(np.argmax(np.where(open_, -np.inf, ratio)))
+        whose = "Of those ranked, parameters" if np.any(open_) else "Parameters"
+        found.append(
+            f"{whose} from {names[best]} predict all trajectories best ({ratio[best]:.2f} times each one's own error), "
+            f"those from {names[worst]} worst ({ratio[worst]:.3g} times)."
+        )
     beyond = comparison.errors / comparison.expected
     i, k, j = np.unravel_index(int(np.nanargmax(np.where(np.isfinite(beyond), beyond, -1.0))), beyond.shape)
     if beyond[i, k, j] > 2.0:
@@ -123,10 +130,22 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, ...]:
             f"Bias, not noise, is at work where {names[k]} predicts {names[i]} on {comparison.model.robot.joints[j]}: "
             f"the error is {beyond[i, k, j]:.3g} times what the parameters' covariance promises."
         )
-    else:
-        found.append("No error exceeds twice what noise in the parameters explains.")
+    elif np.any(np.isfinite(comparison.expected)):
+        which = "other error" if np.any(open_) else "error"
+        found.append(f"No {which} exceeds twice what noise in the parameters explains.")
+    found += [_left_open(summary) for summary, still in zip(comparison.trajectories, open_, strict=True) if still]
     equal = all(np.ptp(summary.estimate.weights) == 0.0 for summary in comparison.trajectories)
     weights = "every row of every joint counts the same" if equal else "each joint is weighted by its residual"
     found.append(f"Estimated by {comparison.method}: {weights}.")
     found.append(scale_sentence(None, comparison.model.robot))
     return tuple(found)
+
+
+def _left_open(summary: TrajectorySummary) -> str:
+    """Say which parameters a trajectory leaves without a standard deviation, and what follows."""
+    estimate = summary.estimate
+    missing = [name for name, std in zip(estimate.model.names, estimate.std, strict=True) if not np.isfinite(std)]
+    return (
+        f"Parameters from {summary.name} are not ranked: no standard deviation could be had of {listed(missing, 3)}, so "
+        "what noise explains is not known where a dash stands for it."
+    )

@@ -58,7 +58,7 @@ def _scale(value: Any) -> float:
     return _not_zero(_number(value))
 
 
-def _counts(value: Any) -> float:
+def _positive(value: Any) -> float:
     number = _number(value)
     if number <= 0.0:
         raise ValueError("expected a number above 0")
@@ -105,7 +105,8 @@ Word = Annotated[str, BeforeValidator(_word)]
 UnitName = Annotated[str | dict[str, str], _once_or_per_joint(_word)]
 Scale = Annotated[float | dict[str, float], _once_or_per_joint(_scale)]
 Shift = Annotated[float | dict[str, float], _once_or_per_joint(_number)]
-Counts = Annotated[float | dict[str, float], _once_or_per_joint(_counts)]
+Positive = Annotated[float, PlainValidator(_positive)]
+Counts = Annotated[float | dict[str, float], _once_or_per_joint(_positive)]
 
 
 class JointDescription(BaseModel):
@@ -121,12 +122,19 @@ class JointDescription(BaseModel):
 
 
 class TimeDescription(BaseModel):
-    """Where the time of a recording stands, and in which unit."""
+    """Where the time of a recording stands, and in which unit; else how many rows a second has."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     column: Word = "time"
     unit: Word = "s"
+    rate: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_clock(self) -> TimeDescription:
+        if self.rate is not None and self.model_fields_set != {"rate"}:
+            raise ValueError("expected rate (of rows without a clock) or column and unit, not both")
+        return self
 
 
 class SignalDescription(BaseModel):

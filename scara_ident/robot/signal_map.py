@@ -53,6 +53,8 @@ class Channels:
         Signals that the robot description names; the others have the contract's columns, if any.
     topic : str or None
         Topic of the bag that holds them.
+    rate : float or None
+        Rows in a second, where the robot description states that instead of a column of time.
     """
 
     time: Channel
@@ -64,6 +66,7 @@ class Channels:
     link_position: tuple[Channel, ...]
     declared: frozenset[str] = frozenset()
     topic: str | None = None
+    rate: float | None = None
 
     def of(self, signal: str) -> tuple[Channel, ...]:
         """Return the channels of a signal, one for each joint."""
@@ -122,7 +125,8 @@ def build_channels(
             for k, joint in enumerate(joints)
         )
     declared = frozenset(name for name in ("time", *SIGNALS) if getattr(description, name) is not None)
-    channels = _channels(Channel(time.column, unit.factor), built, declared, description.topic)
+    clock = Channel(time.column, unit.factor)
+    channels = _channels(clock, built, declared, description.topic, time.rate)
     _refuse_shared(channels, source, joints)
     return channels
 
@@ -132,6 +136,7 @@ def _channels(
     signals: Mapping[str, tuple[Channel, ...]],
     declared: frozenset[str] = frozenset(),
     topic: str | None = None,
+    rate: float | None = None,
 ) -> Channels:
     return Channels(
         time=time,
@@ -143,6 +148,7 @@ def _channels(
         link_position=signals["link_position"],
         declared=declared,
         topic=topic,
+        rate=rate,
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.simulation.arm import VirtualArm
@@ -38,16 +37,16 @@ def inverse_dynamics(arm: VirtualArm, bodies: Array, q: Array, v: Array, a: Arra
         N m (N) at the joint.
     """
     # Imported here since it loads numba.
-    from scara_ident.simulation.spatial import configuration, with_bodies
+    from scara_ident.simulation.spatial import configuration, torque_by_regressor
 
     robot = arm.robot
     back = np.argsort(robot.order)
-    model = with_bodies(robot.model, bodies[back])
+    model, moved = robot.model, bodies[back]
     data = model.createData()
     torque = np.empty_like(q)
     for k in range(q.shape[1]):
         full = configuration(model, q[back, k])
-        torque[:, k] = pin.rnea(model, data, full, v[back, k], a[back, k])[robot.order]
+        torque[:, k] = torque_by_regressor(model, data, moved, full, v[back, k], a[back, k])[robot.order]
     size = np.abs(arm.scale)[:, None]
     a0, a1, a2, a3 = (arm.friction[:, i, None] for i in range(4))
     sign = np.sign(v)

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, UsageError
@@ -17,7 +16,7 @@ from scara_ident.robot.robot import Robot
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.defaults import placed_poles, virtual_arm
 from scara_ident.simulation.effects import EFFECTS, Effect
-from scara_ident.simulation.spatial import configuration, with_bodies
+from scara_ident.simulation.spatial import mass_and_bias
 
 # Models whose parameters the virtual arm has.
 _MODELS = ("complete", "reduced", "basic")
@@ -41,7 +40,8 @@ def arms_of(model: IdentifiedModel) -> tuple[VirtualArm, VirtualArm]:
     """
     if model.model.name not in _MODELS:
         raise UsageError(f"its model {model.model.name!r} is none that the virtual arm has")
-    bare, whole = (arm_with(model.robot, by_name(model, value)) for value in (model.before, model.value))
+    near = model.standard
+    bare, whole = (arm_with(model.robot, by_name(model, value), near) for value in (model.before, model.value))
     return bare, whole
 
 
@@ -50,10 +50,10 @@ def by_name(model: IdentifiedModel, value: Array) -> dict[str, float]:
     return {name: float(x) for name, x in zip(model.model.names, value, strict=False) if np.isfinite(x)}
 
 
-def arm_with(robot: Robot, parameters: Mapping[str, float]) -> VirtualArm:
+def arm_with(robot: Robot, parameters: Mapping[str, float], near: Array | None = None) -> VirtualArm:
     """Return the virtual arm whose complete model has given parameters.
 
-    Torque tells base parameters only; of all bodies with these, those are taken that are nearest to the URDF's, each kind
+    Torque tells base parameters only; of all bodies with these, those are taken that are nearest to given ones, each kind
     of parameter in units of the arm's largest. Every motion then takes the same torque, whichever they are.
 
     Parameters
@@ -61,6 +61,8 @@ def arm_with(robot: Robot, parameters: Mapping[str, float]) -> VirtualArm:
     robot : Robot
     parameters : mapping of str to float
         By the names of the complete model; those that it lacks are zero.
+    near : ndarray, shape (11 n,), optional
+        Standard parameters of bodies and rotors: those of an estimate that has them, by default the URDF's.
 
     Returns
     -------
@@ -75,7 +77,7 @@ def arm_with(robot: Robot, parameters: Mapping[str, float]) -> VirtualArm:
     value = np.array([float(parameters.get(name, 0.0)) for name in model.names])
     body, n = model.rigid_body, robot.n
     grouping = body.base.grouping[body.kept]
-    nominal = np.concatenate([arm.bodies.ravel(), arm.armature])
+    nominal = np.concatenate([arm.bodies.ravel(), arm.armature]) if near is None else near
     size = np.concatenate([np.tile(_sizes(arm.bodies), n), np.full(n, max(float(np.max(arm.armature)), _LEAST_SHARE))])
     scaled = grouping * size
     change = size * (np.linalg.pinv(scaled) @ (value[: len(grouping)] - grouping @ nominal))
@@ -148,13 +150,11 @@ def _mean_inertia(arm: VirtualArm) -> Array:
     lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
     upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
     random, total = np.random.default_rng(0), np.zeros(robot.n)
-    model = with_bodies(robot.model, arm.bodies[back])
-    data = model.createData()
+    bodies, still = arm.bodies[back], np.zeros(robot.n)
     for _ in range(_POSES):
         pose = random.uniform(lower, upper)[back]
-        # Pinocchio fills the upper triangle.
-        mass = pin.crba(model, data, configuration(model, pose)) + np.diag(arm.armature[back])
-        if np.linalg.eigvalsh(mass, "U")[0] <= 0.0:
+        mass = mass_and_bias(robot.model, bodies, pose, still)[0] + np.diag(arm.armature[back])
+        if np.linalg.eigvalsh(mass)[0] <= 0.0:
             raise RobotError(
                 f"{robot.name}: no arm with these parameters can move, its inertia is not positive; identify with "
                 "--method consistent, or from motion that tells more"

@@ -210,7 +210,7 @@ def _drawn(model: IdentifiedModel, whole: VirtualArm, random: np.random.Generato
     for share in 0.5 ** np.arange(HALVINGS):
         try:
             moved = {name: x + share * step.get(name, 0.0) for name, x in value.items()}
-            return replace(arm_with(model.robot, moved), controller=whole.controller)
+            return replace(arm_with(model.robot, moved, model.standard), controller=whole.controller)
         except RobotError:
             continue
     return whole

@@ -89,6 +89,7 @@ OTHERS = [
     ("identify good_1.parquet --band 1e9", 2, ("1e+09 Hz", "good_1 has 1000 samples per second", "a lower band")),
     ("identify good_1.parquet --band 500", 2, ("band of joint1 is 500 Hz", "less than 500 Hz", "a lower band")),
     ("identify good_1.parquet --friction dry", 2, ("--friction", "'dry' is not one of 'auto'")),
+    ("identify good_1.parquet --friction free", 2, ("--friction free: belongs to --method consistent",)),
     ("identify good_1.parquet --band=wide", 2, ("--band", "number", "see scara-ident identify --help")),
     ("identify good_1.parquet --validate", 2, ("--validate", "requires an argument")),
     ("identify good_1.parquet --validate missing.csv", 2, ("missing.csv: no such file",)),

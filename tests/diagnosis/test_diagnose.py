@@ -15,7 +15,7 @@ from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.position import Spring
-from scara_ident.errors import UsageError
+from scara_ident.errors import ArgumentError, UsageError
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import (
     BANDS,
@@ -108,6 +108,11 @@ def test_the_band_is_not_chosen_on_recordings_held_out():
     alone = diagnose(ROBOT, train, catalogue=())
     beside = diagnose(ROBOT, train, validation=[wild], catalogue=())
     assert alone.search.bands == beside.search.bands
+
+
+def test_a_name_in_the_catalogue_is_said_to_be_no_effect():
+    with pytest.raises(ArgumentError, match="catalogue: expected effects, as effects_named gives; found 'spring'"):
+        diagnose(ROBOT, exact_runs(), catalogue=["spring"])
 
 
 def test_a_recording_cannot_be_fitted_and_held_out():

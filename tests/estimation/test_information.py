@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from scara_ident.errors import UsageError
 from scara_ident.estimation import information
 from scara_ident.estimation.information import GRAM_ROWS, Information, merge
 
@@ -304,8 +305,10 @@ def test_shapes_that_do_not_fit_are_refused():
     for w, u in ((np.ones((5, 2)), np.ones(5)), (np.ones((5, 3)), np.ones(4)), (np.ones(3), np.ones(1))):
         with pytest.raises(ValueError, match=r"expected a regressor \(N, 3\)"):
             empty.absorb(w, u)
-    with pytest.raises(ValueError, match="nothing to merge"):
+    with pytest.raises(UsageError, match="nothing to merge"):
         merge([])
+    with pytest.raises(UsageError, match="information about 3 and 4 parameters cannot be merged"):
+        merge([empty, Information.empty(4)])
 
 
 def weak_rows(seed: int, count: int, condition: float) -> np.ndarray:

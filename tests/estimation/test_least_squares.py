@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from scara_ident.errors import EstimationError
+from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation import ols, wls
 from scara_ident.estimation.information import joint_noise
 from scara_ident.estimation.least_squares import value_and_weights, weighted_value
@@ -83,6 +83,13 @@ def test_wls_of_an_exact_fit_is_the_truth(model: TorqueModel):
     w = rows(rng, model, 500)
     truth = np.arange(1.0, w.shape[2] + 1)
     assert_allclose(wls(linear(model, "a_1", w, w @ truth, 100)).value, truth, rtol=1e-8)
+
+
+@pytest.mark.parametrize("noise", [[1.0], np.ones((2, 2)), 3.0])
+def test_wls_refuses_noise_that_is_not_one_number_a_joint(model: TorqueModel, noise):
+    w, u, _ = made(model, count=300)
+    with pytest.raises(UsageError, match="expected one number for each of j1, j2"):
+        wls(linear(model, "a_1", w, u, 100), noise)
 
 
 @pytest.mark.parametrize("noise", [np.array([0.0, 1.0]), np.array([1.0, np.nan]), np.array([-1.0, 1.0])])

@@ -67,3 +67,8 @@ def test_the_paper_counts_both_ends_among_its_samples():
 def test_too_little_to_move_by_is_said(duration, harmonics):
     with pytest.raises(UsageError, match="expected"):
         make_basis(duration, harmonics)
+
+
+def test_a_family_that_is_none_is_said():
+    with pytest.raises(UsageError, match="family 'wavelet': expected one of fourier, spline"):
+        make_basis(5.0, 5, "wavelet")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scara_ident.errors import ArgumentError, UsageError
 from scara_ident.excitation import (
     Effort,
     InfeasibleLimits,
@@ -70,3 +71,11 @@ def test_a_winner_far_outside_on_the_fine_grid_is_searched_again():
     least, _ = verified_inside(fine, far)
     costs = [fine.sharpened(1.0).at(item).cost for item in (x, least, verified_inside(fine, found.x)[0])]
     assert costs[0] < costs[1] - 10.0 and costs[0] < costs[2] + 1.0
+
+
+def test_an_effort_that_searches_nothing_is_said_where_it_is_made():
+    for given in ({"starts": 0}, {"rounds": -1}):
+        with pytest.raises(UsageError, match="expected at least 1 and 0"):
+            Effort(**given)
+    with pytest.raises(ArgumentError, match="starts 'many', rounds 2: expected whole numbers"):
+        Effort(starts="many")

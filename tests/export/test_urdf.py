@@ -214,6 +214,10 @@ def test_rotor_inertias_without_a_place_are_in_a_comment_and_a_note(branched: Ro
     assert "wrist: 2e-05" in note
     assert "branch: 5e-05" in note
     assert "shoulder" not in note
+    standard[30] = 1.0 / 7.0
+    (note,) = (note for note in urdf_text(branched, standard)[1] if "rotor_inertia" in note)
+    # 1/7 kg m^2 at the joint behind 50 turns a turn.
+    assert "wrist: 5.714e-05" in note
 
 
 def test_a_rotor_inertia_that_the_description_overrides_is_told(tmp_path: Path) -> None:

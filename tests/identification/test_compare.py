@@ -7,7 +7,7 @@ import pytest
 
 from scara_ident.errors import RecordingError
 from scara_ident.estimation.observations import observe
-from scara_ident.identification.compare import compare
+from scara_ident.identification.compare import _spread, compare
 from scara_ident.motion.prepared import prepare
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, NOISE, complete, exact_runs
@@ -59,3 +59,14 @@ def test_repeatability_is_the_noise_and_names_are_kept(clean):
 def test_one_trajectory_is_not_a_comparison():
     with pytest.raises(RecordingError, match="at least two trajectories"):
         compare(ROBOT, exact_runs()[:2], bands=BANDS)
+
+
+def test_a_parameter_left_open_counts_on_the_joints_that_depend_on_it(clean):
+    """No row of joint1 depends on the offset of joint2."""
+    rows = observe(complete(), prepare(exact_runs(3), BANDS)).by_joint
+    covariance = clean.trajectories[0].estimate.covariance.copy()
+    place = complete().names.index("p_o2")
+    before = [_spread(information, covariance) for information in rows]
+    covariance[place, place] = np.inf
+    assert _spread(rows[0], covariance) == before[0]
+    assert _spread(rows[1], covariance) == np.inf

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from scara_ident.errors import EstimationError, RecordingError, UsageError
+from scara_ident.errors import ArgumentError, EstimationError, RecordingError, UsageError
 from scara_ident.estimation import ols
+from scara_ident.estimation.consistent.options import ConsistentOptions
 from scara_ident.estimation.observations import observe
 from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.identify import (
@@ -289,6 +290,13 @@ def test_a_recording_cannot_be_fitted_and_held_out(robot: Robot, clean: Recordin
         identify(robot, [replace(clean, path=path)], validation=[replace(clean, path=link)])
     with pytest.raises(UsageError, match="given to fit and to validate"):
         identify(robot, [clean], validation=[clean])
+
+
+def test_options_are_those_of_consistent(robot: Robot, clean: Recording):
+    with pytest.raises(UsageError, match="options: those of the method consistent; 'ols' takes none"):
+        identify(robot, [clean], method="ols", options=ConsistentOptions())
+    with pytest.raises(ArgumentError, match="options: expected ConsistentOptions; found dict"):
+        identify(robot, [clean], method="consistent", options={"friction": "free"})
 
 
 def test_bad_requests_are_refused(robot: Robot, clean: Recording):

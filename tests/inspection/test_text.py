@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
 import yaml
 
+from scara_ident.inspection.inspection import inspect_file
 from tests.arms import Link, write_urdf
 from tests.inspection.made import MADE, assert_same, inspected, read_back
 from tests.made_recordings import save
@@ -70,3 +72,24 @@ def test_a_share_of_the_rated_torque_asks_for_that_torque(tmp_path):
     assert found.mapping["effort"] == {"column": "{joint}.torque_percent", "unit": "%"}
     assert "# STATE effort_gain, N m at 100 %" in (found.description or "")
     assert found.recording is not None
+
+
+@pytest.mark.parametrize("name", ["{joint}.{signal}", "{joint}_{signal}"])
+def test_a_log_without_a_clock_asks_for_the_rate(tmp_path, name):
+    made = {
+        name.format(joint=key.split(".")[0], signal=key.split(".")[1]): v for key, v in MADE.items() if key != "time"
+    }
+    path = save(tmp_path / "a.parquet", made)
+    found = inspected(path, tmp_path)
+    assert any("state the rate of even rows" in problem for problem in found.problems)
+    text = found.description or ""
+    assert "# STATE the rate, samples per second" in text
+    assert yaml.safe_load(text)
+    rate = 1.0 / float(MADE["time"][1] - MADE["time"][0])
+    stated = text.replace("# effort_side: joint", "effort_side: joint").replace("# recording:", "recording:")
+    stated = stated.replace("#   time:", "  time:").replace("# time:", "time:")
+    (tmp_path / "robot.yaml").write_text(stated.replace("rate: 100", f"rate: {rate!r}"), encoding="utf-8")
+    again = inspect_file(path, robot=tmp_path / "robot.yaml")
+    assert again.refusal is None
+    assert again.recording is not None
+    assert again.recording.rate == pytest.approx(rate, rel=1e-6)

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import scara_ident.motion.motion
 import scara_ident.motion.prepared
-from scara_ident.errors import RecordingError
+from scara_ident.errors import RecordingError, UsageError
 from scara_ident.identification.identify import identify
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.low_pass import low_pass
@@ -248,3 +248,17 @@ def test_an_identification_does_not_look_for_periods(monkeypatch: pytest.MonkeyP
     """Only the tests of a diagnosis ask for them, and they take as long as a tenth of an identification."""
     monkeypatch.setattr(scara_ident.motion.prepared, "periods_of", lambda _: pytest.fail("looked for periods"))
     assert identify(robot, [run]).estimate.value.size
+
+
+@pytest.mark.parametrize(
+    ("bands", "said"),
+    [
+        ([-1, 2], "band of j1 is -1; expected a frequency above 0"),
+        ([2.0, np.nan], "band of j2 is nan"),
+        (["wide", None], "band of j1 is 'wide'"),
+        ([2.0], "bands: 1 given; expected one for each of j1, j2"),
+    ],
+)
+def test_bands_that_are_none_are_said(run: Recording, bands, said: str):
+    with pytest.raises(UsageError, match=said):
+        prepare([run], bands)

@@ -22,6 +22,7 @@ WANTED = ["time", "j1.position", "j2.position"]
             [f"column_{k}" for k in range(1, 6)],
             "first line holds numbers; .*or map column_1 to column_5 under recording:",
         ),
+        (["j1.position", "j2.position"], "no column 'time'; .*or state the rate of even rows.*{time: {rate: 100}}"),
     ],
 )
 def test_a_missing_column_has_a_remedy(names: list[str], said: str):

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from scara_ident.identification.compare import compare
 from scara_ident.report.comparison import comparison_dict, comparison_sentences
+from scara_ident.report.told.comparison import tables
+from scara_ident.report.told.words import text_of
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, complete, exact_runs, with_torque
 
@@ -48,3 +53,26 @@ def test_the_report_says_the_same_by_name(clean):
     curve = content["friction"]["joint1"]["torque"]["A"]
     value = clean.trajectories[0].estimate.value[complete().names.index("a01")]
     assert curve[0] == pytest.approx(value)
+
+
+def test_a_fit_that_leaves_a_parameter_open_is_neither_best_nor_explained(clean):
+    """Whatever its errors are: what noise explains of them is not known."""
+    open_, expected = clean.trajectories[2], clean.expected.copy()
+    covariance = open_.estimate.covariance.copy()
+    place = complete().names.index("p_o2")
+    covariance[place, place], expected[:, 2, 1] = np.inf, np.inf
+    left = replace(open_, estimate=replace(open_.estimate, covariance=covariance))
+    best = replace(clean, errors=clean.errors * [[[1.0], [1.0], [0.5]]], expected=expected)
+    held = replace(best, trajectories=(*clean.trajectories[:2], left))
+    found = comparison_sentences(held)
+    assert "C" not in found[0]
+    assert found[1] == "No other error exceeds twice what noise in the parameters explains."
+    assert found[2].startswith("Parameters from C are not ranked: no standard deviation could be had of p_o2")
+    assert "(-)" in text_of(*tables(comparison_dict(held)))
+    assert "inf" not in text_of(*tables(comparison_dict(held)))
+
+
+def test_of_fits_that_all_leave_a_parameter_open_none_is_best(clean):
+    found = comparison_sentences(replace(clean, expected=np.full_like(clean.expected, np.inf)))
+    assert not any("best" in sentence or "exceeds" in sentence for sentence in found)
+    assert sum("not ranked" in sentence for sentence in found) == 3

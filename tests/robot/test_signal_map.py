@@ -95,6 +95,10 @@ def test_columns_are_named_by_a_pattern_or_one_by_one(tmp_path, place, columns):
         ("{position: {pattern: x}}", "recording.position.pattern", "counts_per_turn"),
         ("[a]", "recording", "dictionary"),
         ("{time: {column: 3}}", "recording.time.column", "expected a name"),
+        ("{time: {rate: 0}}", "recording.time.rate", "expected a number above 0"),
+        ("{time: {rate: fast}}", "recording.time.rate", "expected a number"),
+        ("{time: {rate: 100, column: t}}", "recording.time", "not both"),
+        ("{time: {rate: 100, unit: ms}}", "recording.time", "not both"),
         ("{time: {unit: min}}", "recording.time.unit", "expected one of s, ms, us, ns"),
         ("{position: {unit: degrees}}", "recording.position.unit", "one of rad, deg, turn, count"),
         ("{position: {unit: deg}}", "recording.position.unit", "j2, which translates; one of m, mm, um"),
@@ -124,6 +128,13 @@ def test_a_fault_in_the_mapping_is_one_line_with_its_key(tmp_path, recording, ke
     assert message.startswith(f"{tmp_path / 'robot.yaml'}: {key}: ")
     assert said in message
     assert len(message) < 400
+
+
+def test_a_rate_stands_for_a_clock(tmp_path):
+    channels = described(tmp_path, "{time: {rate: 100}}").channels
+    assert channels is not None
+    assert channels.rate == 100.0
+    assert described(tmp_path, "{time: {column: t}}").channels.rate is None
 
 
 def test_a_current_without_its_gain_is_refused(tmp_path):

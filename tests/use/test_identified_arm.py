@@ -36,6 +36,37 @@ def test_its_torque_is_the_models_on_any_motion(name: str) -> None:
     np.testing.assert_allclose(torque, predicted, rtol=1e-9, atol=1e-9 * np.abs(predicted).max())
 
 
+def test_bodies_without_mass_take_the_models_torque_too() -> None:
+    """Of base parameters bodies of less than no mass may follow, as on a large arm seen by small motion."""
+    robot = load_robot("ur5")
+    model, wanted = build_model(robot, "complete"), moved_values(robot)
+    lighter = virtual_arm(robot).bodies.copy()
+    lighter[3, :4] = -40.0, 3.0, -2.0, 1.0
+    near = np.concatenate([lighter.ravel(), virtual_arm(robot).armature])
+    arm = arm_with(robot, wanted, near)
+    assert arm.bodies[3, 0] < 0.0
+    q, v, a = np.random.default_rng(1).normal(size=(3, robot.n, 40))
+    motion = Motion("", "", np.arange(40.0), q, v, a, None, 1.0)
+    predicted = np.einsum("npk,p->nk", model.regressor(motion), np.array(list(wanted.values())))
+    torque = inverse_dynamics(arm, arm.bodies, q, v, a) / arm.scale[:, None]
+    np.testing.assert_allclose(torque, predicted, rtol=1e-9, atol=1e-9 * np.abs(predicted).max())
+    arm.draft()
+
+
+def test_an_arm_that_an_estimate_has_found_is_taken_as_it_is() -> None:
+    robot = load_robot("ur5")
+    arm, random = virtual_arm(robot), np.random.default_rng(4)
+    found = np.concatenate([arm.bodies.ravel(), arm.armature]) * random.uniform(0.5, 1.5, 11 * robot.n)
+    body = build_model(robot, "complete").rigid_body
+    names = build_model(robot, "complete").names
+    value = dict(zip(names, body.base.grouping[body.kept] @ found, strict=False))
+    taken = arm_with(robot, value, found)
+    # To rounding of the largest of its standard parameters.
+    close = 1e-12 * np.abs(found).max()
+    np.testing.assert_allclose(taken.bodies.ravel(), found[: 10 * robot.n], rtol=0.0, atol=close)
+    np.testing.assert_allclose(taken.armature, found[10 * robot.n :], rtol=0.0, atol=close)
+
+
 def test_parameters_of_no_arm_are_refused() -> None:
     robot = load_robot()
     wanted = moved_values(robot) | {"P_d4": -50.0}

@@ -32,7 +32,7 @@ FEW_VALUES = 24
 
 
 def dead_effort(samples: Samples) -> Checked:
-    """Refuse a dead effort of a joint that moves; leave out rows where it is stuck."""
+    """Refuse a dead effort of a joint that moves; leave out rows where it is stuck, of that joint alone where most are."""
     if samples.effort is None:
         return samples, []
     idle = samples.idle()
@@ -56,9 +56,17 @@ def dead_effort(samples: Samples) -> Checked:
         if not count:
             continue
         first = samples.where(int(np.argmax(stuck)))
-        what = f"{name}.effort is stuck at {values[np.argmax(stuck)]:g} from {first}"
+        value = values[np.argmax(stuck)]
+        what = f"{name}.effort is stuck at {value:g} from {first}"
         if count > DEAD_SHARE * samples.count:
-            samples.refuse(f"{what}, {count} of {samples.count} rows, while the joint moves; cut the file there")
+            what += f", {count} of {samples.count} rows, while the joint moves"
+            # Too much to cut out for all joints; the others may be whole.
+            if np.any(values[stuck] != value) or np.sum(~idle) < 2:
+                samples.refuse(f"{what}; cut the file there")
+            torque = float(value * samples.robot.effort_gain[joint])
+            said = f"{what}: left out of the fit of {name}, wherever it is {value:g}"
+            found.append(Finding("stuck_effort", said, count, (joint, torque)))
+            continue
         keep &= ~stuck
         said = f"{what} while the joint moves: {several(count, 'row')} left out"
         found.append(Finding("stuck_effort", said, count))

@@ -41,7 +41,7 @@ class Finding:
     count : int
         How many samples (gaps, joints) it concerns.
     clipped : (int, float) or None
-        A joint by its place and the torque at which its effort is clipped, N m or N.
+        A joint by its place and the torque at which its effort is clipped or stuck, N m or N.
     """
 
     kind: str

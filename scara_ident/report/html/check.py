@@ -24,6 +24,7 @@ from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection
 from scara_ident.report.plot import Figure, Layer, Level, Mark, Panel, Plot, single, style, thin_line
 from scara_ident.use.check import CLOSE, Check, limits_of_joint, sentences
+from scara_ident.use.energy import Energy
 
 # Points of a line, at the most.
 MOST_POINTS = 6000
@@ -148,11 +149,20 @@ def _energy(found: Check) -> list[Block]:
     head = ("joint", "given [J]", "taken back [J]", "heat [J]", *(f"{each} [J]" for each in names))
     words = (
         f"At the drives' shafts: resistance of windings and losses of the electronics come on top. Given less taken back is the sum "
-        f"of the parts on the right; of these {', '.join(energy.heat) or 'none'} take energy out at every moment and become heat."
+        f"of the parts on the right; {_heat_words(energy)}."
     )
     plot = Plot("time [s]", (Panel("given less taken back [J]", _balances(found), 180),))
     figure = single("energy-time", "Energy of each drive over time", "", plot)
     return [Paragraph(words), Table(head, rows, tuple(range(1, len(head)))), Group("energy-group", (figure,))]
+
+
+def _heat_words(energy: Energy) -> str:
+    """Say which parts become heat, and why one of them may be negative."""
+    if len(energy.heat) < 2:
+        return f"of these {', '.join(energy.heat) or 'none'} becomes heat"
+    negative = any(np.any(energy.work[each] < 0.0) for each in energy.heat)
+    why = ", and a negative one belongs to the curve of friction that they make together" if negative else ""
+    return f"of these the sum of {', '.join(energy.heat)} becomes heat{why}"
 
 
 def _worth(work: float, given: float) -> float:

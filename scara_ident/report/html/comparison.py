@@ -89,7 +89,7 @@ def _errors(context: ComparisonContext) -> list[Block]:
     """The error on every trajectory with the parameters from every other."""
     words = (
         "Rms error on the trajectory of the row with parameters from that of the column. The colour is the ratio to the row's own error, "
-        f"none at 1 and full at {FULL_RATIO:g}; in brackets what the covariance of the parameters promises. Where the error is over twice that (▲), bias is at work and not noise."
+        f"none at 1 and full at {FULL_RATIO:g}; in brackets what the covariance of the parameters promises, a dash where one that counts has no standard deviation. Where the error is over twice that (▲), bias is at work and not noise."
     )
     blocks: list[Block] = [Paragraph(words), Scale("own error", f"{FULL_RATIO:g} times the own error")]
     for joint in context.joints:
@@ -116,7 +116,7 @@ def _error_table(context: ComparisonContext, joint: str) -> Table:
 def _error_cell(error: float | None, own: float | None, promised: float | None) -> Cell:
     biased = "▲ " if promised and error and error > BIASED * promised else ""
     strength = float(np.clip(np.log(error / own) / np.log(FULL_RATIO), -1.0, 1.0)) if error and own else None
-    note = "" if promised is None else f"({number(promised, 2)})"
+    note = f"({number(promised, 2)})"
     return Cell(f"{biased}{number(error)}", "num", strength, note=note)
 
 

@@ -11,7 +11,7 @@ from scara_ident.report.html.blocks import Block, Cell, Group, Paragraph, Select
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection
 from scara_ident.report.plot import Drawing, Figure, Layer, Panel, Plot, Region, single, thin_line
-from scara_ident.use.contact import ContactFindings, sentences
+from scara_ident.use.contact import LEAST_JOINTS, ContactFindings, sentences
 from scara_ident.use.external_torque import Observed
 
 # Points of a line and recordings drawn, at the most.
@@ -60,9 +60,10 @@ def _contacts(found: ContactFindings) -> list[Block]:
         rows.append(
             [name(each.recording), *spans, ", ".join(each.joints), torque, number(each.score), each.place, force]
         )
+    told = f"{LEAST_JOINTS} joints or more" if robot.n > LEAST_JOINTS else "all joints"
     words = (
         "Torque is the mean on the first joint while it is strong, on the side where effort is recorded. The place is the tool where a constant force "
-        "there explains the torque of three joints or more, else the outermost link that is loaded: the contact is there or farther out."
+        f"there explains the torque of {told}, else the outermost link that is loaded: the contact is there or farther out."
     )
     head = ("recording", "from [s]", "to [s]", "joints", "torque", "over threshold", "place", "force")
     return [Paragraph(words), Table(head, rows, (1, 2, 4, 5, 7))] if rows else []

@@ -87,9 +87,9 @@ def tables(held: dict[str, Any]) -> list[Table]:
             right=("torque", *names, "average"),
         )  # fmt: skip
         for name in names:
+            promised = held["predicted_by_covariance"][name]
             cells = [
-                f"{held['errors'][name][other][joint]:.3g} ({held['predicted_by_covariance'][name][other][joint]:.2g})"
-                for other in names
+                f"{held['errors'][name][other][joint]:.3g} ({_known(promised[other][joint], 2)})" for other in names
             ]
             average = held["average_of_predicted"][name][joint]
             rows.add_row(name, f"{held['torque_rms'][name][joint]:.3g}", *cells, f"{average:.3g}")
@@ -97,3 +97,8 @@ def tables(held: dict[str, Any]) -> list[Table]:
         rows.add_row("average", "", *averages, "")
         found.append(rows)
     return found
+
+
+def _known(value: float, digits: int) -> str:
+    """Return a number in few digits; a dash where it is not known."""
+    return f"{value:.{digits}g}" if np.isfinite(value) else "-"

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scara_ident.motion.motion import stretches
 from tests.made_recordings import columns
 from tests.recording.audit.made import kinds, only, refusal
 
@@ -28,7 +29,7 @@ def test_a_dead_effort_is_no_matter_where_the_joint_stands_still_or_efforts_are_
     assert kinds(read(made)) == ["idle_joint", "dead_effort"]
 
 
-def test_an_effort_that_dies_is_left_out_or_refused_with_its_place(read):
+def test_an_effort_that_dies_is_left_out_with_its_place(read):
     made = columns()
     made["joint1.effort"][3000:] = 0.1
     recording = read(made)
@@ -36,8 +37,32 @@ def test_an_effort_that_dies_is_left_out_or_refused_with_its_place(read):
     assert finding.count == 1000
     assert "row 3001" in finding.message
     assert len(recording.time) == 3000
+
+
+def test_an_effort_that_is_dead_most_of_the_time_costs_its_joint_alone(read, robot):
+    """One dead current cost the other seven joints of an arm their recording."""
+    made = columns()
     made["joint1.effort"][1500:] = 0.1
+    recording = read(made, replace(robot, effort_gain=np.array([2.0, 1.0])))
+    finding = only(recording, "stuck_effort")
+    assert "row 1501" in finding.message
+    assert "left out of the fit of joint1, wherever it is 0.1" in finding.message
+    assert finding.clipped == (0, 0.2)
+    assert len(recording.time) == len(made["time"])
+    (stretch,) = stretches(recording)
+    assert not isinstance(stretch.clipped, bool)
+    assert np.all(stretch.clipped[0, 1500:])
+    assert not np.any(stretch.clipped[1])
+
+
+def test_an_effort_that_is_dead_most_of_the_time_is_refused_where_no_other_joint_is_whole(read):
+    made = columns()
+    made["joint1.effort"][1500:] = 0.1
+    made["joint2.position"][:] = 0.4
     assert "row 1501" in refusal(read, made)
+    made = columns()
+    made["joint1.effort"][1500:2800], made["joint1.effort"][2800:] = 0.1, 0.12
+    assert "cut the file there" in refusal(read, made)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

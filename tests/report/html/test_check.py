@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from scara_ident.report.html.check import _worth, check_figures
+import numpy as np
+import pytest
+
+from scara_ident.report.html.check import _heat_words, _worth, check_figures
+from scara_ident.use.energy import Energy
 from tests.report.html.document import data_of, document
 
 
@@ -18,6 +22,26 @@ def test_a_broken_limit_is_shown_with_its_time(checked, checked_page):
     assert "It cannot be run: torque of joint1" in checked_page.read_text()
     assert [len(row) for row in check_figures(checked)] == [2, 2]
     assert "beyond it [s]" in page.words
+
+
+@pytest.mark.parametrize(
+    ("work", "said"),
+    [
+        ({}, "of these none becomes heat"),
+        ({"Coulomb": 1.0}, "of these Coulomb becomes heat"),
+        ({"Coulomb": 1.0, "viscous": 2.0}, "of these the sum of Coulomb, viscous becomes heat"),
+        (
+            {"viscous": 2.0, "cubic": -1.0},
+            "of these the sum of viscous, cubic becomes heat, and a negative one belongs to the curve of friction that they "
+            "make together",
+        ),
+    ],
+)
+def test_parts_of_friction_become_heat_together(work, said):
+    """A cubic part that is negative takes no energy out: it bends the viscous one."""
+    zero = np.zeros(1)
+    energy = Energy(zero, zero, {key: np.array([value]) for key, value in work.items()}, tuple(work), zero)
+    assert _heat_words(energy) == said
 
 
 def test_rounding_is_no_work():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scara_ident.report.html.comparison import ComparisonContext, _parameter_cell, _trajectories
+from scara_ident.report.html.comparison import ComparisonContext, _error_cell, _parameter_cell, _trajectories
 from tests.report.html.document import document
 
 
@@ -24,3 +24,8 @@ def test_what_no_trajectory_has_takes_no_column():
 def test_a_value_and_its_standard_deviation_end_on_the_same_digit():
     cell = _parameter_cell(16.16623, 0.00471, 16.0)
     assert (cell.text, cell.note) == ("16.1662", "± 0.0047")
+
+
+def test_what_the_covariance_does_not_promise_is_a_dash():
+    assert _error_cell(0.2, 0.1, None).note == "(–)"
+    assert "▲" not in _error_cell(0.2, 0.1, None).text
