@@ -83,6 +83,8 @@ def _first_lines(path: Path) -> tuple[list[int], list[str]]:
     with path.open(encoding="utf-8-sig", newline="") as file:
         for place in range(LOOKED_AT):
             line = file.readline(LONGEST_LINE)
+            if len(line) == LONGEST_LINE and lines:
+                break
             if len(line) == LONGEST_LINE:
                 raise RecordingError(
                     f"{path}: a line of more than {LONGEST_LINE} characters: not a table; save it again"
@@ -126,7 +128,7 @@ def _header(rows: Sequence[Sequence[str]], width: int) -> tuple[int | None, int]
             continue
         units = len(rows[place + 1]) == width and _are_units(rows[place + 1])
         begin = place + 2 if units else place + 1
-        if begin < len(rows) and len(rows[begin]) == width and _has_number(rows[begin]):
+        if begin < len(rows) and len(rows[begin]) >= width and _has_number(rows[begin]):
             return place, begin
     begin = next((place for place, row in enumerate(rows) if _is_row(row, width)), 0)
     # Where no line can be the header the first is, whatever is wrong with it, unless it is a remark before bare rows.

@@ -30,6 +30,7 @@ HEAD, ROWS = "time,q,tau", ["0.0,1.5,2", "0.1,1.25,-3e-1", "0.2,1.0,4"]
         ([HEAD, "[ms],-,"], ("time [ms]", "q", "tau"), 2),
         (["time,1,2"], ("time", "1", "2"), 1),
         ([HEAD, "0,oops,1"], ("time", "q", "tau"), 1),
+        ([HEAD, "0,1,2,3"], ("time", "q", "tau"), 1),
     ],
 )
 def test_the_rows_tell_what_stands_before_them(tmp_path, before, names, first):
@@ -56,6 +57,8 @@ def test_what_is_no_table_has_a_layout_too(tmp_path):
     ):
         path.write_text(text)
         assert csv_layout(path).names == names
+    path.write_text(f"{HEAD}\n" + "0" * LONGEST_LINE)
+    assert csv_layout(path).names == ("time", "q", "tau")
     path.write_text("x" * LONGEST_LINE)
     with pytest.raises(RecordingError, match="not a table"):
         csv_layout(path)
