@@ -164,7 +164,7 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
 
     try:
         frame = pl.read_csv(path, schema=schema(pl.Float64), decimal_comma=layout.decimal_comma, **how)
-    except pl.exceptions.ComputeError:
+    except (pl.exceptions.ComputeError, pl.exceptions.SchemaError):
         # Something is not a number: read the words themselves, so that it can be named.
         _refuse_long_rows(path, layout)
         frame = pl.read_csv(path, schema=schema(pl.String), **how)
