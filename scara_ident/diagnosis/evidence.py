@@ -64,6 +64,7 @@ def evidence(
     residuals: Residuals,
     fit: Sequence[LackOfFit],
     small: Sequence[float],
+    of_positions: Sequence[float],
     suspected: Sequence[Decision] = (),
     criteria: SelectionCriteria = CRITERIA,
     made: Callable[[], Sequence[Array]] | None = None,
@@ -79,6 +80,8 @@ def evidence(
         From repetitions; empty without.
     small : sequence of float
         What may repeat on each joint all the same, as filters and encoders leave as much, N m or N.
+    of_positions : sequence of float
+        What of it the noise of the positions makes, which may be white.
     suspected : sequence of Decision, optional
         On effects that explain some of it and are not believed.
     criteria : SelectionCriteria, optional
@@ -102,7 +105,15 @@ def evidence(
     return tuple(
         Evidence(joint, False, "", doubts[j], float(limits[j]))
         if j in doubts
-        else _of_joint(joint, repeated.get(joint), float(coloured[j]), noise[j], float(limits[j]), small[j], criteria)
+        else _of_joint(
+            joint,
+            repeated.get(joint),
+            float(coloured[j]),
+            noise[j],
+            float(limits[j]),
+            (small[j], of_positions[j]),
+            criteria,
+        )
         for j, joint in enumerate(found.scene.robot.joints)
     )
 
@@ -113,22 +124,29 @@ def _of_joint(
     coloured: float,
     noise: str,
     limit: float,
-    small: float,
+    allowed: tuple[float, float],
     criteria: SelectionCriteria,
 ) -> Evidence:
+    small, of_positions = allowed
+    repeats = fit is not None and fit.p_value < criteria.significant
     if limit > criteria.least_power:
         effect = (
             "no effect" if limit >= 1.0 else f"no effect that removes less than {limit:.0%} of the squared residual"
         )
         why = f"{effect} would have been significant: record more"
         return Evidence(joint, False, "", why, limit)
-    if fit is not None and fit.p_value < criteria.significant and fit.missing > small:
+    if fit is not None and repeats and fit.missing > small:
         why = f"{fit.missing:.3g} repeats (p = {fit.p_value:.1e}) beside {fit.noise:.3g} that does not: "
         why += "too much for filters and encoders alone, too little to tell what it is"
         return Evidence(joint, False, "repetition", why, limit)
     if fit is not None and fit.most_missing <= criteria.remainder_to_noise * fit.noise:
         why = f"repetitions leave at most {fit.most_missing:.3g} that repeats, and {fit.noise:.3g} that does not"
         return Evidence(joint, True, "repetition", why, limit)
+    if fit is not None and repeats and fit.missing > of_positions:
+        # A ripple at many speeds is as white as noise, and repeats.
+        why = f"{fit.missing:.3g} repeats (p = {fit.p_value:.1e}) beside {fit.noise:.3g} that does not, white as it may be: "
+        why += "as little of the torque as filters and encoders may leave, and more than noise"
+        return Evidence(joint, False, "repetition", why, limit)
     if coloured <= criteria.least_colour:
         why = f"at most {max(coloured, 0.0):.0%} of its power stands out from {noise} within the band"
         return Evidence(joint, True, "whiteness", why, limit)

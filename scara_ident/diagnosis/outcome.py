@@ -64,6 +64,8 @@ class Outcome:
     unexplained : Unexplained or None
     small : tuple of float
         What is too small on each joint to be called a remainder, where one is significant; 0 elsewhere. N m or N.
+    of_positions : tuple of float
+        What of it the noise of the positions makes.
     repeating : frozenset of str
         Joints on which more repeats than noise, however small beside the torque, of however few moments or frequencies.
     demoted : tuple of Decision
@@ -81,6 +83,7 @@ class Outcome:
     dependences: tuple[Dependence, ...]
     unexplained: Unexplained | None
     small: tuple[float, ...]
+    of_positions: tuple[float, ...]
     repeating: frozenset[str]
     demoted: tuple[Decision, ...] = ()
     suspected: tuple[Decision, ...] = ()
@@ -142,7 +145,8 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
     )
     fit_before = fit_after if left is before else lack_of_fit(before)
     return Outcome(
-        found, after, training, left, fit_before, fit_after, dependences, unexplained, tuple(small.tolist()), names
+        *(found, after, training, left, fit_before, fit_after, dependences, unexplained),
+        *(tuple(small.tolist()), tuple(made.tolist()), names),
     )
 
 

@@ -46,7 +46,9 @@ def weighed_evidence(
     found, after = outcome.search, outcome.after
     doubtful = (*outcome.suspected, *left_open(found, after.weights, outcome.demoted))
     made = partial(noise_signals, outcome.training, after.value)
-    shown = evidence(found, outcome.residuals, outcome.fit_after, outcome.small, doubtful, criteria, made)
+    shown = evidence(
+        found, outcome.residuals, outcome.fit_after, outcome.small, outcome.of_positions, doubtful, criteria, made
+    )
     shown = without_lines(shown, lines, found)
     shown = even_evidence(shown, after, outcome.training, criteria)
     shown = steady_evidence(shown, after, outcome.training, criteria)

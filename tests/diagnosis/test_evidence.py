@@ -145,9 +145,19 @@ def test_what_surely_repeats_is_no_noise_however_small_beside_it(nothing_missing
     # A delay of 12 ms that no candidate could take up left as much, beside noise that is larger.
     fit = [LackOfFit(joint, 0.0103, missing, missing * 1.1, 1.3e-14, ()) for joint in ("joint1", "joint2")]
     residuals = nothing_missing.training_after.residuals(nothing_missing.after.value)
-    found = evidence(nothing_missing.search, residuals, fit, (0.0057, 0.0057))
+    found = evidence(nothing_missing.search, residuals, fit, (0.0057, 0.0057), (0.0, 0.0))
     assert [item.shown for item in found] == [shown, shown]
     assert ("repeats (p = 1.3e-14)" in found[0].why) != shown
+
+
+@pytest.mark.parametrize(("of_positions", "shown"), [(0.0, False), (0.4, True)])
+def test_what_is_white_and_repeats_above_the_noise_is_no_noise(nothing_missing, of_positions, shown):
+    """A ripple five times the noise, at many speeds and beside 2 % of the torque, was white enough to be complete."""
+    fit = [LackOfFit(joint, 0.07, 0.376, 0.4, 5e-22, ()) for joint in ("joint1", "joint2")]
+    residuals = nothing_missing.training_after.residuals(nothing_missing.after.value)
+    found = evidence(nothing_missing.search, residuals, fit, (0.48, 0.48), (of_positions,) * 2)
+    assert [(item.shown, item.by) for item in found] == 2 * [(shown, "whiteness" if shown else "repetition")]
+    assert ("white as it may be" in found[0].why) != shown
 
 
 def test_the_noise_of_positions_speaks_of_the_joints_alone_that_it_colours(nothing_missing):
@@ -166,7 +176,8 @@ def test_the_noise_of_positions_speaks_of_the_joints_alone_that_it_colours(nothi
     residuals = Residuals(data, tuple(predicted))
     told = [np.array([10.0, 1.0])[:, None] * noise for noise in made]
     without, within = (
-        evidence(nothing_missing.search, residuals, (), (0.0, 0.0), made=known) for known in (None, lambda: told)
+        evidence(nothing_missing.search, residuals, (), (0.0, 0.0), (0.0, 0.0), made=known)
+        for known in (None, lambda: told)
     )
     assert [item.shown for item in without] == [False, True]
     assert [item.shown for item in within] == [True, True]

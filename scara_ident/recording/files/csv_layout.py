@@ -79,7 +79,8 @@ def csv_layout(path: Path) -> CsvLayout:
 
 def _first_lines(path: Path) -> tuple[list[int], list[str]]:
     """Return the first lines that are not empty, without the sign of a comment, and how many stand before each."""
-    places, lines = [], []
+    places: list[int] = []
+    lines: list[str] = []
     with path.open(encoding="utf-8-sig", newline="") as file:
         for place in range(LOOKED_AT):
             line = file.readline(LONGEST_LINE)
