@@ -97,6 +97,8 @@ def evidence(
         mended = (coloured > criteria.least_colour) & (less < coloured)
         noise[mended], coloured[mended] = "white noise and that of the positions", less[mended]
     repeated = {item.joint: item for item in fit}
+    # An effect found leaves something of second order, which repeats as it does.
+    times = criteria.far_above_noise if found.chosen or found.correction is not None else 0.0
     doubts = dict(found.step.columns.unresolved)
     for item in suspected:
         own = item.candidate.member.joint
@@ -111,7 +113,7 @@ def evidence(
             float(coloured[j]),
             noise[j],
             float(limits[j]),
-            (small[j], of_positions[j]),
+            (small[j], of_positions[j], times),
             criteria,
         )
         for j, joint in enumerate(found.scene.robot.joints)
@@ -124,10 +126,10 @@ def _of_joint(
     coloured: float,
     noise: str,
     limit: float,
-    allowed: tuple[float, float],
+    allowed: tuple[float, float, float],
     criteria: SelectionCriteria,
 ) -> Evidence:
-    small, of_positions = allowed
+    small, of_positions, of_effects = allowed
     repeats = fit is not None and fit.p_value < criteria.significant
     if limit > criteria.least_power:
         effect = (
@@ -142,7 +144,7 @@ def _of_joint(
     if fit is not None and fit.most_missing <= criteria.remainder_to_noise * fit.noise:
         why = f"repetitions leave at most {fit.most_missing:.3g} that repeats, and {fit.noise:.3g} that does not"
         return Evidence(joint, True, "repetition", why, limit)
-    if fit is not None and repeats and fit.missing > of_positions:
+    if fit is not None and repeats and fit.missing > max(of_effects * fit.noise, max(1.0, of_effects) * of_positions):
         # A ripple at many speeds is as white as noise, and repeats.
         why = f"{fit.missing:.3g} repeats (p = {fit.p_value:.1e}) beside {fit.noise:.3g} that does not, white as it may be: "
         why += "as little of the torque as filters and encoders may leave, and more than noise"

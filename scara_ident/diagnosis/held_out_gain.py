@@ -59,8 +59,8 @@ class HeldOutGain:
         return HeldOutGain(entry["gain"], entry["size"], std, entry["joint"], entry["without"], entry["with"])
 
     def against(self, criteria: SelectionCriteria = CRITERIA) -> bool:
-        """Whether it surely makes the error larger."""
-        return 0.5 - self.size > criteria.least_final_size * self.std
+        """Whether it makes the error larger, and surely does not show there as large as it was found."""
+        return self.size < 0.5 and 1.0 - self.size > criteria.least_final_size * self.std
 
     def borne_out(self, criteria: SelectionCriteria = CRITERIA) -> bool:
         """Whether it surely shows there, and makes the error smaller."""

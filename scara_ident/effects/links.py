@@ -62,27 +62,44 @@ def first_moments(robot: Robot) -> NDArray[np.intp]:
     return np.asarray((10 * np.arange(robot.n)[:, None] + np.arange(4)).ravel(), dtype=np.intp)
 
 
+def sideways(robot: Robot) -> tuple[tuple[str, Array], tuple[str, Array]]:
+    """Return the two directions across gravity, which are those that a base turns it in, and the base's axis nearest each.
+
+    Of a base that stands they are x and y. Of another they are the axes that gravity is least along, in their order, made
+    perpendicular to it and to each other (Gram and Schmidt): each a name and a unit vector of shape (3,) in the base's frame.
+    """
+    gravity = np.asarray(robot.model.gravity.linear, dtype=float)
+    size = float(np.linalg.norm(gravity))
+    down = gravity / size if size > 0.0 else np.array([0.0, 0.0, -1.0])
+    found: list[tuple[str, Array]] = []
+    for axis in np.delete(np.arange(3), np.argmax(np.abs(down))):
+        along = np.eye(3)[axis]
+        for other in (down, *(vector for _, vector in found)):
+            along = along - (along @ other) * other
+        found.append(("xyz"[axis], along / np.linalg.norm(along)))
+    return found[0], found[1]
+
+
 @lru_cache(maxsize=8)
 def gravity_kernels(robot: Robot) -> tuple[RegressorKernel, RegressorKernel]:
-    """Return the kernels of the torque that gravity along minus the base's x, and y, gives the `first_moments`."""
+    """Return the kernels of the torque that gravity along minus each of `sideways` gives the `first_moments`."""
     columns = pinocchio_columns(robot, first_moments(robot))
     kernels = []
-    for axis in range(2):
+    for _, direction in sideways(robot):
         model = robot.model.copy()
-        direction = np.zeros(3)
-        direction[axis] = -gravity_size(robot)
-        model.gravity.linear = direction
+        model.gravity.linear = -gravity_size(robot) * direction
         kernels.append(build_kernel(model, columns))
     return kernels[0], kernels[1]
 
 
 def gravity_columns(robot: Robot, axis: int, q: Array) -> Array:
-    """Return the torque per mass and first moment under gravity along minus the base's x (0) or y (1).
+    """Return the torque per mass and first moment under gravity along minus one of two directions across that of the robot.
 
     Parameters
     ----------
     robot : Robot
     axis : {0, 1}
+        Which of `sideways`.
     q : ndarray, shape (n, N)
 
     Returns

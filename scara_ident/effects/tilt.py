@@ -10,7 +10,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect, View
-from scara_ident.effects.links import first_moments, gravity_columns, gravity_torque, shared
+from scara_ident.effects.links import first_moments, gravity_columns, gravity_torque, shared, sideways
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.spanned import rows_by_sample
@@ -27,12 +27,11 @@ NEGLIGIBLE_TORQUE_SHARE = 1e-4
 AGREEMENT_STDS = 3.0
 # Samples whose columns are made at once.
 AT_ONCE = 2048
-AXES = ("x", "y")
 
 
 @dataclass(frozen=True, eq=False)
 class _Gravity:
-    """How gravity along minus the base's x and y enters the torque, per robot.
+    """How gravity along minus the two directions across it enters the torque, per robot.
 
     Attributes
     ----------
@@ -100,9 +99,9 @@ def _gravity(term: RigidBody) -> _Gravity:
 
 
 def _parts(signals: Signals) -> Array:
-    """Torques under gravity along -x and -y of what the estimate knows and of the nominal rest, then of what enters.
+    """Torques under gravity against either direction across it, of what the estimate knows and of the rest, then of what enters.
 
-    Shape (n, 4 + r, N): known x, known y, nominal x, nominal y, entering.
+    Shape (n, 4 + r, N): known of both, nominal of both, entering.
     """
 
     def make() -> Array:
@@ -137,7 +136,7 @@ class _Tilt(Effect):
 
 
 class BaseTilt(_Tilt):
-    """Gravity's components -g tilt_x and -g tilt_y along the base's x and y axes.
+    """Gravity's components -g tilt_x and -g tilt_y along the base's x and y axes; of one that hangs or leans, across gravity.
 
     What they do to parameters that the model estimates anyway tells the tilt. On an arm with vertical axes they also
     bring in first moments that no motion told before (of the first link, and of all that it carries); these have
@@ -153,7 +152,7 @@ class BaseTilt(_Tilt):
     def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
         """Tilt about each axis that can be told, then what enters newly."""
         gravity = _gravity(scene.model.rigid_body)
-        tilts = (_tilt_column(axis) for axis in gravity.known_axes)
+        tilts = (_tilt_column(scene.robot, axis) for axis in gravity.known_axes)
         units = (_moment_unit(scene.robot, gravity.entering[:, k]) for k in range(len(gravity.entering_axes)))
         entering = (
             Column(f"tilt_moment{k + 1}", None, unit, "tilt times a first moment that a level base does not show")
@@ -185,7 +184,7 @@ class BaseTilt(_Tilt):
         if count == 2 and np.any(gravity.blend):
             tilt, spread = _combined(value, covariance, gravity.blend)
         return {
-            f"tilt_{AXES[axis]}": Parameter(float(tilt[k]), float(np.sqrt(spread[k, k])), "rad")
+            _tilt_column(scene.robot, axis).name: Parameter(float(tilt[k]), float(np.sqrt(spread[k, k])), "rad")
             for k, axis in enumerate(gravity.known_axes)
         }
 
@@ -210,7 +209,7 @@ class NominalBaseTilt(_Tilt):
 
     def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
         """Tilt about each axis."""
-        return tuple(_tilt_column(axis) for axis in self._axes(scene))
+        return tuple(_tilt_column(scene.robot, axis) for axis in self._axes(scene))
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque under sideways gravity."""
@@ -228,9 +227,11 @@ class NominalBaseTilt(_Tilt):
         return [axis for axis in range(2) if axis in gravity.known_axes or np.any(gravity.blend[:, axis])]
 
 
-def _tilt_column(axis: int) -> Column:
-    name = AXES[axis]
-    return Column(f"tilt_{name}", None, "rad", f"gravity along the base's {name} is -g times this")
+def _tilt_column(robot: Robot, axis: int) -> Column:
+    name, direction = sideways(robot)[axis]
+    exact = np.max(np.abs(direction)) == 1.0
+    along = f"the base's {name}" if exact else f"({', '.join(f'{x:.3g}' for x in direction)}) of the base"
+    return Column(f"tilt_{name}", None, "rad", f"gravity along {along} is -g times this")
 
 
 def _moment_unit(robot: Robot, moments: Array) -> str:

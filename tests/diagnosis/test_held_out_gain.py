@@ -194,7 +194,7 @@ def test_without_recordings_held_out_nothing_is_said():
 def test_what_was_shown_is_taken_back_on_the_joint_that_is_worse_and_only_there():
     shown = tuple(Evidence(joint, True, "whiteness", "white", 0.05) for joint in ("joint1", "joint2"))
     worse = HeldOutGain(-0.2, 0.1, 0.1, "joint2", 0.1, 0.15)
-    unsure = HeldOutGain(-0.2, 0.1, 0.2, "joint1", 0.1, 0.15)
+    unsure = HeldOutGain(-0.2, 0.1, 0.35, "joint1", 0.1, 0.15)
     one, other = spoken_against(shown, {"spring of joint1": worse, "base_tilt": unsure})
     assert one == shown[0]
     assert (other.shown, other.by) == (False, "")
@@ -203,7 +203,13 @@ def test_what_was_shown_is_taken_back_on_the_joint_that_is_worse_and_only_there(
 
 @pytest.mark.parametrize(
     ("size", "std", "borne_out", "against"),
-    [(1.0, 0.1, True, False), (0.55, 0.3, False, False), (0.4, 0.1, False, False), (0.1, 0.1, False, True)],
+    [
+        (1.0, 0.1, True, False),
+        (0.55, 0.3, False, False),
+        (0.4, 0.1, False, True),
+        (0.4, 0.25, False, False),
+        (0.1, 0.1, False, True),
+    ],
 )
 def test_what_is_sure_enough_is_said_and_nothing_else(size: float, std: float, borne_out: bool, against: bool):
     gain = HeldOutGain(0.0, size, std, "joint1", 0.1, 0.1)

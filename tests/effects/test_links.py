@@ -21,6 +21,7 @@ from scara_ident.effects.links import (
     point_mass,
     rigid_torque,
     shared,
+    sideways,
     tool_of,
     usual_link_inertia,
 )
@@ -78,6 +79,22 @@ def test_gravity_from_the_side_is_that_of_pinocchio(tmp_path):
         tilted.model.gravity.linear = -9.81 * np.eye(3)[axis]
         expected = rnea(tilted, item.q, rest, rest) * robot.row_scale[:, None]
         assert found == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("gravity", "names"),
+    [((0, 0, -1), "xy"), ((0, -1, 0), "xz"), ((1, 0, 0), "yz"), ((0, 0, 0), "xy"), ((0.0, -0.42, -0.91), "xy")],
+)
+def test_directions_across_gravity_are_named_by_the_nearest_axes(gravity, names):
+    robot = load_robot()
+    model = robot.model.copy()
+    model.gravity.linear = 9.81 * np.array(gravity, dtype=float)
+    found = sideways(replace(robot, model=model))
+    assert "".join(name for name, _ in found) == names
+    across = np.array([direction for _, direction in found])
+    assert across @ across.T == pytest.approx(np.eye(2))
+    assert across @ np.array(gravity) == pytest.approx(np.zeros(2))
+    assert all(direction["xyz".index(name)] > 0.9 for name, direction in found)
 
 
 def test_a_point_mass_has_the_parameters_of_pinocchio():

@@ -57,6 +57,24 @@ def test_the_columns_are_what_tilted_gravity_adds(name: str, tmp_path: Path):
         assert np.abs(np.einsum("jkn,k->jn", nominal, np.array(TILT)) - added).max() < 1e-6 * size
 
 
+def test_on_a_wall_it_turns_gravity_towards_the_bases_z():
+    """The base's x and y alone left out one direction, and made the size of gravity of the other."""
+    upright = load_robot(example_urdf("ur5_robot.urdf"))
+    hung, turned = (upright.model.copy() for _ in range(2))
+    hung.gravity.linear = np.array([0.0, -9.81, 0.0])
+    turned.gravity.linear = 9.81 * np.array([0.0, -np.cos(0.02), -np.sin(0.02)])
+    robot = replace(upright, model=hung)
+    item, scene = moving(robot, 1.0), scene_of(robot)
+    described = BaseTilt().columns(scene, Member(None))
+    assert [column.name for column in described][:2] == ["tilt_x", "tilt_z"]
+    assert described[1].meaning == "gravity along the base's z is -g times this"
+    state = (item.q, item.v, item.a)
+    added = (rnea(replace(upright, model=turned), *state) - rnea(robot, *state)) * robot.row_scale[:, None]
+    free = columns(BaseTilt(), scene, item, Member(None))
+    value, *_ = np.linalg.lstsq(free.transpose(0, 2, 1).reshape(-1, free.shape[1]), added.ravel(), rcond=1e-10)
+    assert value[:2] == pytest.approx([0.0, 0.02], abs=3e-4)
+
+
 def test_level_vertical_axes_leave_two_moments_of_the_first_link_unknown():
     scene = scene_of(load_robot())
     names = [column.name for column in BaseTilt().columns(scene, Member(None))]

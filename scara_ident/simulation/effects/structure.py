@@ -18,24 +18,25 @@ from scara_ident.simulation.plant import PlantDraft
 
 @dataclass(frozen=True)
 class BaseTilt(Effect):
-    """A base that is not level: gravity gets the components ``-g tilt_x`` and ``-g tilt_y`` along the base's x and y.
+    """A base that is not level: gravity gets the components ``-g tilt_x``, ``-g tilt_y`` and ``-g tilt_z`` along the base's axes.
 
-    g is the size of the robot's gravity, 9.81 where that is zero; the component along z stays as it is.
+    g is the size of the robot's gravity, 9.81 where that is zero. Of a base that stands the component along z stays as it is.
     """
 
     name: ClassVar[str] = "base_tilt"
-    equation: ClassVar[str] = "gravity += (-g tilt_x, -g tilt_y, 0)"
-    units: ClassVar[dict[str, str]] = {"tilt_x": "rad", "tilt_y": "rad"}
+    equation: ClassVar[str] = "gravity += (-g tilt_x, -g tilt_y, -g tilt_z)"
+    units: ClassVar[dict[str, str]] = {"tilt_x": "rad", "tilt_y": "rad", "tilt_z": "rad"}
     whole_arm = "always"
     tilt_x: float = 0.02
     tilt_y: float = -0.01
+    tilt_z: float = 0.0
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Add to gravity."""
         nominal = np.asarray(arm.robot.model.gravity.linear)
         vacant(self, float(np.abs(draft.arrays["gravity"] - nominal).max()))
         draft.arrays["gravity"] = draft.arrays["gravity"] - gravity_size(arm.robot) * np.array(
-            [self.tilt_x, self.tilt_y, 0.0]
+            [self.tilt_x, self.tilt_y, self.tilt_z]
         )
 
 
