@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.choice import fitted_beside
 from scara_ident.diagnosis.exchange import near_in_place, same
-from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.diagnosis.selection_step import SelectionStep, observed
 from scara_ident.diagnosis.variation_check import counted
 from scara_ident.effects import Scene
+from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.processes import halved
+
+# Two effects cancel where their sum is less than this share of the smaller one: each takes back most of the other.
+CANCELS = 0.5
 
 
 @dataclass(frozen=True)
@@ -27,7 +33,7 @@ class Confounder:
         Of it in the place of the effect found; see `gains`.
     candidate : Candidate
     value : tuple of float
-        Its coefficients in the place of the effect found.
+        Its coefficients in the place of the effect found; none where it is in the model beside it.
     """
 
     label: str
@@ -59,7 +65,36 @@ def confounders(
     def of_one(place: int) -> tuple[Confounder, ...]:
         return _confounders_of(step.without(place), step.chosen[place], pool, first, doubtful)
 
-    return halved(of_one, range(len(step.chosen)), [1.0] * len(step.chosen))
+    found = halved(of_one, range(len(step.chosen)), [1.0] * len(step.chosen))
+    return [(*others, *against) for others, against in zip(found, _cancelling(step), strict=True)]
+
+
+def _cancelling(step: SelectionStep) -> list[tuple[Confounder, ...]]:
+    """Return for each chosen effect those on its joint that take most of its torque back.
+
+    Two that nearly cancel stand for what is left of both, a curve that neither has: a cubic spring is a spring against a
+    counterbalance, each of five times its torque. What an offset takes up does not count.
+    """
+    found: list[tuple[Confounder, ...]] = [() for _ in step.chosen]
+    if len({item.member.joint for item in step.chosen}) == len(step.chosen):
+        return found
+    value, _ = value_and_weights(observed(step))
+    torques, start = [], step.observations.parameters
+    for rows in step.rows(step.scene, step.chosen):
+        count = len(next(iter(rows.values())))
+        torque = {joint: value[start : start + count] @ columns for joint, columns in rows.items()}
+        torques.append({joint: own - np.mean(own) for joint, own in torque.items()})
+        start += count
+    for place, (own, candidate) in enumerate(zip(torques, step.chosen, strict=True)):
+        for other, rival in zip(torques, step.chosen, strict=True):
+            joint = candidate.member.joint
+            if other is own or joint is None or joint != rival.member.joint or not set(own) == set(other) == {joint}:
+                continue
+            least = min(np.linalg.norm(own[joint]), np.linalg.norm(other[joint]))
+            if np.linalg.norm(own[joint] + other[joint]) < CANCELS * least:
+                label, name = rival.label(step.scene), rival.effect.name
+                found[place] += (Confounder(label, name, rival.joint(step.scene), 0.0, rival, ()),)
+    return found
 
 
 def _confounders_of(

@@ -141,7 +141,7 @@ def _recordings(diagnosis: Diagnosis) -> Iterator[NextStep]:
 
 def _confirmations(diagnosis: Diagnosis) -> Iterator[NextStep]:
     """Ask for the experiment that brings an effect out, one for all of its joints."""
-    told = {effect.effect for effect in diagnosis.effects if effect.confounded_with}
+    told = {effect.effect for effect in diagnosis.effects if any(item.value for item in effect.confounded_with)}
     confirm: dict[str, list[str]] = {}
     experiment = {item.decision.candidate.effect.name: item.decision for item in diagnosis.search.steps}
     for effect in diagnosis.effects:

@@ -199,7 +199,7 @@ def _rivals(diagnosis: Diagnosis) -> Iterator[Question]:
         if effect.candidate not in own or effect.candidate is None:
             continue
         first = own[effect.candidate]
-        others = [item for item in effect.confounded_with if _moves(item.candidate)][:MOST_RIVALS]
+        others = [item for item in effect.confounded_with if item.value and _moves(item.candidate)][:MOST_RIVALS]
         suspects = (first, *(Suspect(item.candidate, item.label, item.value) for item in others))
         labels = frozenset(item.label for item in suspects)
         if others and _moves(first.candidate) and labels not in asked:

@@ -123,6 +123,34 @@ def test_what_recordings_hold_too_little_of_is_named_as_it_is():
         assert all(item.candidate.member.nonlinear == (1.0,) for item in others)
 
 
+def test_two_that_nearly_cancel_are_not_told_apart():
+    """A cubic spring was a spring and a counterbalance, each of five times its torque, and surely so."""
+
+    def cubic(motion):
+        turn = motion.q[0] - MIDDLE
+        return 2.0 * (turn - np.sin(turn))
+
+    step = step_beside(
+        with_torque(exact_runs(), 0, cubic), (Candidate(Spring(), Member(0)), Candidate(Lifting(), Member(0)))
+    )
+    first, second = confounders(step, [], step.scene)
+    assert [item.label for item in first] == ["lifting of joint1"] and [item.label for item in second] == [
+        "spring of joint1"
+    ]
+    assert first[0].value == () and first[0].gain == 0.0
+    # Half of it taken back is no cancelling.
+    step = step_beside(with_torque(exact_runs(), 0, lambda motion: 2.0 * motion.q[0]), step.chosen)
+    assert confounders(step, [], step.scene) == [(), ()]
+
+
+@dataclass(frozen=True)
+class Lifting(Pendulum):
+    """What a counterbalance does to that joint."""
+
+    name = "lifting"
+    coefficients = (Coefficient("moment", "N m", "moment that lifts"),)
+
+
 def test_what_runs_differ_by_does_not_tell_which_of_two_is_there():
     runs = runs_with_a_spring()
     found, there = (Candidate(effect, Member(0)) for effect in (Bent(), Spring()))
