@@ -12,6 +12,7 @@ PAGE = (ROOT / "docs" / "howto" / "detect-contact.md").read_text(encoding="utf-8
 LABELS = {
     "scara03": "virtual SCARA03",
     "ur5": "virtual UR5",
+    "panda": "virtual Panda",
     "ur10e": "measured UR10e",
     "ur10e_residuals": "virtual UR10e, measured residuals",
 }
