@@ -52,16 +52,16 @@ SHORT = {
     "residual before": "before",
     "residual after": "after",
 }
-# A share of what an effect removes that another must remove to be said to stand in for it.
-LEAST_STAND_IN = 0.02
 
 HEAD = """# Gallery of effects
 
 Every effect that the diagnosis knows, as it looks: each was put on a virtual arm, whose recordings were then diagnosed.
 Orange is the residual before the effect came in, blue after, dashed what the effect adds to the prediction; above, green is
-the torque that the rest of the model leaves to the effect, dotted the effect as found. Bands are two standard errors. *Taken for* is what the diagnosis of the same recordings finds when the effect is left out of the
-catalogue: what it can be confounded with. On poorer motions more is alike; see
-[Groups](diagnosis.md#groups). The columns are explained in [Theory](theory.md#effects).
+the torque that the rest of the model leaves to the effect, dotted the effect as found. Bands are two standard errors. *Taken
+for* is what the diagnosis of the same recordings finds when the effect is left out of the catalogue: what it can be confounded
+with. Where that is nothing and the verdict `complete`, the effect is missed: what is left without it passes for noise, or for
+what runs differ by ([limits](diagnosis.md#the-verdict)). On poorer motions more is alike; see [Groups](diagnosis.md#groups). The
+columns are explained in [Theory](theory.md#effects).
 
 This page is written by `python docs/gallery.py`, in the words of the effects' classes. Yours: [My own
 effect](howto/my-own-effect.md).
@@ -269,12 +269,31 @@ def stand_ins(robot: Robot, runs: Sequence[Recording], name: str, effect: FoundE
     others = [family for family in CATALOGUE if family.name != name]
     found = diagnose(robot, runs, catalogue=others)
     labels = [f"`{item.effect}`" + (f" of {item.joint}" if item.joint else "") for item in found.effects]
+    if not labels:
+        missed = f": it is missed, though it removes {_removed(effect)}" if found.verdict == "complete" else ""
+        noted = [note for note in found.notes if " lags by " in note] if missed else []
+        return (
+            f"**Taken for:** nothing; the verdict is then `{found.verdict}`{missed}"
+            + (f". A note says: {'; '.join(noted)}" if noted else "")
+            + "."
+        )
     rest = _squares(found, robot)
     start, own = rest[0], sum((effect.after[j] or 0.0) ** 2 / (effect.before[j] or 1.0) ** 2 for j in robot.joints)
     share = (start - rest[1]) / max(start - own, 1e-12)
-    told = ", ".join(labels) if labels else "nothing"
-    left = f", which removes {max(share, 0.0):.0%} of what it removes" if labels else ""
-    return f"**Taken for:** {told}{left}; the verdict is then `{found.verdict}`."
+    removes = f"{share:.0%} of what it removes" if share > 0.0 else "nothing over all joints"
+    return f"**Taken for:** {', '.join(labels)}, which removes {removes}; the verdict is then `{found.verdict}`."
+
+
+def told_of(name: str, robot: Robot, runs: Sequence[Recording], hidden: str, effect: FoundEffect) -> str:
+    """Return what the page says of an effect that was computed."""
+    return f"{here(effect, hidden)}\n\n{stand_ins(robot, runs, name, effect)}"
+
+
+def _removed(effect: FoundEffect) -> str:
+    """Say how much of a joint's squared residual an effect removes, where that is most."""
+    shares = {j: 1.0 - ((effect.after[j] or 0.0) / b) ** 2 for j, b in effect.before.items() if b}
+    most = max(shares, key=lambda joint: shares[joint])
+    return f"{shares[most]:.0%} of what is left on {most}, squared"
 
 
 def _squares(found: Diagnosis, robot: Robot) -> tuple[float, float]:
@@ -325,7 +344,7 @@ def main(wanted: Sequence[str]) -> None:
         print(name, diagnosis.verdict, *(item.label for item in diagnosis.effects), flush=True)
         effect, told = figure(diagnosis, name)
         draw(PICTURES / f"{name}.png", told)
-        computed[name] = f"{here(effect, hidden)}\n\n{stand_ins(robot, runs, name, effect)}"
+        computed[name] = told_of(name, robot, runs, hidden, effect)
         PAGE.write_text(page(computed), encoding="utf-8")
     PAGE.write_text(page(computed), encoding="utf-8")
 

@@ -141,7 +141,7 @@ def feed_forward(folder: Path) -> None:
            diagnose runs/OJD_1.parquet runs/OJK_1.parquet --validate runs/L1_1.parquet --effects transmission_loss --output out
            use out/diagnosis.json --recording runs/L1_1.parquet --output use""",
     )
-    photographed(folder / "use" / "report.html", "feed_forward", 900)
+    photographed(folder / "use" / "report.html", "feed_forward", 686)
 
 
 def fleet(folder: Path) -> None:

@@ -251,3 +251,34 @@ def test_the_page_of_criteria_has_each_with_its_value_and_unit() -> None:
     page = (DOCS / "criteria.md").read_text(encoding="utf-8")
     for name, value, unit, *_ in CRITERIA.documented():
         assert f"| `{name}` | {value} | {unit} |" in page, name
+
+
+def test_what_the_readme_says_of_the_diagnosis_adds_up_from_its_page() -> None:
+    page = (DOCS / "diagnosis.md").read_text(encoding="utf-8")
+    table = page[page.index("Added up, ") :].split("\n\n")[1].splitlines()[2:]
+    rows = {line.split("|")[1].strip(): [int(n) for n in re.findall(r"\d+", line.split("|", 2)[2])] for line in table}
+    first, *further, total, alone = rows.values()
+    # Sets, those with a false effect, right, of, with nothing missing, of these with a false effect.
+    assert [sum(row[k] for row in further) for k in range(6)] == total[:6]
+    counted = sum(row[4] for row in further if len(row) == 7)
+    assert total[6:] == [sum(row[6] for row in further if len(row) == 7), counted]
+    # Of one effect above the diagnosis' own limit, and above both; of two and three above both.
+    own, both, more = (
+        [sum(int(n) for n in found) for found in zip(*re.findall(r"(\d+) of (\d+)", row), strict=True)]
+        for row in (
+            next(line for line in page.splitlines() if line.startswith(start))
+            for start in ("| above what `diagnosis.json`", "| above both, of one", "| each of two above both")
+        )
+    )
+    assert first[2:4] == own
+    readme = " ".join(README.read_text(encoding="utf-8").split())
+    for said in (
+        f"a believed effect that is not there in {first[1]} of {first[0]} sets",
+        f"in {own[0]} of {own[1]} sets with one,",
+        f"same sets too in {both[0]} of {both[1]}; of two or three effects, each above both, all in {more[0]} of {more[1]}",
+        f"In {total[0]} sets of further seeds",
+        f"a false effect in {total[1]}, and {total[2]} of {total[3]} above",
+        f"of {total[4] + alone[0]} further sets",
+        f"of the {counted + alone[2]} for which it was counted none",
+    ):
+        assert said in readme, said

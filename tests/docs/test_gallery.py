@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 
 from docs import gallery
+from scara_ident import diagnose
 from scara_ident.effects import CATALOGUE
+from tests.docs.pages import not_printed
 from tests.shared import ROOT
 
 FIGURES = ROOT / "docs" / "figures"
@@ -35,3 +37,13 @@ def test_the_pictures_are_small():
     assert sum(path.stat().st_size for path in (FIGURES / "effects").glob("*")) < 600_000
     assert (FIGURES / "report.png").stat().st_size < 250_000
     assert sum(path.stat().st_size for path in FIGURES.rglob("*.*")) < 1_500_000
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["stribeck", "transmission_loss"])
+def test_what_the_page_says_was_found_is_what_the_program_finds_today(name: str):
+    robot, runs, hidden = gallery.recordings(name)
+    effect = next(found for found in diagnose(robot, runs).effects if found.effect == name)
+    told = gallery.told_of(name, robot, runs, hidden, effect)
+    shown = gallery.computed_in(PAGE)[name]
+    assert not_printed(shown.splitlines(), told) is None, f"run: python docs/gallery.py; found now:\n{told}"
