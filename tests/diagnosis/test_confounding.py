@@ -131,7 +131,7 @@ def test_two_that_nearly_cancel_are_not_told_apart():
         return 2.0 * (turn - np.sin(turn))
 
     step = step_beside(
-        with_torque(exact_runs(), 0, cubic), (Candidate(Spring(), Member(0)), Candidate(Lifting(), Member(0)))
+        with_torque(exact_runs(size=1.2), 0, cubic), (Candidate(Spring(), Member(0)), Candidate(Lifting(), Member(0)))
     )
     first, second = confounders(step, [], step.scene)
     assert [item.label for item in first] == ["lifting of joint1"] and [item.label for item in second] == [
@@ -139,7 +139,7 @@ def test_two_that_nearly_cancel_are_not_told_apart():
     ]
     assert first[0].value == () and first[0].gain == 0.0
     # Half of it taken back is no cancelling.
-    step = step_beside(with_torque(exact_runs(), 0, lambda motion: 2.0 * motion.q[0]), step.chosen)
+    step = step_beside(with_torque(exact_runs(size=1.2), 0, lambda motion: 2.0 * motion.q[0]), step.chosen)
     assert confounders(step, [], step.scene) == [(), ()]
 
 
