@@ -72,8 +72,8 @@ def confounders(
 def _cancelling(step: SelectionStep) -> list[tuple[Confounder, ...]]:
     """Return for each chosen effect those on its joint that take most of its torque back.
 
-    Two that nearly cancel stand for what is left of both, a curve that neither has: a cubic spring is a spring against a
-    counterbalance, each of five times its torque. What an offset takes up does not count.
+    Two that nearly cancel stand for what is left of both, a curve that neither has: x cubed is x against its
+    sine, each of several times its size. What an offset takes up does not count.
     """
     found: list[tuple[Confounder, ...]] = [() for _ in step.chosen]
     if len({item.member.joint for item in step.chosen}) == len(step.chosen):

@@ -201,7 +201,7 @@ def test_a_field_longer_than_the_parser_takes_is_read_or_told(command, here: Pat
     assert command("inspect", "note_1.csv").status == 0
     for name, said in {
         "word_1.csv": "column 'joint1.position', row 2: 'yyyyyyyyyy",
-        "head_1.csv": "head_1.csv: its first line is no header (field larger than field limit (131072)); put the column",
+        "head_1.csv": "head_1.csv: its first line is no header (a name of more than 131072 characters); put the column",
     }.items():
         answer = command("identify", name)
         assert answer.status == 1

@@ -29,7 +29,7 @@ def test_coupled_wrists_are_found_in_one_noisy_run_of_45_s():
     run = formula_run(robot, "run", [7, 0], seconds=45.0, rate=100.0, bits=9, noise=0.1, added=coupled, highest=8)
     found = diagnose(robot, [run])
     assert found.verdict in ("undecided", "explained")
-    assert {(item.effect, item.joint) for item in found.effects} == {("friction_coupling", name) for name in WRISTS}
+    assert {(item.effect, item.joint) for item in found.effects} == {("coupled_shaft", WRISTS[0])}
     for item in found.effects:
         for name, true in (("viscous", VISCOUS), ("coulomb", COULOMB)):
             value = item.parameters[name]

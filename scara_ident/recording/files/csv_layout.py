@@ -72,6 +72,8 @@ def csv_layout(path: Path) -> CsvLayout:
             name if unit in ("", *MISSING) or is_si(unit) else f"{name} [{unit.strip(BRACKETS)}]"
             for name, unit in zip(rows[header], units, strict=True)
         )
+    if max(map(len, names)) > csv.field_size_limit():
+        raise csv.Error(f"a name of more than {csv.field_size_limit()} characters")
     first = places[begin] if begin < len(places) else places[-1] + 1
     comma = separator != "," and begin < len(lines) and "," in lines[begin]
     return CsvLayout(separator, comma, names, first)
@@ -117,7 +119,10 @@ def _table(lines: Sequence[str]) -> tuple[str, list[list[str]], int]:
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    return next(csv.reader([line.strip() if separator == " " else line], delimiter=separator), [])
+    line = line.strip() if separator == " " else line
+    # A field longer than Python's parser takes is no name and no number, wherever it ends.
+    whole = len(line) <= csv.field_size_limit()
+    return next(csv.reader([line], delimiter=separator), []) if whole else line.split(separator)
 
 
 def _header(rows: Sequence[Sequence[str]], width: int) -> tuple[int | None, int]:
