@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidate_tests import examine
@@ -12,7 +13,7 @@ from scara_ident.diagnosis.candidates import Candidate, Rows
 from scara_ident.diagnosis.nonlinear_fit import Linearised, linearise, tune
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.unknowns import sides
-from scara_ident.effects import Parameter
+from scara_ident.effects import Parameter, Scene
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
@@ -89,12 +90,13 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
     """
     state = linearise(step.scene, step.columns, step.weights, step.chosen, step.criteria.rotor_inertia_std)
     covariance = _covariance(step, state, scatter_alone=scatter_alone)
+    undetermined = merge([state.information, state.prior]).solve().undetermined
     found: list[dict[str, Parameter]] = []
     coefficients = []
     for owner, (candidate, own) in enumerate(zip(step.chosen, state.places, strict=True)):
         linear = Coefficients(state.value[own], covariance[own, own])
         coefficients.append(linear)
-        parameters = dict(candidate.effect.parameters(step.scene, candidate.member, linear.value, linear.covariance))
+        parameters = _told(step.scene, candidate, linear, np.flatnonzero(undetermined[own]))
         for position, unknown in enumerate(state.unknowns):
             if unknown.owner != owner:
                 continue
@@ -106,6 +108,21 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
                 parameters[parameter.name] = Parameter(unknown.value, float(np.sqrt(max(variance, 0.0))), unit)
         found.append(parameters)
     return PhysicalParameters(tuple(found), tuple(coefficients), _rotors(step, state, covariance))
+
+
+def _told(
+    scene: Scene, candidate: Candidate, linear: Coefficients, left_open: NDArray[np.intp]
+) -> dict[str, Parameter]:
+    """Return physical parameters from coefficients; one that changes with a coefficient that is left open is not told."""
+    effect, member = candidate.effect, candidate.member
+    found = dict(effect.parameters(scene, member, linear.value, linear.covariance))
+    for k in left_open:
+        other = linear.value.copy()
+        other[k] += 1.0 + abs(other[k])
+        for name, item in effect.parameters(scene, member, other, linear.covariance).items():
+            if item.value != found[name].value:
+                found[name] = replace(found[name], std=np.inf)
+    return found
 
 
 def _rotors(step: SelectionStep, state: Linearised, covariance: Array) -> tuple[RotorInertia, ...]:

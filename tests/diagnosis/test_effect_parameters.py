@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.effect_parameters import Coefficients, parameters_beside, physical_parameters
+from scara_ident.diagnosis.effect_parameters import Coefficients, _told, parameters_beside, physical_parameters
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Member
 from scara_ident.effects.coupling import DriveCoupling
@@ -18,8 +18,11 @@ from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.position import Spring
 from scara_ident.estimation.observations import Observations
+from scara_ident.robot.robot import load_robot
 from tests.arms import noisy
 from tests.diagnosis.made import NOISE, complete, exact_runs, observed, step_beside, with_torque
+from tests.effects.scenes import scene_of
+from tests.effects.test_position import without_offset
 
 Array = NDArray[np.float64]
 
@@ -32,6 +35,17 @@ def stribeck_runs():
         return AMPLITUDE * np.sign(motion.v[0]) * np.exp(-((motion.v[0] / VELOCITY) ** 2))
 
     return with_torque(exact_runs(), 0, added)
+
+
+def test_what_changes_with_a_coefficient_that_is_left_open_is_not_told():
+    """The rest of a gas spring on a vertical axis was -0.21 m to half a millimetre, where 0 was true: weight is a preload too."""
+    scene, candidate = without_offset(scene_of(load_robot())), Candidate(Spring(), Member(1))
+    # What a generalized inverse leaves of a coefficient that is open.
+    linear = Coefficients(np.array([0.19, 0.04]), np.diag([2.5e-7, 0.0]))
+    told = _told(scene, candidate, linear, np.array([], dtype=np.intp))
+    assert told["rest_position"].std == pytest.approx(0.04 / 0.19**2 * 5e-4)
+    told = _told(scene, candidate, linear, np.array([1]))
+    assert (told["stiffness"].std, told["rest_position"].std) == (pytest.approx(5e-4), np.inf)
 
 
 def test_the_deviation_of_a_nonlinear_parameter_is_its_scatter_over_noise():
