@@ -127,6 +127,7 @@ def found_effects(
                 scene, candidate.member, found.correction.value, parameters.coefficients[-1].covariance
             )
             confounded: tuple[Confounder, ...] = ()
+            otherwise = candidate.effect.or_else(scene, candidate.member, found.correction.value)
         else:
             place = labels.index(decision.label)
             candidate = found.chosen[place]

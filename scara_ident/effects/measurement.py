@@ -119,6 +119,14 @@ class TimeDelay(Effect):
     view = View("torque rate")
     experiment = "run the same path at two speeds: a delay's error grows with the third power of speed"
 
+    def or_else(self, scene: Scene, member: Member, value: Array) -> str:
+        """Say which of both is late where the delay is negative."""
+        return (
+            ": by less than nothing, so that the position is the later one, as behind a filter of its own"
+            if value[0] < 0.0
+            else ""
+        )
+
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return one for all joints together, then one per joint."""
         n = scene.robot.n

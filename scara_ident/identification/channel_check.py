@@ -32,7 +32,7 @@ PIECES = 4
 POOR = 0.05
 # An axis turned round leaves more than this of some joint's torque.
 TURNED = 0.08
-# Exchanging one signal alone makes nonsense of both joints.
+# Exchanging one signal alone makes nonsense of both joints; of the one whose torque is large beside the other's, at least.
 BAD = 0.3
 # Friction that feeds in this share of a joint's power, and this many standard deviations, points to a sign.
 PUSHING = 0.02
@@ -162,7 +162,7 @@ def _suspects(errors: Array, pushing: NDArray[np.bool_]) -> list[tuple[Signal, t
         found += [(both, (j,), False) for j in range(len(errors))]
     for pair in combinations(poor, 2):
         found.append((both, pair, True))
-        if np.all(errors[list(pair)] > BAD):
+        if np.any(errors[list(pair)] > BAD):
             found += [(signal, pair, True) for signal in one]
     return found
 

@@ -161,3 +161,9 @@ def test_a_delay_is_taken_out_of_the_joints_that_have_it(joint: int | None):
     np.testing.assert_allclose(recorded[1, 100:-100], tones(time + 0.0031)[1, 100:-100], rtol=0.0, atol=1e-3)
     assert not effect.settled(value)
     assert effect.settled(np.array([1e-6]))
+
+
+def test_a_delay_below_nothing_says_that_the_position_is_the_later_one():
+    scene, delay = scene_of(load_robot()), TimeDelay()
+    assert delay.or_else(scene, Member(None), np.array([0.005])) == ""
+    assert "the position is the later one" in delay.or_else(scene, Member(None), np.array([-0.005]))

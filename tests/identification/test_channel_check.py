@@ -10,8 +10,9 @@ import pytest
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.errors import RecordingError
+from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import observe
-from scara_ident.identification.channel_check import ChannelFault, _better, channel_faults
+from scara_ident.identification.channel_check import ChannelFault, _better, _relative, channel_faults
 from scara_ident.identification.identify import identify
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
@@ -19,7 +20,7 @@ from scara_ident.paper import OJD, OJK
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import sampled, simulate, virtual_arm
-from tests.arms import PLANAR_2R, noisy, recorded_torque, recording, sines, write_urdf
+from tests.arms import PLANAR_2R, noisy, recorded_torque, recording, sines, swing, write_urdf
 
 BANDS = (10.0, 10.0)
 
@@ -97,6 +98,16 @@ def test_all_efforts_of_opposite_sign_where_friction_shows_on_one_joint(tmp_path
 def test_exchanged_joints(recordings: tuple[Recording, ...], signals: tuple[str, ...]) -> None:
     faults = found([exchanged(item, *signals) for item in recordings])
     assert faults == [(" and ".join(signals), ("joint1", "joint2"), True)]
+
+
+def test_an_exchange_shows_where_one_torque_is_large_beside_the_other(tmp_path: Path) -> None:
+    """The shoulder that carries all is explained at once by the other's motion, to a quarter."""
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", [PLANAR_2R[0], replace(PLANAR_2R[1], mass=0.3)]))
+    runs = [noisy(swing(robot, f"s{seed}_1", seed, 12.0, 200.0), np.random.default_rng(seed), 0.02) for seed in (1, 2)]
+    seen = observe(build_model(robot, "basic"), prepare([exchanged(run, "effort") for run in runs], (8.0, 8.0)))
+    errors = _relative(weighted_value(seen.by_joint), seen)
+    assert np.min(errors) < 0.3 < np.max(errors)
+    assert [(fault.signal, fault.exchanged) for fault in channel_faults(seen)] == [("effort", True)]
 
 
 def test_two_faults_at_once(recordings: tuple[Recording, ...]) -> None:
