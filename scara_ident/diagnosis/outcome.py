@@ -18,6 +18,7 @@ from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, SearchTask
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.estimation import Estimate, wls
+from scara_ident.estimation.beside_runs import beside_runs
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
@@ -53,6 +54,8 @@ class Outcome:
     search : Search
     after : Estimate
         With the effects found.
+    together : Estimate
+        The same with what runs differ by fitted beside it, see `beside_runs`.
     training : Observations
         Of the training recordings, as corrected, with the effects found.
     residuals : Residuals
@@ -76,6 +79,7 @@ class Outcome:
 
     search: Search
     after: Estimate
+    together: Estimate
     training: Observations
     residuals: Residuals
     fit_before: tuple[LackOfFit, ...]
@@ -105,10 +109,12 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
     joints, criteria = task.model.robot.joints, task.criteria
     least = dict.fromkeys(joints, criteria.remainder)
     least_share = dict.fromkeys(joints, criteria.least_remainder)
-    if after.variation:
+    together = beside_runs(after, training)
+    if after.variation and together.variation:
         # What a run differs by from the others is no remainder of the model; of second order something of it is left.
-        deviations = after.variation.deviations(training, after.value)
-        left = Residuals(left.data, tuple(a + b for a, b in zip(left.predicted, deviations, strict=True)))
+        deviations = together.variation.deviations(training, together.value)
+        predicted = training.predicted(together.value)
+        left = Residuals(left.data, tuple(a + b for a, b in zip(predicted, deviations, strict=True)))
         differing = after.variation.sizes(task.model.robot)
         least |= dict.fromkeys(differing, criteria.remainder_of_runs)
         least_share |= dict.fromkeys(differing, criteria.least_remainder_of_runs)
@@ -145,7 +151,7 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
     )
     fit_before = fit_after if left is before else lack_of_fit(before)
     return Outcome(
-        *(found, after, training, left, fit_before, fit_after, dependences, unexplained),
+        *(found, after, together, training, left, fit_before, fit_after, dependences, unexplained),
         *(tuple(small.tolist()), tuple(made.tolist()), names),
     )
 

@@ -51,7 +51,7 @@ def weighed_evidence(
     )
     shown = without_lines(shown, lines, found)
     shown = even_evidence(shown, after, outcome.training, criteria)
-    shown = steady_evidence(shown, after, outcome.training, criteria)
+    shown = steady_evidence(shown, outcome.together, outcome.training, criteria)
     training, others = (rms_of(after.value, item) for item in (outcome.training, held_out.undisturbed))
     shown = held_out_evidence(shown, training, others, held_out.unsure, held_out.apart, criteria)
     gains = {item.label: item.held_out for item in effects if item.held_out is not None}
