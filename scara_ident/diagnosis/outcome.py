@@ -112,9 +112,7 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
     together = beside_runs(after, training)
     if after.variation and together.variation:
         # What a run differs by from the others is no remainder of the model; of second order something of it is left.
-        deviations = together.variation.deviations(training, together.value)
-        predicted = training.predicted(together.value)
-        left = Residuals(left.data, tuple(a + b for a, b in zip(predicted, deviations, strict=True)))
+        left = _least_left(*(_beside(training, item) for item in (after, together)))
         differing = after.variation.sizes(task.model.robot)
         least |= dict.fromkeys(differing, criteria.remainder_of_runs)
         least_share |= dict.fromkeys(differing, criteria.least_remainder_of_runs)
@@ -154,6 +152,22 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
         *(found, after, together, training, left, fit_before, fit_after, dependences, unexplained),
         *(tuple(small.tolist()), tuple(made.tolist()), names),
     )
+
+
+def _beside(training: Observations, fit: Estimate) -> Residuals:
+    """Return what a fit leaves beside what runs differ by."""
+    assert fit.variation is not None
+    pairs = zip(training.predicted(fit.value), fit.variation.deviations(training, fit.value), strict=True)
+    return Residuals(training.data, tuple(torque + off for torque, off in pairs))
+
+
+def _least_left(first: Residuals, second: Residuals) -> Residuals:
+    """Return of each joint what of the two repeats less: what surely does shows beside either."""
+    once, again = ({fit.joint: fit.missing for fit in lack_of_fit(item)} for item in (first, second))
+    names = first.data.recordings[0].recording.joints
+    chosen = np.array([again.get(name, np.inf) < once.get(name, 0.0) for name in names])[:, None]
+    pairs = zip(first.predicted, second.predicted, strict=True)
+    return Residuals(first.data, tuple(np.where(chosen, other, own) for own, other in pairs))
 
 
 def _unexplained(

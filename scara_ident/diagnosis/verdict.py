@@ -12,6 +12,7 @@ from scara_ident.diagnosis.even_evidence import even_evidence
 from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.held_out_gain import spoken_against
+from scara_ident.diagnosis.late_evidence import late_evidence
 from scara_ident.diagnosis.outcome import Outcome, rms_of
 from scara_ident.diagnosis.standing_lines import StandingLine, without_lines
 from scara_ident.diagnosis.steady_evidence import steady_evidence
@@ -32,7 +33,7 @@ def weighed_evidence(
 
     Every witness that may speak against it is asked in turn, and the first that does is the one that is told: what the search
     left open, what is left of the training recordings, lines in it, one of them beside all others, its parts beside each other,
-    those held out, and there each effect.
+    what comes late in all, those held out, and there each effect.
 
     Parameters
     ----------
@@ -51,7 +52,10 @@ def weighed_evidence(
     )
     shown = without_lines(shown, lines, found)
     shown = even_evidence(shown, after, outcome.training, criteria)
-    shown = steady_evidence(shown, outcome.together, outcome.training, criteria)
+    # What runs differ by is not taken off alike beside both: what changes within them shows beside either.
+    changing = [steady_evidence(shown, each, outcome.training, criteria) for each in (after, outcome.together)]
+    shown = tuple(second if not first.shown else first for first, second in zip(*changing, strict=True))
+    shown = late_evidence(shown, outcome.together, outcome.training, criteria)
     training, others = (rms_of(after.value, item) for item in (outcome.training, held_out.undisturbed))
     shown = held_out_evidence(shown, training, others, held_out.unsure, held_out.apart, criteria)
     gains = {item.label: item.held_out for item in effects if item.held_out is not None}

@@ -125,7 +125,7 @@ class RunVariation:
             if item is None:
                 continue
             rms = np.sqrt(np.mean(item.directions**2, axis=1))
-            late, least = _late_alike(item), SPOKEN_OF * rms[KINDS.index("torque scale")]
+            late, least = late_alike(item), SPOKEN_OF * rms[KINDS.index("torque scale")]
             if abs(late) * rms[KINDS.index("delay")] > least:
                 found.append(
                     f"{joint} {'lags' if late > 0.0 else 'leads'} by {1e3 * abs(late):.2g} ms in all runs alike"
@@ -217,7 +217,7 @@ class RunVariation:
         return same_day(offsets, unsure, np.array([item.std[OFFSET] for item in told]))
 
 
-def _late_alike(item: JointVariation) -> float:
+def late_alike(item: JointVariation) -> float:
     """Return by how much every run is late, s, where they differ little in it; 0 where they do not."""
     late = item.of_run[:, KINDS.index("delay")]
     mean, apart = float(np.mean(late)), float(np.std(late, ddof=1))
