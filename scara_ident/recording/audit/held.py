@@ -197,6 +197,6 @@ def _is_hold(samples: Samples, same: NDArray[np.bool_], judged: NDArray[np.bool_
 
 def _by_chance(count: int, expected: float) -> bool:
     """Whether so many may be seen by chance where so many are expected."""
-    from scipy.stats import poisson
+    from scipy.special import pdtrc
 
-    return bool(poisson.sf(count - 1, expected) >= UNLIKELY)
+    return count < 1 or bool(pdtrc(count - 1, expected) >= UNLIKELY)
