@@ -17,9 +17,6 @@ from scara_ident.effects import Scene
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.processes import halved
 
-# Two effects cancel where their sum is less than this share of the smaller one: each takes back most of the other.
-CANCELS = 0.5
-
 
 @dataclass(frozen=True)
 class Confounder:
@@ -91,7 +88,7 @@ def _cancelling(step: SelectionStep) -> list[tuple[Confounder, ...]]:
             if other is own or joint is None or joint != rival.member.joint or not set(own) == set(other) == {joint}:
                 continue
             least = min(np.linalg.norm(own[joint]), np.linalg.norm(other[joint]))
-            if np.linalg.norm(own[joint] + other[joint]) < CANCELS * least:
+            if np.linalg.norm(own[joint] + other[joint]) < step.criteria.cancels * least:
                 label, name = rival.label(step.scene), rival.effect.name
                 found[place] += (Confounder(label, name, rival.joint(step.scene), 0.0, rival, ()),)
     return found

@@ -210,6 +210,9 @@ class SelectionCriteria:
     least_share: float = _criterion(
         0.8, "of its gain", "that another effect must remove to be compared with the best, and to be a confounder"
     )
+    cancels: float = _criterion(
+        0.5, "of the smaller torque", "two effects of a joint leave less together: each takes back most of the other"
+    )
 
     def documented(self) -> list[tuple[str, Any, str, str, str]]:
         """Return name, value, unit, reason and source of every criterion."""
