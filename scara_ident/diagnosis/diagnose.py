@@ -239,7 +239,7 @@ def diagnose(
     step = replace(found.step, weights=after.weights)
     held_out, useless = with_rows(held_out.at(found.bands), needed=False)
     held = validated(outcome, held_out)
-    whole = found.whole(step)
+    whole = replace(found.whole(step), variation=after.offsets)
     parameters = physical_parameters(whole) if whole.chosen else PhysicalParameters((), (), ())
     readings = direct_readings(found, families, criteria.rotor_inertia_std)
     effects = found_effects(found, step, parameters, readings, held.gains)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +17,9 @@ from scara_ident.diagnosis.unknowns import sides
 from scara_ident.effects import Parameter, Scene
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.information import merge
+from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
-from scara_ident.estimation.run_variation import run_variation
+from scara_ident.estimation.variation_between import run_variation
 
 # A rotor is told by the data where they leave less than this share of its prior's standard deviation.
 TOLD_SHARE = 0.7
@@ -80,6 +82,7 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
     Parameters
     ----------
     step : SelectionStep
+        Its `variation` are offsets of runs that are noise, see `Estimate.offsets`.
     scatter_alone : bool, optional
         Whether standard deviations leave out what runs differ by and what the noise of the positions does.
 
@@ -88,7 +91,8 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
     Nonlinear parameters, armatures included, join the fit by the derivative of the effects' columns, so that the
     covariance is that of all parameters together.
     """
-    state = linearise(step.scene, step.columns, step.weights, step.chosen, step.criteria.rotor_inertia_std)
+    std = step.criteria.rotor_inertia_std
+    state = linearise(step.scene, step.columns, step.weights, step.chosen, std, step.variation)
     covariance = _covariance(step, state, scatter_alone=scatter_alone)
     undetermined = merge([state.information, state.prior]).solve().undetermined
     found: list[dict[str, Parameter]] = []
@@ -169,11 +173,15 @@ def _covariance(step: SelectionStep, state: Linearised, *, scatter_alone: bool) 
     """Block covariance of all parameters, with what the priors leave open, which no residual shows."""
     inverse = merge([state.information, state.prior]).inverse()
     value = np.concatenate([state.value, np.zeros(len(state.unknowns))])
-    spread = block_covariance(inverse, value, state.joints, step.observations.owner, step.weights).matrix
+    # By what a row moves the fit; see `scara_ident.estimation.run_offsets`.
+    influence: Sequence[JointRows] = state.joints
+    if step.variation is not None:
+        influence = step.variation.whitened_rows(step.variation.whitened_rows(state.joints))
+    spread = block_covariance(inverse, value, influence, step.observations.owner, step.weights).matrix
     if not scatter_alone:
         variation = run_variation(step.observations, state.joints, value)
         bias = _noise_bias(step, state)
-        spread = spread + variation.covariance(inverse, state.joints, step.weights) + np.outer(bias, bias)
+        spread = spread + variation.covariance(inverse, influence, step.weights) + np.outer(bias, bias)
     known = state.prior.factor[:, :-1]
     return np.asarray(spread + state.variance * inverse @ (known.T @ known) @ inverse)
 
@@ -186,8 +194,8 @@ def _noise_bias(step: SelectionStep, state: Linearised) -> Array:
     scene, chosen = twin.scene, twin.chosen
     if len(state.ties.factor):
         # A resonance with little damping bends too much for one step.
-        scene, chosen = tune(scene, twin.columns, step.weights, chosen, std)
-    again = linearise(scene, twin.columns, step.weights, chosen, std)
+        scene, chosen = tune(scene, twin.columns, step.weights, chosen, std, offsets=step.variation)
+    again = linearise(scene, twin.columns, step.weights, chosen, std, step.variation)
     bias = again.solve()[0] - state.solve()[0]
     bias[state.linear :] += [
         there.value - here.value for there, here in zip(again.unknowns, state.unknowns, strict=True)

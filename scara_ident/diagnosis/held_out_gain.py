@@ -149,12 +149,12 @@ def _each_left_out(
         columns = np.arange(start, stop)
         start = stop
         if any(np.any(rows.table[:-1][np.isin(rows.columns, columns)]) for rows in held_out.joints):
-            value, _ = told_value_and_weights(observed(found.step.without(place)))
+            value, _ = told_value_and_weights(observed(found.step.without(place)), after.offsets)
             value = np.insert(value, np.full(len(columns), columns[0]), 0.0)
             yield candidate.label(scene), candidate.member.joint, _errors(held_out.joints, value), errors
     if found.correction is not None:
         step = replace(found.step, columns=found.step.columns.beside(found.uncorrected))
-        value, _ = told_value_and_weights(observed(step))
+        value, _ = told_value_and_weights(observed(step), after.offsets)
         candidate = found.correction.candidate
         joints = held_out.with_torque(uncorrected.data).faded(quiet).joints
         # Both of the recordings as they are: what correcting makes of their noise would count as half of the effect.

@@ -19,6 +19,7 @@ from scara_ident.diagnosis.unknowns import Unknown, unknowns_of
 from scara_ident.effects import Scene, Tie
 from scara_ident.estimation.information import Information, merge, weighted
 from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.run_variation import RunVariation
 from scara_ident.threads import one_blas_thread, side_by_side
 
 # Steps of Gauss and Newton; most fits settle in three, and a search has further ones. A tied effect comes from far away.
@@ -51,7 +52,7 @@ class Linearised:
     joints : tuple of JointRows
         Columns of the base model, of the effects, and the change of the torque per unit of each nonlinear parameter.
     information : Information
-        Of all weighted rows; its parameters are k linear ones, then s nonlinear ones.
+        Of all weighted rows, with offsets of runs as noise; its parameters are k linear ones, then s nonlinear ones.
     ties : Information
         Rows that hold the coefficients of tied effects to what the nonlinear parameters and the rigid bodies say of them.
     """
@@ -140,7 +141,12 @@ class Linearised:
 
 
 def linearise(
-    scene: Scene, columns: CandidateColumns, weights: Array, chosen: Sequence[Candidate], rotor_inertia_std: float
+    scene: Scene,
+    columns: CandidateColumns,
+    weights: Array,
+    chosen: Sequence[Candidate],
+    rotor_inertia_std: float,
+    offsets: RunVariation | None = None,
 ) -> Linearised:
     """Return the linear model about the present nonlinear parameters.
 
@@ -153,6 +159,8 @@ def linearise(
     chosen : sequence of Candidate
     rotor_inertia_std : float
         Standard deviation of a stated rotor inertia, as a share of it.
+    offsets : RunVariation, optional
+        Offsets of runs that are noise, see `Estimate.offsets`.
     """
     observations = columns.observations
     unknowns = unknowns_of(scene, chosen, rotor_inertia_std)
@@ -171,10 +179,10 @@ def linearise(
             size = _size(joints, int(bounds[owner]), weights)
             ties.append(TIGHTNESS * size * _tie_row(scene, chosen, unknowns, owner, tie, int(bounds[owner]), linear))
     held = Information(np.array(ties).reshape(-1, total + 1), 0.0)
-    value = _solved(_pooled(joints, total, weights), held, linear)
+    value = _solved(_pooled(joints, total, weights, offsets), held, linear)
     changes = [_change(scene, columns, chosen, item, places, value, slopes) for item in unknowns]
     extended = tuple(_beside(rows, joint, changes, linear) for joint, rows in enumerate(joints))
-    information = _pooled(extended, total, weights)
+    information = _pooled(extended, total, weights, offsets)
     return Linearised(scene, tuple(chosen), unknowns, places, extended, information, held)
 
 
@@ -243,7 +251,8 @@ def _size(joints: Sequence[JointRows], column: int, weights: Array) -> float:
     return float(np.linalg.norm([w * np.linalg.norm(part) for w, part in zip(weights, parts, strict=True)]))
 
 
-def _pooled(joints: Sequence[JointRows], parameters: int, weights: Array) -> Information:
+def _pooled(joints: Sequence[JointRows], parameters: int, weights: Array, offsets: RunVariation | None) -> Information:
+    joints = joints if offsets is None else offsets.whitened_rows(joints)
     with one_blas_thread():
         return weighted(side_by_side(lambda rows: rows.information(parameters), joints), weights)
 
@@ -296,13 +305,14 @@ def tune(
     chosen: Sequence[Candidate],
     rotor_inertia_std: float,
     *,
+    offsets: RunVariation | None = None,
     coarse: bool = False,
 ) -> tuple[Scene, tuple[Candidate, ...]]:
     """Fit the nonlinear parameters of all effects in a model together, and settle the loads that they depend on.
 
     Parameters
     ----------
-    scene, columns, weights, chosen, rotor_inertia_std
+    scene, columns, weights, chosen, rotor_inertia_std, offsets
         See `linearise`.
     coarse : bool, optional
         Whether near the best is enough, as for a candidate that is only judged.
@@ -319,7 +329,7 @@ def tune(
     step, share, std = np.zeros(0), 1.0, np.zeros(0)
     tied = any(item.effect.tie(scene, item.member) is not None for item in chosen)
     for _ in range(TIED_ROUNDS if tied else ROUNDS):
-        now = linearise(scene, columns, weights, chosen, rotor_inertia_std)
+        now = linearise(scene, columns, weights, chosen, rotor_inertia_std, offsets)
         if best is not None and now.error > (1.0 + RISE) * best.error:
             share *= 0.5
             if share < SHORTEST_SHARE:

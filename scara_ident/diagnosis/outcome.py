@@ -18,7 +18,6 @@ from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, SearchTask
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.estimation import Estimate, wls
-from scara_ident.estimation.beside_runs import beside_runs
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
@@ -54,8 +53,6 @@ class Outcome:
     search : Search
     after : Estimate
         With the effects found.
-    together : Estimate
-        The same with what runs differ by fitted beside it, see `beside_runs`.
     training : Observations
         Of the training recordings, as corrected, with the effects found.
     residuals : Residuals
@@ -79,7 +76,6 @@ class Outcome:
 
     search: Search
     after: Estimate
-    together: Estimate
     training: Observations
     residuals: Residuals
     fit_before: tuple[LackOfFit, ...]
@@ -105,14 +101,19 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
     after, left = found.start, before
     if training is not found.uncorrected:
         after = wls(training)
+        if after.offsets is not None and found.chosen:
+            found = found.beside(after.offsets)
+            training = observed_at_every_sample(found.step)
+            after = wls(training)
         left = training.residuals(after.value)
     joints, criteria = task.model.robot.joints, task.criteria
     least = dict.fromkeys(joints, criteria.remainder)
     least_share = dict.fromkeys(joints, criteria.least_remainder)
-    together = beside_runs(after, training)
-    if after.variation and together.variation:
+    if after.variation:
         # What a run differs by from the others is no remainder of the model; of second order something of it is left.
-        left = _least_left(*(_beside(training, item) for item in (after, together)))
+        off = after.variation.deviations(training, after.value)
+        pairs = zip(training.predicted(after.value), off, strict=True)
+        left = Residuals(training.data, tuple(torque + more for torque, more in pairs))
         differing = after.variation.sizes(task.model.robot)
         least |= dict.fromkeys(differing, criteria.remainder_of_runs)
         least_share |= dict.fromkeys(differing, criteria.least_remainder_of_runs)
@@ -149,25 +150,9 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
     )
     fit_before = fit_after if left is before else lack_of_fit(before)
     return Outcome(
-        *(found, after, together, training, left, fit_before, fit_after, dependences, unexplained),
+        *(found, after, training, left, fit_before, fit_after, dependences, unexplained),
         *(tuple(small.tolist()), tuple(made.tolist()), names),
     )
-
-
-def _beside(training: Observations, fit: Estimate) -> Residuals:
-    """Return what a fit leaves beside what runs differ by."""
-    assert fit.variation is not None
-    pairs = zip(training.predicted(fit.value), fit.variation.deviations(training, fit.value), strict=True)
-    return Residuals(training.data, tuple(torque + off for torque, off in pairs))
-
-
-def _least_left(first: Residuals, second: Residuals) -> Residuals:
-    """Return of each joint what of the two repeats less: what surely does shows beside either."""
-    once, again = ({fit.joint: fit.missing for fit in lack_of_fit(item)} for item in (first, second))
-    names = first.data.recordings[0].recording.joints
-    chosen = np.array([again.get(name, np.inf) < once.get(name, 0.0) for name in names])[:, None]
-    pairs = zip(first.predicted, second.predicted, strict=True)
-    return Residuals(first.data, tuple(np.where(chosen, other, own) for own, other in pairs))
 
 
 def _unexplained(

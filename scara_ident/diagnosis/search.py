@@ -25,6 +25,7 @@ from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
+from scara_ident.estimation.run_variation import RunVariation
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.low_pass import HIGHEST_CUT
 from scara_ident.motion.prepared import PreparedData
@@ -132,6 +133,12 @@ class Search:
         scene, kept = tune(self.scene, step.columns, step.weights, kept, step.criteria.rotor_inertia_std)
         steps = tuple(item for item in self.steps if item.decision.label not in labels)
         return replace(self, step=replace(step, scene=scene, chosen=kept), steps=steps)
+
+    def beside(self, offsets: RunVariation) -> Search:
+        """Return it with the nonlinear parameters fitted beside offsets of runs, see `Estimate.offsets`."""
+        step, std = self.step, self.step.criteria.rotor_inertia_std
+        scene, chosen = tune(self.scene, step.columns, step.weights, self.chosen, std, offsets=offsets)
+        return replace(self, step=replace(step, scene=scene, chosen=chosen))
 
     def whole(self, step: SelectionStep) -> SelectionStep:
         """Return a step of the effects that stayed, with what was taken out of the data as the last of them.

@@ -68,9 +68,7 @@ class SelectionStep:
         model = fitted_model(self.observations, own, self.weights, self.criteria.parts)
         if self.variation is None:
             return model
-        tables = [self.variation.whitened(joint, item.table) for joint, item in enumerate(model.joints)]
-        joints = tuple(replace(item, table=table) for item, table in zip(model.joints, tables, strict=True))
-        return replace(model, joints=joints)
+        return replace(model, joints=self.variation.whitened_rows(model.joints))
 
     @property
     def filled(self) -> NDArray[np.intp]:

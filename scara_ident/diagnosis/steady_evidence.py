@@ -12,7 +12,8 @@ from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_variation import KINDS, JointVariation, variation_between
+from scara_ident.estimation.run_variation import KINDS, JointVariation
+from scara_ident.estimation.variation_between import variation_between
 from scara_ident.robot.robot import Robot
 
 # Parts of each recording that are compared: a change over a minute shows in few of them, one over seconds in many.

@@ -19,7 +19,8 @@ from scara_ident.estimation.assumed_variation import (
     ASSUMED_SCALE,
     assumed_variation,
 )
-from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation, run_variation
+from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation
+from scara_ident.estimation.variation_between import run_variation
 
 
 def variation_objection(step: SelectionStep, decision: Decision, least_gain: float = 0.0) -> str | None:

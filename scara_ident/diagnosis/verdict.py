@@ -52,13 +52,8 @@ def weighed_evidence(
     )
     shown = without_lines(shown, lines, found)
     shown = even_evidence(shown, after, outcome.training, criteria)
-    # What runs differ by is not taken off alike beside both: what changes within them shows beside either.
-    steady = steady_evidence(shown, after, outcome.training, criteria)
-    if steady != shown:
-        again = steady_evidence(shown, outcome.together, outcome.training, criteria)
-        steady = tuple(first if first.shown else second for first, second in zip(steady, again, strict=True))
-    shown = steady
-    shown = late_evidence(shown, outcome.together, outcome.training, criteria)
+    shown = steady_evidence(shown, after, outcome.training, criteria)
+    shown = late_evidence(shown, after, outcome.training, criteria)
     training, others = (rms_of(after.value, item) for item in (outcome.training, held_out.undisturbed))
     shown = held_out_evidence(shown, training, others, held_out.unsure, held_out.apart, criteria)
     gains = {item.label: item.held_out for item in effects if item.held_out is not None}

@@ -63,6 +63,9 @@ class Estimate(Saved, told_by="estimate"):
         How the covariance was found, see `scara_ident.estimation.covariance`.
     variation : RunVariation or None
         How runs differ, which is part of the covariance; None where it was not looked for.
+    offsets : RunVariation or None
+        How far offsets of runs lie apart that the fit took for noise, see `scara_ident.estimation.run_offsets`; None where it
+        took none.
     noise_bias : ndarray, shape (p,), or None
         By how much the noise of positions moves the parameters, which is part of the covariance; None where negligible
         or not looked for.
@@ -77,6 +80,7 @@ class Estimate(Saved, told_by="estimate"):
     weights: Array
     std_kind: str
     variation: RunVariation | None = field(default=None, kw_only=True)
+    offsets: RunVariation | None = field(default=None, kw_only=True)
     noise_bias: Array | None = field(default=None, kw_only=True)
 
     @property

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError, UsageError
@@ -13,9 +15,17 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, merge, residual_noise, weighted
 from scara_ident.estimation.noise_bias import noise_bias
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation, run_variation
-from scara_ident.estimation.working_range import told_directions
+from scara_ident.estimation.run_offsets import beside_offsets
+from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation
+from scara_ident.estimation.variation_between import run_variation
+from scara_ident.estimation.working_range import Told, told_directions
 from scara_ident.threads import one_blas_thread, side_by_side
+
+# Weights of the joints' rows, shape (n,), from all of them.
+Weigh = Callable[[Sequence[Information]], Array]
+# Fits beside offsets of runs: how far they lie apart is seen beside the first, where gravity has taken up some of them, and
+# beside the second, where it has not.
+ROUNDS = 2
 
 
 def ols(observations: Observations) -> Estimate:
@@ -34,11 +44,13 @@ def ols(observations: Observations) -> Estimate:
     EstimationError
         If there is nothing to estimate from.
     """
-    return least_squares(observations, np.ones(len(observations.joints)), "ols")
+    return least_squares(observations, equally, "ols")
 
 
 def wls(observations: Observations, noise: Array | None = None) -> Estimate:
     """Estimate by least squares with each joint's rows divided by its noise.
+
+    Offsets that differ from run to run are noise too, see `scara_ident.estimation.run_offsets`.
 
     Parameters
     ----------
@@ -59,8 +71,7 @@ def wls(observations: Observations, noise: Array | None = None) -> Estimate:
         If there is nothing to estimate from, or a joint's noise is not a positive number.
     """
     if noise is None:
-        with one_blas_thread():
-            return least_squares(observations, 1.0 / joint_noise(_joints(observations)), "wls")
+        return least_squares(observations, by_noise, "wls")
     joints = observations.model.robot.joints
     noise = np.asarray(noise)
     if noise.shape != (len(joints),):
@@ -68,66 +79,118 @@ def wls(observations: Observations, noise: Array | None = None) -> Estimate:
     for joint, sigma in zip(joints, noise, strict=True):
         if not 0.0 < sigma < np.inf:
             raise EstimationError(f"noise of joint {joint} is {sigma:g}; expected a positive number to weigh by")
-    return least_squares(observations, 1.0 / noise, "wls")
+    return least_squares(observations, lambda _: 1.0 / noise, "wls")
 
 
-@one_blas_thread()
-def least_squares(
-    observations: Observations, weights: Array, method: str, prior: Information | None = None
-) -> Estimate:
-    """Least squares with a weight per joint and, if given, rows of a prior.
+def equally(joints: Sequence[Information]) -> Array:
+    """Return the same weight for all joints, shape (n,)."""
+    return np.ones(len(joints))
 
-    With weights and without a prior, what data leave open of the torque within the arm's limits is left at zero, see
-    `told_directions`.
+
+def by_noise(joints: Sequence[Information]) -> Array:
+    """Return each joint's weight by what is left of its rows, shape (n,)."""
+    return 1.0 / joint_noise(joints)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """A solution, and how rows move it.
+
+    Attributes
+    ----------
+    weights : ndarray, shape (n,)
+    information : Information
+    value : ndarray, shape (p,)
+    undetermined : ndarray of bool, shape (p,)
+    inverse : ndarray, shape (p, p)
+        Of ``W.T @ W`` of all weighted rows, within the directions that are told.
+    told : Told or None
     """
-    information = weighted(_joints(observations), weights)
+
+    weights: Array
+    information: Information
+    value: Array
+    undetermined: NDArray[np.bool_]
+    inverse: Array
+    told: Told | None
+
+
+def _fit(observations: Observations, weigh: Weigh, method: str, prior: Information | None) -> _Fit:
+    """Solve; with weights and without a prior, what data leave open of the torque is left at zero, see `told_directions`."""
+    joints = _joints(observations)
+    weights = weigh(joints)
+    information = weighted(joints, weights)
     if prior is not None:
         information = merge([information, prior])
     solution = information.solve()
-    value, undetermined, inverse = solution.value, solution.undetermined, information.inverse()
     # Equal weights stay what they are in the literature, the paper's among it.
     told = (
-        told_directions(observations, residual_noise(observations.by_joint, value))
+        told_directions(observations, residual_noise(joints, solution.value))
         if prior is None and method == "wls"
         else None
     )
-    if told is not None:
-        within = told.within(information)
-        value, undetermined = told.kept @ within.solve().value, told.undetermined
-        inverse = told.kept @ within.inverse() @ told.kept.T
+    if told is None:
+        return _Fit(weights, information, solution.value, solution.undetermined, information.inverse(), None)
+    within = told.within(information)
+    inverse = told.kept @ within.inverse() @ told.kept.T
+    return _Fit(weights, information, told.kept @ within.solve().value, told.undetermined, inverse, told)
+
+
+@one_blas_thread()
+def least_squares(observations: Observations, weigh: Weigh, method: str, prior: Information | None = None) -> Estimate:
+    """Least squares with a weight per joint and, if given, rows of a prior.
+
+    Parameters
+    ----------
+    observations : Observations
+    weigh : callable
+        Returns the weight of each joint's rows, shape (n,), from all of them.
+    method : str
+        As the estimate is called; of `wls` offsets of runs are noise.
+    prior : Information, optional
+    """
+    fit, offsets, influence = _fit(observations, weigh, method, prior), None, observations
     variation, spread = side_by_side(
         lambda work: work(),
         [
-            lambda: run_variation(observations, observations.joints, value, of_two=True),
-            lambda: block_covariance(inverse, value, observations.joints, observations.owner, weights),
+            lambda: run_variation(observations, observations.joints, fit.value, of_two=True),
+            lambda: block_covariance(fit.inverse, fit.value, observations.joints, observations.owner, fit.weights),
         ],
     )
-    covariance = spread.matrix + variation.covariance(inverse, observations.joints, weights)
+    if method == "wls" and variation.offsets:
+        for _ in range(ROUNDS):
+            offsets = variation.offsets or offsets
+            rows = beside_offsets(observations, offsets)
+            fit, influence = _fit(rows.fitted, weigh, method, prior), rows.influence
+            variation = run_variation(observations, observations.joints, fit.value, of_two=True)
+        spread = block_covariance(fit.inverse, fit.value, influence.joints, observations.owner, fit.weights)
+    covariance = spread.matrix + variation.covariance(fit.inverse, influence.joints, fit.weights)
     if len(observations.data.recordings) < LEAST_RUNS:
         # What else two runs might differ by is not told, and nothing is said of it.
         variation = RunVariation((None,) * len(observations.joints))
     bias = None
-    if told is not None:
-        covariance += told.prior
+    if fit.told is not None:
+        covariance += fit.told.prior
     elif prior is None:
-        bias = noise_bias(observations, weights, value)
+        bias = noise_bias(observations, fit.weights, fit.value if offsets is None else None)
     if bias is not None:
         covariance += np.outer(bias, bias)
     if prior is not None:
         # The prior's own error, which no residual shows.
         precision = prior.regressor_factor.T @ prior.regressor_factor
-        covariance += inverse @ precision @ inverse
-    covariance[np.diag_indices_from(covariance)] = np.where(undetermined, np.inf, np.diag(covariance))
+        covariance += fit.inverse @ precision @ fit.inverse
+    covariance[np.diag_indices_from(covariance)] = np.where(fit.undetermined, np.inf, np.diag(covariance))
     return Estimate(
         observations.model,
         method,
-        value,
+        fit.value,
         covariance,
-        undetermined,
-        information,
-        weights,
+        fit.undetermined,
+        fit.information,
+        fit.weights,
         spread.kind,
         variation=variation,
+        offsets=offsets,
         noise_bias=bias,
     )
 
@@ -147,13 +210,17 @@ def value_and_weights(observations: Observations) -> tuple[Array, Array]:
 
 
 @one_blas_thread()
-def told_value_and_weights(observations: Observations) -> tuple[Array, Array]:
-    """Return the same with what data leave open of the torque within the arm's limits at zero, as `wls` leaves it."""
-    value, weights = value_and_weights(observations)
-    told = told_directions(observations, residual_noise(observations.by_joint, value))
-    if told is not None:
-        value = told.kept @ told.within(weighted(_joints(observations), weights)).solve().value
-    return value, weights
+def told_value_and_weights(observations: Observations, offsets: RunVariation | None = None) -> tuple[Array, Array]:
+    """Return the same with what data leave open of the torque within the arm's limits at zero, as `wls` leaves it.
+
+    Parameters
+    ----------
+    observations : Observations
+    offsets : RunVariation, optional
+        Offsets of runs that are noise, see `Estimate.offsets`.
+    """
+    fit = _fit(beside_offsets(observations, offsets).fitted, by_noise, "wls", None)
+    return fit.value, fit.weights
 
 
 def _joints(observations: Observations) -> tuple[Information, ...]:

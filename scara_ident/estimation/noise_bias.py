@@ -30,7 +30,7 @@ SPOKEN_OF = 1.0
 _LAST: WeakKeyDictionary[Observations, tuple[Array, Array]] = WeakKeyDictionary()
 
 
-def noise_bias(observations: Observations, weights: Array, value: Array) -> Array | None:
+def noise_bias(observations: Observations, weights: Array, value: Array | None) -> Array | None:
     """Return by how much the noise of positions moves parameters, shape (p,); None where it is negligible.
 
     Parameters
@@ -38,8 +38,8 @@ def noise_bias(observations: Observations, weights: Array, value: Array) -> Arra
     observations : Observations
     weights : ndarray, shape (n,)
         Of each joint's rows.
-    value : ndarray, shape (p,)
-        Estimated with them.
+    value : ndarray, shape (p,), or None
+        Least squares with them, where it is known.
     """
     if max(noise_shares(observations.data), default=0.0) < NEGLIGIBLE:
         return None
@@ -49,7 +49,7 @@ def noise_bias(observations: Observations, weights: Array, value: Array) -> Arra
     again = informations(here.model, noisier(here.data).of(places))
     # What is compared is of the same samples.
     same = here is observations and len(places) == len(here.data.recordings)
-    once = value if same else weighted(here.of(places).by_joint, weights).solve().value
+    once = value if same and value is not None else weighted(here.of(places).by_joint, weights).solve().value
     return np.asarray(weighted(again, weights).solve().value - once)
 
 

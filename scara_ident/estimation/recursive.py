@@ -11,7 +11,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, merge
-from scara_ident.estimation.least_squares import least_squares
+from scara_ident.estimation.least_squares import equally, least_squares
 from scara_ident.estimation.observations import Observations
 from scara_ident.manners import Frozen
 
@@ -72,7 +72,6 @@ def rls(
     """
     if not 0.0 < forgetting <= 1.0:
         raise UsageError(f"forgetting is {forgetting:g}; expected a factor per sample above 0 and up to 1")
-    equal = np.ones(len(observations.joints))
     counts = np.mean([joint.counts for joint in observations.joints], axis=0)
     state = prior if prior is not None else Information.empty(observations.parameters)
     value, std, log_det = [], [], []
@@ -84,12 +83,12 @@ def rls(
         log_det.append(-np.inf if np.any(solution.undetermined) else state.log_det())
     history = History(np.cumsum(counts), np.array(value), np.array(std), np.array(log_det))
     if forgetting == 1.0:
-        return least_squares(observations, equal, "rls", prior=prior), history
+        return least_squares(observations, equally, "rls", prior=prior), history
     # What each block still weighs at the end.
     remaining = forgetting ** (np.sum(counts) - np.cumsum(counts))
     remembered = observations.faded(remaining)
     old = None if prior is None else _faded(prior, float(forgetting ** np.sum(counts)))
-    return least_squares(remembered, equal, "rls", prior=old), history
+    return least_squares(remembered, equally, "rls", prior=old), history
 
 
 def _faded(information: Information, decay: float) -> Information:

@@ -10,7 +10,7 @@ maximum likelihood. A component that chance explains is left out.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,10 +20,8 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.days import same_day, widening
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.variance_components import components, expected
 from scara_ident.model.terms.friction import Friction, Offset
 from scara_ident.robot.robot import Robot
-from scara_ident.threads import side_by_side
 
 KINDS = ("friction", "torque scale", "offset", "delay")
 OFFSET = KINDS.index("offset")
@@ -35,7 +33,7 @@ SPOKEN_OF = 0.01
 # Delays of runs whose mean is so many of their standard deviations are one delay: no parameter takes up their mean.
 ALIKE = 2.0
 # Directions of a run below this share of the largest are not told apart.
-_RANK = 1e-9
+RANK = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +76,7 @@ class JointVariation:
         for start, stop in zip(self.bounds[:-1], self.bounds[1:], strict=True):
             rows = size[:, None] * self.directions[:, start:stop]
             values, vectors = np.linalg.eigh(rows @ rows.T)
-            kept = values > _RANK * max(float(np.max(values, initial=0.0)), np.finfo(float).tiny)
+            kept = values > RANK * max(float(np.max(values, initial=0.0)), np.finfo(float).tiny)
             root = np.sqrt(values[kept])
             found.append(((vectors[:, kept] / root).T @ rows, 1.0 / np.sqrt(1.0 + values[kept])))
         return tuple(found)
@@ -148,6 +146,20 @@ class RunVariation:
         """Return signals on a joint's rows, see `JointVariation.whitened`."""
         item = self.joints[joint]
         return signals if item is None else item.whitened(signals)
+
+    def whitened_rows(self, joints: Sequence[JointRows]) -> tuple[JointRows, ...]:
+        """Return the rows of every joint, see `JointVariation.whitened`."""
+        return tuple(replace(rows, table=self.whitened(joint, rows.table)) for joint, rows in enumerate(joints))
+
+    @property
+    def offsets(self) -> RunVariation | None:
+        """The same of the offsets alone; None where they do not differ."""
+        alone = np.arange(len(KINDS)) == OFFSET
+        joints = tuple(
+            None if item is None or item.std[OFFSET] == 0.0 else replace(item, std=item.std * alone)
+            for item in self.joints
+        )
+        return RunVariation(joints) if any(joints) else None
 
     def deviations(self, observations: Observations, value: Array) -> tuple[Array, ...]:
         """Return by how much the torque of each run lies off that of the mean run, on every stretch, shape (n, N) each.
@@ -230,65 +242,6 @@ def unit_of_kind(robot: Robot, joint: str, kind: str) -> str:
     return units[KINDS.index(kind)]
 
 
-def run_variation(
-    observations: Observations, joints: Sequence[JointRows], value: Array, *, of_two: bool = False
-) -> RunVariation:
-    """Estimate how runs differ.
-
-    Parameters
-    ----------
-    observations : Observations
-        Of the base model.
-    joints : sequence of JointRows
-        Its rows, with those of further columns.
-    value : ndarray, shape (p,)
-        Parameters of all these columns.
-    of_two : bool, optional
-        Whether the offsets of two runs are told too: by two, other differences may be the parameters'.
-    """
-    runs = len(observations.data.recordings)
-    if runs < (2 if of_two else LEAST_RUNS):
-        return RunVariation((None,) * len(joints))
-    firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
-    return variation_between(observations, joints, value, firsts)
-
-
-def variation_between(
-    observations: Observations,
-    joints: Sequence[JointRows],
-    value: Array,
-    firsts: NDArray[np.intp],
-    known: RunVariation | None = None,
-) -> RunVariation:
-    """Estimate how groups of blocks that follow each other differ.
-
-    Parameters
-    ----------
-    observations, joints, value
-        See `run_variation`.
-    firsts : ndarray of int, shape (groups + 1,)
-        The block with which each group begins, and the number of blocks.
-    known : RunVariation, optional
-        What runs differ by, which is taken off before.
-    """
-    # Where blocks are triangular factors, or no samples are kept, the rows are not beside those that directions are made of.
-    if not observations.raw or any(rows.sizes is not None for rows in joints):
-        return RunVariation((None,) * len(joints))
-    # Made once, and not in two threads.
-    _ = observations.late(value[: observations.parameters])
-
-    def of_joint(joint: int, rows: JointRows) -> _Sums | None:
-        directions = directions_of(observations, joint, rows, value)
-        item = None if known is None else known.joints[joint]
-        left = rows.left(value) - (0.0 if item is None else item.off)
-        return _sums(directions, left, rows.starts, firsts)
-
-    sums = side_by_side(of_joint, range(len(joints)), joints)
-    told = [item for item in sums if item is not None]
-    estimated = iter(_estimated(told) if told else ())
-    return RunVariation(tuple(None if item is None else next(estimated) for item in sums))
-
-
 def directions_of(observations: Observations, joint: int, rows: JointRows, value: Array) -> Array:
     """Return what one unit of each kind does on the rows of a joint, shape (kinds, N); zero where it does nothing."""
     late = observations.late(value[: observations.parameters])[joint]
@@ -310,91 +263,3 @@ def _of_columns(
     return np.array(
         [own_value[friction] @ signals[friction], own_value @ signals, np.sum(signals[offset], axis=0), rate]
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Sums:
-    """Of one joint, in units of the noise of one row: what its runs say of differences along each direction.
-
-    Attributes
-    ----------
-    directions : ndarray, shape (kinds, N)
-    products : ndarray, shape (runs, kinds, kinds)
-    aims : ndarray, shape (runs, kinds)
-    back : ndarray, shape (kinds,)
-        The unit of each direction; 0 where a kind does nothing.
-    noise : float
-    bounds : ndarray of int, shape (runs + 1,)
-    """
-
-    directions: Array
-    products: Array
-    aims: Array
-    back: Array
-    noise: float
-    bounds: NDArray[np.intp]
-
-
-def _sums(directions: Array, left: Array, starts: NDArray[np.intp], firsts: NDArray[np.intp]) -> _Sums | None:
-    bounds = starts[firsts]
-    runs, kinds = len(bounds) - 1, len(directions)
-    size = np.sqrt(np.sum(directions**2, axis=1) / runs)
-    shown = size > 0.0
-    if not np.any(shown) or not np.any(left):
-        return None
-    found, by_residual, noise, spread = _of_runs(directions[shown] / size[shown, None], left, starts, firsts)
-    if noise == 0.0:
-        return None
-    # The memory of the noise makes directions less sure than white noise would.
-    scale = 1.0 / np.sqrt(spread)
-    products, aims, back = np.zeros((runs, kinds, kinds)), np.zeros((runs, kinds)), np.zeros(kinds)
-    products[:, np.outer(shown, shown)] = (found * np.outer(scale, scale)).reshape(runs, -1)
-    aims[:, shown] = by_residual * scale / noise
-    back[shown] = scale * noise / size[shown]
-    return _Sums(directions, products, aims, back, noise, bounds)
-
-
-def _estimated(joints: Sequence[_Sums]) -> list[JointVariation | None]:
-    """Return how runs differ on each of some joints."""
-    products, aims = np.array([item.products for item in joints]), np.array([item.aims for item in joints])
-    runs = aims.shape[1]
-    told = np.array([item.back > 0.0 for item in joints])
-    if runs < LEAST_RUNS:
-        told &= np.arange(len(KINDS)) == OFFSET
-    variances = components(products, aims, told)
-    means, unsure = expected(products, aims, variances)
-    found: list[JointVariation | None] = []
-    for item, variance, mean, spread in zip(joints, variances, means, unsure, strict=True):
-        # Parameters are fitted to all runs, so that these lie about their own mean.
-        std = np.sqrt(variance * runs / (runs - 1.0)) * item.back
-        some = bool(np.any(variance))
-        of_run, own = mean * item.back, spread * item.back**2
-        found.append(JointVariation(item.directions, std, of_run, item.noise, item.bounds, own) if some else None)
-    return found
-
-
-def _of_runs(
-    unit: Array, left: Array, starts: NDArray[np.intp], firsts: NDArray[np.intp]
-) -> tuple[Array, Array, float, Array]:
-    """Return per run products of directions and with the residual, the noise of a row, and its spread by its memory."""
-    products, aims = [], []
-    bounds = starts[firsts]
-    squares = rows = 0.0
-    scatter, white = np.zeros(len(unit)), np.zeros(len(unit))
-    for run, (start, stop) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
-        own, rest = unit[:, start:stop], left[start:stop]
-        product, aim = own @ own.T, own @ rest
-        products.append(product)
-        aims.append(aim)
-        rest = rest - np.linalg.lstsq(product, aim, rcond=_RANK)[0] @ own
-        squares += float(rest @ rest)
-        rows += max(0.0, stop - start - len(unit))
-        blocks = starts[firsts[run] : firsts[run + 1] + 1]
-        # Blocks without rows have no score.
-        begins = blocks[:-1][np.diff(blocks) > 0] - start
-        if len(begins):
-            scatter += np.sum(np.add.reduceat(own * rest, begins, axis=1) ** 2, axis=1)
-        white += np.diag(product)
-    variance = squares / rows if rows else 0.0
-    spread = np.maximum(1.0, scatter / np.maximum(variance * white, np.finfo(float).tiny))
-    return np.array(products), np.array(aims), float(np.sqrt(variance)), spread

@@ -82,14 +82,14 @@ def possible_standard(found: IdentifiedModel) -> tuple[Array, tuple[str, ...]]:
     """
     if found.standard is not None:
         return found.standard, ()
-    if not any(item.rows for item in found.training):
+    if not any(item.rows for item in found.fitted):
         raise EstimationError("the result holds no observations; no arm that can exist can be found for it")
     # The bodies are what is wanted; friction is as the observations have it.
     problem = Problem(found.model, ConsistentOptions(friction="free"))
     information, notes = found.information, tuple[str, ...]()
     solution = least_squares_arm(problem, information)
     if solution is None:
-        solution, information, _ = solve_joints(problem, found.training)
+        solution, information, _ = solve_joints(problem, found.fitted)
         notes = ("no arm can have the identified parameters; this is the one that explains the same recordings best",)
     x = nearest_arm(problem, information, solution.x)
     return problem.unknowns.standard(x), notes

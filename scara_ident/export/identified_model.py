@@ -16,6 +16,7 @@ from scara_ident.effects import EffectTerm
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.information import Information, weighted
+from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.identification.identify import Identification
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
@@ -43,6 +44,8 @@ class IdentifiedModel:
     undetermined : ndarray of bool, shape (p,)
     weights : ndarray, shape (n,)
         Of each joint's rows in the estimate.
+    fitted : tuple of Information
+        Training rows as the estimate saw them, per joint: offsets of runs are noise, see `Estimate.offsets`.
     training, validation : tuple of Information
         Per joint, within the band; validation has no rows where nothing was held out.
     standard : ndarray, shape (11 n,), or None
@@ -62,6 +65,7 @@ class IdentifiedModel:
     before: Array
     undetermined: NDArray[np.bool_]
     weights: Array
+    fitted: tuple[Information, ...]
     training: tuple[Information, ...]
     validation: tuple[Information, ...]
     standard: Array | None
@@ -98,7 +102,7 @@ class IdentifiedModel:
     @property
     def information(self) -> Information:
         """All training rows as the estimate weighted them."""
-        return weighted(self.training, self.weights)
+        return weighted(self.fitted, self.weights)
 
     @property
     def held_out(self) -> tuple[str, tuple[Information, ...]]:
@@ -126,6 +130,7 @@ class IdentifiedModel:
             value=self.before,
             covariance=self.covariance[np.ix_(own, own)],
             undetermined=self.undetermined[own],
+            fitted=tuple(item.select(own) for item in self.fitted),
             training=tuple(item.select(own) for item in self.training),
             validation=tuple(item.select(own) for item in self.validation),
             found=(),
@@ -189,6 +194,7 @@ def identified_model(found: Identification | Diagnosis) -> IdentifiedModel:
         before=before.value,
         undetermined=estimate.undetermined,
         weights=estimate.weights,
+        fitted=beside_offsets(fitted, estimate.offsets).fitted.by_joint,
         training=tuple(fitted.by_joint),
         validation=tuple(held_out.by_joint),
         standard=estimate.standard if isinstance(estimate, ConsistentEstimate) else None,

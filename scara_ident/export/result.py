@@ -20,6 +20,7 @@ from scara_ident.estimation import Estimate
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.estimation.information import Information
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.files import path_fault, unreadable
 from scara_ident.memory import read_text
@@ -37,6 +38,9 @@ def rebuild_entry(estimate: Estimate, training: Observations, validation: Observ
     """Return what a result file holds under ``rebuild``."""
     robot, terms = estimate.model.robot, estimate.model.terms
     effects = [term for term in terms if isinstance(term, EffectTerm)]
+    kinds = {"training": training, "validation": validation}
+    if estimate.offsets is not None:
+        kinds["fitted"] = beside_offsets(training, estimate.offsets).fitted
     return {
         "robot": _robot_entry(robot),
         "covariance": _packed(estimate.covariance),
@@ -46,7 +50,7 @@ def rebuild_entry(estimate: Estimate, training: Observations, validation: Observ
         "effects": [_effect_entry(term) for term in effects],
         "observations": {
             kind: [_factor_entry(item, own) for item, own in zip(rows.by_joint, rows.model.active, strict=True)]
-            for kind, rows in (("training", training), ("validation", validation))
+            for kind, rows in kinds.items()
         },
     }
 
@@ -105,6 +109,7 @@ def _model_of(content: Mapping[str, Any], path: Path, robot: Path | str | None, 
         before=_array([item.get("before", item["value"]) for item in parameters[: len(base.columns)]]),
         undetermined=open_,
         weights=_array(known["weights"]),
+        fitted=observations.get("fitted", observations["training"]),
         training=observations["training"],
         validation=observations["validation"],
         standard=None if known["standard"] is None else _array(known["standard"]),

@@ -17,6 +17,7 @@ from scara_ident.effects.friction import PositionDependentFriction
 from scara_ident.effects.measurement import TimeDelay
 from scara_ident.estimation.another_run import variance_of_another_run
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.recording.recording import Recording
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.html.diagnosis import DiagnosisContext, _effect_words, _verdict
@@ -81,8 +82,8 @@ def test_the_error_without_it_is_that_of_a_fit_of_all_else_to_what_was_fitted():
     (effect,) = result.effects
     gain = effect.held_out
     assert gain is not None
-    # Of the training rows without the effect, weighted by what each joint leaves; by rows, not by factors.
-    rest = observed(result.search.step.without(0))
+    # Of the training rows without the effect, offsets of runs and what each joint leaves as noise; by rows, not by factors.
+    rest = beside_offsets(observed(result.search.step.without(0)), result.after.offsets).fitted
     weights = np.ones(2)
     value = np.zeros(rest.parameters)
     for _ in range(4):

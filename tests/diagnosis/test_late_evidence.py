@@ -11,7 +11,6 @@ from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.late_evidence import late_evidence
 from scara_ident.estimation import wls
-from scara_ident.estimation.beside_runs import beside_runs
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, observed
@@ -41,7 +40,7 @@ def late(delays: list[float]) -> list[Recording]:
 )
 def test_a_delay_of_all_runs_is_no_noise(delays: list[float], passes: bool):
     training = observed(late(delays))
-    shown = late_evidence(SHOWN, beside_runs(wls(training), training), training)
+    shown = late_evidence(SHOWN, wls(training), training)
     assert [item.shown for item in shown] == [passes, passes]
     if not passes:
         word = "lags" if delays[0] > 0.0 else "leads"

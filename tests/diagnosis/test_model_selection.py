@@ -97,7 +97,7 @@ def test_what_was_found_shows_that_the_band_is_wider() -> None:
 
 @pytest.mark.slow
 def test_an_effect_that_stands_for_one_outside_the_catalogue_is_not_counted() -> None:
-    runs = virtual_runs("unlisted_1:joint2")
+    runs = virtual_runs("unlisted_1:joint2:amplitude=0.01")
     bands = widest(runs)
     outcome = selected(runs, bands=bands, free=False)
     assert outcome.unexplained is not None

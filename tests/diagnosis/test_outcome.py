@@ -7,12 +7,10 @@ import pytest
 
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.evidence import coloured_shares
-from scara_ident.diagnosis.lack_of_fit import lack_of_fit
-from scara_ident.diagnosis.outcome import _least_left, outcome_of, rms_of
+from scara_ident.diagnosis.outcome import outcome_of, rms_of
 from scara_ident.diagnosis.search import SearchTask
 from scara_ident.effects.position import Spring
-from scara_ident.estimation.residuals import Residuals
-from tests.diagnosis.made import exact_runs, observed, runs_that_repeat, searched, virtual_runs, with_torque
+from tests.diagnosis.made import exact_runs, runs_that_repeat, searched, virtual_runs, with_torque
 from tests.diagnosis.test_model_selection import MODEL, selected
 
 
@@ -59,16 +57,3 @@ def test_what_repeats_far_above_noise_is_a_remainder_of_any_colour(size: float, 
     (fit,) = [fit for fit in outcome.fit_after if fit.joint == "joint1"]
     assert (fit.missing > CRITERIA.far_above_noise * fit.noise) is unexplained
     assert (outcome.unexplained is not None) is unexplained
-
-
-def test_what_repeats_is_asked_of_both_fits_joint_by_joint():
-    training = observed(exact_runs())
-    rng, sides = np.random.default_rng(0), []
-    noise = [0.01 * rng.standard_normal(part.torque.shape) for part in training.data.stretches]
-    for joint in (0, 1):
-        predicted = [part.torque - own for part, own in zip(training.data.stretches, noise, strict=True)]
-        for part, torque in zip(training.data.stretches, predicted, strict=True):
-            torque[joint] -= 0.1 * np.sin(part.motion.q[joint])
-        sides.append(Residuals(training.data, tuple(predicted)))
-    assert all(max(fit.missing for fit in lack_of_fit(side)) > 0.01 for side in sides)
-    assert all(fit.missing < 0.002 for fit in lack_of_fit(_least_left(*sides)))

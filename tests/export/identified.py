@@ -71,7 +71,7 @@ def identified(
     open_ = np.zeros(len(value), dtype=bool)
     return IdentifiedModel(
         model=full, value=value, covariance=1e-4 * np.eye(len(value)), before=value[: len(base.columns)], undetermined=open_,
-        weights=np.ones(robot.n), training=information(1), validation=information(2), standard=standard,
+        weights=np.ones(robot.n), fitted=information(1), training=information(1), validation=information(2), standard=standard,
         bands=(None,) * robot.n, rms=np.full(robot.n, NOISE),
     )  # fmt: skip
 

@@ -91,12 +91,12 @@ def test_an_arm_that_can_exist_is_found_from_the_factors_alone(tmp_path: Path):
     # Observations of an arm whose second link has a negative inertia.
     wrong = found.value.copy()
     wrong[found.model.names.index("P_d4")] = -0.5
-    training = tuple(_answering(item, wrong) for item in found.training)
-    standard, notes = possible_standard(replace(found, value=wrong, training=training))
+    fitted = tuple(_answering(item, wrong) for item in found.fitted)
+    standard, notes = possible_standard(replace(found, value=wrong, fitted=fitted))
     assert "no arm can have the identified parameters" in notes[0]
     assert np.all(np.linalg.eigvalsh(standard[14:20][[[0, 1, 3], [1, 2, 4], [3, 4, 5]]]) > -1e-9)
     with pytest.raises(EstimationError, match="holds no observations"):
-        possible_standard(replace(found, training=tuple(Information.empty(len(value)) for _ in range(2))))
+        possible_standard(replace(found, fitted=tuple(Information.empty(len(value)) for _ in range(2))))
 
 
 def _answering(item: Information, value: np.ndarray) -> Information:

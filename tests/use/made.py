@@ -24,7 +24,7 @@ def known_as(model: TorqueModel, value: np.ndarray, *, found: tuple[Entry, ...] 
     n, p = model.robot.n, len(value)
     return IdentifiedModel(
         model=model, value=value, covariance=np.diag(1e-6 * value**2), before=value, undetermined=np.zeros(p, dtype=bool),
-        weights=np.ones(n), training=(Information.empty(p),) * n, validation=(Information.empty(p),) * n, standard=None,
+        weights=np.ones(n), fitted=(Information.empty(p),) * n, training=(Information.empty(p),) * n, validation=(Information.empty(p),) * n, standard=None,
         found=found, **{"bands": (None,) * n, "rms": np.full(n, np.nan), **more},
     )  # fmt: skip
 

@@ -33,7 +33,8 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import UNDETERMINED, Information
 from scara_ident.estimation.least_squares import least_squares
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_variation import run_variation
+from scara_ident.estimation.run_offsets import beside_offsets
+from scara_ident.estimation.variation_between import run_variation
 from scara_ident.threads import one_blas_thread
 
 __all__ = ["ConsistentEstimate", "ConsistentOptions", "consistent", "links", "physical_consistency"]
@@ -113,21 +114,23 @@ def consistent(observations: Observations, *, options: ConsistentOptions | None 
     options = options or ConsistentOptions()
     if not observations.blocks:
         raise EstimationError("no recording to estimate from")
-    plain = least_squares(observations, joint_weights(observations.by_joint, options), "wls")
+    plain = least_squares(observations, lambda joints: joint_weights(joints, options), "wls")
+    rows = beside_offsets(observations, plain.offsets)
     shapes = choose_shapes(declared(model, options)[1], options, observations, plain)
     problem = Problem(model, replace(options, friction={choice.joint: choice.shape for choice in shapes}))
     u = problem.unknowns
     parameter_prior, standard_prior = _priors(u, options)
     found, information, weights = solve_joints(
-        problem, observations.by_joint, parameter_prior=parameter_prior, standard_prior=standard_prior
+        problem, rows.fitted.by_joint, parameter_prior=parameter_prior, standard_prior=standard_prior
     )
     x = nearest_arm(problem, information, found.x, standard_prior=standard_prior)
-    return _estimate(problem, observations, information, weights, plain, found, x, shapes)
+    return _estimate(problem, observations, rows.influence, information, weights, plain, found, x, shapes)
 
 
 def _estimate(
     problem: Problem,
     observations: Observations,
+    influence: Observations,
     information: Information,
     weights: Array,
     plain: Estimate,
@@ -139,10 +142,10 @@ def _estimate(
     value = u.parameters(x)
     free, labels = _free_directions(u, found.point)
     inverse = _inverse_along(information, free, u.sizes(value))
-    spread = block_covariance(inverse, value, observations.joints, observations.owner, weights)
+    spread = block_covariance(inverse, value, influence.joints, observations.owner, weights)
     undetermined = information.solve().undetermined
     variation = run_variation(observations, observations.joints, value)
-    covariance = spread.matrix + variation.covariance(inverse, observations.joints, weights)
+    covariance = spread.matrix + variation.covariance(inverse, influence.joints, weights)
     bias = None
     if plain.noise_bias is not None:
         # As far as constraints let the noise of the positions move the estimate.
@@ -172,6 +175,7 @@ def _estimate(
         shapes=shapes,
         notes=_notes(u, labels, value, covariance),
         variation=variation,
+        offsets=plain.offsets,
         noise_bias=bias,
     )
 

@@ -33,6 +33,7 @@ from scara_ident.estimation.consistent.friction import LUBRICATED
 from scara_ident.estimation.consistent.options import ConsistentOptions, FrictionShape
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.model.terms.constraints import BrakingPolynomial
 
 # A shape is contradicted where data such as these are this rare under it.
@@ -186,7 +187,9 @@ def block_shares(observations: Observations, plain: Estimate, columns: Sequence[
     inverse = inverse / np.where(size > 0.0, size, 1.0)[:, None]
     shares = np.zeros((observations.blocks, len(places), len(places)))
     scores = np.zeros((observations.blocks, len(places)))
-    for rows, weight in zip(observations.joints, plain.weights, strict=True):
+    # Beside offsets of runs, an estimate is moved by what these leave of the rows.
+    influencing = beside_offsets(observations, plain.offsets).influence.joints
+    for rows, weight in zip(influencing, plain.weights, strict=True):
         influence = weight * (inverse[:, rows.columns] @ rows.table[:-1])
         residual = weight * rows.left(plain.value)
         for b, (start, stop) in enumerate(pairwise(rows.starts)):

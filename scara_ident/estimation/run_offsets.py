@@ -1,0 +1,48 @@
+"""Rows on which offsets that differ from run to run are the noise that they are.
+
+One offset for all runs leaves each run's own to be explained by something else: gravity, where motions differ. Generalised
+least squares (Aitken 1936) takes them for draws of a variance, so that a run says little of its mean torque and all it knows
+of the rest. Offsets alone are weighted so: a model that lacks something seems to differ from motion to motion in friction
+and torque scale, and to weigh those down would leave it to the motions that it fits best.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_variation import RunVariation
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetRows:
+    """Observations as a fit sees them.
+
+    Attributes
+    ----------
+    fitted : Observations
+        Their rows times V^-1/2, with V the covariance of a row's noise and of the offsets, in units of the noise: ordinary
+        least squares on them is generalised least squares.
+    influence : Observations
+        Their rows times V^-1: the columns are by what a row moves that estimate, and what is left is the noise without the
+        offsets.
+    """
+
+    fitted: Observations
+    influence: Observations
+
+
+def beside_offsets(observations: Observations, offsets: RunVariation | None) -> OffsetRows:
+    """Return rows with offsets of runs as noise.
+
+    Parameters
+    ----------
+    observations : Observations
+    offsets : RunVariation or None
+        How far they lie apart, see `RunVariation.offsets`; None where they do not.
+    """
+    if offsets is None:
+        return OffsetRows(observations, observations)
+    once = offsets.whitened_rows(observations.joints)
+    twice = offsets.whitened_rows(once)
+    return OffsetRows(replace(observations, joints=once), replace(observations, joints=twice))
