@@ -75,7 +75,7 @@ def _cancelling(step: SelectionStep) -> list[tuple[Confounder, ...]]:
     found: list[tuple[Confounder, ...]] = [() for _ in step.chosen]
     if len({item.member.joint for item in step.chosen}) == len(step.chosen):
         return found
-    value, _ = value_and_weights(observed(step))
+    value, _ = value_and_weights(observed(step), step.offsets)
     torques, start = [], step.observations.parameters
     for rows in step.rows(step.scene, step.chosen):
         count = len(next(iter(rows.values())))

@@ -53,7 +53,7 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
     """
     whole, last = np.zeros(len(candidate.effect.columns(step.scene, candidate.member))), np.inf
     for _ in range(MOST_CORRECTIONS):
-        (own,) = step.columns.rows(step.scene, [candidate])
+        (own,) = step.rows(step.scene, [candidate])
         value, _ = coefficients(step.model, own, step.criteria)
         size = float(np.linalg.norm(value))
         if candidate.effect.settled(value) or size >= last:
@@ -61,7 +61,7 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
         whole, last = whole + value, size
         observations = step.observations.with_torque(corrected(step.observations.data, candidate, value))
         step = replace(step, columns=step.columns.beside(observations))
-        estimate, weights = value_and_weights(observed(step))
+        estimate, weights = value_and_weights(observed(step), step.offsets)
         scene = replace(step.scene, value=estimate[: len(step.scene.model.columns)])
         step = replace(step, scene=scene, weights=weights)
     return step.columns, whole

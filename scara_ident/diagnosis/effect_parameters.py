@@ -82,7 +82,6 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
     Parameters
     ----------
     step : SelectionStep
-        Its `variation` are offsets of runs that are noise, see `Estimate.offsets`.
     scatter_alone : bool, optional
         Whether standard deviations leave out what runs differ by and what the noise of the positions does.
 
@@ -92,7 +91,7 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
     covariance is that of all parameters together.
     """
     std = step.criteria.rotor_inertia_std
-    state = linearise(step.scene, step.columns, step.weights, step.chosen, std, step.variation)
+    state = linearise(step.scene, step.columns, step.weights, step.chosen, std, step.offsets)
     covariance = _covariance(step, state, scatter_alone=scatter_alone)
     undetermined = merge([state.information, state.prior]).solve().undetermined
     found: list[dict[str, Parameter]] = []
@@ -155,12 +154,12 @@ def parameters_beside(step: SelectionStep, candidate: Candidate) -> dict[str, Pa
     The model's columns are projected out, and the covariance is that of the effect's block scores. Armatures stay as
     they are.
     """
-    (own,) = step.columns.rows(step.scene, [candidate])
+    (own,) = step.rows(step.scene, [candidate])
     (alone,) = examine(step.model, [own], step.criteria)
     wide: Rows = {joint: rows for joint, rows in own.items()}
     size = len(alone.value)
     for one, other, reach in sides(candidate):
-        up, down = step.columns.rows(step.scene, [one, other])
+        up, down = step.rows(step.scene, [one, other])
         for joint in wide:
             change = alone.value @ (up[joint] - down[joint]) / (2.0 * reach)
             wide[joint] = np.concatenate([wide[joint], change[None]])
@@ -175,8 +174,8 @@ def _covariance(step: SelectionStep, state: Linearised, *, scatter_alone: bool) 
     value = np.concatenate([state.value, np.zeros(len(state.unknowns))])
     # By what a row moves the fit; see `scara_ident.estimation.run_offsets`.
     influence: Sequence[JointRows] = state.joints
-    if step.variation is not None:
-        influence = step.variation.whitened_rows(step.variation.whitened_rows(state.joints))
+    if step.offsets is not None:
+        influence = step.offsets.whitened_rows(step.offsets.whitened_rows(state.joints))
     spread = block_covariance(inverse, value, influence, step.observations.owner, step.weights).matrix
     if not scatter_alone:
         variation = run_variation(step.observations, state.joints, value)
@@ -194,8 +193,8 @@ def _noise_bias(step: SelectionStep, state: Linearised) -> Array:
     scene, chosen = twin.scene, twin.chosen
     if len(state.ties.factor):
         # A resonance with little damping bends too much for one step.
-        scene, chosen = tune(scene, twin.columns, step.weights, chosen, std, offsets=step.variation)
-    again = linearise(scene, twin.columns, step.weights, chosen, std, step.variation)
+        scene, chosen = tune(scene, twin.columns, step.weights, chosen, std, offsets=step.offsets)
+    again = linearise(scene, twin.columns, step.weights, chosen, std, step.offsets)
     bias = again.solve()[0] - state.solve()[0]
     bias[state.linear :] += [
         there.value - here.value for there, here in zip(again.unknowns, state.unknowns, strict=True)

@@ -18,9 +18,9 @@ from scara_ident.diagnosis.proxies import proxies
 from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.work import first, next_of
+from scara_ident.estimation import wls
 from scara_ident.estimation.bands import HIGHEST_BAND, choose_bands
 from scara_ident.estimation.explained_power import EXPLAINED, sample
-from scara_ident.estimation.least_squares import told_value_and_weights
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.prepared import PreparedData
 
@@ -97,12 +97,13 @@ def _band_beyond(task: SearchTask, found: Search) -> float:
         return 0.0
     # One repetition of each motion shows what is large enough.
     columns = CandidateColumns(observe(task.model, sample(found.data.at((band,) * len(found.bands)))))
-    value, weights = told_value_and_weights(columns.observations)
-    scene = replace(scene_of(task.model, value, columns.observations), armatures=found.scene.armatures)
+    start = wls(columns.observations)
+    scene = replace(scene_of(task.model, start.value, columns.observations), armatures=found.scene.armatures)
     members = [Candidate(effect, item) for effect in task.catalogue for item in effect.members(scene)]
     # What the band at hand holds was tried there.
     needing = [item for item in members if item.effect.band(item.member) > _widest(found.data)]
-    step = SelectionStep(scene, columns, found.chosen, weights, found.tried + len(needing), task.criteria)
+    tried = found.tried + len(needing)
+    step = SelectionStep(scene, columns, found.chosen, start.weights, tried, task.criteria, start.offsets)
     # The band was left where the motion explains less than half: so much of what is seen further up must be this effect.
     seen = [item for item in step.judge(needing) if item.accepted and item.gain >= task.criteria.near_best * EXPLAINED]
     fitted = [(own, item) for own, item in fitted_beside(step, seen, 0.0, None) if item.accepted]

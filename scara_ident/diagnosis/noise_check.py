@@ -15,6 +15,7 @@ from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Scene
 from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
+from scara_ident.estimation.run_offsets import offsets_on
 from scara_ident.motion.position_noise import noise_sizes
 
 
@@ -81,7 +82,8 @@ def _gone_further_down(step: SelectionStep, decision: Decision) -> str | None:
         return None
     share = criteria.lower_band
     narrower = tuple(share * (band or step.scene.band) for band in step.observations.data.bands)
-    below = replace(step, columns=step.columns.at(narrower), variation=None)
+    columns = step.columns.at(narrower)
+    below = replace(step, columns=columns, variation=offsets_on(columns.observations, step.offsets))
     found = examine(below.model, below.rows(below.scene, [candidate]), criteria)[0]
     apart, spread = found.value - whole.value, found.covariance + whole.covariance
     p_value = significance(apart, spread, min(found.freedom, whole.freedom), found.products)
@@ -119,7 +121,7 @@ def _each_without_noise(step: SelectionStep, decisions: Sequence[Decision], scen
     """Return `without_noise` of each, examined beside a model by the columns of a scene."""
     noisier = step.noisier
     at = noisier.scene if scene is None else replace(scene, columns=noisier.scene.columns)
-    rows = noisier.columns.rows(at, [item.candidate for item in decisions])
+    rows = noisier.rows(at, [item.candidate for item in decisions])
     return [
         without_noise(item.examination, *coefficients(noisier.model, own, step.criteria))
         for item, own in zip(decisions, rows, strict=True)

@@ -101,7 +101,8 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
     after, left = found.start, before
     if training is not found.uncorrected:
         after = wls(training)
-        if after.offsets is not None and found.chosen:
+        if found.chosen and (after.offsets or found.step.offsets):
+            # With the effects in the model offsets of runs are others, or none.
             found = found.beside(after.offsets)
             training = observed_at_every_sample(found.step)
             after = wls(training)

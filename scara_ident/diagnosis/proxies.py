@@ -118,7 +118,7 @@ def _each_without(found: Outcome, labels: list[str]) -> Iterator[tuple[Step, ByJ
         if fitted is None:
             yield step, before, step.rms
         else:
-            yield step, rms_of(value_and_weights(fitted)[0], fitted), whole
+            yield step, rms_of(value_and_weights(fitted, found.after.offsets)[0], fitted), whole
         before = step.rms
 
 

@@ -130,15 +130,16 @@ class Search:
         """Return it without some of the effects that stayed, the others fitted again."""
         kept = tuple(item for item in self.chosen if item.label(self.scene) not in labels)
         step = self.step
-        scene, kept = tune(self.scene, step.columns, step.weights, kept, step.criteria.rotor_inertia_std)
+        std, offsets = step.criteria.rotor_inertia_std, step.offsets
+        scene, kept = tune(self.scene, step.columns, step.weights, kept, std, offsets=offsets)
         steps = tuple(item for item in self.steps if item.decision.label not in labels)
         return replace(self, step=replace(step, scene=scene, chosen=kept), steps=steps)
 
-    def beside(self, offsets: RunVariation) -> Search:
+    def beside(self, offsets: RunVariation | None) -> Search:
         """Return it with the nonlinear parameters fitted beside offsets of runs, see `Estimate.offsets`."""
         step, std = self.step, self.step.criteria.rotor_inertia_std
         scene, chosen = tune(self.scene, step.columns, step.weights, self.chosen, std, offsets=offsets)
-        return replace(self, step=replace(step, scene=scene, chosen=chosen))
+        return replace(self, step=replace(step, scene=scene, chosen=chosen, variation=offsets))
 
     def whole(self, step: SelectionStep) -> SelectionStep:
         """Return a step of the effects that stayed, with what was taken out of the data as the last of them.
@@ -202,14 +203,14 @@ def search(
     chosen: tuple[Candidate, ...] = ()
     steps: list[Step] = []
     correction: Correction | None = None
-    weights, value = start.weights, start.value
+    weights, value, offsets = start.weights, start.value, start.offsets
     rounds = exchanges = 0
     while True:
         words = f"trying {len(candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else "")
         task.progress(words, after_rounds(rounds))
         rounds += 1
         columns.forget_all_but(first, scene)
-        step = SelectionStep(scene, columns, chosen, weights, tried, criteria)
+        step = SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets)
         decisions = step.judge(candidates, first)
         residuals = Residuals(observations.data, columns.predicted(scene, chosen, value))
         seeds = line_candidates(scene, residuals, task.catalogue, criteria)
@@ -231,16 +232,18 @@ def search(
             candidates += [item for item in everything if item.label(scene) == gone]
         candidate, found = winner.candidate, winner.examination
         if candidate.corrects_data:
-            columns, value = taken_out(SelectionStep(scene, columns, chosen, weights, tried, criteria), candidate)
+            columns, value = taken_out(
+                SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets), candidate
+            )
             observations = columns.observations
             correction = Correction(candidate, value + (correction.value if correction else 0.0))
         else:
             chosen = (*chosen, candidate)
         if not candidate.corrects_data or candidate.effect.settled(found.value):
             candidates = [item for item in candidates if item.label(scene) != winner.label]
-        scene, chosen = tune(scene, columns, weights, chosen, criteria.rotor_inertia_std)
-        fitted = observed(SelectionStep(scene, columns, chosen, weights, tried, criteria))
-        value, weights = value_and_weights(fitted)
+        scene, chosen = tune(scene, columns, weights, chosen, criteria.rotor_inertia_std, offsets=offsets)
+        fitted = observed(SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets))
+        value, weights = value_and_weights(fitted, offsets)
         scene = replace(scene, value=value[: len(task.model.columns)])
         repeated = bool(steps) and steps[-1].decision.label == winner.label
         left = tuple(item.rms(value) if item.rows else None for item in fitted.by_joint)
@@ -248,14 +251,14 @@ def search(
     if correction is not None:
         # What came in since had moved it.
         columns, value = taken_out(
-            SelectionStep(scene, columns, chosen, weights, tried, criteria), correction.candidate
+            SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets), correction.candidate
         )
         correction = replace(correction, value=value + correction.value)
-    kept = needed(SelectionStep(scene, columns, chosen, weights, tried, criteria))
-    scene, kept = tune(scene, columns, weights, kept, criteria.rotor_inertia_std)
+    kept = needed(SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets))
+    scene, kept = tune(scene, columns, weights, kept, criteria.rotor_inertia_std, offsets=offsets)
     labels = {item.label(scene) for item in kept}
     stayed = [item for item in steps if item.decision.label in labels or item.decision.candidate.corrects_data]
-    final = SelectionStep(scene, columns, kept, weights, tried, criteria)
+    final = SelectionStep(scene, columns, kept, weights, tried, criteria, offsets)
     others = [Candidate(effect, member) for effect in task.catalogue for member in effect.doubtful(first)]
     doubtful = tuple(item for item in others if item.label(scene) not in labels)
     return Search(final, uncorrected, start, tuple(stayed), correction, tuple(decisions), first, doubtful)

@@ -19,6 +19,7 @@ from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.effects import Scene
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_offsets import offsets_on
 from scara_ident.estimation.run_variation import RunVariation
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.prepared import PreparedData
@@ -45,7 +46,7 @@ class SelectionStep:
         Candidates and scan points tried.
     criteria : SelectionCriteria
     variation : RunVariation or None
-        What runs differ by, where all rows are to weigh it as the noise it is.
+        What runs differ by, where all rows are to weigh it as the noise it is: their offsets, or all of it.
     """
 
     scene: Scene
@@ -71,6 +72,11 @@ class SelectionStep:
         return replace(model, joints=self.variation.whitened_rows(model.joints))
 
     @property
+    def offsets(self) -> RunVariation | None:
+        """Offsets of runs, which fits take for noise whatever else rows weigh so, see `Estimate.offsets`."""
+        return None if self.variation is None else self.variation.offsets
+
+    @property
     def filled(self) -> NDArray[np.intp]:
         """Places of the blocks that have rows."""
         return filled_blocks(self.observations.joints)
@@ -79,7 +85,8 @@ class SelectionStep:
     def noisier(self) -> SelectionStep:
         """The same step had the positions their noise once more on top."""
         twin = self.columns.noisier
-        return replace(self, scene=replace(self.scene, columns=columns_at_hand(twin.observations)), columns=twin)
+        scene = replace(self.scene, columns=columns_at_hand(twin.observations))
+        return replace(self, scene=scene, columns=twin, variation=offsets_on(twin.observations, self.offsets))
 
     def rows(self, scene: Scene, candidates: Sequence[Candidate]) -> list[Rows]:
         """Return the columns of candidates as they are tried beside the model."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from scara_ident.arrays import Array
@@ -26,6 +28,8 @@ def noise_density(diagnosis: Diagnosis) -> Array:
     maybe = [item.decision.candidate for item in diagnosis.tentative if item.decision is not None]
     columns = step.columns.rows(search.scene, [*search.chosen, *maybe])
     model = fitted_model(step.observations, columns, after.weights, 1)
+    if after.offsets is not None:
+        model = replace(model, joints=after.offsets.whitened_rows(model.joints))
     parts = [part for part in step.observations.data.stretches if part.usable]
     rate = min(part.rate for part in parts)
     level, thinned, count = np.full(len(model.joints), np.inf), 0.0, 0

@@ -201,10 +201,17 @@ def weighted_value(joints: Sequence[Information]) -> Array:
         return weighted(joints, 1.0 / joint_noise(joints)).solve().value
 
 
-def value_and_weights(observations: Observations) -> tuple[Array, Array]:
-    """Return parameters (p,) and joints' weights (n,) of `wls`, without the work of a covariance."""
+def value_and_weights(observations: Observations, offsets: RunVariation | None = None) -> tuple[Array, Array]:
+    """Return parameters (p,) and joints' weights (n,) of `wls`, without the work of a covariance.
+
+    Parameters
+    ----------
+    observations : Observations
+    offsets : RunVariation, optional
+        Offsets of runs that are noise, see `Estimate.offsets`.
+    """
     with one_blas_thread():
-        joints = _joints(observations)
+        joints = _joints(beside_offsets(observations, offsets).fitted)
         weights = 1.0 / joint_noise(joints)
         return weighted(joints, weights).solve().value, weights
 

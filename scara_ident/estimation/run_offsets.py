@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_variation import RunVariation
+from scara_ident.estimation.run_variation import OFFSET, RunVariation, offset_direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,3 +48,26 @@ def beside_offsets(observations: Observations, offsets: RunVariation | None) -> 
     once = offsets.whitened_rows(observations.joints)
     twice = offsets.whitened_rows(once)
     return OffsetRows(replace(observations, joints=once), replace(observations, joints=twice))
+
+
+def offsets_on(observations: Observations, offsets: RunVariation | None) -> RunVariation | None:
+    """Return the same offsets on other rows of the same runs, as of another band; white noise of a row is the same there.
+
+    Parameters
+    ----------
+    observations : Observations
+        Of a model with the same offsets.
+    offsets : RunVariation or None
+    """
+    if offsets is None:
+        return None
+    joints, firsts = (
+        list(offsets.joints),
+        np.searchsorted(observations.owner, np.arange(len(observations.data.recordings) + 1)),
+    )
+    for joint, (item, rows) in enumerate(zip(offsets.joints, observations.joints, strict=True)):
+        if item is not None:
+            directions = np.zeros((len(item.std), rows.table.shape[1]))
+            directions[OFFSET] = offset_direction(observations.model, rows)
+            joints[joint] = replace(item, directions=directions, bounds=rows.starts[firsts])
+    return RunVariation(tuple(joints))

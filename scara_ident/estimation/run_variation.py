@@ -20,7 +20,9 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.days import same_day, widening
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations
+from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.friction import Friction, Offset
+from scara_ident.model.terms.term import Term
 from scara_ident.robot.robot import Robot
 
 KINDS = ("friction", "torque scale", "offset", "delay")
@@ -248,17 +250,26 @@ def directions_of(observations: Observations, joint: int, rows: JointRows, value
     return _of_columns(observations, rows.columns, value, rows.table[:-1], late)
 
 
+def offset_direction(model: TorqueModel, rows: JointRows) -> Array:
+    """Return what an offset of one unit does on the rows of a joint, shape (N,)."""
+    return np.asarray(np.sum(rows.table[:-1][_of_terms(model, rows.columns, Offset)], axis=0))
+
+
+def _of_terms(model: TorqueModel, columns: NDArray[np.intp], kind: type[Term]) -> NDArray[np.bool_]:
+    """Return which columns are of terms of a kind."""
+    found = np.zeros(len(columns), dtype=bool)
+    for term in model.terms:
+        if isinstance(term, kind):
+            place = model.place(term)
+            found |= (columns >= place.start) & (columns < place.stop)
+    return found
+
+
 def _of_columns(
     observations: Observations, columns: NDArray[np.intp], value: Array, signals: Array, rate: Array
 ) -> Array:
     """Return what one unit of each kind does, of the columns (k, N) of a joint and what one second of delay does."""
-    model = observations.model
-    friction, offset = np.zeros(len(columns), dtype=bool), np.zeros(len(columns), dtype=bool)
-    for term in model.terms:
-        place = model.place(term)
-        own = (columns >= place.start) & (columns < place.stop)
-        friction |= own & isinstance(term, Friction)
-        offset |= own & isinstance(term, Offset)
+    friction, offset = (_of_terms(observations.model, columns, kind) for kind in (Friction, Offset))
     own_value = value[columns]
     return np.array(
         [own_value[friction] @ signals[friction], own_value @ signals, np.sum(signals[offset], axis=0), rate]

@@ -64,8 +64,7 @@ def test_what_is_mostly_noise_is_not_believed_however_sure_the_rest_is(
 ):
     """An elastic elbow stood for a wrist's: a tenth of it was left without the noise, with p = 1e-20."""
     once, twice = with_noise_once_and_twice(true, 0.02)
-    rows = SimpleNamespace(rows=lambda scene, candidates: [None])
-    noisier = SimpleNamespace(columns=rows, scene=None, model=None)
+    noisier = SimpleNamespace(rows=lambda scene, candidates: [None], scene=None, model=None)
     columns = SimpleNamespace(unresolved_for=lambda joint: None)
     step = SimpleNamespace(columns=columns, noisier=noisier, criteria=CRITERIA, tried=100)
     monkeypatch.setattr(noise_check, "coefficients", lambda *_: (twice.value, twice.products))

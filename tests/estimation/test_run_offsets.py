@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from scara_ident.estimation import ols, wls
+from scara_ident.estimation.least_squares import told_value_and_weights
 from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.run_offsets import beside_offsets, offsets_on
 from scara_ident.model.model import build_model
 from scara_ident.model.urdf_values import urdf_values
 from scara_ident.motion.prepared import prepare
@@ -60,3 +62,46 @@ def test_standard_deviations_are_those_of_runs_without_offsets_but_for_the_offse
         ratio.append((found.std / steady.std)[gravity])
     assert np.all(np.abs(np.sqrt(np.mean(np.square(errors), axis=0)) - 1.0) < 0.5)
     assert np.median(ratio) < 1.5
+
+
+def test_the_influence_of_rows_is_what_moves_the_value(robot: Robot):
+    """By generalised least squares of all rows at once, with the whole covariance."""
+    observations = observed(robot, 0.5)
+    found = wls(observations)
+    rows = beside_offsets(observations, found.offsets)
+    parameters = observations.parameters
+    normal, right, moved = np.zeros((parameters, parameters)), np.zeros(parameters), np.zeros((parameters, 0))
+    for joint, (own, influence) in enumerate(zip(observations.joints, rows.influence.joints, strict=True)):
+        item, count = found.offsets.joints[joint], own.table.shape[1]
+        covariance = np.eye(count)
+        for start, stop in zip(item.bounds[:-1], item.bounds[1:], strict=True):
+            one = item.directions[2, start:stop] * item.std[2] / item.noise
+            covariance[start:stop, start:stop] += np.outer(one, one)
+        weight = np.linalg.inv(covariance) * found.weights[joint] ** 2
+        wide = np.zeros((parameters, count))
+        wide[own.columns] = own.table[:-1]
+        normal += wide @ weight @ wide.T
+        right += wide @ weight @ own.table[-1]
+        moved = np.hstack([moved, wide @ weight])
+        np.testing.assert_allclose(
+            influence.table[:-1] * found.weights[joint] ** 2,
+            (wide @ weight)[own.columns],
+            atol=1e-6 * found.weights[joint] ** 2,
+        )
+    np.testing.assert_allclose(np.linalg.solve(normal, right), found.value, rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(found.information.inverse(), np.linalg.inv(normal), rtol=1e-5, atol=1e-12)
+
+
+def test_offsets_of_one_band_are_those_of_another(robot: Robot):
+    observations = observed(robot, 0.5)
+    offsets = wls(observations).offsets
+    assert offsets_on(observations, None) is None
+    for one, same in zip(offsets.joints, offsets_on(observations, offsets).joints, strict=True):
+        np.testing.assert_array_equal(same.directions[2], one.directions[2])
+        np.testing.assert_array_equal(same.bounds, one.bounds)
+    narrow = observe(observations.model, observations.data.at((4.0, 4.0)))
+    there, own = offsets_on(narrow, offsets), wls(narrow).offsets
+    for one, other in zip(there.joints, own.joints, strict=True):
+        np.testing.assert_allclose(one.std[2] / one.noise, other.std[2] / other.noise, rtol=0.2)
+    value = [wls(narrow).value, told_value_and_weights(narrow, there)[0]]
+    assert np.linalg.norm((value[1] - value[0]) / wls(narrow).std) < 0.1
