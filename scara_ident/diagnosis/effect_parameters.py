@@ -193,8 +193,8 @@ def _noise_bias(step: SelectionStep, state: Linearised) -> Array:
     scene, chosen = twin.scene, twin.chosen
     if len(state.ties.factor):
         # A resonance with little damping bends too much for one step.
-        scene, chosen = tune(scene, twin.columns, step.weights, chosen, std, offsets=step.offsets)
-    again = linearise(scene, twin.columns, step.weights, chosen, std, step.offsets)
+        scene, chosen = tune(scene, twin.columns, step.weights, chosen, std, offsets=twin.offsets)
+    again = linearise(scene, twin.columns, step.weights, chosen, std, twin.offsets)
     bias = again.solve()[0] - state.solve()[0]
     bias[state.linear :] += [
         there.value - here.value for there, here in zip(again.unknowns, state.unknowns, strict=True)

@@ -53,3 +53,16 @@ def test_effects_are_as_true_as_of_runs_without_offsets(tmp_path: Path):
         np.testing.assert_allclose(exported.information.solve().value, result.after.value, rtol=1e-6, atol=1e-9)
     assert np.all(np.array(std[0.5]) < 1.3 * np.array(std[0.0]))
     assert np.all(np.abs(np.subtract(value[0.5], value[0.0])) < 0.5 * np.array(std[0.0]))
+
+
+def test_an_encoder_with_steps_changes_nothing_of_that(tmp_path: Path):
+    """Noise once more on top of the positions leaves other rows: a diagnosis ended in an internal error."""
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
+    step = 2.0 * np.pi / 2**12
+    coarse = [replace(run, position=np.round(run.position / step) * step) for run in made(robot, 0.5, 6)]
+    found = diagnose(
+        robot, coarse, model="basic", bands=(8.0, 8.0), catalogue=effects_named("spring", "transmission_loss")
+    )
+    (spring,) = [item for item in found.effects if item.effect == "spring"]
+    stiffness = spring.parameters["stiffness"]
+    assert abs(stiffness.value - STIFFNESS) < 3.0 * stiffness.std < 0.05
