@@ -56,7 +56,7 @@ class Estimate(Saved, told_by="estimate"):
     undetermined : ndarray of bool, shape (p,)
         Parameters that the data leave open, alone or in a combination.
     information : Information
-        All rows with the weights of the estimate.
+        All rows with the weights of the estimate, offsets of runs as the noise they were to it.
     weights : ndarray, shape (n,)
         Weight of each joint's rows.
     std_kind : str

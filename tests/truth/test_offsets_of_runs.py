@@ -11,6 +11,7 @@ import pytest
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.effects.catalogue import effects_named
 from scara_ident.export.identified_model import identified_model
+from scara_ident.identification.identify import identify
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import PLANAR_2R, noisy, swing, write_urdf
@@ -20,14 +21,14 @@ pytestmark = pytest.mark.slow
 STIFFNESS, WIDTH, DEPTH = 0.8, 0.3, 0.6
 
 
-def made(robot: Robot, offset: float, seed: int) -> list[Recording]:
+def made(robot: Robot, offset: float, seed: int, lacking: float = 1.0) -> list[Recording]:
     rng, runs = np.random.default_rng(seed), []
     for motion in (1, 2, 3):
         for repetition in (1, 2):
             run = noisy(swing(robot, f"s{motion}_{repetition}", motion, 12.0, 200.0), rng, 0.05)
             speed = np.gradient(run.position[0], run.time)
             more = np.array([DEPTH * np.sign(speed) * np.exp(-((speed / WIDTH) ** 2)), STIFFNESS * run.position[1]])
-            effort = run.effort + more + offset * rng.standard_normal((2, 1))
+            effort = run.effort + lacking * more + offset * rng.standard_normal((2, 1))
             runs.append(replace(run, effort=effort, repetition=repetition, trajectory=f"s{motion}"))
     return runs
 
@@ -66,3 +67,12 @@ def test_an_encoder_with_steps_changes_nothing_of_that(tmp_path: Path):
     (spring,) = [item for item in found.effects if item.effect == "spring"]
     stiffness = spring.parameters["stiffness"]
     assert abs(stiffness.value - STIFFNESS) < 3.0 * stiffness.std < 0.05
+
+
+@pytest.mark.parametrize("method", ["wls", "consistent"])
+def test_a_fit_that_bounds_blocks_of_time_agrees(tmp_path: Path, method: str):
+    """It had one offset for all runs: by 171 standard deviations another first moment."""
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
+    found = identify(robot, made(robot, 0.5, 1, 0.0), model="basic", bands=(8.0, 8.0), method=method)
+    assert not any("bounds" in note for note in found.notes)
+    assert found.events == ()
