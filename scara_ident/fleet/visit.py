@@ -202,6 +202,9 @@ def _visit(model: TorqueModel, recordings: Sequence[Recording], reference: Refer
     # What one second of delay of each joint's torque does on its rows.
     delays: list[Rows] = [{j: own[None]} for j, own in enumerate(observations.late(reference.value))]
     rows = with_columns(observations, [*added, *delays])
+    if estimate.offsets is not None:
+        # What gravity takes up of the runs' own would be another change on each date.
+        rows = estimate.offsets.whitened_rows(rows)
     known = [Information.empty(len(item.columns)).absorb_columns(item.table).factor for item in rows]
     errors = [
         np.nan if item is None or item.relative is None else item.relative for item in estimate.errors(result.training)

@@ -14,6 +14,7 @@ from scara_ident.estimation.run_offsets import beside_offsets, offsets_on
 from scara_ident.model.model import build_model
 from scara_ident.model.urdf_values import urdf_values
 from scara_ident.motion.prepared import prepare
+from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import PLANAR_2R, noisy, swing, write_urdf
 
@@ -23,7 +24,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
     return load_robot(write_urdf(tmp_path_factory.mktemp("arm") / "arm.urdf", PLANAR_2R))
 
 
-def observed(robot: Robot, offset: float, seed: int = 0) -> Observations:
+def zeroed_runs(robot: Robot, offset: float, seed: int = 0) -> list[Recording]:
     """Three motions, each recorded twice, every run with offsets of its own on both joints."""
     rng, made = np.random.default_rng(seed), []
     for motion in (1, 2, 3):
@@ -31,7 +32,11 @@ def observed(robot: Robot, offset: float, seed: int = 0) -> Observations:
             run = noisy(swing(robot, f"s{motion}_{repetition}", motion, 12.0, 200.0), rng, 0.05)
             off = offset * rng.standard_normal((2, 1))
             made.append(replace(run, effort=run.effort + off, repetition=repetition, trajectory=f"s{motion}"))
-    return observe(build_model(robot, "basic"), prepare(made, (8.0, 8.0)))
+    return made
+
+
+def observed(robot: Robot, offset: float, seed: int = 0) -> Observations:
+    return observe(build_model(robot, "basic"), prepare(zeroed_runs(robot, offset, seed), (8.0, 8.0)))
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

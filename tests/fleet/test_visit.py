@@ -8,12 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scara_ident.estimation.information import Information, joint_noise, triangular, weighted
 from scara_ident.fleet.folder import RecordingFile
-from scara_ident.fleet.visit import look, watched
+from scara_ident.fleet.visit import _visit, look, watched
 from scara_ident.identification.identify import identify
+from scara_ident.model.model import build_model
 from scara_ident.recording import long_file
 from scara_ident.recording.recording import read_recording
 from scara_ident.robot.robot import load_robot
+from tests.arms import PLANAR_2R, write_urdf
+from tests.estimation.test_run_offsets import zeroed_runs
 from tests.fleet.made import DATES
 
 ROBOT = pickle.dumps(load_robot())
@@ -86,3 +90,17 @@ def test_a_long_file_is_a_visit_too(folder, histories, monkeypatch):
         monkeypatch.setattr(long_file, name, size)
     visit, faults = look(ROBOT, "complete", [file_of(folder)], histories[0].visits[0].reference)
     assert (faults, visit is not None) == ((), True)
+
+
+def test_offsets_of_runs_are_no_gravity_of_a_date(tmp_path):
+    """Each date's own would be a change of the arm from one date to the next."""
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
+    model, visit = build_model(robot, "basic"), None
+    for date in range(3):
+        visit = _visit(model, zeroed_runs(robot, 0.5, date), None if visit is None else visit.reference)
+        whole, size = [], len(visit.value)
+        for own, factor in zip(visit.columns, visit.factors, strict=True):
+            part = np.append(own < size, True)
+            whole.append(Information(triangular(factor[:, part]), 1e3).embed(own[own < size], size))
+        found = weighted(whole, 1.0 / joint_noise(whole)).solve().value
+        np.testing.assert_allclose((found - visit.value) / visit.std, 0.0, atol=0.1)
