@@ -56,6 +56,8 @@ class JointVariation:
         Where the rows of each run begin.
     unsure : ndarray, shape (runs, kinds)
         Variance of what each run lies off by.
+    memory : float
+        How many times the variance of white noise the noise has along the offset: what a model lacks changes slowly.
     """
 
     directions: Array
@@ -64,6 +66,7 @@ class JointVariation:
     noise: float
     bounds: NDArray[np.intp]
     unsure: Array
+    memory: float = 1.0
 
     @property
     def off(self) -> Array:
@@ -158,7 +161,9 @@ class RunVariation:
         """The same of the offsets alone; None where they do not differ."""
         alone = np.arange(len(KINDS)) == OFFSET
         joints = tuple(
-            None if item is None or item.std[OFFSET] == 0.0 else replace(item, std=item.std * alone)
+            None
+            if item is None or item.std[OFFSET] == 0.0
+            else replace(item, std=item.std * alone, noise=item.noise * np.sqrt(item.memory), memory=1.0)
             for item in self.joints
         )
         return RunVariation(joints) if any(joints) else None

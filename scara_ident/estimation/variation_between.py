@@ -99,6 +99,8 @@ class _Sums:
     back : ndarray, shape (kinds,)
         The unit of each direction; 0 where a kind does nothing.
     noise : float
+    memory : float
+        See `JointVariation.memory`.
     bounds : ndarray of int, shape (runs + 1,)
     """
 
@@ -107,6 +109,7 @@ class _Sums:
     aims: Array
     back: Array
     noise: float
+    memory: float
     bounds: NDArray[np.intp]
 
 
@@ -126,7 +129,8 @@ def _sums(directions: Array, left: Array, starts: NDArray[np.intp], firsts: NDAr
     products[:, np.outer(shown, shown)] = (found * np.outer(scale, scale)).reshape(runs, -1)
     aims[:, shown] = by_residual * scale / noise
     back[shown] = scale * noise / size[shown]
-    return _Sums(directions, products, aims, back, noise, bounds)
+    memory = float(spread[np.count_nonzero(shown[:OFFSET])]) if shown[OFFSET] else 1.0
+    return _Sums(directions, products, aims, back, noise, memory, bounds)
 
 
 def _estimated(joints: Sequence[_Sums]) -> list[JointVariation | None]:
@@ -144,7 +148,9 @@ def _estimated(joints: Sequence[_Sums]) -> list[JointVariation | None]:
         std = np.sqrt(variance * runs / (runs - 1.0)) * item.back
         some = bool(np.any(variance))
         of_run, own = mean * item.back, spread * item.back**2
-        found.append(JointVariation(item.directions, std, of_run, item.noise, item.bounds, own) if some else None)
+        found.append(
+            JointVariation(item.directions, std, of_run, item.noise, item.bounds, own, item.memory) if some else None
+        )
     return found
 
 
