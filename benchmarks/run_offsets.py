@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scara_ident import build_model, load_robot, observe, prepare, read_recordings
 from scara_ident.estimation.least_squares import told_value_and_weights
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_variation import KINDS, RunVariation
+from scara_ident.estimation.run_variation import KINDS, OFFSET, RunVariation
 from scara_ident.estimation.variation_between import run_variation
 
 Array = NDArray[np.float64]
@@ -63,6 +63,8 @@ def ratios_of(arm: Path, model: str) -> dict[str, Array]:
 
 def alone(variation: RunVariation, kinds: tuple[int, ...]) -> RunVariation | None:
     """Return differences of some kinds; None where there are none."""
+    if kinds == (OFFSET,):
+        return variation.offsets
     of_kinds = np.isin(np.arange(len(KINDS)), kinds)
     joints = [None if item is None else replace(item, std=item.std * of_kinds) for item in variation.joints]
     told = [None if item is None or not np.any(item.std) else item for item in joints]
