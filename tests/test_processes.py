@@ -175,7 +175,7 @@ def test_ctrl_c_reaches_the_caller_alone_and_ends_the_others_at_once(capfd: pyte
         return os.getpid()
 
     caller, before, found = os.getpid(), signal.signal(signal.SIGINT, signal.default_int_handler), list[int]()
-    start = time.monotonic()
+    start, others = time.monotonic(), multiprocessing.active_children()
     try:
         with pytest.raises(KeyboardInterrupt):
             found.extend(map_in_order(work, range(4), 2))
@@ -184,7 +184,8 @@ def test_ctrl_c_reaches_the_caller_alone_and_ends_the_others_at_once(capfd: pyte
     finally:
         signal.signal(signal.SIGINT, before)
     assert time.monotonic() - start < 30.0
-    assert multiprocessing.active_children() == []
+    # Workers of another test may be there still.
+    assert set(multiprocessing.active_children()) <= set(others)
     assert capfd.readouterr() == ("", "")
 
 
