@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.answerability import Inquiry
 from scara_ident.diagnosis.candidates import Rows, with_columns
-from scara_ident.diagnosis.cluster_test import least_sizes
+from scara_ident.diagnosis.cluster_test import least_sizes, surely_needed
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel, products_of
 from scara_ident.diagnosis.questions import Suspect, all_suspects
@@ -80,20 +80,31 @@ class Blocks:
         starts = tuple(np.append(own[first], own[-1]) for own in self.starts)
         return Blocks(self.tables, starts, self.owner[first], self.trajectory[first])
 
-    def fitted(self, columns: Sequence[int] | NDArray[np.intp], parts: int) -> FittedModel:
-        """Return a model of some of the columns, to be tried beside; the torque takes no part."""
+    def fitted(self, columns: Sequence[int] | NDArray[np.intp], parts: int, *, in_folds: bool = False) -> FittedModel:
+        """Return a model of some of the columns, to be tried beside; the torque takes no part.
+
+        Parameters
+        ----------
+        columns : sequence of int
+        parts : int
+            Folds of a recording where there is but one trajectory.
+        in_folds : bool, optional
+            Whether neighbouring blocks of a fold are taken for one, which tells what folds hold in a part of the time.
+        """
+        owner, fold = self.owner, self.trajectory
+        if not np.any(fold):
+            count = np.bincount(owner)
+            begin = np.cumsum(count) - count
+            fold = (np.arange(len(fold)) - begin[owner]) * parts // np.maximum(1, count[owner])
+        changes = np.diff(owner, prepend=-1) | np.diff(fold, prepend=-1)
+        kept = np.flatnonzero(changes) if in_folds else np.arange(len(owner))
         joints = []
-        for table, starts in zip(self.tables, self.starts, strict=True):
-            own = table[columns]
+        for table, every in zip(self.tables, self.starts, strict=True):
+            own, starts = table[columns], np.append(every[:-1][kept], every[-1])
             acting = np.flatnonzero(np.any(own != 0.0, axis=1))
             rows = np.concatenate([own[acting], np.zeros((1, table.shape[1]))])
             joints.append(JointRows(acting, rows, starts, np.diff(starts).astype(float)))
-        fold = self.trajectory
-        if not np.any(fold):
-            count = np.bincount(self.owner)
-            begin = np.cumsum(count) - count
-            fold = (np.arange(len(fold)) - begin[self.owner]) * parts // np.maximum(1, count[self.owner])
-        return FittedModel(tuple(joints), len(columns), self.owner, fold, np.ones(len(joints)))
+        return FittedModel(tuple(joints), len(columns), owner[kept], fold[kept], np.ones(len(joints)))
 
     @cached_property
     def information(self) -> Information:
@@ -128,7 +139,7 @@ def known_blocks(inquiry: Inquiry, bands: Bands) -> Blocks | None:
     return Blocks(tuple(tables), starts, observations.owner, place[observations.owner]).fewer()
 
 
-def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
+def believed(inquiry: Inquiry, blocks: Blocks, *, tested: bool = True) -> dict[str, float]:
     """Return how many times as large as the diagnosis needs it is each effect that may be below the limit, by label.
 
     That it is let in, that it is not too small to speak of, and that none of the others asked for is taken for it.
@@ -138,6 +149,9 @@ def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
     inquiry : Inquiry
     blocks : Blocks
         All rows: those of the recordings at hand, and of motions to be recorded.
+    tested : bool, optional
+        Whether it is followed how many standard errors the test takes with these blocks, which takes most of the time; else
+        as few as with any.
     """
     asked = all_suspects([item for item in inquiry.questions if item.kind == "below_limit"])
     p, names = len(inquiry.scene.model.columns), [item.label for item in inquiry.suspects]
@@ -153,11 +167,12 @@ def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
         ]
         places = [inquiry.places[names.index(item.label)][0] for item in some]
         times = times_believed(
-            blocks.fitted(np.concatenate([np.arange(p), *beside]), CRITERIA.parts),
+            blocks.fitted(np.concatenate([np.arange(p), *beside]), CRITERIA.parts, in_folds=not tested),
             [blocks.rows(slice(p + own.start, p + own.stop)) for own in places],
             [inquiry.just_seen[item.label] for item in some],
             [item.candidate.member.joint for item in some],
             inquiry.tried,
+            tested=tested,
         )
         found |= dict(zip((item.label for item in some), times.tolist(), strict=True))
     apart = times_apart(inquiry, asked, blocks.information)
@@ -227,6 +242,8 @@ def times_believed(
     joints: Sequence[int | None],
     tried: int,
     criteria: SelectionCriteria = CRITERIA,
+    *,
+    tested: bool = True,
 ) -> Array:
     """Return how many times as large as the diagnosis needs it each effect is, shape (g,); below 1 it stays open.
 
@@ -243,6 +260,8 @@ def times_believed(
     tried : int
         Candidates that the diagnosis tries.
     criteria : SelectionCriteria
+    tested : bool, optional
+        See `believed`.
     """
     result = np.zeros(len(candidates))
     seen = [place for place, rows in enumerate(candidates) if rows]
@@ -252,7 +271,8 @@ def times_believed(
         found = products_of(model, [candidates[place] for place in group])
         whole = np.sum(found.columns, axis=1)
         outside = np.max(np.diagonal(whole, axis1=1, axis2=2) / np.maximum(found.sizes, np.finfo(float).tiny), axis=1)
-        sizes = least_sizes(model, found, criteria.family_error / tried)
+        chance = criteria.family_error / tried
+        sizes = least_sizes(model, found, chance) if tested else np.full(len(group), surely_needed(k, chance))
         folds = np.array([np.sum(found.columns[:, model.fold == f], axis=1) for f in range(model.folds)])
         costs = _costs(folds, whole - folds)
         for g, place in enumerate(group):

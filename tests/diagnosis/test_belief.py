@@ -83,6 +83,35 @@ def test_what_lives_in_few_blocks_is_believed_less_at_as_many_standard_errors():
     assert one > 1.0 > other > none == 0.0
 
 
+def test_without_the_test_as_few_standard_errors_are_needed_as_with_all_freedom():
+    spread, short = column(SPREAD), column(SHORT)
+    blocks, axes = blocks_of(spread, short), [np.full((1, 1), 10.0)] * 2
+    found = {
+        tested: times_believed(
+            blocks.fitted(range(PARAMETERS), CRITERIA.parts, in_folds=not tested),
+            [{0: spread}, {0: short}],
+            axes,
+            [0, 0],
+            TRIED,
+            tested=tested,
+        )
+        for tested in (True, False)
+    }
+    assert np.all(found[False] >= found[True]) and found[False][1] > 1.2 * found[True][1]
+    # What blocks spread evenly says is hardly less than what all freedom says.
+    assert found[False][0] < 1.2 * found[True][0]
+
+
+def test_blocks_of_a_fold_taken_for_one_hold_its_products():
+    blocks = blocks_of()
+    for some in (blocks, replace(blocks, trajectory=np.zeros(BLOCKS, dtype=np.intp))):
+        every, folds = (some.fitted(range(PARAMETERS), 3, in_folds=few) for few in (False, True))
+        assert len(folds.owner) < len(every.owner) and folds.folds == every.folds
+        for fold in range(every.folds):
+            of = [np.sum(model.basis_products[model.fold == fold], axis=0) for model in (every, folds)]
+            assert of[1] == pytest.approx(of[0], abs=1e-12)
+
+
 def test_blocks_taken_together_hold_the_same_rows_and_more_are_of_other_trajectories():
     some = blocks_of()
     both = some.with_more(some)
