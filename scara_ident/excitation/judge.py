@@ -2,8 +2,8 @@
 
 A motion is judged by what the diagnosis would see and believe of it: its columns within the bands, over the noise, block of
 time by block, beside what is known. Most of that takes time for little: a motion is smooth, so that few samples a second show
-its columns, and the test's standard errors hardly differ from motion to motion once evidence is spread. A glance leaves
-these out, in about a quarter of the time.
+its columns; the test's standard errors hardly differ from motion to motion once evidence is spread; and effects that the
+recordings say little for count little. A glance leaves these out, in about an eighth of the time.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from itertools import compress
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.answerability import Inquiry
+from scara_ident.diagnosis.answerability import Inquiry, known_rows
 from scara_ident.diagnosis.belief import believed, known_blocks
 from scara_ident.diagnosis.questions import Question
 from scara_ident.estimation.information import Information
@@ -29,6 +29,8 @@ from scara_ident.motion.motion import Motion
 RATE, TURNING_RATE = 200.0, 500.0
 # Samples per second at a glance, and per period of the widest band: what turns faster than that is not within it.
 GLANCE_RATE, PER_PERIOD = 100.0, 5.0
+# Of what may be below the limit those that weigh less than this together are not looked at in a glance.
+LITTLE = 0.05
 # Weights of kinds of questions against that of what may be below the limit: what was found comes first.
 WEIGHTS = {"rivals": 2.0, "unexplained": 2.0, "below_limit": 1.0, "parameter": 0.2}
 # How many times what is needed is worth having: noise and size are foreseen to a factor or two.
@@ -70,7 +72,7 @@ class Judge:
         ----------
         x : ndarray, shape (1, n, m)
         """
-        return self._in_full.cost(self._motion(x, self._glance_rate), tested=False)
+        return self._likely.cost(self._motion(x, self._glance_rate), tested=False)
 
     @cached_property
     def _glance_rate(self) -> float:
@@ -83,6 +85,21 @@ class Judge:
     @cached_property
     def _in_full(self) -> _Worth:
         return _Worth(each_alone(self.inquiry))
+
+    @cached_property
+    def _likely(self) -> _Worth:
+        """The same of the suspects that count most."""
+        whole = self._in_full
+        order = np.argsort(-whole.weights, kind="stable")
+        below = np.array([item.kind == "below_limit" for item in whole.inquiry.questions])[order]
+        before = np.cumsum(np.where(below, whole.weights[order], 0.0)) - whole.weights[order]
+        kept = np.sort(order[~below | (before < (1.0 - LITTLE) * WEIGHTS["below_limit"])])
+        if len(kept) == len(order):
+            return whole
+        fewer = replace(whole.inquiry, questions=tuple(whole.inquiry.questions[k] for k in kept))
+        if fewer.columns is not None:
+            fewer = replace(fewer, known=known_rows(fewer, fewer.columns))
+        return _Worth(fewer)
 
 
 @dataclass(frozen=True, eq=False)

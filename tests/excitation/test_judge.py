@@ -56,3 +56,18 @@ def test_a_glance_sees_as_much_of_what_turns_fast_within_a_wide_band():
     assert judge_of(replace(inquiry, bands=(10.0, 10.0)))._glance_rate == GLANCE_RATE
     assert judge_of(replace(inquiry, bands=(10.0, 60.0)))._glance_rate == pytest.approx(300.0)
     assert judge_of(replace(inquiry, bands=(10.0, None)))._glance_rate == 500.0
+
+
+def test_a_glance_leaves_out_what_the_recordings_say_little_for():
+    inquiry = below_the_limit()
+    (question,) = inquiry.questions
+    spring, tilt = question.suspects
+    for odds, kept in ((1.0, 2), (30.0, 1)):
+        asked = replace(question, suspects=(replace(spring, odds=odds), tilt))
+        judge = judge_of(replace(inquiry, questions=(asked, Question("parameter", "one", parameter="a01", size=1.0))))
+        looked = judge._likely.inquiry
+        assert [item.label for item in looked.suspects] == [item.label for item in (spring, tilt)[:kept]]
+        assert [item.kind for item in looked.questions] == ["below_limit"] * kept + ["parameter"]
+        assert looked.known.parameters == len(inquiry.scene.model.columns) + sum(
+            len(item.value) for item in looked.suspects
+        )
