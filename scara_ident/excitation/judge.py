@@ -3,7 +3,7 @@
 A motion is judged by what the diagnosis would see and believe of it: its columns within the bands, over the noise, block of
 time by block, beside what is known. Most of that takes time for little: a motion is smooth, so that few samples a second show
 its columns; the test's standard errors hardly differ from motion to motion once evidence is spread; and effects that the
-recordings say little for count little. A glance leaves these out, in about an eighth of the time.
+recordings say little for count little. A glance leaves these out, in about a tenth of the time.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.answerability import Inquiry, known_rows
-from scara_ident.diagnosis.belief import believed, known_blocks
+from scara_ident.diagnosis.belief import Blocks, believed, known_blocks
 from scara_ident.diagnosis.questions import Question
 from scara_ident.estimation.information import Information
 from scara_ident.excitation.curves import Basis
@@ -24,6 +24,7 @@ from scara_ident.excitation.promise import SURE, KnownBlocks, all_rows
 from scara_ident.excitation.search import UNSEEN
 from scara_ident.excitation.verification import grid
 from scara_ident.motion.motion import Motion
+from scara_ident.motion.rest import Bands
 
 # Samples per second of a motion that is judged, and where a suspect follows the motor's turns.
 RATE, TURNING_RATE = 200.0, 500.0
@@ -63,7 +64,7 @@ class Judge:
             Coefficients of the motion.
         """
         turning = any(item.candidate.effect.seeded_by == "order" for item in self.inquiry.suspects)
-        return self._in_full.cost(self._motion(x, TURNING_RATE if turning else RATE), tested=True)
+        return self._in_full.cost(self._motion(x, TURNING_RATE if turning else RATE))
 
     def glance(self, x: Array) -> float:
         """Return about what `cost` returns, which differs from it by nearly as much for one motion as for the next.
@@ -72,7 +73,7 @@ class Judge:
         ----------
         x : ndarray, shape (1, n, m)
         """
-        return self._likely.cost(self._motion(x, self._glance_rate), tested=False)
+        return self._likely.cost(self._motion(x, self._glance_rate), in_short=True)
 
     @cached_property
     def _glance_rate(self) -> float:
@@ -108,10 +109,10 @@ class _Worth:
 
     inquiry: Inquiry
 
-    def cost(self, motion: Motion, *, tested: bool) -> float:
+    def cost(self, motion: Motion, *, in_short: bool = False) -> float:
         asked = self.inquiry.questions
-        rows = all_rows(self.inquiry, [motion], self.known)
-        sure = believed(self.inquiry, rows, tested=tested)
+        rows = all_rows(self.inquiry, [motion], self.known_in_short if in_short else self.known, in_short=in_short)
+        sure = believed(self.inquiry, rows)
         sizes = np.array([sure.get(item.text, 0.0) if item.kind == "below_limit" else 0.0 for item in asked])
         rest = [item.kind != "below_limit" for item in asked]
         if any(rest):
@@ -134,6 +135,16 @@ class _Worth:
     def known(self) -> KnownBlocks:
         """The rows of the recordings at hand, made once for all motions with which they have the same bands."""
         return cache(known_blocks)
+
+    @cached_property
+    def known_in_short(self) -> KnownBlocks:
+        """The same `Blocks.in_short`."""
+
+        def made(inquiry: Inquiry, bands: Bands) -> Blocks | None:
+            blocks = known_blocks(inquiry, bands)
+            return None if blocks is None else blocks.in_short(1)
+
+        return cache(made)
 
     @cached_property
     def weights(self) -> Array:
