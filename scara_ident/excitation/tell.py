@@ -9,8 +9,8 @@ goes by glances, and judges in full what it ends with (`judge.py`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -35,7 +35,7 @@ from scara_ident.excitation.search import (
 from scara_ident.processes import map_in_order
 from scara_ident.threads import one_blas_thread
 
-# Motions that a search draws first, and changes of the best of them per round.
+# Motions that a search draws first, and changes of the best of them in a round.
 DRAWN, CHANGED = 48, 60
 # Speeds of a drawn motion as shares of the limits, evenly in their logarithm; how often a joint stands still.
 SLOWEST, STILL = 0.03, 0.15
@@ -59,9 +59,9 @@ def search_to_tell(
         Of one trajectory; its criterion is that of the motions where the first search begins.
     inquiry : Inquiry
     effort : Effort
-        Searches from ``starts`` sets of random motions, each with as many changes as ``1 + rounds`` say.
+        Searches from ``starts`` sets of random motions, of which in each of ``rounds`` further rounds the better half goes on.
     progress : callable, optional
-        Called after every search.
+        Called after every round of every search.
 
     Raises
     ------
@@ -77,42 +77,82 @@ def search_to_tell(
 
     beside = [item.x for item in map_in_order(paced, PACES, effort.processes) if item is not None]
 
-    def work(index: int) -> tuple[float, Array] | None:
-        random, begun = np.random.default_rng([effort.seed, index]), beside if index == 0 else []
-        return _best(problem, judge, random, effort.rounds, beside, begun)
-
-    found: list[tuple[float, Array]] = []
-    costs: list[float] = []
-    for result in map_in_order(work, range(effort.starts), effort.processes):
-        costs.append(np.inf if result is None else result[0])
-        if result is not None:
-            found.append(result)
-        if progress is not None:
-            progress(Progress(len(costs), effort.starts, min(costs)))
-    if not found:
+    if beside:
+        # What is known is made before the processes begin, each of which would make it.
+        judge.glance(beside[0])
+    rounds, going = _Rounds(problem, judge, effort.seed, tuple(beside)), list(range(effort.starts))
+    total = sum(_left(effort.starts, number) for number in range(1 + effort.rounds))
+    climbs: dict[int, _Climb] = {}
+    done = 0
+    for number in range(1 + effort.rounds):
+        begun = [(index, climbs.get(index)) for index in going]
+        for index, climb in zip(
+            going, map_in_order(partial(rounds.climbed, number), begun, effort.processes), strict=True
+        ):
+            done += 1
+            if climb is not None:
+                climbs[index] = climb
+            if progress is not None:
+                progress(Progress(done, total, min((item.least for item in climbs.values()), default=np.inf)))
+        going = sorted(climbs.keys() & set(going), key=lambda index: (climbs[index].least, index))
+        going = sorted(going[: _left(effort.starts, number + 1)])
+    if not climbs:
         raise InfeasibleLimits("no motion drawn is within the limits; widen the tightest of them")
+    ends = [climbs.get(index) for index in range(effort.starts)]
+    costs = tuple(map_in_order(lambda end: np.inf if end is None else judge.cost(end.x), ends, effort.processes))
+    best = ends[int(np.argmin(costs))]
+    assert best is not None
     with one_blas_thread():
-        fine = within_grid(task, FINE, problem.bounds)
-        x, times = verified_inside(fine, min(found, key=lambda item: item[0])[1])
-    return Found(x, tuple(costs), times)
+        x, times = verified_inside(within_grid(task, FINE, problem.bounds), best.x)
+    return Found(x, costs, times)
 
 
-def _best(
-    problem: Problem, judge: Judge, random: np.random.Generator, rounds: int, beside: list[Array], begun: list[Array]
-) -> tuple[float, Array] | None:
-    """Return cost and coefficients of the best of some motions and random ones, changed as long as that helps."""
-    drawn = (_inside(problem, x) for x in (*begun, *(random_motion(problem.task, random) for _ in range(DRAWN))))
-    ranked = sorted(((judge.glance(x), k, x) for k, x in enumerate(drawn) if x is not None), key=lambda item: item[:2])
-    if not ranked:
-        return None
-    (least, _, best), size = ranked[0], FIRST
-    for _ in range(CHANGED * (1 + rounds)):
-        x = _inside(problem, _changed(problem.task, best, size, beside, random))
-        if x is not None and (now := judge.glance(x)) < least:
-            least, best, size = now, x, min(1.0, GROWN * size)
-        else:
-            size = max(LEAST, GROWN**-0.25 * size)
-    return judge.cost(best), best
+def _left(starts: int, number: int) -> int:
+    """Return how many searches take part in a round: half of them each time, those that look best, and at least one."""
+    return max(1, int(np.ceil(starts / 2**number)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Climb:
+    """How far a search is: the least at a glance, the motion that has it, and how large changes of it now are."""
+
+    least: float
+    x: Array
+    size: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Rounds:
+    """What the rounds of all searches share; each round of each has random numbers of its own."""
+
+    problem: Problem
+    judge: Judge
+    seed: int
+    beside: tuple[Array, ...]
+
+    def climbed(self, number: int, begun: tuple[int, _Climb | None]) -> _Climb | None:
+        """Change the motion of a search as long as that helps; the first round begins at the best of some drawn."""
+        (index, climb), task = begun, self.problem.task
+        random = np.random.default_rng([self.seed, index, number])
+        if climb is None:
+            climb = self._drawn(self.beside if index == 0 else (), random)
+        if climb is None:
+            return None
+        least, best, size = climb.least, climb.x, climb.size
+        for _ in range(CHANGED):
+            x = _inside(self.problem, _changed(task, best, size, self.beside, random))
+            if x is not None and (now := self.judge.glance(x)) < least:
+                least, best, size = now, x, min(1.0, GROWN * size)
+            else:
+                size = max(LEAST, GROWN**-0.25 * size)
+        return _Climb(least, best, size)
+
+    def _drawn(self, first: Sequence[Array], random: np.random.Generator) -> _Climb | None:
+        """Return the best of some motions and random ones; None where none is within the limits."""
+        wanted = (*first, *(random_motion(self.problem.task, random) for _ in range(DRAWN)))
+        inside = [x for x in (_inside(self.problem, x) for x in wanted) if x is not None]
+        looks = [self.judge.glance(x) for x in inside]
+        return _Climb(min(looks), inside[int(np.argmin(looks))], FIRST) if inside else None
 
 
 def random_motion(task: Task, random: np.random.Generator) -> Array:
