@@ -22,9 +22,10 @@ from scara_ident.excitation.judge import Judge, rows_over
 from scara_ident.excitation.limits import InfeasibleLimits
 from scara_ident.excitation.problem import Problem, Task, row_names
 from scara_ident.excitation.search import (
-    BOUND,
+    CLOSE,
     COARSE,
     FINE,
+    SPARSE,
     Effort,
     Found,
     Progress,
@@ -68,12 +69,15 @@ def search_to_tell(
     InfeasibleLimits
         If no random motion is within the limits.
     """
-    problem = within_grid(task, COARSE, np.full(len(row_names(task.limits, len(task.posture))), BOUND))
+    bounds = np.full(len(row_names(task.limits, len(task.posture))), CLOSE)
+    # What is inside on the fine grid is so between its times, or all but; distances, which take longest, on a coarse one.
+    fine = within_grid(task, FINE, bounds)
+    problem = replace(fine, sparse=FINE // COARSE * SPARSE[COARSE])
     judge = Judge(inquiry, task.bases[0], task.posture)
 
     def paced(share: float) -> Minimum | None:
         slower = replace(task, limits=replace(task.limits, velocity=share * task.limits.velocity))
-        return from_random(within_grid(slower, COARSE, problem.bounds), effort.seed, 0)
+        return from_random(within_grid(slower, COARSE, bounds), effort.seed, 0)
 
     beside = [item.x for item in map_in_order(paced, PACES, effort.processes) if item is not None]
 
@@ -103,7 +107,7 @@ def search_to_tell(
     best = ends[int(np.argmin(costs))]
     assert best is not None
     with one_blas_thread():
-        x, times = verified_inside(within_grid(task, FINE, problem.bounds), best.x)
+        x, times = verified_inside(fine, best.x)
     return Found(x, costs, times)
 
 
