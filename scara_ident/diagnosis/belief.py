@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.answerability import Inquiry
 from scara_ident.diagnosis.candidates import Rows, with_columns
-from scara_ident.diagnosis.cluster_test import least_sizes
+from scara_ident.diagnosis.cluster_test import least_sizes, surely_needed
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel, products_of
 from scara_ident.diagnosis.questions import Suspect, all_suspects
@@ -51,6 +51,8 @@ class Blocks:
         Recording and trajectory of each block.
     parts : tuple of Blocks
         Which these are one after the other, where they are.
+    stands_for : ndarray, shape (n,), or None
+        Of each joint the rows that one table stands for, see `in_short`; None where each joint has its own.
     """
 
     tables: tuple[Array, ...]
@@ -58,6 +60,13 @@ class Blocks:
     owner: NDArray[np.intp]
     trajectory: NDArray[np.intp]
     parts: tuple[Blocks, ...] = ()
+    stands_for: Array | None = None
+
+    @property
+    def counts(self) -> Array:
+        """Rows of each joint, shape (n,)."""
+        own = [float(table.shape[1]) for table in self.tables]
+        return np.array(own) if self.stands_for is None else self.stands_for
 
     def with_more(self, other: Blocks) -> Blocks:
         """Return both, the other's recordings being of other trajectories."""
@@ -68,7 +77,23 @@ class Blocks:
             np.append(self.owner, self.owner.max(initial=-1) + 1 + other.owner),
             np.append(self.trajectory, self.trajectory.max(initial=-1) + 1 + other.trajectory),
             (self, other),
+            None if self.stands_for is None or other.stands_for is None else self.stands_for + other.stands_for,
         )
+
+    def in_short(self, parts: int) -> Blocks:
+        """Return a triangular factor of all joints for each of so many parts of every recording, in place of their blocks.
+
+        They have the same products of columns in a tenth of the rows, but no more say how evidence is spread over a part.
+        """
+        part = _parts(self.owner, parts)
+        first = np.flatnonzero(np.diff(self.owner, prepend=-1) | np.diff(part, prepend=-1))
+        factors = []
+        for begin, end in pairwise([*first.tolist(), len(self.owner)]):
+            rows = [table[:, own[begin] : own[end]] for table, own in zip(self.tables, self.starts, strict=True)]
+            factors.append(triangular(np.vstack([_factor(some) for some in rows])).T)
+        starts = np.cumsum([0, *(factor.shape[1] for factor in factors)])
+        table = np.concatenate(factors, axis=1)
+        return Blocks((table,), (starts,), self.owner[first], self.trajectory[first], stands_for=self.counts)
 
     def fewer(self) -> Blocks:
         """Return neighbouring blocks of a recording together, so that there are not many more than `MOST_BLOCKS`."""
@@ -88,11 +113,7 @@ class Blocks:
             acting = np.flatnonzero(np.any(own != 0.0, axis=1))
             rows = np.concatenate([own[acting], np.zeros((1, table.shape[1]))])
             joints.append(JointRows(acting, rows, starts, np.diff(starts).astype(float)))
-        fold = self.trajectory
-        if not np.any(fold):
-            count = np.bincount(self.owner)
-            begin = np.cumsum(count) - count
-            fold = (np.arange(len(fold)) - begin[self.owner]) * parts // np.maximum(1, count[self.owner])
+        fold = self.trajectory if np.any(self.trajectory) else _parts(self.owner, parts)
         return FittedModel(tuple(joints), len(columns), self.owner, fold, np.ones(len(joints)))
 
     @cached_property
@@ -100,12 +121,28 @@ class Blocks:
         """The triangular factor of all rows."""
         if self.parts:
             return merge([part.information for part in self.parts])
-        factors = [triangular(np.vstack([table, np.zeros((1, table.shape[1]))]).T) for table in self.tables]
-        return Information(triangular(np.vstack(factors)), float(sum(table.shape[1] for table in self.tables)))
+        factor = triangular(np.vstack([_factor(table) for table in self.tables]))
+        return Information(np.hstack([factor, np.zeros((len(factor), 1))]), float(np.sum(self.counts)))
 
     def rows(self, columns: slice) -> Rows:
         """Return some columns on the rows of the joints that they act on."""
         return {j: table[columns] for j, table in enumerate(self.tables) if np.any(table[columns])}
+
+
+def _parts(owner: NDArray[np.intp], parts: int) -> NDArray[np.intp]:
+    """Return in which of so many parts of its recording each block is."""
+    count = np.bincount(owner)
+    begin = np.cumsum(count) - count
+    return np.asarray((np.arange(len(owner)) - begin[owner]) * parts // np.maximum(1, count[owner]))
+
+
+def _factor(table: Array) -> Array:
+    """Return the triangular factor of the rows of columns, shape (m, columns)."""
+    acting = np.flatnonzero(np.any(table != 0.0, axis=1))
+    own = triangular(table[acting].T)
+    found = np.zeros((len(own), len(table)))
+    found[:, acting] = own
+    return found
 
 
 def known_blocks(inquiry: Inquiry, bands: Bands) -> Blocks | None:
@@ -137,7 +174,8 @@ def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
     ----------
     inquiry : Inquiry
     blocks : Blocks
-        All rows: those of the recordings at hand, and of motions to be recorded.
+        All rows: those of the recordings at hand, and of motions to be recorded. In short they do not say how many standard
+        errors the test takes; as few as with any are then taken for it.
     """
     asked = all_suspects([item for item in inquiry.questions if item.kind == "below_limit"])
     p, names = len(inquiry.scene.model.columns), [item.label for item in inquiry.suspects]
@@ -156,8 +194,9 @@ def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
             blocks.fitted(np.concatenate([np.arange(p), *beside]), CRITERIA.parts),
             [blocks.rows(slice(p + own.start, p + own.stop)) for own in places],
             [inquiry.just_seen[item.label] for item in some],
-            [item.candidate.member.joint for item in some],
+            [_count(blocks.counts, item.candidate.member.joint) for item in some],
             inquiry.tried,
+            tested=blocks.stands_for is None,
         )
         found |= dict(zip((item.label for item in some), times.tolist(), strict=True))
     apart = times_apart(inquiry, asked, blocks.information)
@@ -165,6 +204,11 @@ def believed(inquiry: Inquiry, blocks: Blocks) -> dict[str, float]:
         item.label: min(found[item.label], apart.get(item.label, np.inf), _times_negligible(inquiry.scene, item))
         for item in asked
     }
+
+
+def _count(counts: Array, joint: int | None) -> float:
+    """Return the rows of a joint, or of all where an effect is of none."""
+    return float(np.sum(counts) if joint is None else counts[joint])
 
 
 def _times_negligible(scene: Scene, item: Suspect) -> float:
@@ -224,9 +268,11 @@ def times_believed(
     model: FittedModel,
     candidates: Sequence[Rows],
     axes: Sequence[Array],
-    joints: Sequence[int | None],
+    counts: Sequence[float],
     tried: int,
     criteria: SelectionCriteria = CRITERIA,
+    *,
+    tested: bool = True,
 ) -> Array:
     """Return how many times as large as the diagnosis needs it each effect is, shape (g,); below 1 it stays open.
 
@@ -238,11 +284,14 @@ def times_believed(
         Columns of each on the rows of every joint that it acts on.
     axes : sequence of ndarray, shape (k, r)
         Coefficients that each may have; the mean of the squared sizes needed over them counts.
-    joints : sequence of int or None
-        Whose each is.
+    counts : sequence of float
+        Rows of the joint whose each is.
     tried : int
         Candidates that the diagnosis tries.
     criteria : SelectionCriteria
+    tested : bool, optional
+        Whether it is followed how many standard errors the test takes with the blocks of the model, in most of the time; else as
+        few as with any.
     """
     result = np.zeros(len(candidates))
     seen = [place for place, rows in enumerate(candidates) if rows]
@@ -252,15 +301,14 @@ def times_believed(
         found = products_of(model, [candidates[place] for place in group])
         whole = np.sum(found.columns, axis=1)
         outside = np.max(np.diagonal(whole, axis1=1, axis2=2) / np.maximum(found.sizes, np.finfo(float).tiny), axis=1)
-        sizes = least_sizes(model, found, criteria.family_error / tried)
+        chance = criteria.family_error / tried
+        sizes = least_sizes(model, found, chance) if tested else np.full(len(group), surely_needed(k, chance))
         folds = np.array([np.sum(found.columns[:, model.fold == f], axis=1) for f in range(model.folds)])
         costs = _costs(folds, whole - folds)
         for g, place in enumerate(group):
             if outside[g] < criteria.least_outside:
                 continue
-            own = joints[place]
-            count = sum(rows.independent for j, rows in enumerate(model.joints) if own is None or j == own)
-            each = (folds[:, g], costs[:, g], float(sizes[g]), count, criteria)
+            each = (folds[:, g], costs[:, g], float(sizes[g]), counts[place], criteria)
             squares = [_needed_square(axis, whole[g], *each) for axis in axes[place].T]
             result[place] = 1.0 / np.sqrt(np.mean(squares))
     return result

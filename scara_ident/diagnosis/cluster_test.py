@@ -225,6 +225,13 @@ def needed(count: int, freedom: float, chance: float) -> float:
     return float(min(together, alone))
 
 
+def surely_needed(count: int, chance: float) -> float:
+    """Return the standard errors that `needed` is at least, however much freedom there is."""
+    from scipy.special import chdtri
+
+    return float(np.sqrt(chdtri(count, chance)))
+
+
 def _least(freedom: Array) -> Array:
     """Return that of the direction of which least is known; one without any column takes no part."""
     least = np.min(freedom, axis=1)

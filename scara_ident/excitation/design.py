@@ -16,13 +16,14 @@ from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information, merge
 from scara_ident.excitation.criteria import Criterion, LogDet
 from scara_ident.excitation.curves import ExcitationTrajectory, Family, make_basis
+from scara_ident.excitation.judge import motion_of
 from scara_ident.excitation.limits import Limits, limits_of, nominal_parameters, resting_posture, without_coulomb
 from scara_ident.excitation.problem import NARROWEST, Task
 from scara_ident.excitation.promise import FINE_RATE, Told, told
 from scara_ident.excitation.search import Effort, Progress, search
 from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.size import SAMPLES, check_size, default_harmonics, durations_of, harmonics_of
-from scara_ident.excitation.tell import motion_of, search_to_tell
+from scara_ident.excitation.tell import search_to_tell
 from scara_ident.excitation.verification import Reached, reached
 from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel

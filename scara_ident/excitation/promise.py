@@ -12,6 +12,7 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.answerability import Inquiry
 from scara_ident.diagnosis.belief import Blocks, believed, known_blocks
 from scara_ident.diagnosis.candidates import Candidate, Rows
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.questions import MOST_NAMED, Question, Suspect
 from scara_ident.effects import Parameter, Scene, Signals
 from scara_ident.manners import listed
@@ -161,7 +162,9 @@ def sure_of(inquiry: Inquiry, motions: Sequence[Motion]) -> dict[str, float]:
     return believed(inquiry, all_rows(inquiry, motions))
 
 
-def all_rows(inquiry: Inquiry, motions: Sequence[Motion], known: KnownBlocks = known_blocks) -> Blocks:
+def all_rows(
+    inquiry: Inquiry, motions: Sequence[Motion], known: KnownBlocks = known_blocks, *, in_short: bool = False
+) -> Blocks:
     """Return all rows that there will be: of what is known, in the bands that it then has, and of motions.
 
     Parameters
@@ -171,10 +174,15 @@ def all_rows(inquiry: Inquiry, motions: Sequence[Motion], known: KnownBlocks = k
         Each at rest at both ends.
     known : callable, optional
         Makes the rows of what is known, `known_blocks`.
+    in_short : bool, optional
+        Whether those of motions are `Blocks.in_short`, as those of what is known then have to be.
     """
     each = [rows_in_blocks(inquiry, motion) for motion in motions]
     new = [blocks for blocks, _ in each]
     held = known(inquiry, tuple(map(_widest, zip(*(bands for _, bands in each), strict=True))))
+    if in_short:
+        # Trajectories are the folds where there are several.
+        new = [blocks.in_short(1 if held is not None or len(new) > 1 else CRITERIA.parts) for blocks in new]
     return reduce(Blocks.with_more, new if held is None else [held, *new])
 
 

@@ -2,35 +2,30 @@
 
 Effects remember, turn with the sign of a speed and pass the bands of the diagnosis, so that their columns have no useful
 derivative by a motion's coefficients. The search draws motions, takes each as large as its limits allow or smaller, and
-changes the best of them, beside motions at some speeds that tell most of the model's parameters, which a gradient finds. A
-motion is judged by what the diagnosis would see and believe of it: its columns within the bands, over the noise, block of
-time by block, beside what is known.
+changes the best of them, beside motions at some speeds that tell most of the model's parameters, which a gradient finds. It
+goes by glances, and judges in full what it ends with (`judge.py`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, lru_cache
-from itertools import compress
+from functools import lru_cache, partial
 
 import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.answerability import Inquiry
-from scara_ident.diagnosis.belief import believed, known_blocks
-from scara_ident.diagnosis.questions import Question
-from scara_ident.estimation.information import Information
 from scara_ident.excitation.curves import Basis
 from scara_ident.excitation.interior_point import Minimum
+from scara_ident.excitation.judge import Judge, rows_over
 from scara_ident.excitation.limits import InfeasibleLimits
 from scara_ident.excitation.problem import Problem, Task, row_names
-from scara_ident.excitation.promise import SURE, KnownBlocks, all_rows
 from scara_ident.excitation.search import (
-    BOUND,
+    CLOSE,
     COARSE,
     FINE,
-    UNSEEN,
+    SPARSE,
     Effort,
     Found,
     Progress,
@@ -38,14 +33,10 @@ from scara_ident.excitation.search import (
     verified_inside,
     within_grid,
 )
-from scara_ident.excitation.verification import grid
-from scara_ident.motion.motion import Motion
 from scara_ident.processes import map_in_order
 from scara_ident.threads import one_blas_thread
 
-# Samples per second of a motion in the search, and where a suspect follows the motor's turns.
-RATE, TURNING_RATE = 200.0, 500.0
-# Motions that a search draws first, and changes of the best of them per round.
+# Motions that a search draws first, and changes of the best of them in a round.
 DRAWN, CHANGED = 48, 60
 # Speeds of a drawn motion as shares of the limits, evenly in their logarithm; how often a joint stands still.
 SLOWEST, STILL = 0.03, 0.15
@@ -56,10 +47,6 @@ PACES = (1.0, 0.3, 0.1)
 FIRST, GROWN, LEAST = 0.3, 1.5, 0.01
 # What a motion that breaks a limit shrinks by at first, twice as much each time up to the most, and how often.
 SHRINKING, MOST_SHRINKING, TRIES = 0.01, 0.2, 40
-# Weights of kinds of questions against that of what may be below the limit: what was found comes first.
-WEIGHTS = {"rivals": 2.0, "unexplained": 2.0, "below_limit": 1.0, "parameter": 0.2}
-# How many times what is needed is worth having: noise and size are foreseen to a factor or two.
-ENOUGH = 5.0
 
 
 def search_to_tell(
@@ -73,135 +60,103 @@ def search_to_tell(
         Of one trajectory; its criterion is that of the motions where the first search begins.
     inquiry : Inquiry
     effort : Effort
-        Searches from ``starts`` sets of random motions, each with as many changes as ``1 + rounds`` say.
+        Searches from ``starts`` sets of random motions, of which in each of ``rounds`` further rounds the better half goes on.
     progress : callable, optional
-        Called after every search.
+        Called after every round of every search.
 
     Raises
     ------
     InfeasibleLimits
         If no random motion is within the limits.
     """
-    problem = within_grid(task, COARSE, np.full(len(row_names(task.limits, len(task.posture))), BOUND))
-    turning = any(item.candidate.effect.seeded_by == "order" for item in inquiry.suspects)
-    judge = _Judge(inquiry, task, TURNING_RATE if turning else RATE)
+    bounds = np.full(len(row_names(task.limits, len(task.posture))), CLOSE)
+    # What is inside on the fine grid is so between its times, or all but; distances, which take longest, on a coarse one.
+    fine = within_grid(task, FINE, bounds)
+    problem = replace(fine, sparse=FINE // COARSE * SPARSE[COARSE])
+    judge = Judge(inquiry, task.bases[0], task.posture)
 
     def paced(share: float) -> Minimum | None:
         slower = replace(task, limits=replace(task.limits, velocity=share * task.limits.velocity))
-        return from_random(within_grid(slower, COARSE, problem.bounds), effort.seed, 0)
+        return from_random(within_grid(slower, COARSE, bounds), effort.seed, 0)
 
     beside = [item.x for item in map_in_order(paced, PACES, effort.processes) if item is not None]
 
-    def work(index: int) -> tuple[float, Array] | None:
-        random, begun = np.random.default_rng([effort.seed, index]), beside if index == 0 else []
-        return _best(problem, judge, random, effort.rounds, beside, begun)
-
-    found: list[tuple[float, Array]] = []
-    costs: list[float] = []
-    for result in map_in_order(work, range(effort.starts), effort.processes):
-        costs.append(np.inf if result is None else result[0])
-        if result is not None:
-            found.append(result)
-        if progress is not None:
-            progress(Progress(len(costs), effort.starts, min(costs)))
-    if not found:
+    if beside:
+        # What is known is made before the processes begin, each of which would make it.
+        judge.glance(beside[0])
+    rounds, going = _Rounds(problem, judge, effort.seed, tuple(beside)), list(range(effort.starts))
+    total = sum(_left(effort.starts, number) for number in range(1 + effort.rounds))
+    climbs: dict[int, _Climb] = {}
+    done = 0
+    for number in range(1 + effort.rounds):
+        begun = [(index, climbs.get(index)) for index in going]
+        for index, climb in zip(
+            going, map_in_order(partial(rounds.climbed, number), begun, effort.processes), strict=True
+        ):
+            done += 1
+            if climb is not None:
+                climbs[index] = climb
+            if progress is not None:
+                progress(Progress(done, total, min((item.least for item in climbs.values()), default=np.inf)))
+        going = sorted(climbs.keys() & set(going), key=lambda index: (climbs[index].least, index))
+        going = sorted(going[: _left(effort.starts, number + 1)])
+    if not climbs:
         raise InfeasibleLimits("no motion drawn is within the limits; widen the tightest of them")
+    ends = [climbs.get(index) for index in range(effort.starts)]
+    costs = tuple(map_in_order(lambda end: np.inf if end is None else judge.cost(end.x), ends, effort.processes))
+    best = ends[int(np.argmin(costs))]
+    assert best is not None
     with one_blas_thread():
-        fine = within_grid(task, FINE, problem.bounds)
-        x, times = verified_inside(fine, min(found, key=lambda item: item[0])[1])
-    return Found(x, tuple(costs), times)
+        x, times = verified_inside(fine, best.x)
+    return Found(x, costs, times)
+
+
+def _left(starts: int, number: int) -> int:
+    """Return how many searches take part in a round: half of them each time, those that look best, and at least one."""
+    return max(1, int(np.ceil(starts / 2**number)))
 
 
 @dataclass(frozen=True, eq=False)
-class _Judge:
-    inquiry: Inquiry
-    task: Task
-    rate: float
+class _Climb:
+    """How far a search is: the least at a glance, the motion that has it, and how large changes of it now are."""
 
-    def cost(self, x: Array) -> float:
-        """Return minus the weighted sum of the logarithms of what questions gain, up to what is enough.
-
-        Where something may be below the limit, with that of what nobody thought of.
-        """
-        (basis,) = self.task.bases
-        rows = all_rows(self.each, [motion_of(basis, self.task.posture, x[0], self.rate)], self.known)
-        sure = believed(self.each, rows)
-        sizes = np.array(
-            [sure.get(item.text, 0.0) if item.kind == "below_limit" else 0.0 for item in self.each.questions]
-        )
-        rest = [item.kind != "below_limit" for item in self.each.questions]
-        if any(rest):
-            sizes[rest] = self.each.sigmas(rows.information, [*compress(self.each.questions, rest)]) / SURE
-        told = float(self.weights @ np.log((1.0 + sizes**2) / (1.0 + (sizes / ENOUGH) ** 2)))
-        return -told - (0.0 if all(rest) else WEIGHTS["below_limit"] * self.of_the_rest(rows.information))
-
-    def of_the_rest(self, rows: Information) -> float:
-        """Return the mean logarithm of the squares that tell a parameter of the model.
-
-        What is below the limit may be none of what is asked for: effects of joints that hardly moved are not even tried, and
-        nonlinear parameters of the others are those that noise left. Both show where the whole workspace is seen, so that the
-        log determinant counts as much as all that is asked for: DT-optimality (Atkinson 2008).
-        """
-        count = len(self.inquiry.scene.model.columns)
-        size = np.abs(np.diag(rows.factor)[:count])
-        return float(2.0 * np.mean(np.log(np.maximum(size, UNSEEN * np.max(size)))))
-
-    @cached_property
-    def known(self) -> KnownBlocks:
-        """The rows of the recordings at hand, made once for all motions with which they have the same bands."""
-        return cache(known_blocks)
-
-    @cached_property
-    def each(self) -> Inquiry:
-        """The same with a question for each of several that may be below the limit.
-
-        How large the one that is there may be is not known: each counts by the logarithm of what it gains, and one that no
-        motion shows keeps none from showing the others.
-        """
-        return replace(
-            self.inquiry, questions=tuple(alone for item in self.inquiry.questions for alone in _alone(item))
-        )
-
-    @cached_property
-    def weights(self) -> Array:
-        """Questions of one kind share its weight, those of what may be below the limit by the odds of each."""
-        kinds = [item.kind for item in self.each.questions]
-        odds = np.array([item.suspects[0].odds if item.kind == "below_limit" else 1.0 for item in self.each.questions])
-        total = {kind: sum(odds[k] for k, other in enumerate(kinds) if other == kind) for kind in kinds}
-        return np.array([WEIGHTS[kind] * share / total[kind] for kind, share in zip(kinds, odds, strict=True)])
+    least: float
+    x: Array
+    size: float
 
 
-def _alone(question: Question) -> list[Question]:
-    """Return a question for each suspect that may be below the limit; any other as it is."""
-    if question.kind != "below_limit":
-        return [question]
-    return [replace(question, text=item.label, suspects=(item,)) for item in question.suspects]
+@dataclass(frozen=True, eq=False)
+class _Rounds:
+    """What the rounds of all searches share; each round of each has random numbers of its own."""
 
+    problem: Problem
+    judge: Judge
+    seed: int
+    beside: tuple[Array, ...]
 
-def motion_of(basis: Basis, posture: Array, coefficients: Array, rate: float) -> Motion:
-    """Return samples of a motion at equal steps over its period, the end left out."""
-    count = round(basis.duration * rate)
-    time = np.arange(count, dtype=np.float64) / rate
-    q, v, a = (coefficients @ rows.T for rows in _rows(basis, count)[:3])
-    return Motion("asked", "asked", time, q + posture[:, None], v, a, None, rate)
+    def climbed(self, number: int, begun: tuple[int, _Climb | None]) -> _Climb | None:
+        """Change the motion of a search as long as that helps; the first round begins at the best of some drawn."""
+        (index, climb), task = begun, self.problem.task
+        random = np.random.default_rng([self.seed, index, number])
+        if climb is None:
+            climb = self._drawn(self.beside if index == 0 else (), random)
+        if climb is None:
+            return None
+        least, best, size = climb.least, climb.x, climb.size
+        for _ in range(CHANGED):
+            x = _inside(self.problem, _changed(task, best, size, self.beside, random))
+            if x is not None and (now := self.judge.glance(x)) < least:
+                least, best, size = now, x, min(1.0, GROWN * size)
+            else:
+                size = max(LEAST, GROWN**-0.25 * size)
+        return _Climb(least, best, size)
 
-
-def _best(
-    problem: Problem, judge: _Judge, random: np.random.Generator, rounds: int, beside: list[Array], begun: list[Array]
-) -> tuple[float, Array] | None:
-    """Return cost and coefficients of the best of some motions and random ones, changed as long as that helps."""
-    drawn = (_inside(problem, x) for x in (*begun, *(random_motion(problem.task, random) for _ in range(DRAWN))))
-    ranked = sorted(((judge.cost(x), k, x) for k, x in enumerate(drawn) if x is not None), key=lambda item: item[:2])
-    if not ranked:
-        return None
-    (cost, _, best), size = ranked[0], FIRST
-    for _ in range(CHANGED * (1 + rounds)):
-        x = _inside(problem, _changed(problem.task, best, size, beside, random))
-        if x is not None and (now := judge.cost(x)) < cost:
-            cost, best, size = now, x, min(1.0, GROWN * size)
-        else:
-            size = max(LEAST, GROWN**-0.25 * size)
-    return cost, best
+    def _drawn(self, first: Sequence[Array], random: np.random.Generator) -> _Climb | None:
+        """Return the best of some motions and random ones; None where none is within the limits."""
+        wanted = (*first, *(random_motion(self.problem.task, random) for _ in range(DRAWN)))
+        inside = [x for x in (_inside(self.problem, x) for x in wanted) if x is not None]
+        looks = [self.judge.glance(x) for x in inside]
+        return _Climb(min(looks), inside[int(np.argmin(looks))], FIRST) if inside else None
 
 
 def random_motion(task: Task, random: np.random.Generator) -> Array:
@@ -232,19 +187,13 @@ def _placed(basis: Basis, x: Array, mean: Array) -> Array:
 
 
 def _mean(basis: Basis, x: Array) -> Array:
-    return np.asarray(x @ np.mean(_rows(basis, 8 * basis.size)[0], axis=0))
-
-
-@lru_cache(maxsize=8)
-def _rows(basis: Basis, count: int) -> Array:
-    """The basis and its derivatives at equal steps over its period, shape (4, count, m)."""
-    return grid((basis,), count)[:, 0]
+    return np.asarray(x @ np.mean(rows_over(basis, 8 * basis.size)[0], axis=0))
 
 
 @lru_cache(maxsize=8)
 def _inverse(basis: Basis, derivative: int) -> Array:
     """From values at equal steps to the coefficients of the nearest motion, shape (m, 8 m)."""
-    return np.linalg.pinv(_rows(basis, 8 * basis.size)[derivative], rcond=1e-9)
+    return np.linalg.pinv(rows_over(basis, 8 * basis.size)[derivative], rcond=1e-9)
 
 
 def _changed(task: Task, x: Array, size: float, beside: Sequence[Array], random: np.random.Generator) -> Array:
@@ -270,7 +219,7 @@ def _spliced(basis: Basis, x: Array, other: Array, phase: float) -> Array:
     """Return coefficients of a motion that goes as one does for half of the time, and as another for the other half."""
     angle = 2.0 * np.pi * np.arange(8 * basis.size) / (8 * basis.size)
     share = 0.5 + 0.5 * np.clip(2.0 * np.cos(angle - phase), -1.0, 1.0)
-    one, two = (each @ _rows(basis, 8 * basis.size)[1].T for each in (x, other))
+    one, two = (each @ rows_over(basis, 8 * basis.size)[1].T for each in (x, other))
     return _placed(basis, (share * one + (1.0 - share) * two) @ _inverse(basis, 1).T, _mean(basis, x))
 
 

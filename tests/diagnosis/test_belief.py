@@ -68,7 +68,7 @@ SPREAD, SHORT = list(range(BLOCKS)), [2, 7, 15, 22, 30]
 @pytest.mark.parametrize("own", [column(SPREAD), column(SHORT), mostly_one()])
 def test_much_less_than_is_needed_is_seldom_let_in_and_much_more_nearly_always(own):
     model = blocks_of(own).fitted(range(PARAMETERS), CRITERIA.parts)
-    needed = 1.0 / times_believed(model, [{0: own}], [np.ones((1, 1))], [0], TRIED)[0]
+    needed = 1.0 / times_believed(model, [{0: own}], [np.ones((1, 1))], [ROWS * BLOCKS], TRIED)[0]
     # Of few blocks the standard error itself is hardly known, to a third or so with four degrees of freedom.
     assert let_in(model, own, 0.3 * needed) <= 0.1
     assert 0.2 < let_in(model, own, needed) < 0.8
@@ -79,8 +79,40 @@ def test_what_lives_in_few_blocks_is_believed_less_at_as_many_standard_errors():
     spread, short = column(SPREAD), column(SHORT)
     model = blocks_of(spread, short).fitted(range(PARAMETERS), CRITERIA.parts)
     axes = [np.full((1, 1), 10.0)] * 3
-    one, other, none = times_believed(model, [{0: spread}, {0: short}, {}], axes, [0, 0, 0], TRIED)
+    one, other, none = times_believed(model, [{0: spread}, {0: short}, {}], axes, [ROWS * BLOCKS] * 3, TRIED)
     assert one > 1.0 > other > none == 0.0
+
+
+def test_without_the_test_as_few_standard_errors_are_needed_as_with_all_freedom():
+    columns = [column(SPREAD), column(SHORT)]
+    model, axes = blocks_of(*columns).fitted(range(PARAMETERS), CRITERIA.parts), [np.full((1, 1), 10.0)] * 2
+    counts = [ROWS * BLOCKS] * 2
+    whole, free = (
+        times_believed(model, [{0: own} for own in columns], axes, counts, TRIED, tested=tested)
+        for tested in (True, False)
+    )
+    assert np.all(free >= whole) and free[1] > 1.2 * whole[1]
+    # What blocks spread evenly says is hardly less than what all freedom says.
+    assert free[0] < 1.2 * whole[0]
+
+
+def test_in_short_are_all_products_of_folds_and_what_follows_from_them():
+    columns = [column(SPREAD), column(SHORT)]
+    two = blocks_of(*columns)
+    one = replace(two, trajectory=np.zeros(BLOCKS, dtype=np.intp))
+    axes, counts = [np.full((1, 1), 10.0)] * 2, [ROWS * BLOCKS] * 2
+    for blocks, parts in ((two, 1), (one, CRITERIA.parts), (two.with_more(one), 1)):
+        short = blocks.in_short(parts)
+        assert short.counts == pytest.approx(blocks.counts) and short.tables[0].shape[1] < 0.1 * blocks.counts[0]
+        assert short.information.factor.T @ short.information.factor == pytest.approx(
+            blocks.information.factor.T @ blocks.information.factor, abs=1e-9
+        )
+        found = []
+        for some in (blocks, short):
+            model = some.fitted(range(PARAMETERS), CRITERIA.parts)
+            own = [some.rows(slice(PARAMETERS + k, PARAMETERS + k + 1)) for k in range(2)]
+            found.append(times_believed(model, own, axes, counts, TRIED, tested=False))
+        assert found[1] == pytest.approx(found[0], rel=1e-9)
 
 
 def test_blocks_taken_together_hold_the_same_rows_and_more_are_of_other_trajectories():

@@ -89,6 +89,21 @@ def test_a_motion_for_what_may_be_below_the_limit_tells_of_what_nobody_thought_o
     assert design.log_det > plain.log_det - 0.1 * len(model.names)
 
 
+def test_the_better_half_of_the_searches_goes_on_whatever_the_number_of_processes(asked):
+    inquiry, _ = asked
+    model, said = inquiry.scene.model, []
+    effort = Effort(starts=2, rounds=1, seed=3, processes=1)
+    one, two = (
+        design_excitation(
+            model, duration=6.0, harmonics=4, tell=inquiry, effort=replace(effort, processes=k), progress=said.append
+        )
+        for k in (1, 2)
+    )
+    assert [(item.done, item.total) for item in said] == 2 * [(1, 3), (2, 3), (3, 3)]
+    assert len(one.costs) == 2 and one.costs == two.costs
+    assert np.array_equal(one.trajectories[0].coefficients, two.trajectories[0].coefficients)
+
+
 def test_goals_that_exclude_each_other_are_said(asked):
     model = asked[0].scene.model
     with pytest.raises(UsageError, match="without a criterion of its own"):
