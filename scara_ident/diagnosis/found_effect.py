@@ -11,10 +11,10 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.confounding import Confounder, confounders
 from scara_ident.diagnosis.effect_parameters import Coefficients, PhysicalParameters
 from scara_ident.diagnosis.held_out_gain import HeldOutGain
-from scara_ident.diagnosis.outcome import rms_of
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Effect, Parameter
+from scara_ident.estimation.run_offsets import rms_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.audit import suspected
 from scara_ident.diagnosis.criteria import SelectionCriteria
@@ -179,8 +178,3 @@ def _unexplained(
 
 def _above_noise(fit: LackOfFit, criteria: SelectionCriteria) -> bool:
     return fit.missing > criteria.remainder_to_noise * fit.noise
-
-
-def rms_of(value: Array, observations: Observations) -> tuple[float | None, ...]:
-    """Return the rms of each joint over recordings, within the band; None without rows."""
-    return tuple(item.rms(value) if item.rows else None for item in observations.by_joint)

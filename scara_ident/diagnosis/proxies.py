@@ -10,11 +10,12 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.moments import examine_moments
-from scara_ident.diagnosis.outcome import Outcome, rms_of
+from scara_ident.diagnosis.outcome import Outcome
 from scara_ident.diagnosis.search import Step
 from scara_ident.diagnosis.selection_step import SelectionStep, observed
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.noise_bias import noise_torque
+from scara_ident.estimation.run_offsets import rms_of
 
 ByJoint = tuple[float | None, ...]
 
@@ -76,7 +77,7 @@ def proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
         noisy = owner is not None and owner in rest and rest[owner].of_positions > 0.0
         excused = short and noisy and removal.removed >= criteria.least_of_repeatable * removal.beyond
         if short and (owner is None or owner in left) and not (excused and kept):
-            share = max(0.0, removal.removed / removal.repeating)
+            share = max(0.0, removal.removed / removal.repeating) if removal.repeating > 0.0 else 0.0
             why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"
             refused.append(decision.refused(why))
         elif kept and (excused or (found.unexplained and owner in (None, found.unexplained.joint))):
@@ -88,6 +89,8 @@ def proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
 def _not_repeating(found: Outcome, left: frozenset[str] | set[str]) -> Mapping[str, _NotRepeating]:
     """Return it for each joint of which repetitions tell."""
     joints, variation = found.search.base.robot.joints, found.after.variation
+    if variation is not None and found.after.offsets is not None:
+        variation = variation.beside_offsets
     varied = np.zeros(len(joints)) if variation is None else variation.mean_squares(found.training.joints)
     differing = dict(zip(joints, varied.tolist(), strict=True))
     made = dict(zip(joints, noise_torque(found.training, found.after.value).tolist(), strict=True))
@@ -108,7 +111,9 @@ def _each_without(found: Outcome, labels: list[str]) -> Iterator[tuple[Step, ByJ
     when it came in; of one that went again, when it came in.
     """
     search = found.search
-    before, whole = rms_of(search.start.value, search.uncorrected), rms_of(found.after.value, found.training)
+    start, after = search.start, found.after
+    before = rms_of(start.value, search.uncorrected, start.offsets)
+    whole = rms_of(after.value, found.training, after.offsets)
     for step in search.steps:
         fitted = None
         if step.decision.label in labels:
@@ -118,7 +123,7 @@ def _each_without(found: Outcome, labels: list[str]) -> Iterator[tuple[Step, ByJ
         if fitted is None:
             yield step, before, step.rms
         else:
-            yield step, rms_of(value_and_weights(fitted, found.after.offsets)[0], fitted), whole
+            yield step, rms_of(value_and_weights(fitted, after.offsets)[0], fitted, after.offsets), whole
         before = step.rms
 
 

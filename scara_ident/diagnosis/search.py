@@ -25,6 +25,7 @@ from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
+from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.estimation.run_variation import RunVariation
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.low_pass import HIGHEST_CUT
@@ -246,7 +247,7 @@ def search(
         value, weights = value_and_weights(fitted, offsets)
         scene = replace(scene, value=value[: len(task.model.columns)])
         repeated = bool(steps) and steps[-1].decision.label == winner.label
-        left = tuple(item.rms(value) if item.rows else None for item in fitted.by_joint)
+        left = rms_of(value, fitted, offsets)
         steps[len(steps) - repeated :] = [Step(winner, scene, chosen, observations.data, value, left)]
     if correction is not None:
         # What came in since had moved it.

@@ -13,11 +13,12 @@ from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.held_out_gain import spoken_against
 from scara_ident.diagnosis.late_evidence import late_evidence
-from scara_ident.diagnosis.outcome import Outcome, rms_of
+from scara_ident.diagnosis.outcome import Outcome
 from scara_ident.diagnosis.standing_lines import StandingLine, without_lines
 from scara_ident.diagnosis.steady_evidence import steady_evidence
 from scara_ident.diagnosis.validation import Validation
 from scara_ident.estimation.noise_bias import noise_signals
+from scara_ident.estimation.run_offsets import rms_of
 
 Verdict = Literal["complete", "explained", "unexplained", "undecided"]
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array, runs_of
-from scara_ident.estimation.least_squares import weighted_value
-from scara_ident.estimation.observations import informations, kept_rows
+from scara_ident.estimation.observations import informations_of_each, kept_rows
+from scara_ident.estimation.own_offsets import value_beside_offsets
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Stretch, motion_of, thinned, torque_of
 from scara_ident.motion.prepared import PreparedData, PreparedStretch
@@ -82,14 +82,16 @@ class Spectra:
         data = self.data.at(tuple(bands.tolist()))
         # One that is too short for these bands, or at rest, has nothing to say.
         kept = np.flatnonzero(side_by_side(kept_rows, data.recordings)).tolist()
-        return self.judged(bands, weighted_value(informations(self.model, data.of(kept) if kept else data)))
+        each = informations_of_each(self.model, data.of(kept) if kept else data)
+        return self.judged(bands, value_beside_offsets(self.model, each))
 
     def left(self, value: Array) -> Array:
         """Return the power of what parameters leave of the torque, shape (n, m)."""
 
         def of(part: Stretch, columns: tuple[Array, ...], fade: Array) -> Array:
             predicted = [value[own] @ rows for own, rows in zip(self.model.active, columns, strict=True)]
-            return binned_power(fade * (torque_of(part) - np.array(predicted)), part.rate, self.edges)
+            # As of the torque: what a run's offset leaves is none of its motion's.
+            return moving_power(torque_of(part) - np.array(predicted), fade, part.rate, self.edges)
 
         return np.asarray(np.sum(side_by_side(of, self.parts, self.columns, self.fades), axis=0))
 

@@ -285,6 +285,16 @@ def informations(model: TorqueModel, data: PreparedData) -> tuple[Information, .
     RecordingError
         If no row of a recording is left.
     """
+    each = informations_of_each(model, data)
+    nothing = [[Information.empty(len(own)) for own in model.active]]
+    return tuple(
+        merge(parts).embed(own, len(model.columns))
+        for own, parts in zip(model.active, zip(*(each or nothing), strict=True), strict=True)
+    )
+
+
+def informations_of_each(model: TorqueModel, data: PreparedData) -> list[list[Information]]:
+    """Return of each recording the rows of every joint, in the columns that act on it; see `informations`."""
     longest = max((part.samples for part in data.stretches), default=0)
 
     def of_some(items: Sequence[PreparedRecording]) -> list[list[Information]]:
@@ -292,13 +302,9 @@ def informations(model: TorqueModel, data: PreparedData) -> tuple[Information, .
         memory = [np.empty((len(own) + 1) * longest) for own in model.active]
         return [[rows.information(len(rows.columns)) for rows in _observed(model, item, memory)[1]] for item in items]
 
-    turns = [data.recordings[k::THREADS] for k in range(min(THREADS, len(data.recordings)))]
-    each = list(chain.from_iterable(side_by_side(of_some, turns)))
-    nothing = [[Information.empty(len(own)) for own in model.active]]
-    return tuple(
-        merge(parts).embed(own, len(model.columns))
-        for own, parts in zip(model.active, zip(*(each or nothing), strict=True), strict=True)
-    )
+    count = min(THREADS, len(data.recordings))
+    turns = side_by_side(of_some, [data.recordings[k::THREADS] for k in range(count)])
+    return [turns[k % count][k // count] for k in range(len(data.recordings))]
 
 
 def _observed(

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scara_ident.arrays import Array
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import OFFSET, RunVariation, offset_direction
 
@@ -71,3 +72,17 @@ def offsets_on(observations: Observations, offsets: RunVariation | None) -> RunV
             directions[OFFSET] = offset_direction(observations.model, rows)
             joints[joint] = replace(item, directions=directions, bounds=rows.starts[firsts])
     return RunVariation(tuple(joints))
+
+
+def rms_of(value: Array, observations: Observations, offsets: RunVariation | None = None) -> tuple[float | None, ...]:
+    """Return the rms of each joint over recordings, within the band; None without rows.
+
+    Parameters
+    ----------
+    value : ndarray, shape (p,)
+    observations : Observations
+    offsets : RunVariation, optional
+        Offsets of runs, which count as no more than the noise then, see `Estimate.offsets`.
+    """
+    joints = beside_offsets(observations, offsets).fitted.by_joint
+    return tuple(item.rms(value) if item.rows else None for item in joints)

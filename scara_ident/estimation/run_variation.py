@@ -152,6 +152,16 @@ class RunVariation:
         item = self.joints[joint]
         return signals if item is None else item.whitened(signals)
 
+    @property
+    def beside_offsets(self) -> RunVariation:
+        """The same without the offsets, as rows have it on which these are noise already."""
+        told = np.arange(len(KINDS)) != OFFSET
+        joints = [
+            None if item is None else replace(item, std=item.std * told, of_run=item.of_run * told)
+            for item in self.joints
+        ]
+        return RunVariation(tuple(joints))
+
     def whitened_rows(self, joints: Sequence[JointRows]) -> tuple[JointRows, ...]:
         """Return the rows of every joint, see `JointVariation.whitened`."""
         return tuple(replace(rows, table=self.whitened(joint, rows.table)) for joint, rows in enumerate(joints))

@@ -105,6 +105,8 @@ def without_stretches(observations: Observations, events: Sequence[Event]) -> Ob
 def payload_share(value: Array, item: Observations, noise: Array) -> float:
     """Return the share of a recording's squared residual that a body on the last link explains, the second half by the first.
 
+    It is 0 where an offset of each joint explains more: of little motion, a sensor that was zeroed is as heavy as a load.
+
     Parameters
     ----------
     value : ndarray, shape (p,)
@@ -117,7 +119,7 @@ def payload_share(value: Array, item: Observations, noise: Array) -> float:
     last = int(np.argmax(robot.order))
     parts = [(part, left) for part, left in zip(item.data.stretches, item.residuals(value).banded, strict=True)]
     step = max(1, sum(part.samples for part, _ in parts) // SAMPLES)
-    rows, rights = [], []
+    rows, rights, ones = [], [], []
     for part, left in parts:
         places = np.flatnonzero(np.any(part.used, axis=0))[::step]
         if not len(places):
@@ -128,12 +130,21 @@ def payload_share(value: Array, item: Observations, noise: Array) -> float:
         columns = robot.row_scale[:, None, None] * body[:, 10 * last : 10 * last + 10] * weight[:, None]
         rows.append(np.moveaxis(columns, 1, 2).reshape(len(places) * robot.n, 10, order="F"))
         rights.append((weight * left[:, places]).reshape(-1, order="F"))
+        ones.append(
+            np.moveaxis(weight[:, None] * np.eye(robot.n)[:, :, None], 1, 2).reshape(rows[-1].shape[0], -1, order="F")
+        )
     if not rows:
         return 0.0
-    matrix, right = np.concatenate(rows), np.concatenate(rights)
+    right = np.concatenate(rights)
+    load, offsets = (_share(np.concatenate(each), right) for each in (rows, ones))
+    return load if load > offsets else 0.0
+
+
+def _share(matrix: Array, right: Array) -> float:
+    """Return the share of the second half's squares that columns explain as they were fitted to the first."""
     half = len(right) // 2
     size = np.linalg.norm(matrix, axis=0)
     scale = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 0.0)
-    body_value = scale * np.linalg.lstsq(matrix[:half] * scale, right[:half], rcond=SHOWN)[0]
+    value = scale * np.linalg.lstsq(matrix[:half] * scale, right[:half], rcond=SHOWN)[0]
     total = float(right[half:] @ right[half:])
-    return 1.0 - float(np.sum((right[half:] - matrix[half:] @ body_value) ** 2)) / total if total > 0.0 else 0.0
+    return 1.0 - float(np.sum((right[half:] - matrix[half:] @ value) ** 2)) / total if total > 0.0 else 0.0

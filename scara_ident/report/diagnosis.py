@@ -14,12 +14,13 @@ from scara_ident.diagnosis.evidence import Evidence, least_found
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.held_out_gain import shown_of, words_of
 from scara_ident.diagnosis.next_steps import next_steps
-from scara_ident.diagnosis.outcome import Unexplained, rms_of
+from scara_ident.diagnosis.outcome import Unexplained
 from scara_ident.diagnosis.questions import suspects_in_model
 from scara_ident.diagnosis.torque_noise import noise_density
 from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.model.terms.friction import Friction

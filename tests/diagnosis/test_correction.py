@@ -9,10 +9,10 @@ import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.correction import corrected, taken_out
-from scara_ident.diagnosis.outcome import rms_of
 from scara_ident.effects import Member
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.estimation import wls
+from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 from tests.diagnosis.made import exact_runs, observed, step_beside

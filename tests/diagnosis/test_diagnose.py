@@ -9,13 +9,13 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.outcome import rms_of
 from scara_ident.effects import CATALOGUE, Coefficient, Effect, effects_named
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.position import Spring
 from scara_ident.errors import ArgumentError, UsageError
+from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import (
     BANDS,

@@ -11,7 +11,7 @@ from scara_ident.diagnosis import model_selection
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.model_selection import _asked_band, _band_beyond, _promised_band, select_model
-from scara_ident.diagnosis.outcome import Outcome, rms_of
+from scara_ident.diagnosis.outcome import Outcome
 from scara_ident.diagnosis.search import SearchTask, search
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.effects import CATALOGUE
@@ -23,6 +23,7 @@ from scara_ident.effects.presliding import Presliding
 from scara_ident.estimation import wls
 from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.observations import observe
+from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.motion.prepared import prepare
 from tests.diagnosis.made import complete, searched, virtual_runs
 

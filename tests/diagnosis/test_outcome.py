@@ -7,9 +7,10 @@ import pytest
 
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.evidence import coloured_shares
-from scara_ident.diagnosis.outcome import outcome_of, rms_of
+from scara_ident.diagnosis.outcome import outcome_of
 from scara_ident.diagnosis.search import SearchTask
 from scara_ident.effects.position import Spring
+from scara_ident.estimation.run_offsets import rms_of
 from tests.diagnosis.made import exact_runs, runs_that_repeat, searched, virtual_runs, with_torque
 from tests.diagnosis.test_model_selection import MODEL, selected
 

@@ -13,12 +13,13 @@ from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.evidence import coloured_shares
 from scara_ident.diagnosis.lack_of_fit import lack_of_fit
 from scara_ident.diagnosis.moments import examine_moments
-from scara_ident.diagnosis.outcome import Outcome, Unexplained, outcome_of, rms_of
+from scara_ident.diagnosis.outcome import Outcome, Unexplained, outcome_of
 from scara_ident.diagnosis.proxies import proxies
 from scara_ident.diagnosis.search import SearchTask
 from scara_ident.effects.friction import AsymmetricFriction, FrictionCoupling
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
+from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.estimation.run_variation import JointVariation, RunVariation
 from tests.diagnosis.made import exact_runs, runs_that_repeat, searched, virtual_runs, with_torque
 from tests.diagnosis.test_model_selection import MODEL, found, selected

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
-from scara_ident.diagnosis.outcome import rms_of
 from scara_ident.diagnosis.search import (
     SearchTask,
     columns_at_hand,
@@ -20,6 +19,7 @@ from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
 from scara_ident.estimation import wls
+from scara_ident.estimation.run_offsets import rms_of
 from tests.diagnosis.made import (
     BANDS,
     Bump,

@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from scara_ident.diagnosis import Diagnosis, diagnose
-from scara_ident.diagnosis.outcome import rms_of
 from scara_ident.effects.friction import PositionDependentFriction
+from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS
