@@ -20,6 +20,8 @@ WORSE, WORSE_THAN_ALL = 2.0, 1.5
 PAYLOAD_FITS = 0.7
 # An error within so many of the standard deviations that the parameters, or what runs differ by, make is theirs: 95 %.
 UNSURE_STDS = 2.0
+# Of what an offset of each joint leaves, a payload leaves no more than this share.
+OF_OFFSETS = 0.5
 # Samples of a recording that a payload is fitted to.
 SAMPLES = 1500
 # Directions of the payload's parameters that show less than this share of the best are none.
@@ -105,7 +107,7 @@ def without_stretches(observations: Observations, events: Sequence[Event]) -> Ob
 def payload_share(value: Array, item: Observations, noise: Array) -> float:
     """Return the share of a recording's squared residual that a body on the last link explains, the second half by the first.
 
-    It is 0 where an offset of each joint explains more: of little motion, a sensor that was zeroed is as heavy as a load.
+    It is 0 where an offset of each joint explains as much: of little motion, a sensor that was zeroed is as heavy as a load.
 
     Parameters
     ----------
@@ -137,7 +139,7 @@ def payload_share(value: Array, item: Observations, noise: Array) -> float:
         return 0.0
     right = np.concatenate(rights)
     load, offsets = (_share(np.concatenate(each), right) for each in (rows, ones))
-    return load if load > offsets else 0.0
+    return load if 1.0 - load < OF_OFFSETS * (1.0 - offsets) else 0.0
 
 
 def _share(matrix: Array, right: Array) -> float:

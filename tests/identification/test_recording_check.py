@@ -10,6 +10,8 @@ from scara_ident.identification.events import Event
 from scara_ident.identification.identify import identify
 from scara_ident.identification.recording_check import own_uncertainty, quiet_blocks, without_stretches
 from scara_ident.robot.robot import load_robot
+from tests.arms import PLANAR_2R, SWING_FRICTION, noisy, recorded_torque, recording, sines, write_urdf
+from tests.estimation.test_run_offsets import zeroed_runs
 from tests.truth.pushes import pushed
 from tests.truth.scenes import formula_run
 
@@ -35,6 +37,19 @@ def test_a_loaded_held_out_recording_is_named():
     (event,) = found.events
     assert (event.recording, event.kind, event.held_out) == ("loaded", "other payload", True)
     assert any("loaded is explained much worse" in note for note in found.notes)
+
+
+def test_a_sensor_that_was_zeroed_in_a_held_out_recording_is_no_other_payload(tmp_path):
+    """Of a small motion its weight is all but constant, and so is an offset."""
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
+    training = zeroed_runs(robot, 0.0)
+    time = np.arange(2400) / 200.0
+    q, v, a = (0.1 * signal for signal in sines(np.random.default_rng(7), time, 2))
+    torque = recorded_torque(robot, q, v, a, SWING_FRICTION)
+    small = noisy(recording(robot, "zeroed_1", time, q, torque), np.random.default_rng(8), 0.05)
+    for offset, kinds in ((np.zeros((2, 1)), []), (np.array([[3.0], [1.0]]), ["unknown"])):
+        found = identify(robot, training, validation=[replace(small, effort=small.effort + offset)], model="basic")
+        assert [event.kind for event in found.events] == kinds
 
 
 def test_a_push_in_a_held_out_recording_is_no_other_payload():
