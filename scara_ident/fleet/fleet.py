@@ -22,7 +22,7 @@ from scara_ident.fleet.changes import (
     residual_scatter,
     trials_of,
 )
-from scara_ident.fleet.folder import Fault, list_fleet
+from scara_ident.fleet.folder import Fault, date_notes, list_fleet
 from scara_ident.fleet.history import History
 from scara_ident.fleet.store import FOLDER, Store
 from scara_ident.fleet.table import Quantity, quantities
@@ -96,12 +96,15 @@ class Fleet:
         By name.
     quantities : mapping of str to tuple
         By arm, for each date its quantities.
+    notes : tuple of str
+        What to know of the dates.
     """
 
     robot: Robot
     model: TorqueModel
     arms: tuple[ArmReport, ...]
     quantities: Mapping[str, tuple[tuple[Quantity, ...], ...]]
+    notes: tuple[str, ...] = ()
 
     @property
     def ranked(self) -> tuple[ArmReport, ...]:
@@ -189,7 +192,7 @@ def watch_fleet(
         )
         for arm in arms
     )
-    return Fleet(robot, model, reports, quantities(list(histories.values())))
+    return Fleet(robot, model, reports, quantities(list(histories.values())), date_notes(files))
 
 
 def changes_of(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:

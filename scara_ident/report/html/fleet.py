@@ -190,6 +190,7 @@ def fleet_report(path: Path, fleet: Fleet) -> None:
     verdict += [f"{item.arm}: {words}." for item in changed for words in item.sentences]
     if fleet.reservation:
         verdict.append(f"{fleet.reservation}.")
+    verdict += [f"{note}." for note in fleet.notes]
     if fleet.faults:
         verdict.append(f"{several(len(fleet.faults), 'fault')}: see below.")
     dates = sum(len(item.history.dates) for item in fleet.arms if item.history is not None)
