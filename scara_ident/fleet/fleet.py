@@ -16,7 +16,6 @@ from scara_ident.fleet.changes import (
     Change,
     arms_counted,
     find_changes,
-    fleet_scatter,
     grown_residuals,
     least_probability,
     residual_scatter,
@@ -24,9 +23,10 @@ from scara_ident.fleet.changes import (
 )
 from scara_ident.fleet.folder import Fault, date_notes, list_fleet
 from scara_ident.fleet.history import History
+from scara_ident.fleet.scatter import fleet_scatter
 from scara_ident.fleet.store import FOLDER, Store
 from scara_ident.fleet.table import Quantity, quantities
-from scara_ident.fleet.words import sentence
+from scara_ident.fleet.words import sentences
 from scara_ident.fleet.work import IDENTIFYING, LateEngine, Settings, Work
 from scara_ident.manners import several
 from scara_ident.model.model import TorqueModel, build_model
@@ -80,8 +80,8 @@ class ArmReport:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What changed, in words."""
-        return tuple(sentence(change, self.known.scene) for change in self.changes)
+        """What changed, in words, a sentence for each cause."""
+        return sentences(self.changes, self.known.scene) if self.changes else ()
 
 
 @dataclass(frozen=True, eq=False)
