@@ -9,7 +9,15 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.manners import several
-from scara_ident.recording.audit.samples import IDLE_TRAVEL, Finding, Samples, joint_range, levels, runs
+from scara_ident.recording.audit.samples import (
+    IDLE_TRAVEL,
+    Finding,
+    Samples,
+    joint_range,
+    levels,
+    resolution,
+    runs,
+)
 
 Checked = tuple[Samples, list[Finding]]
 
@@ -20,6 +28,10 @@ DEAD_SHARE = 0.5
 # Where more than this share of the other samples repeats the one before, the effort has no noise (a simulation, a
 # coarse converter), and a value that lasts says nothing.
 NOISELESS = 0.5
+# An effort without noise is one value as well while all joints keep their speed, to this share of the way.
+STEADY = 1e-3
+# Differences of this order and the next tell noise, which makes the next larger; rounding makes it so many smallest steps.
+ORDER, ROUNDING_STEPS = 4, 4.0
 # A saturated amplifier holds its extreme for this many samples in a row, ...
 PILE_RUN = 3
 # ... for this share of the recording in all, ...
@@ -148,7 +160,36 @@ def _stuck(samples: Samples, joint: int, same: NDArray[np.bool_]) -> NDArray[np.
     elsewhere = ~(stuck[1:] & stuck[:-1])
     if stuck.any() and elsewhere.any() and np.mean(same[elsewhere]) > NOISELESS:
         stuck[:] = False
+    if stuck.any() and _without_noise(values, ~stuck):
+        for first, last in zip(start[long], end[long], strict=True):
+            if _steady(samples, first, last):
+                stuck[first : last + 1] = False
     return stuck
+
+
+def _without_noise(values: Array, live: NDArray[np.bool_]) -> bool:
+    """Tell whether what is live of an effort is smooth to its rounding, as a simulator writes it."""
+    beside = ORDER + 2
+    if len(values) < beside:
+        return False
+    whole = np.convolve(live, np.ones(beside), "valid") > beside - 0.5
+    if not whole.any():
+        return False
+    lower, higher = (np.abs(np.diff(values, n=order)) for order in (ORDER, ORDER + 1))
+    rounding = ROUNDING_STEPS * resolution(values)
+    return bool(np.median(higher[whole]) <= max(float(np.median(lower[:-1][whole])), rounding))
+
+
+def _steady(samples: Samples, first: int, last: int) -> bool:
+    """Tell whether all joints keep their speed from one sample to another."""
+    time = samples.time[first : last + 1] - samples.time[first]
+    small = IDLE_TRAVEL * joint_range(samples.robot)
+    for joint, position in enumerate(samples.position[:, first : last + 1]):
+        off = np.max(np.abs(position - np.polyval(np.polyfit(time, position, 1), time)))
+        # A joint that rests may do so on the edge between two steps of its encoder.
+        if off > max(STEADY * max(np.ptp(position), small[joint]), 2.0 * resolution(samples.position[joint])):
+            return False
+    return True
 
 
 def _piles_up(values: Array, at: NDArray[np.bool_], direction: int) -> bool:
