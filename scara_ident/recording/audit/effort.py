@@ -26,8 +26,9 @@ STUCK_SECONDS = 0.2
 # ... and dead where it does so for this share of the recording.
 DEAD_SHARE = 0.5
 # Where more than this share of the other samples repeats the one before, the effort has no noise (a simulation, a
-# coarse converter), and a value that lasts says nothing.
-NOISELESS = 0.5
+# coarse converter), and a value that lasts says nothing, unless it lasts for most of the time and so many times
+# longer than any other does.
+NOISELESS, OUTLASTING = 0.5, 10.0
 # An effort without noise is one value as well while all joints keep their speed, to this share of the way.
 STEADY = 1e-3
 # Differences of this order and the next tell noise, which makes the next larger; rounding makes it so many smallest steps.
@@ -153,17 +154,27 @@ def _stuck(samples: Samples, joint: int, same: NDArray[np.bool_]) -> NDArray[np.
     end = start + length - 1
     long = samples.time[end] - samples.time[start] > STUCK_SECONDS
     long &= (values[start] != values.max()) & (values[start] != values.min()) | (length > DEAD_SHARE * samples.count)
-    for first, last in zip(start[long], end[long], strict=True):
-        travel = np.ptp(samples.position[joint, first : last + 1])
-        if travel > IDLE_TRAVEL * joint_range(samples.robot)[joint]:
-            stuck[first : last + 1] = True
+    least = IDLE_TRAVEL * joint_range(samples.robot)[joint]
+
+    def moves(run: int) -> bool:
+        return bool(np.ptp(samples.position[joint, start[run] : end[run] + 1]) > least)
+
+    found = [run for run in np.flatnonzero(long).tolist() if moves(run)]
+    for run in found:
+        stuck[start[run] : end[run] + 1] = True
     elsewhere = ~(stuck[1:] & stuck[:-1])
-    if stuck.any() and elsewhere.any() and np.mean(same[elsewhere]) > NOISELESS:
-        stuck[:] = False
-    if stuck.any() and _without_noise(values, ~stuck):
-        for first, last in zip(start[long], end[long], strict=True):
-            if _steady(samples, first, last):
-                stuck[first : last + 1] = False
+    if found and elsewhere.any() and np.mean(same[elsewhere]) > NOISELESS:
+        by_length = np.argsort(-length, kind="stable").tolist()
+        value = values[start[max(found, key=lambda run: length[run])]]
+        # Without another value that lasts in motion nothing says how long one may.
+        usual = next((length[run] for run in by_length if values[start[run]] != value and moves(run)), samples.count)
+        most = max(OUTLASTING * usual, DEAD_SHARE * samples.count)
+        found = [run for run in found if values[start[run]] == value and length[run] > most]
+    if found and _without_noise(values, ~stuck):
+        found = [run for run in found if not _steady(samples, start[run], end[run])]
+    stuck[:] = False
+    for run in found:
+        stuck[start[run] : end[run] + 1] = True
     return stuck
 
 

@@ -65,6 +65,15 @@ def test_an_effort_that_is_dead_most_of_the_time_is_refused_where_no_other_joint
     assert "cut the file there" in refusal(read, made)
 
 
+@pytest.mark.parametrize(("dead", "said"), [(2400, True), (500, False)])
+def test_a_coarse_effort_that_dies_is_told_by_how_much_longer_it_lasts_than_any_other(read, dead: int, said: bool):
+    """Of 17 values one that lasted for 55 % of the time was believed, and the joint's inertia was 6.6 instead of 16.1."""
+    made = columns()
+    made["joint1.effort"] = 0.1 * np.round(made["joint1.effort"] / 0.1)
+    made["joint1.effort"][len(made["time"]) - dead :] = 0.0
+    assert ("stuck_effort" in kinds(read(made))) is said
+
+
 def cruising(digits: int) -> dict[str, np.ndarray]:
     """Columns of a simulator: joints in turn speed up, keep their speed and slow down; the second one pulls at the first."""
     ramp = np.sin(np.linspace(0.0, np.pi / 2.0, 150)) ** 2
