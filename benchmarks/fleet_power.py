@@ -26,10 +26,11 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from scara_ident.arrays import Array
-from scara_ident.fleet.changes import LEVEL, Scatter, arms_counted, fleet_scatter, least_probability, trials_of
+from scara_ident.fleet.changes import LEVEL, arms_counted, least_probability, trials_of
 from scara_ident.fleet.fleet import changes_of
 from scara_ident.fleet.folder import list_fleet
 from scara_ident.fleet.history import DateRows, History, common_removed, noise_of
+from scara_ident.fleet.scatter import Scatter, fleet_scatter
 from scara_ident.fleet.table import quantities
 from scara_ident.fleet.visit import Visit, look
 from scara_ident.model.model import build_model

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from scara_ident.excitation import Limits
     from scara_ident.robot.robot import Robot
 
-# Share of a design that its searches take; the rest is the verification of limits.
-SEARCHES_SHARE = 0.97
+# Share of a design that its searches take; the rest is the winner on the finer grid and the verification of limits.
+SEARCHES_SHARE = 0.85
 
 
 @with_motion_limits

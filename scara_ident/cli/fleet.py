@@ -62,6 +62,7 @@ def fleet(
     if rows.row_count:
         console.print(rows)
     console.note([found.reservation] if found.reservation else [])
+    console.note(found.notes)
     console.note(str(fault) for fault in found.faults)
     with progress() as work:
         work("drawing report.html")

@@ -307,6 +307,12 @@ def _remarks(outcome: Outcome, parameters: PhysicalParameters) -> list[str]:
             f"{left.joint}: no reduction is stated, and of a motor behind a gear or a screw no ripple is looked for; "
             "state it in robot.yaml"
         )
+    elif left is not None and f"position of {left.joint}" in left.signals:
+        criteria = found.step.criteria
+        notes.append(
+            f"{left.joint}: what repeats with the motor's angle is looked for from {criteria.lowest_order:g} to "
+            f"{criteria.highest_order:g} periods per motor turn; what is left may lie outside, as once per turn of the gear's output"
+        )
     if after.variation is not None:
         notes += after.variation.sentences(robot, None if left is None else left.joint)
     uncounted = uncounted_correction(found, parameters)

@@ -106,9 +106,7 @@ class Problem:
     ----------
     task : Task
     rows : ndarray, shape (4, k, M, m)
-        Bases and their derivatives at the M times of the limits.
-    stride : int
-        Every stride-th of them counts in the criterion.
+        Bases and their derivatives at the M times of limits and criterion.
     bounds : ndarray, shape (R,)
         Bound of each row of limits, 1 or a little less to make up for what happens between the times.
     sparse : int
@@ -117,7 +115,6 @@ class Problem:
 
     task: Task
     rows: Array
-    stride: int
     bounds: Array
     sparse: int = 1
 
@@ -177,12 +174,8 @@ class Problem:
         assert regressor is not None
         k, n = point.x.shape[:2]
         cost, uphill = self._cost(regressor) if point.uphill is None else (point.cost, point.uphill)
-        counted = self._counted(regressor)
-        weights = np.zeros_like(regressor)
         scale = 2.0 * self._share[:, None] * task.weights[:, None, None, None] ** 2
-        weights.reshape(n, -1, k, motion.samples // k)[..., :: self.stride] = scale * (uphill @ counted).reshape(
-            n, -1, k, counted.shape[2] // k
-        )
+        weights = (scale * (uphill @ regressor).reshape(n, -1, k, motion.samples // k)).reshape(regressor.shape)
         by_motion, torque = task.smooth.derivatives(motion, weights, task.nominal)
         limited = np.isfinite(task.limits.torque)
         dense = [torque[limited] / task.limits.torque[limited, None, None, None]]
@@ -203,7 +196,7 @@ class Problem:
     @property
     def _share(self) -> Array:
         """Samples of the criterion that one sample of the grid stands for, shape (k,)."""
-        return np.asarray(np.array(self.task.samples) * self.stride / self.rows.shape[2])
+        return np.asarray(np.array(self.task.samples) / self.rows.shape[2])
 
     @cached_property
     def _own_rows(self) -> tuple[tuple[int, int, float], ...]:
@@ -252,13 +245,8 @@ class Problem:
         slope[:, 0][..., places] = clearance.slopes(motion.q[:, places], near)
         return slope
 
-    def _counted(self, regressor: Array) -> Array:
-        k = self.task.trajectories
-        n, p, samples = regressor.shape
-        return regressor.reshape(n, p, k, samples // k)[..., :: self.stride].reshape(n, p, -1)
-
     def _cost(self, regressor: Array) -> tuple[float, Array]:
-        rows = self._counted(regressor) * self.task.weights[:, None, None]
+        rows = regressor * self.task.weights[:, None, None]
         rows = rows.reshape(*rows.shape[:2], self.task.trajectories, -1) * np.sqrt(self._share)[:, None]
         stacked = rows.transpose(1, 0, 2, 3).reshape(rows.shape[1], -1)
         return self.task.criterion.cost(stacked @ stacked.T + self.task.prior)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from numbers import Integral
 
 import numpy as np
@@ -19,19 +19,20 @@ from scara_ident.motion.motion import Motion
 from scara_ident.processes import map_in_order
 from scara_ident.threads import one_blas_thread
 
-# Times of the limits per period of the highest frequency, in the search and for the winner.
+# Times of limits and criterion per period of the highest frequency, in the search and for the winner. Of few in the criterion
+# a search finds those between which friction turns, which is less in truth.
 COARSE, FINE = 12, 48
 # Distances are measured at every so many-th of them.
 SPARSE = {COARSE: 2, FINE: 1}
+# At least, in the search; the winner has as many more as above.
 LEAST_TIMES = 60
 # Times of the verification per time of the winner's limits, and at least per second.
 FINER, LEAST_RATE = 10, 1000.0
 # Bounds of the search, and of the winner for what happens between its times, as shares; and what a bound is tightened by
 # besides its excess.
 BOUND, CLOSE, MARGIN = 0.999, 0.998, 5e-4
-# How the winner of the search, which is near its limits, goes on; and once more where it broke some between the times.
-WINNER = Schedule(first=0.2, last=1e-2, tolerance=1e-2, steps=100, sharpness=1.0)
-CORRECTION = replace(WINNER, first=0.05, steps=50)
+# How the winner, searched anew on the finer grid, goes on where it broke a limit between the times.
+CORRECTION = Schedule(first=0.05, last=1e-2, tolerance=1e-2, steps=50, sharpness=1.0)
 # Size of changes of a good motion, as shares of it.
 CHANGES = (0.03, 0.1, 0.2)
 ELITE = 3
@@ -154,11 +155,11 @@ def _rows(task: Task) -> int:
     return len(row_names(task.limits, len(task.posture)))
 
 
-def within_grid(task: Task, density: int, bounds: Array, stride: int = 1) -> Problem:
-    """Return a task on so many times per period of its highest frequency; every stride-th counts in the criterion."""
+def within_grid(task: Task, density: int, bounds: Array) -> Problem:
+    """Return a task on so many times per period of its highest frequency."""
     periods = max(basis.bandwidth * basis.duration for basis in task.bases)
-    counted = max(LEAST_TIMES, int(np.ceil(density / stride * periods)))
-    return Problem(task, grid(task.bases, stride * counted), stride, bounds, SPARSE[density])
+    times = max(LEAST_TIMES * density // COARSE, int(np.ceil(density * periods)))
+    return Problem(task, grid(task.bases, times), bounds, SPARSE[density])
 
 
 def from_random(problem: Problem, seed: int, index: int, parent: Array | None = None) -> Minimum | None:
@@ -191,8 +192,8 @@ def _random_motion(task: Task, random: np.random.Generator) -> Array:
 
 def _finish(task: Task, x: Array) -> tuple[Array, int]:
     """Take a motion to a fine grid, and tighten bounds until it keeps its limits between the samples as well."""
-    bounds, plan = np.full(_rows(task), CLOSE), WINNER
-    problem = within_grid(task, FINE, bounds, FINE // COARSE)
+    bounds, plan = np.full(_rows(task), CLOSE), Schedule()
+    problem = within_grid(task, FINE, bounds)
     times = _verified_times(problem)
     for _ in range(CORRECTIONS):
         start = shrunk_inside(problem.sharpened(plan.sharpness), x, room=1e-3, factor=0.998)
@@ -206,7 +207,7 @@ def _finish(task: Task, x: Array) -> tuple[Array, int]:
         if np.all(excess <= 1.0):
             return x, times
         bounds = bounds * np.where(excess > 1.0, (1.0 - MARGIN) / np.maximum(excess, 1.0), 1.0)
-        problem = within_grid(task, FINE, bounds, FINE // COARSE)
+        problem = within_grid(task, FINE, bounds)
         plan = CORRECTION
     return verified_inside(problem, x)
 

@@ -98,7 +98,7 @@ def extremes(task: Task, x: Array, times: int) -> tuple[Array, Array]:
 
 def _envelope(task: Task, x: Array, shares: Array) -> tuple[Array, Array]:
     """Return what rows may reach around shares of the durations, from above and from below, shape (R, k, M)."""
-    problem = Problem(task, rows_at(task.bases, shares), 1, np.ones(0))
+    problem = Problem(task, rows_at(task.bases, shares), np.ones(0))
     values = problem.limited(x).reshape(-1, task.trajectories, len(shares))
     around = np.zeros_like(values)
     around[..., 1:-1] = np.abs(np.diff(values, n=2, axis=2))
@@ -150,7 +150,7 @@ def _of_distance(task: Task, x: Array, group: str, value: float, times: int) -> 
     assert clearance is not None
     least = np.inf
     for shares in np.array_split(np.linspace(0.0, 1.0, times), -(-times // CHUNK)):
-        motion = Problem(task, rows_at(task.bases, shares), 1, np.ones(0)).motion(x)
+        motion = Problem(task, rows_at(task.bases, shares), np.ones(0)).motion(x)
         least = min(least, clearance.smallest(motion.q, group))
     share = value if value > 1.0 else max(0.0, 1.0 - (least - clearance.margin) / REACH)
     return Reached(f"distance.{group}", clearance.margin, least, "m", share)

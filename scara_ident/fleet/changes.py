@@ -10,7 +10,7 @@ wrong on average, and one in fifty reports of a fleet in which nothing changed n
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,18 +18,13 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.fleet.causes import Cause
 from scara_ident.fleet.history import (
-    CUT,
-    LEFT,
-    NORMAL_MEDIAN,
     DateRows,
     History,
     common_removed,
     freedom_of,
-    pseudo_inverses,
-    run_scatter,
     scatter,
-    variance_prior,
 )
+from scara_ident.fleet.scatter import LEFT_SHARE, Scatter, inverses_by_size
 
 # Chance that a report names any arm of a fleet in which nothing changed, and share of the arms named that are wrong on average.
 LEVEL = 0.02
@@ -38,13 +33,9 @@ MOST_CAUSES = 3
 AS_GOOD = 0.05
 # Draws of noise that say how many independent tests an arm's are worth, and the probability at which they do.
 SIMULATED, SIMULATED_LEVEL = 2000, 0.1
-# Causes of which runs are less than this share of the variance tell each other how much larger than noise it is.
-BY_RUNS = 0.5
 # The median of fewer differences between dates does not withstand one that is a change: what differs by nature is then taken
 # to be as large, and nothing is named.
 FEWEST_STEPS = 3
-# A combination of which less is left beside the common parameters, as a share of its square, is one of them.
-LEFT_SHARE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +52,7 @@ class Change:
     gradual : bool
         Whether it grows from then on; else it came at once.
     size : ndarray, shape (s,)
-        By how much the last date differs from the first.
+        By how much it makes the last date differ, all that changed fitted together.
     covariance : ndarray, shape (s, s)
     p_value : float
         Corrected for all that was tried.
@@ -85,83 +76,10 @@ class Change:
         return float(np.sqrt(max(0.0, square)))
 
 
-@dataclass(frozen=True, eq=False)
-class Scatter:
-    """What differs from date to date in a fleet, where nothing changes.
-
-    Attributes
-    ----------
-    runs : ndarray, shape (4 n,)
-        Standard deviations, see `run_scatter`.
-    causes : mapping of str to ndarray, shape (s,)
-        By a cause's label how much larger than their noise differences of each of its sizes are, as a ratio of squares, at
-        least 1: a tilt about one axis may differ from date to date and that about the other not.
-    freedom : float
-        Degrees of freedom of ``runs``.
-    freedoms : mapping of str to float
-        By a cause's label of both together.
-    """
-
-    runs: Array
-    causes: Mapping[str, Array]
-    freedom: float
-    freedoms: Mapping[str, float]
-
-
-def fleet_scatter(histories: Sequence[History]) -> Scatter:
-    """Return what differs from date to date in a fleet.
-
-    A cause's variance is that of runs and of noise. The first is as sure as `run_scatter` tells it; how much larger the second
-    is than noise all causes tell each other, see `variance_prior`, and with no more degrees of freedom than all of them have
-    together (Smyth 2004). The degrees of freedom of the sum are Satterthwaite's (1946).
-
-    Parameters
-    ----------
-    histories : sequence of History
-        Of one robot and model.
-    """
-    runs, told = run_scatter(histories)
-    freedom = max(1.0, told)
-    found: dict[str, list[Array]] = {}
-    parts: dict[str, list[float]] = {}
-    for history in histories:
-        if len(history.dates) < 2:
-            continue
-        rows = history.whitened(runs)
-        left, _ = common_removed(rows)
-        for k, cause in enumerate(history.causes):
-            aims = np.array([row.directions[k].T @ rest for row, rest in zip(rows, left, strict=True)])
-            spread, alone = (
-                _inverses(np.array([row.directions[k].T @ row.directions[k] for row in each]))
-                for each in (rows, history.rows)
-            )
-            sizes = np.einsum("dij,dj->di", spread, aims)
-            step, noise = np.diff(sizes, axis=0), np.einsum("dii->di", spread[1:] + spread[:-1])
-            # What all dates share is the same on both dates of a difference, and takes nothing of it.
-            squares = np.where(noise > 0.0, step**2 / np.where(noise > 0.0, noise, 1.0), 0.0)
-            found.setdefault(cause.label, []).append(squares)
-            own, whole = np.einsum("dii->i", alone), np.einsum("dii->i", spread)
-            parts.setdefault(cause.label, []).append(1.0 - float(np.min(own / np.where(whole > 0.0, whole, np.inf))))
-    # As `scatter` does: in noise the median alone is worth a third as many differences.
-    raw = {label: _mean_square(np.concatenate(squares)) for label, squares in found.items()}
-    by_runs = {label: float(np.mean(part)) for label, part in parts.items()}
-    noisy = [ratio for label, ratio in raw.items() if by_runs[label] < BY_RUNS]
-    pooled = np.concatenate(noisy) if noisy else np.zeros(0)
-    prior, usual = variance_prior(pooled, freedom)
-    moderated = min(freedom + prior, freedom * max(1, int(np.count_nonzero(pooled > 0.0))))
-    weight = freedom / (freedom + prior)
-    ratios = {label: np.maximum(1.0, usual + weight * (ratio - usual)) for label, ratio in raw.items()}
-    freedoms = {label: 1.0 / (part**2 / freedom + (1.0 - part) ** 2 / moderated) for label, part in by_runs.items()}
-    return Scatter(runs, ratios, freedom, freedoms)
-
-
-def _mean_square(squares: Array) -> Array:
-    usual = np.median(squares, axis=0) / NORMAL_MEDIAN**2
-    return np.asarray(np.nanmean(np.where(squares <= CUT**2 * usual, squares, np.nan), axis=0) / LEFT)
-
-
 def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Change, ...]:
     """Return what changed in an arm, the surest first; nothing of fewer than two dates.
+
+    A cause that changes on several dates is there for each; sizes are those of all changes together.
 
     Parameters
     ----------
@@ -177,24 +95,29 @@ def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Chan
     rows = history.whitened(scatter.runs)
     left, basis = common_removed(rows)
     shapes = list(_shapes(history.days))
-    found: list[Change] = []
+    found: list[tuple[_Trial, tuple[Cause, ...]]] = []
+    first = left, basis
     while len(found) < MOST_CAUSES:
         trials = _in_order(history, rows, left, basis, shapes, scatter)
         if not trials or trials[0].p_value * tried >= LEVEL:
             break
-        best = trials[0]
-        start, gradual, _ = shapes[best.shape]
-        cause = history.causes[best.cause]
-        enough = cause.sizes * float(fdtri(cause.sizes, scatter.freedom, 1.0 - AS_GOOD))
+        best, sizes = trials[0], history.causes[trials[0].cause].sizes
+        enough = sizes * float(fdtri(sizes, scatter.freedom, 1.0 - AS_GOOD))
         alike = tuple(history.causes[item.cause] for item in trials[1:] if best.explained - item.explained < enough)
-        found.append(
-            Change(
-                cause, cause.joint, history.dates[start], gradual, best.size, best.covariance,
-                min(1.0, best.p_value * tried), alike,
-            )
-        )  # fmt: skip
+        found.append((best, alike))
         left, basis = _without(best, rows, left, basis, shapes)
-    return tuple(found)
+    named = []
+    for trial, alike in found:
+        left, basis = first
+        for other, _ in found:
+            if other is not trial:
+                left, basis = _without(other, rows, left, basis, shapes)
+        cause, (start, gradual, _) = history.causes[trial.cause], shapes[trial.shape]
+        beside = _best(trial.cause, cause, rows, left, basis, [shapes[trial.shape]], scatter) or trial
+        chance = min(1.0, trial.p_value * tried)
+        since = history.dates[start]
+        named.append(Change(cause, cause.joint, since, gradual, beside.size, beside.covariance, chance, alike))
+    return tuple(named)
 
 
 def arms_counted(probabilities: Sequence[float]) -> float:
@@ -385,13 +308,4 @@ def _left_of(own: Sequence[Array], basis: Sequence[Array], share: Array) -> tupl
     whole = np.einsum("sd,dij->sij", share**2, squares)
     matrix = whole - np.einsum("sri,srj->sij", taken, taken)
     kept = np.all(np.einsum("sii->si", matrix) > LEFT_SHARE * np.einsum("sii->si", whole), axis=1)
-    return _inverses(matrix), matrix, kept
-
-
-def _inverses(matrices: Array) -> Array:
-    """Return the pseudo-inverses of symmetric matrices, shape (N, k, k), each in units of its own diagonal."""
-    size = np.sqrt(np.maximum(np.einsum("nii->ni", matrices), np.finfo(float).tiny))
-    scale = size[:, :, None] * size[:, None, :]
-    if matrices.shape[1] == 1:
-        return np.where(matrices > np.finfo(float).tiny, 1.0 / scale, 0.0)
-    return np.asarray(pseudo_inverses(matrices / scale, LEFT_SHARE) / scale)
+    return inverses_by_size(matrix), matrix, kept

@@ -16,17 +16,17 @@ from scara_ident.fleet.changes import (
     Change,
     arms_counted,
     find_changes,
-    fleet_scatter,
     grown_residuals,
     least_probability,
     residual_scatter,
     trials_of,
 )
-from scara_ident.fleet.folder import Fault, list_fleet
+from scara_ident.fleet.folder import Fault, date_notes, list_fleet
 from scara_ident.fleet.history import History
+from scara_ident.fleet.scatter import fleet_scatter
 from scara_ident.fleet.store import FOLDER, Store
 from scara_ident.fleet.table import Quantity, quantities
-from scara_ident.fleet.words import sentence
+from scara_ident.fleet.words import sentences
 from scara_ident.fleet.work import IDENTIFYING, LateEngine, Settings, Work
 from scara_ident.manners import several
 from scara_ident.model.model import TorqueModel, build_model
@@ -80,8 +80,8 @@ class ArmReport:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What changed, in words."""
-        return tuple(sentence(change, self.known.scene) for change in self.changes)
+        """What changed, in words, a sentence for each cause."""
+        return sentences(self.changes, self.known.scene) if self.changes else ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +96,15 @@ class Fleet:
         By name.
     quantities : mapping of str to tuple
         By arm, for each date its quantities.
+    notes : tuple of str
+        What to know of the dates.
     """
 
     robot: Robot
     model: TorqueModel
     arms: tuple[ArmReport, ...]
     quantities: Mapping[str, tuple[tuple[Quantity, ...], ...]]
+    notes: tuple[str, ...] = ()
 
     @property
     def ranked(self) -> tuple[ArmReport, ...]:
@@ -189,7 +192,7 @@ def watch_fleet(
         )
         for arm in arms
     )
-    return Fleet(robot, model, reports, quantities(list(histories.values())))
+    return Fleet(robot, model, reports, quantities(list(histories.values())), date_notes(files))
 
 
 def changes_of(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
@@ -152,16 +152,55 @@ def date_of(place: str, info: Mapping[str, Any]) -> str:
     >>> date_of("2026-03/run_20260315_2.csv", {})
     '2026-03-15'
     """
-    for part in reversed(PurePosixPath(place).parts):
-        for year, month, day in reversed(_DATE.findall(part)):
-            with suppress(ValueError):
-                return date(int(year), int(month), int(day)).isoformat()
+    for _, named in _named_dates(place):
+        if named is not None:
+            return named
     written = info.get("LastModified") or info.get("mtime") or info.get("updated") or 0.0
     if not isinstance(written, datetime):
         with suppress(TypeError, ValueError):
             return datetime.fromtimestamp(float(written), UTC).date().isoformat()
         written = datetime.fromisoformat(str(written))
     return written.date().isoformat()
+
+
+def date_notes(files: Sequence[RecordingFile]) -> tuple[str, ...]:
+    """Say which recordings are named after a date that does not exist, and which date they have instead.
+
+    Parameters
+    ----------
+    files : sequence of RecordingFile
+
+    Returns
+    -------
+    tuple of str
+        One for all recordings of an arm with one such date.
+    """
+    found: dict[tuple[str, str, bool], list[RecordingFile]] = {}
+    for file in files:
+        named = list(_named_dates(file.place))
+        real = [day for _, day in named if day is not None]
+        for word, day in named:
+            if day is not None:
+                break
+            # Digits in a row may be any number where a date is named beside them.
+            if "-" in word or not real:
+                found.setdefault((file.arm, word, bool(real)), []).append(file)
+                break
+    return tuple(
+        f"{arm}/{same[0].place}{f' and {len(same) - 1} more' if same[1:] else ''}: there is no date {word}; "
+        f"{same[0].date} is taken, {'which is in the path too' if real else 'when the file was written'}; rename to the right date"
+        for (arm, word, real), same in found.items()
+    )
+
+
+def _named_dates(place: str) -> Iterator[tuple[str, str | None]]:
+    """Give what looks like a date in a path, the nearest to its end first, with the ISO date; None where there is no such."""
+    for part in reversed(PurePosixPath(place).parts):
+        for match in reversed(list(_DATE.finditer(part))):
+            try:
+                yield match[0], date(*map(int, match.groups())).isoformat()
+            except ValueError:
+                yield match[0], None
 
 
 def content_key(url: str) -> str:

@@ -143,10 +143,9 @@ def _fault_row(fault: Fault, verdict: str) -> dict[str, Any]:
 
 
 def _change_of(item: Quantity, day: str, changes: Sequence[Change]) -> Change | None:
-    for change in changes:
-        if change.cause is not None and item.cause == change.cause.label and day >= change.since:
-            return change
-    return None
+    """Return the first change of the cause of a quantity, None where there is none up to a day."""
+    own = [change for change in changes if change.cause is not None and change.cause.label == item.cause]
+    return min((change for change in own if change.since <= day), key=lambda change: change.since, default=None)
 
 
 def _of_date(

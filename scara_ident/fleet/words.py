@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import date
 
 import numpy as np
@@ -15,28 +16,44 @@ from scara_ident.fleet.changes import Change
 NAMED_STDS = 2.0
 
 
-def sentence(change: Change, scene: Scene) -> str:
-    """Return a change in words, such as ``Coulomb friction of joint2 up 31 % (± 2 %) since 1 March 2026``."""
+def sentences(changes: Sequence[Change], scene: Scene) -> tuple[str, ...]:
+    """Return changes in words, such as ``Coulomb friction of joint2 up 31 % (± 2 %) since 1 March 2026``; of a cause all together."""
+    by_cause: dict[str, list[Change]] = {}
+    for change in changes:
+        label = f"residual of {change.joint}" if change.cause is None else change.cause.label
+        by_cause.setdefault(label, []).append(change)
+    return tuple(_sentence(sorted(own, key=lambda item: item.since), scene) for own in by_cause.values())
+
+
+def _sentence(changes: Sequence[Change], scene: Scene) -> str:
+    """Return the changes of one cause in words, the first date first."""
+    change = changes[0]
     if change.cause is None:
         std = np.sqrt(change.covariance[0, 0])
         share = _amount("", Parameter(float(change.size[0]), float(std), "1"))
         return f"Residual of {change.joint}{share} since {day(change.since)}; no watched cause explains it"
     cause = change.cause
     words = cause.words if cause.joint is None or cause.joint in cause.words else f"{cause.words} on {cause.joint}"
-    sizes = {key: item for key, item in sizes_in_words(cause, scene, change.size, change.covariance).items()}
-    told = {key: item for key, item in sizes.items() if abs(item.value) > NAMED_STDS * item.std} or sizes
-    if cause.effect == "inertia":
-        # A sum of many parameters has no size of its own.
-        amount = f" changed by {change.score:.0f} standard deviations"
-    else:
-        shared = cause.candidate is None
-        amount = ",".join(
-            _amount("" if shared else f" {key.replace('_', ' ')}", item, shared) for key, item in told.items()
-        )
-    how = "gradually since" if change.gradual else "since"
-    alike = ", ".join(dict.fromkeys(item.words for item in change.or_else[:3]))
+    each = ",".join(
+        f"{_size(item, scene, again=k > 0)} {'gradually since' if item.gradual else 'since'} {day(item.since)}"
+        for k, item in enumerate(changes)
+    )
+    alike = ", ".join(dict.fromkeys(other.words for item in changes for other in item.or_else[:3]))
     other = f"; it could also be {alike}" if alike else ""
-    return f"{words[0].upper()}{words[1:]}{':' if cause.candidate else ''}{amount} {how} {day(change.since)}{other}"
+    return f"{words[0].upper()}{words[1:]}{':' if cause.candidate else ''}{each}{other}"
+
+
+def _size(change: Change, scene: Scene, *, again: bool = False) -> str:
+    """Return the size of a change in words; a single one that is named before needs no name again."""
+    cause = change.cause
+    if cause is None or cause.effect == "inertia":
+        # A sum of many parameters has no size of its own.
+        return f" changed by {change.score:.0f} standard deviations"
+    sizes = sizes_in_words(cause, scene, change.size, change.covariance)
+    told = {key: item for key, item in sizes.items() if abs(item.value) > NAMED_STDS * item.std} or sizes
+    shared = cause.candidate is None
+    bare = shared or (again and len(sizes) == 1)
+    return ",".join(_amount("" if bare else f" {key.replace('_', ' ')}", item, shared) for key, item in told.items())
 
 
 def day(iso: str) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.manners import Reported
-from scara_ident.recording.audit import Finding, Samples, audit
+from scara_ident.recording.audit import Finding, Samples, audit, once
 from scara_ident.recording.columns import recording_columns
 from scara_ident.recording.even_rows import with_even_clock
 from scara_ident.recording.files import column_names, read_columns, shares_clock
@@ -208,8 +208,7 @@ def _kept(long: LongFile, robot: Robot, *, need_effort: bool) -> Recording:
         values = [getattr(part, signal) for part in parts]
         return None if any(value is None for value in values) else np.concatenate(values, axis=1)
 
-    findings = dict.fromkeys(finding.kind for part in parts for finding in part.findings)
-    said = [next(own for part in parts for own in part.findings if own.kind == kind) for kind in findings]
+    said = once(chain.from_iterable(part.findings for part in parts))
     kept = int(starts[-1])
     if long.windows != (long.bounds,):
         where = f"of its {long.samples} samples {kept} are looked at, in {len(parts)} windows spread over it"

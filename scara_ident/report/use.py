@@ -38,6 +38,7 @@ def use_dict(result: Use) -> dict[str, Any]:
         "arms": len(result.runs),
         "effects": [effect.as_dict() for effect in result.effects],
         "not_simulated": list(result.missing),
+        "notes": list(result.notes),
         "tracking": {
             name: dict(zip(robot.joints, value.tolist(), strict=True)) for name, value in result.rms().items()
         },
@@ -71,7 +72,7 @@ def worth_dict(model: IdentifiedModel) -> dict[str, Any]:
         return dict(zip(robot.joints, errors.tolist(), strict=True))
 
     return {
-        "summary": [_shares_said(found.rms), *(_cost_said(item, found.rms) for item in found.each)],
+        "summary": [_shares_said(found.rms), *(_cost_said(item, found.rms) for item in found.each), *found.notes],
         "trajectory": {"name": found.motion.name, "duration": found.motion.duration},
         "tracking": {name: by_joint(errors) for name, errors in found.rms.items()},
         "effects": [
@@ -147,4 +148,4 @@ def sentences(result: Use) -> list[str]:
         said.append(f"Not simulated in MuJoCo: {result.not_mujoco}.")
     if result.missing:
         said.append(f"Not simulated: {', '.join(result.missing)}.")
-    return said
+    return [*said, *result.notes]

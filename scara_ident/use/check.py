@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RecordingError
+from scara_ident.errors import RecordingError, UsageError
 from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.manners import listed
 from scara_ident.motion.motion import Motion
@@ -123,10 +123,14 @@ def read_motion(path: Path | str, known: IdentifiedModel) -> tuple[Motion, ...]:
 
     Raises
     ------
+    UsageError
+        If there is no such file.
     RecordingError
         If it cannot be read, or is too short.
     """
     path, robot = Path(path), known.robot
+    if not path.exists():
+        raise UsageError(f"{path}: no such file; give a trajectory.csv or a recording")
     names = (
         set() if path.is_dir() else set(column_names(path)) if path.suffix.lower() in (".csv", ".parquet") else set()
     )

@@ -11,7 +11,9 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, UsageError
 from scara_ident.export.identified_model import Entry, IdentifiedModel
+from scara_ident.manners import listed
 from scara_ident.model.model import build_model
+from scara_ident.model.terms import RigidBody
 from scara_ident.robot.robot import Robot
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.defaults import placed_poles, virtual_arm
@@ -24,6 +26,8 @@ _MODELS = ("complete", "reduced", "basic")
 _KINDS = (slice(0, 1), slice(1, 4), slice(4, 10))
 # A kind of parameter that the URDF has none of counts as this share of the kind's largest one on the arm.
 _LEAST_SHARE = 1e-3
+# Of the arm's largest rotor: less than nothing by less is rounding.
+_ROUNDING = 1e-9
 # Random poses at which the inertia must be positive.
 _POSES = 64
 
@@ -54,7 +58,8 @@ def arm_with(robot: Robot, parameters: Mapping[str, float], near: Array | None =
     """Return the virtual arm whose complete model has given parameters.
 
     Torque tells base parameters only; of all bodies with these, those are taken that are nearest to given ones, each kind
-    of parameter in units of the arm's largest. Every motion then takes the same torque, whichever they are.
+    of parameter in units of the arm's largest. Every motion then takes the same torque, whichever they are; only a rotor
+    that torque itself tells to be of less than no inertia has none instead, see `rotor_note`.
 
     Parameters
     ----------
@@ -75,22 +80,68 @@ def arm_with(robot: Robot, parameters: Mapping[str, float], near: Array | None =
     """
     arm, model = virtual_arm(robot), build_model(robot, "complete")
     value = np.array([float(parameters.get(name, 0.0)) for name in model.names])
-    body, n = model.rigid_body, robot.n
-    grouping = body.base.grouping[body.kept]
-    nominal = np.concatenate([arm.bodies.ravel(), arm.armature]) if near is None else near
-    size = np.concatenate([np.tile(_sizes(arm.bodies), n), np.full(n, max(float(np.max(arm.armature)), _LEAST_SHARE))])
-    scaled = grouping * size
-    change = size * (np.linalg.pinv(scaled) @ (value[: len(grouping)] - grouping @ nominal))
-    standard = nominal + change
-    friction = value[len(grouping) : len(grouping) + 4 * n].reshape(n, 4)
+    n, count = robot.n, len(model.rigid_body.kept)
+    standard, _ = _nearest(arm, model.rigid_body, value[:count], near)
     made = replace(
         arm,
         bodies=standard[: 10 * n].reshape(n, 10),
-        rotor_inertia=np.maximum(standard[10 * n :], 0.0) / robot.reduction**2,
-        friction=friction,
-        torque_offset=value[len(grouping) + 4 * n :],
+        rotor_inertia=standard[10 * n :] / robot.reduction**2,
+        friction=value[count : count + 4 * n].reshape(n, 4),
+        torque_offset=value[count + 4 * n :],
     )
     return replace(made, controller=placed_poles(_mean_inertia(made)))
+
+
+def rotor_note(model: IdentifiedModel) -> str:
+    """Say which rotors of a model have less than no inertia, which `arms_of` takes as none; empty where none has.
+
+    Least squares end there where a rotor's share of the torque is small beside the noise, or beside what the model lacks.
+    """
+    robot, body = model.robot, build_model(model.robot, "complete").rigid_body
+    below = np.zeros(robot.n)
+    for value in (model.before, model.value):
+        known = by_name(model, value)
+        base = np.array([known.get(column.name, 0.0) for column in body.columns])
+        lost = _nearest(virtual_arm(robot), body, base, model.standard)[1]
+        below = np.where(lost < 0.0, lost, below)
+    said = [
+        f"{joint} {below[j]:.3g} {robot.armature_unit(j)}" for j, joint in enumerate(robot.joints) if below[j] < 0.0
+    ]
+    if not said:
+        return ""
+    return (
+        f"The fit has a rotor of less than no inertia, at the joint: {listed(said, 6)}. No arm has one: it is 0 in the virtual "
+        "arm and in what is fed forward; identify with --method consistent, or from motion that tells more."
+    )
+
+
+def _nearest(arm: VirtualArm, body: RigidBody, base: Array, near: Array | None) -> tuple[Array, Array]:
+    """Return the standard parameters nearest to given ones that have these base parameters, and rotors below zero.
+
+    Returns
+    -------
+    standard : ndarray, shape (11 n,)
+        With no rotor below zero.
+    below : ndarray, shape (n,)
+        Inertia at the joint of the rotors that no other parameter can stand in for; 0 for all others.
+    """
+    n, grouping = arm.robot.n, body.base.grouping[body.kept]
+    standard = np.concatenate([arm.bodies.ravel(), arm.armature]) if near is None else near.copy()
+    size = np.concatenate([np.tile(_sizes(arm.bodies), n), np.full(n, max(float(np.max(arm.armature)), _LEAST_SHARE))])
+    rotors = np.arange(10 * n, 11 * n)
+    # A rotor that is shared with a link leaves to it what would take it below zero.
+    free = np.ones(11 * n, dtype=bool)
+    for _ in range(n + 1):
+        scaled = (grouping * size)[:, free]
+        standard[free] += size[free] * (np.linalg.pinv(scaled) @ (base - grouping @ standard))
+        negative = rotors[standard[rotors] < 0.0]
+        if not len(negative):
+            break
+        standard[negative], free[negative] = 0.0, False
+    share = grouping[:, rotors]
+    left = share.T @ (base - grouping @ standard) / np.maximum(np.sum(share**2, axis=0), np.finfo(float).tiny)
+    told = ~free[rotors] & (left < -_ROUNDING * size[rotors])
+    return standard, np.where(told, left, 0.0)
 
 
 def simulated(found: Sequence[Entry]) -> tuple[tuple[tuple[Effect, Entry], ...], tuple[str, ...]]:

@@ -19,7 +19,7 @@ from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.first_run import compiled_first
 from scara_ident.simulation.reference import ReferenceMotion
 from scara_ident.threads import side_by_side
-from scara_ident.use.identified_arm import arm_with, arms_of, by_name, simulated
+from scara_ident.use.identified_arm import arm_with, arms_of, by_name, rotor_note, simulated
 from scara_ident.use.mujoco_arm import Free, mujoco_arm
 from scara_ident.use.rollout import HORIZONS, rollout_errors, virtual_free
 from scara_ident.use.tracking import Tracked, at_ticks, foreseen_torque, needed_torque, tracked, urdf_torque
@@ -55,6 +55,8 @@ class Use:
         The arms that followed, with their effects.
     feeds : mapping of str to ndarray of shape (n, N)
         Torque fed forward, on the effort side; none for ``pid``.
+    notes : tuple of str
+        What of the model no virtual arm can have.
     """
 
     model: IdentifiedModel
@@ -67,6 +69,7 @@ class Use:
     missing: tuple[str, ...]
     drawn: tuple[tuple[VirtualArm, tuple[Effect, ...]], ...]
     feeds: Mapping[str, Array]
+    notes: tuple[str, ...] = ()
 
     def rms(self) -> dict[str, Array]:
         """Return the rms tracking error of every joint over all drawn arms, by feed-forward."""
@@ -170,7 +173,8 @@ def use(
                     rollouts[name] = _over(parts, free)
             except ScaraIdentError as error:
                 not_mujoco = str(error)
-    return Use(model, wanted, tuple(runs), HORIZONS, rollouts, not_mujoco, effects, missing, tuple(drawn), feeds)
+    notes = tuple(filter(None, [rotor_note(model)]))
+    return Use(model, wanted, tuple(runs), HORIZONS, rollouts, not_mujoco, effects, missing, tuple(drawn), feeds, notes)
 
 
 def _over(parts: Sequence[PreparedStretch], free: Free) -> Array:

@@ -55,6 +55,8 @@ class Worth:
     each : tuple of EffectWorth
     missing : tuple of str
         Effects that the virtual arm cannot have.
+    notes : tuple of str
+        See `Use`.
     """
 
     model: IdentifiedModel
@@ -62,6 +64,7 @@ class Worth:
     rms: Mapping[str, Array]
     each: tuple[EffectWorth, ...]
     missing: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 def worth(model: IdentifiedModel, *, seed: int = 0) -> Worth:
@@ -96,7 +99,7 @@ def worth(model: IdentifiedModel, *, seed: int = 0) -> Worth:
         return EffectWorth(entry, alone.rms, not_fed)
 
     each = tuple(side_by_side(of_one, range(min(len(pairs), MOST))))
-    return Worth(model, found.motion, found.rms(), each, missing)
+    return Worth(model, found.motion, found.rms(), each, missing, found.notes)
 
 
 def _of_effect(model: IdentifiedModel, entry: Entry) -> Array | None:

@@ -50,6 +50,8 @@ def test_json_alone(capfd, folder: Path, result_file: Path):
 def test_what_is_wrong_is_one_line(command, folder: Path, result_file: Path):
     assert command("check", folder / "OJD_2.parquet", result_file, "--torque", "joint9=1").status == 2
     assert "joint9" in command("check", folder / "OJD_2.parquet", result_file, "--torque", "joint9=1").err
+    missing = command("check", folder / "missing.csv", result_file)
+    assert missing.status == 2 and "missing.csv: no such file" in missing.err
     done = command("check", folder / "OJD_2.parquet", folder / "OJD_1.parquet")
     assert done.status == 1
     assert "give an identification.json" in done.err or "not JSON" in done.err

@@ -137,6 +137,10 @@ def test_what_no_effect_of_the_catalogue_explains_is_said_with_joint_signals_and
     assert result.unexplained.joint == "joint2"
     assert result.unexplained.signals == ("position of joint2",)
     assert result.unexplained.rms == pytest.approx(0.03 / np.sqrt(2.0), rel=0.2)
+    # 0.05 periods per motor turn: nothing said that none so slow is looked for.
+    assert any(
+        note.startswith("joint2: what repeats with the motor's angle is looked for from 0.4") for note in result.notes
+    )
 
 
 def test_a_remainder_is_seen_by_repetition_where_no_signal_shows_it():

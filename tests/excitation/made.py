@@ -76,7 +76,7 @@ def small_problem(
         prior=prior * np.eye(count),
     )
     rows = len(row_names(bounds, robot.n))
-    return Problem(task, grid(task.bases, 60), 2, np.full(rows, 0.999))
+    return Problem(task, grid(task.bases, 60), np.full(rows, 0.999))
 
 
 def upright(folder: Path, *shapes: str) -> Robot:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from scara_ident.fleet.history import noise_of
+from scara_ident.fleet.visit import Visit
 from scara_ident.paper import OJD, table5_parameters
 from scara_ident.recording.recording import Recording, write_recording
 from scara_ident.robot.robot import load_robot
@@ -50,3 +53,14 @@ def write_fleet(folder: Path, arms: int = 4, dates: int = len(DATES), suffix: st
             wear = WEAR[k] if f"arm{arm}" == WORN else 1.0
             write_recording(run_of(arm, k, wear), place / f"OJD_1{suffix}")
     return folder
+
+
+def drawn(first: Visit, random: np.random.Generator) -> Visit:
+    """A date of nothing but noise, in the columns of the first."""
+    factors = []
+    for factor, rows in zip(first.factors, first.rows, strict=True):
+        own = factor.copy()
+        known = factor.shape[1] - 1
+        own[:known, known] = noise_of(factor, rows) * random.standard_normal(known)
+        factors.append(own)
+    return replace(first, factors=tuple(factors))

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from scara_ident.errors import RecordingError, UsageError
-from scara_ident.fleet.folder import content_key, date_of, fetched, file_system, list_fleet
+from scara_ident.fleet.folder import RecordingFile, content_key, date_notes, date_of, fetched, file_system, list_fleet
 
 
 @pytest.mark.parametrize(
@@ -27,6 +27,21 @@ from scara_ident.fleet.folder import content_key, date_of, fetched, file_system,
 )
 def test_the_date_is_the_files_else_its_folders_else_that_of_writing(place, date):
     assert date_of(place, {"mtime": 86400.0}) == date
+
+
+def test_a_date_that_does_not_exist_is_said_once_with_the_date_taken():
+    def notes(*places: str) -> tuple[str, ...]:
+        return date_notes([RecordingFile("arm2", date_of(place, {"mtime": 86400.0}), place, "") for place in places])
+
+    assert notes("2026-02-30/OJD_1.csv", "2026-02-30/OJD_2.csv", "2026-02-28/OJD_1.csv") == (
+        "arm2/2026-02-30/OJD_1.csv and 1 more: there is no date 2026-02-30; 1970-01-02 is taken, when the file was written; "
+        "rename to the right date",
+    )
+    (said,) = notes("2026-03-01/OJD_2026-02-30_1.csv")
+    assert "there is no date 2026-02-30; 2026-03-01 is taken, which is in the path too" in said
+    assert len(notes("run_20260230_1.csv")) == 1
+    # The date taken is the file's own, and digits in a row beside one are any number.
+    assert notes("2026-02-30/OJD_2026-03-02_1.csv", "2026-03-01/serial_20011945_1.csv", "OJD_1.csv") == ()
 
 
 def test_an_object_store_says_when_a_file_was_written():

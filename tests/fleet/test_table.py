@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from scara_ident.effects.catalogue import available_effects
-from scara_ident.fleet.table import _beyond_noise, quantities
+from scara_ident.fleet.changes import Change
+from scara_ident.fleet.table import Quantity, _beyond_noise, _change_of, quantities
 from tests.fleet.made import WORN
 
 
@@ -37,6 +38,16 @@ def test_the_effects_parameters_stand_beside_the_models(histories):
     assert shown == watched
     loss = next(item for item in found if item.name.startswith("loss_coefficient"))
     assert abs(loss.value) < 5.0 * loss.std and loss.unit == "1" and loss.joint == "joint1"
+
+
+def test_a_quantity_has_the_first_of_the_changes_of_its_cause(histories):
+    cause = histories[0].causes[0]
+    item = Quantity("any", cause.joint, "1", 1.0, 0.1, cause.label)
+    late, early = (
+        Change(cause, cause.joint, day, False, np.ones(1), np.eye(1), 1e-6) for day in ("2026-05-01", "2026-03-01")
+    )
+    assert _change_of(item, "2026-04-01", (late, early)) is _change_of(item, "2026-06-01", (late, early)) is early
+    assert _change_of(item, "2026-02-01", (late, early)) is None
 
 
 def test_scatter_is_told_of_coefficients_as_that_of_an_amplitude_near_zero_is_less():

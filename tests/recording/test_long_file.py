@@ -104,6 +104,16 @@ def test_windows_are_spread_over_the_file_and_all_of_a_shorter_one(robot, gappy)
     assert "gap" not in {finding.kind for finding in kept.findings}
 
 
+def test_every_effort_that_is_clipped_is_left_out(robot, tmp_path):
+    """Only that of the first joint was."""
+    made = columns(10_000)
+    for joint in ("joint1", "joint2"):
+        made[f"{joint}.effort"] = np.minimum(made[f"{joint}.effort"], 0.3)
+    recording = read_recording(save(tmp_path / "long_1.parquet", made), robot)
+    assert recording.long is not None
+    assert {item.clipped for item in recording.findings if item.kind == "saturation"} == {(0, 0.3), (1, 0.3)}
+
+
 def test_short_pieces_are_kept_together_so_that_windows_are_no_slivers():
     for bounds in ([*range(0, 2_000, 10), 60_000], [*range(0, 30_000, 10), 60_000], [*range(0, 60_001, 100)]):
         windows = LongFile(Path("a.parquet"), tuple(cut_long(bounds))).windows

@@ -81,3 +81,9 @@ def test_an_effect_in_doubt_is_said_to_be_fed_forward_all_the_same() -> None:
         "Spring of joint1 is in doubt: 10 ± 5 % of it shows on the recordings held out; it is in what is fed forward."
     )
     assert said in sentences(replace(made, model=doubted))
+
+
+def test_what_no_virtual_arm_can_have_is_said_in_words_and_in_the_json() -> None:
+    told = replace(result(), notes=("joint2 has no rotor.",))
+    assert sentences(told)[-1] == "joint2 has no rotor."
+    assert use_dict(told)["notes"] == ["joint2 has no rotor."]

@@ -12,7 +12,8 @@ from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation import virtual_arm
 from scara_ident.simulation.inverse_dynamics import inverse_dynamics
 from scara_ident.simulation.truth import _complete_parameters
-from scara_ident.use.identified_arm import arm_with, simulated
+from scara_ident.use.identified_arm import arm_with, arms_of, rotor_note, simulated
+from tests.use.made import known_as
 
 
 def moved_values(robot: Robot) -> dict[str, float]:
@@ -65,6 +66,22 @@ def test_an_arm_that_an_estimate_has_found_is_taken_as_it_is() -> None:
     close = 1e-12 * np.abs(found).max()
     np.testing.assert_allclose(taken.bodies.ravel(), found[: 10 * robot.n], rtol=0.0, atol=close)
     np.testing.assert_allclose(taken.armature, found[10 * robot.n :], rtol=0.0, atol=close)
+
+
+def test_a_rotor_below_zero_is_said_with_its_value_and_what_a_link_can_stand_in_for_is_not() -> None:
+    robot = load_robot()
+    model = build_model(robot, "complete")
+    value = np.array(_complete_parameters(virtual_arm(robot)))
+    below = value.copy()
+    below[model.names.index("P_d5")] = -0.012
+    assert "joint2 -0.012 kg m^2" in rotor_note(known_as(model, below))
+    assert arms_of(known_as(model, below))[1].rotor_inertia[1] == 0.0
+    # P_d1 has the rotor and the link: the link alone keeps the torque.
+    value[model.names.index("P_d1")] = 1.5
+    assert rotor_note(known_as(model, value)) == ""
+    arm = arms_of(known_as(model, value))[1]
+    found = np.array(_complete_parameters(arm))
+    np.testing.assert_allclose(found, value, rtol=0.0, atol=1e-9 * np.abs(value).max())
 
 
 def test_parameters_of_no_arm_are_refused() -> None:

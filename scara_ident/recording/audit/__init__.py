@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 
 from scara_ident.recording.audit import clock, effort, held, lost_samples, position, stamps
-from scara_ident.recording.audit.samples import Finding, Samples
+from scara_ident.recording.audit.samples import Finding, Samples, once
 
 _LOG = logging.getLogger(__name__)
 
@@ -73,4 +73,4 @@ def audit(samples: Samples) -> tuple[Samples, tuple[Finding, ...]]:
     return samples, tuple(findings)
 
 
-__all__ = ["Finding", "Samples", "audit"]
+__all__ = ["Finding", "Samples", "audit", "once"]

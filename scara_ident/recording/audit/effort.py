@@ -9,7 +9,15 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.manners import several
-from scara_ident.recording.audit.samples import IDLE_TRAVEL, Finding, Samples, joint_range, levels, runs
+from scara_ident.recording.audit.samples import (
+    IDLE_TRAVEL,
+    Finding,
+    Samples,
+    joint_range,
+    levels,
+    resolution,
+    runs,
+)
 
 Checked = tuple[Samples, list[Finding]]
 
@@ -18,8 +26,13 @@ STUCK_SECONDS = 0.2
 # ... and dead where it does so for this share of the recording.
 DEAD_SHARE = 0.5
 # Where more than this share of the other samples repeats the one before, the effort has no noise (a simulation, a
-# coarse converter), and a value that lasts says nothing.
-NOISELESS = 0.5
+# coarse converter), and a value that lasts says nothing, unless it lasts for most of the time and so many times
+# longer than any other does.
+NOISELESS, OUTLASTING = 0.5, 10.0
+# An effort without noise is one value as well while all joints keep their speed, to this share of the way.
+STEADY = 1e-3
+# Differences of this order and the next tell noise, which makes the next larger; rounding makes it so many smallest steps.
+ORDER, ROUNDING_STEPS = 4, 4.0
 # A saturated amplifier holds its extreme for this many samples in a row, ...
 PILE_RUN = 3
 # ... for this share of the recording in all, ...
@@ -141,14 +154,53 @@ def _stuck(samples: Samples, joint: int, same: NDArray[np.bool_]) -> NDArray[np.
     end = start + length - 1
     long = samples.time[end] - samples.time[start] > STUCK_SECONDS
     long &= (values[start] != values.max()) & (values[start] != values.min()) | (length > DEAD_SHARE * samples.count)
-    for first, last in zip(start[long], end[long], strict=True):
-        travel = np.ptp(samples.position[joint, first : last + 1])
-        if travel > IDLE_TRAVEL * joint_range(samples.robot)[joint]:
-            stuck[first : last + 1] = True
+    least = IDLE_TRAVEL * joint_range(samples.robot)[joint]
+
+    def moves(run: int) -> bool:
+        return bool(np.ptp(samples.position[joint, start[run] : end[run] + 1]) > least)
+
+    found = [run for run in np.flatnonzero(long).tolist() if moves(run)]
+    for run in found:
+        stuck[start[run] : end[run] + 1] = True
     elsewhere = ~(stuck[1:] & stuck[:-1])
-    if stuck.any() and elsewhere.any() and np.mean(same[elsewhere]) > NOISELESS:
-        stuck[:] = False
+    if found and elsewhere.any() and np.mean(same[elsewhere]) > NOISELESS:
+        by_length = np.argsort(-length, kind="stable").tolist()
+        value = values[start[max(found, key=lambda run: length[run])]]
+        # Without another value that lasts in motion nothing says how long one may.
+        usual = next((length[run] for run in by_length if values[start[run]] != value and moves(run)), samples.count)
+        most = max(OUTLASTING * usual, DEAD_SHARE * samples.count)
+        found = [run for run in found if values[start[run]] == value and length[run] > most]
+    if found and _without_noise(values, ~stuck):
+        found = [run for run in found if not _steady(samples, start[run], end[run])]
+    stuck[:] = False
+    for run in found:
+        stuck[start[run] : end[run] + 1] = True
     return stuck
+
+
+def _without_noise(values: Array, live: NDArray[np.bool_]) -> bool:
+    """Tell whether what is live of an effort is smooth to its rounding, as a simulator writes it."""
+    beside = ORDER + 2
+    if len(values) < beside:
+        return False
+    whole = np.convolve(live, np.ones(beside), "valid") > beside - 0.5
+    if not whole.any():
+        return False
+    lower, higher = (np.abs(np.diff(values, n=order)) for order in (ORDER, ORDER + 1))
+    rounding = ROUNDING_STEPS * resolution(values)
+    return bool(np.median(higher[whole]) <= max(float(np.median(lower[:-1][whole])), rounding))
+
+
+def _steady(samples: Samples, first: int, last: int) -> bool:
+    """Tell whether all joints keep their speed from one sample to another."""
+    time = samples.time[first : last + 1] - samples.time[first]
+    small = IDLE_TRAVEL * joint_range(samples.robot)
+    for joint, position in enumerate(samples.position[:, first : last + 1]):
+        off = np.max(np.abs(position - np.polyval(np.polyfit(time, position, 1), time)))
+        # A joint that rests may do so on the edge between two steps of its encoder.
+        if off > max(STEADY * max(np.ptp(position), small[joint]), 2.0 * resolution(samples.position[joint])):
+            return False
+    return True
 
 
 def _piles_up(values: Array, at: NDArray[np.bool_], direction: int) -> bool:

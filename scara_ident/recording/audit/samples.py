@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NoReturn
 
@@ -48,6 +49,14 @@ class Finding:
     message: str
     count: int = 1
     clipped: tuple[int, float] | None = None
+
+
+def once(findings: Iterable[Finding]) -> list[Finding]:
+    """Return the first finding of each kind, and of each effort that is clipped, which is left out by it."""
+    found: dict[tuple[str, tuple[int, float] | None], Finding] = {}
+    for finding in findings:
+        found.setdefault((finding.kind, finding.clipped), finding)
+    return list(found.values())
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,25 +50,44 @@ def is_date(word: str) -> bool:
     return seconds(pl.Series([word])) is not None
 
 
-def _parsed(words: pl.Series) -> pl.Series | None:
-    import polars as pl
+def first_wrong(words: pl.Series) -> int | None:
+    """Return the first row that is no point in time, as 30 February, where most rows are; None where most are something else.
 
-    words = words.str.replace(r"^(\S+)T", "$1 ").str.replace(r",([0-9]+)", ".$1")
+    Parameters
+    ----------
+    words : polars.Series of str, shape (N,)
+    """
+    words = words.str.strip_chars().replace("", None)
+    given = len(words) - words.null_count()
+    if int(words.str.contains(":").sum() or 0) < given / 2:
+        return None
+    for found in _readings(words):
+        wrong = (found.is_null() & words.is_not_null()).arg_true()
+        if 0 < len(wrong) < given / 2:
+            return int(wrong[0])
+    return None
+
+
+def _parsed(words: pl.Series) -> pl.Series | None:
     some = words.drop_nulls()
     if not len(some) or not some.str.contains(":").all():
         return None
-    zoned = bool(some.str.contains(OFFSET).all())
+    return next((found for found in _readings(words) if found.null_count() == words.null_count()), None)
+
+
+def _readings(words: pl.Series) -> Iterator[pl.Series]:
+    """Give words as points in time in each way of writing them, null where a word is none."""
+    import polars as pl
+
+    words = words.str.replace(r"^(\S+)T", "$1 ").str.replace(r",([0-9]+)", ".$1")
+    zoned = bool(words.drop_nulls().str.contains(OFFSET).all())
     if zoned:
         words = words.str.replace("Z$", "+00:00")
     for hours in HOURS:
         for day in DAYS:
             found = words.str.to_datetime(f"{day} {hours}{'%z' if zoned else ''}", time_unit="ns", strict=False)
-            if found.null_count() == words.null_count():
-                return found.dt.replace_time_zone(None) if zoned else found
-        clock = words.str.strptime(pl.Time, hours, strict=False)
-        if clock.null_count() == words.null_count():
-            return clock
-    return None
+            yield found.dt.replace_time_zone(None) if zoned else found
+        yield words.str.strptime(pl.Time, hours, strict=False)
 
 
 def _since_first(nanoseconds: pl.Series, *, daily: bool = False) -> Array:

@@ -15,7 +15,7 @@ from scara_ident.files import replacing, why_unwritten
 from scara_ident.memory import check_memory
 from scara_ident.quiet import quiet_stderr
 from scara_ident.recording.files.csv_layout import MISSING, CsvLayout, csv_layout
-from scara_ident.recording.files.dates import seconds
+from scara_ident.recording.files.dates import first_wrong, seconds
 from scara_ident.recording.files.files import check_file
 
 if TYPE_CHECKING:
@@ -205,6 +205,11 @@ def numbers(path: Path, series: pl.Series) -> Array:
             stamps = seconds(words)
             if stamps is not None:
                 return stamps
+            if (wrong := first_wrong(words)) is not None:
+                raise RecordingError(
+                    f"{path}: column {series.name!r}, row {wrong + 1}: {_short(series[wrong])} is no point in time, as most rows "
+                    "are; correct it or leave it empty"
+                )
             row = int(bad[0])
             raise RecordingError(
                 f"{path}: column {series.name!r}, row {row + 1}: {_short(series[row])} is not a number"

@@ -120,7 +120,8 @@ def _plots(fleet: Fleet, item: ArmReport, joint: str | None) -> list[Plot]:
         if not known:
             continue
         since = [change.since for change in item.changes if change.cause and change.cause.label == known[0][1].cause]
-        start = item.known.dates.index(since[0]) if since else len(dates)
+        starts = sorted(item.known.dates.index(day) for day in since)
+        start = starts[0] if starts else len(dates)
         layers: list[Layer] = [Level(known[0][1].value, "grey")]
         for color, own in (
             ("blue", [pair for pair in known if pair[0] < start]),
@@ -129,8 +130,7 @@ def _plots(fleet: Fleet, item: ArmReport, joint: str | None) -> list[Plot]:
             if own:
                 x, y = np.array([k for k, _ in own], dtype=float), np.array([one.value for _, one in own])
                 layers.append(Dots(x, y, color, bar=np.array([2.0 * one.std for _, one in own])))
-        if since:
-            layers.append(Mark(start - 0.5, "vermillion"))
+        layers += [Mark(place - 0.5, "vermillion") for place in dict.fromkeys(starts)]
         unit = known[0][1].unit
         label = quantity if unit == "1" else f"{quantity} [{superscripts(unit)}]"
         plot = Plot("", (Panel(label, layers, 120),), (-0.5, len(dates) - 0.5), small=True, names=item.known.dates)
@@ -190,6 +190,7 @@ def fleet_report(path: Path, fleet: Fleet) -> None:
     verdict += [f"{item.arm}: {words}." for item in changed for words in item.sentences]
     if fleet.reservation:
         verdict.append(f"{fleet.reservation}.")
+    verdict += [f"{note}." for note in fleet.notes]
     if fleet.faults:
         verdict.append(f"{several(len(fleet.faults), 'fault')}: see below.")
     dates = sum(len(item.history.dates) for item in fleet.arms if item.history is not None)

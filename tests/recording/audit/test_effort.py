@@ -65,6 +65,48 @@ def test_an_effort_that_is_dead_most_of_the_time_is_refused_where_no_other_joint
     assert "cut the file there" in refusal(read, made)
 
 
+@pytest.mark.parametrize(("dead", "said"), [(2400, True), (500, False)])
+def test_a_coarse_effort_that_dies_is_told_by_how_much_longer_it_lasts_than_any_other(read, dead: int, said: bool):
+    """Of 17 values one that lasted for 55 % of the time was believed, and the joint's inertia was 6.6 instead of 16.1."""
+    made = columns()
+    made["joint1.effort"] = 0.1 * np.round(made["joint1.effort"] / 0.1)
+    made["joint1.effort"][len(made["time"]) - dead :] = 0.0
+    assert ("stuck_effort" in kinds(read(made))) is said
+
+
+def cruising(digits: int) -> dict[str, np.ndarray]:
+    """Columns of a simulator: joints in turn speed up, keep their speed and slow down; the second one pulls at the first."""
+    ramp = np.sin(np.linspace(0.0, np.pi / 2.0, 150)) ** 2
+    speed = np.concatenate([np.zeros(40), ramp, np.ones(400), ramp[::-1]])
+    still = np.zeros_like(speed)
+    made = {"time": 0.002 * np.arange(8 * len(speed))}
+    for joint, turns in {"joint1": (1, 0, -1, 0), "joint2": (0, 1, 0, -1)}.items():
+        v = np.concatenate([turn * speed if turn else still for turn in turns * 2])
+        made[f"{joint}.position"] = np.round(0.3 + 0.002 * np.cumsum(v), 9)
+        made[f"{joint}.effort"] = 0.2 * np.sign(v) + 0.05 * v + 0.1 * np.gradient(v, 0.002)
+    other = np.gradient(made["joint2.position"], 0.002)
+    made["joint1.effort"] += 0.1 * np.sin(made["joint2.position"]) * np.round(other, 6) ** 2
+    for joint in ("joint1", "joint2"):
+        made[f"{joint}.effort"] = np.round(made[f"{joint}.effort"], digits)
+    return made
+
+
+@pytest.mark.parametrize("digits", [4, 15])
+def test_the_effort_of_a_simulator_lasts_while_all_joints_keep_their_speed(read, digits: int):
+    """All that friction shows was left out as stuck."""
+    assert read(cruising(digits)).findings == ()
+
+
+def test_what_lasts_while_joints_speed_up_or_beside_noise_is_stuck_in_a_simulator_too(read):
+    made = cruising(15)
+    made["joint1.effort"][100:400] = 0.0
+    assert "joint1.effort is stuck at 0 from row 101" in only(read(made), "stuck_effort").message
+    made = cruising(15)
+    made["joint1.effort"] += 1e-3 * np.random.default_rng(0).standard_normal(len(made["time"]))
+    made["joint1.effort"][250:450] = made["joint1.effort"][250]
+    assert "from row 251" in only(read(made), "stuck_effort").message
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_an_effort_that_stands_twice_is_refused(read, sign):
     made = columns()

@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from scara_ident.recording.files.dates import is_date, seconds
+from scara_ident.recording.files.dates import first_wrong, is_date, seconds
 
 
 @pytest.mark.parametrize(
@@ -37,6 +37,13 @@ def test_times_of_other_types_keep_their_nanoseconds():
 @pytest.mark.parametrize("words", [["running", "10:33:21"], ["1.5", "2.5"], [""], ["2023-11-20 10:33:21", "10:33:22"]])
 def test_other_words_are_no_times(words: list[str]):
     assert seconds(pl.Series(words)) is None
+
+
+def test_the_row_whose_date_does_not_exist_is_found():
+    words = [f"2026-02-{day:02} 10:00:00.5" for day in (26, 27, 28, 29, 28)]
+    assert seconds(pl.Series(words)) is None and first_wrong(pl.Series(words)) == 3
+    assert first_wrong(pl.Series(["", None, *words])) == 5
+    assert first_wrong(pl.Series(["oops", "1.5", "2.5"])) is None
 
 
 def test_a_header_is_no_date():

@@ -124,6 +124,16 @@ def test_a_text_in_a_number_column_is_refused_by_row_and_value(robot, tmp_path):
     assert "column 'joint1.position', row 31: 'oops' is not a number (and 1 more)" in message
 
 
+def test_a_date_that_does_not_exist_is_refused_by_its_own_row(robot, tmp_path):
+    """The first row was said to be no number, of a column of dates."""
+    head, *body = csv_lines()
+    lines = [head, *(f"2026-02-28 10:00:0{line}" for line in body)]
+    assert read_recording(write_text(tmp_path / "a.csv", lines), robot).findings == ()
+    lines[41] = lines[41].replace("02-28", "02-30")
+    message = refusal(write_text(tmp_path / "b.csv", lines), robot)
+    assert "row 41: '2026-02-30 10:00:00.040" in message and "is no point in time, as most rows are" in message
+
+
 def test_a_text_in_a_column_that_is_not_needed_is_no_matter(robot, tmp_path):
     lines = csv_lines()
     lines = [f"{lines[0]},note", *(f"{line},running" for line in lines[1:])]

@@ -168,6 +168,16 @@ def test_all_sections_are_named_beside_the_button_whatever_the_width(diagnosed, 
         assert button["x"] + button["width"] <= width
 
 
+def test_the_button_is_within_a_menu_of_one_line_and_level_with_it(fleet_page, opened):
+    """It lay over the line below."""
+    page = opened(fleet_page, viewport={"width": 1100, "height": 900})
+    bar, button = page.locator("nav").bounding_box(), page.locator("#theme").bounding_box()
+    links = [link.bounding_box() for link in page.locator("nav a").all()]
+    assert len({box["y"] for box in links}) == 1
+    assert bar["y"] < button["y"] and button["y"] + button["height"] < bar["y"] + bar["height"] - 1.0
+    assert abs(button["y"] + button["height"] / 2 - links[0]["y"] - links[0]["height"] / 2) < 1.0
+
+
 @pytest.mark.parametrize("kind", PAGES)
 def test_a_phone_shows_a_page_without_scrolling_sideways(pages, opened, kind):
     phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import resource
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from scara_ident.errors import ScaraIdentError
 from scara_ident.fleet.table import fleet_table
-from scara_ident.report.html.fleet import write_fleet
+from scara_ident.report.html.fleet import fleet_report, write_fleet
 from tests.report.html.document import data_of, document
 from tests.report.html.made_fleet import made_fleet
 
@@ -23,6 +24,14 @@ def test_the_arm_that_changed_comes_first_with_what_and_since_when(fleet_page):
     assert "arm2: Coulomb friction of joint2 up 31 % (± 2 %) since 15 February 2026." in page.words
     assert page.words.index("arm2") < page.words.index("arm1")
     assert "arm2/x.csv: <not> whole" in page.words
+
+
+def test_notes_on_dates_are_in_the_verdict(tmp_path):
+    fleet_report(
+        tmp_path / "report.html", replace(made_fleet(), notes=("arm1/2026-02-30/x_1.csv: there is no such date",))
+    )
+    page = document(tmp_path / "report.html")
+    assert "arm1/2026-02-30/x_1.csv: there is no such date." in page.words
 
 
 def test_every_quantity_is_drawn_with_its_bars_for_every_arm(fleet_page):
