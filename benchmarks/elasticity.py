@@ -26,13 +26,13 @@ from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
 from scara_ident.diagnosis.evidence import least_found
 from scara_ident.diagnosis.nonlinear_fit import STEPLESS, linearise
-from scara_ident.diagnosis.outcome import rms_of
 from scara_ident.diagnosis.selection_step import best_of_each
 from scara_ident.effects import EffectTerm, Member, Scene
 from scara_ident.effects.catalogue import effects_named
 from scara_ident.effects.links import usual_link_inertia
 from scara_ident.estimation import wls
 from scara_ident.estimation.observations import observe
+from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.model.model import TorqueModel
 from scara_ident.simulation import SimulationResult, parse_effect, simulate, truth, virtual_arm
 

@@ -19,6 +19,7 @@ from scara_ident.estimation.another_run import variance_of_another_run
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.least_squares import told_value_and_weights
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_offsets import offsets_on
 
 
 @dataclass(frozen=True)
@@ -182,16 +183,21 @@ def _shown(
     """Return how much of the change that an effect makes is seen, and its standard deviation.
 
     By moments of motions; by what the training leaves unsure of the parameters, for motions that are faster than it tell how
-    far those go wrong there, not whether the effect is; and by what runs were seen to differ by.
+    far those go wrong there, not whether the effect is; and by what runs were seen to differ by, their offsets weighed as such.
     """
     joints, data = held_out.joints, held_out.data
     of_block, pull = np.zeros((2, len(joints[0].starts) - 1)), np.zeros(held_out.parameters)
     changes: list[Array] = []
-    for rows, before, now, weight in zip(joints, without, whole, after.weights, strict=True):
-        change = before - now
-        pull[rows.columns] += weight**2 * (rows.table[:-1] @ change)
-        changes.append(weight**2 * change)
-        of_block += [weight**2 * rows.by_block(own * change) for own in (before, change)]
+    offsets = offsets_on(held_out, after.offsets)
+    for joint, (rows, before, now, weight) in enumerate(zip(joints, without, whole, after.weights, strict=True)):
+        both, signals = np.array([before, before - now]), rows.table[:-1]
+        if offsets is not None:
+            # A run's offset says nothing of it, and is noise here as it is to the fit.
+            both, signals = offsets.whitened(joint, both), offsets.whitened(joint, signals)
+        change = weight**2 * both[1]
+        pull[rows.columns] += signals @ change
+        changes.append(change if offsets is None else offsets.whitened(joint, change[None])[0])
+        of_block += [rows.by_block(own * change) for own in both]
     # What a model lacks besides is the same in all repetitions of a moment.
     motion = np.array([data.trajectories.index(label) for label in data.labels])[held_out.owner]
     _, place = np.unique(np.column_stack([motion, moments_of(data)]), axis=0, return_inverse=True)

@@ -15,7 +15,7 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, merge, residual_noise, weighted
 from scara_ident.estimation.noise_bias import noise_bias
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_offsets import beside_offsets
+from scara_ident.estimation.run_offsets import beside_offsets, offsets_on
 from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation
 from scara_ident.estimation.variation_between import run_variation
 from scara_ident.estimation.working_range import Told, told_directions
@@ -153,7 +153,7 @@ def least_squares(observations: Observations, weigh: Weigh, method: str, prior: 
     variation, spread = side_by_side(
         lambda work: work(),
         [
-            lambda: run_variation(observations, observations.joints, fit.value, of_two=True),
+            lambda: _variation(observations, fit.value),
             lambda: block_covariance(fit.inverse, fit.value, observations.joints, observations.owner, fit.weights),
         ],
     )
@@ -162,7 +162,7 @@ def least_squares(observations: Observations, weigh: Weigh, method: str, prior: 
             offsets = variation.offsets or offsets
             rows = beside_offsets(observations, offsets)
             fit, influence = _fit(rows.fitted, weigh, method, prior), rows.influence
-            variation = run_variation(observations, observations.joints, fit.value, of_two=True)
+            variation = _variation(observations, fit.value)
         spread = block_covariance(fit.inverse, fit.value, influence.joints, observations.owner, fit.weights)
     covariance = spread.matrix + variation.covariance(fit.inverse, influence.joints, fit.weights)
     if len(observations.data.recordings) < LEAST_RUNS:
@@ -193,6 +193,15 @@ def least_squares(observations: Observations, weigh: Weigh, method: str, prior: 
         offsets=offsets,
         noise_bias=bias,
     )
+
+
+def _variation(observations: Observations, value: Array) -> RunVariation:
+    """Return how runs differ; of files longer than the memory holds, in the offsets that what is kept of them shows."""
+    kept = observations.in_memory
+    found = run_variation(kept, kept.joints, value, of_two=True)
+    if kept is observations:
+        return found
+    return offsets_on(observations, found.offsets) or RunVariation((None,) * len(observations.joints))
 
 
 def weighted_value(joints: Sequence[Information]) -> Array:

@@ -21,7 +21,7 @@ from scara_ident.estimation.estimate import paper_criteria
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import disagreement, robust_fit
-from scara_ident.estimation.run_offsets import beside_offsets
+from scara_ident.estimation.run_offsets import beside_offsets, offsets_on
 from scara_ident.files import real_path
 from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.arguments import Recordings, model_of, recordings_of
@@ -225,7 +225,8 @@ def identify(
         elif training.kept is not None:
             plain, _ = estimate_by(method, training.kept, options)
         if plain.offsets is not None:
-            robust = robust_fit(beside_offsets(training, plain.offsets).fitted)
+            kept = training.in_memory
+            robust = robust_fit(beside_offsets(kept, offsets_on(kept, plain.offsets)).fitted)
         differs = disagreement(plain, robust)
     events += () if faults else held_out_events(estimate.value, training, validated)
     drift = None if faults else clock_drift(estimate.value, training.in_memory)

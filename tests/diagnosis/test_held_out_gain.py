@@ -9,15 +9,18 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis import Diagnosis, diagnose
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.held_out_gain import HeldOutGain, held_out_gains, shown_of, spoken_against, words_of
 from scara_ident.diagnosis.selection_step import observed
 from scara_ident.effects.friction import PositionDependentFriction
 from scara_ident.effects.measurement import TimeDelay
+from scara_ident.estimation import Estimate
 from scara_ident.estimation.another_run import variance_of_another_run
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_offsets import beside_offsets
+from scara_ident.estimation.run_variation import OFFSET
 from scara_ident.recording.recording import Recording
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.html.diagnosis import DiagnosisContext, _effect_words, _verdict
@@ -77,6 +80,20 @@ def test_an_effect_that_is_there_in_both_removes_most_of_what_is_held_out(effect
     assert not any("by the recordings held out" in line for line in summary)
 
 
+def without_offsets(held: Observations, after: Estimate, joint: int, signal: Array) -> Array:
+    """Times the inverse root of the covariance of each run's rows, in full."""
+    item = None if after.offsets is None else after.offsets.joints[joint]
+    if item is None:
+        return signal
+    rows = held.joints[joint]
+    place = after.model.names.index(f"p_o{joint + 1}")
+    (offset,) = rows.table[:-1][rows.columns == place] * item.std[OFFSET] / item.noise
+    run = np.repeat(held.owner, np.diff(rows.starts))
+    covariance = np.eye(len(offset)) + np.outer(offset, offset) * (run[:, None] == run)
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray((vectors / np.sqrt(values)) @ vectors.T @ signal)
+
+
 def test_the_error_without_it_is_that_of_a_fit_of_all_else_to_what_was_fitted():
     result = found(UNEVEN, UNEVEN)
     (effect,) = result.effects
@@ -106,8 +123,16 @@ def test_the_error_without_it_is_that_of_a_fit_of_all_else_to_what_was_fitted():
     # How much of the change is there, by rows; its variance from the sums of the scores over blocks of time.
     value = np.concatenate([value, np.zeros(len(result.after.value) - len(value))])
     old, new = (left_of(held, each) for each in (value, result.after.value))
-    shown = [w**2 * a * (a - b) for w, a, b in zip(result.after.weights, old, new, strict=True)]
-    made = [w**2 * (a - b) ** 2 for w, a, b in zip(result.after.weights, old, new, strict=True)]
+    white = [
+        [w * without_offsets(held, result.after, j, own) for own in (a, a - b)]
+        for j, (w, a, b) in enumerate(zip(result.after.weights, old, new, strict=True))
+    ]
+    shown = [a * change for a, change in white]
+    made = [change**2 for _, change in white]
+    signals = [
+        w * without_offsets(held, result.after, j, change)
+        for j, (w, (_, change)) in enumerate(zip(result.after.weights, white, strict=True))
+    ]
     size = sum(map(np.sum, shown)) / sum(map(np.sum, made))
     assert gain.size == pytest.approx(size, rel=1e-3)
     # Two runs of three motions: block k of both runs of a motion is one.
@@ -121,11 +146,10 @@ def test_the_error_without_it_is_that_of_a_fit_of_all_else_to_what_was_fitted():
     scatter = sum(score**2 for score in scores.values()) * len(scores) / (len(scores) - 1)
     # And what the parameters' errors make of it: those of the prediction along the change.
     pull = np.zeros(len(result.after.value))
-    for w, joint, a, b in zip(result.after.weights, held.joints, old, new, strict=True):
+    for joint, own in zip(held.joints, signals, strict=True):
         for k, column in enumerate(joint.columns):
-            pull[column] += w**2 * joint.table[k] @ (a - b)
+            pull[column] += joint.table[k] @ own
     assert result.after.variation is not None
-    signals = [w**2 * (a - b) for w, a, b in zip(result.after.weights, old, new, strict=True)]
     apart = variance_of_another_run(result.after.variation, held, result.after.value, signals)
     std = np.sqrt(scatter + pull @ result.after.covariance @ pull + apart) / sum(map(np.sum, made))
     assert gain.std == pytest.approx(std, rel=2e-3)

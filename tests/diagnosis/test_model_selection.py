@@ -110,13 +110,14 @@ def test_an_effect_that_stands_for_one_outside_the_catalogue_is_not_counted() ->
     (refused,) = outcome.demoted
     assert (refused.label, refused.accepted, refused.tentative) == (proxy, False, True)
     assert refused.why.startswith("it would remove ")
-    before, after = rms_of(first.start.value, first.uncorrected)[1], first.steps[-1].rms[1]
+    before, after = rms_of(first.start.value, first.uncorrected, first.start.offsets)[1], first.steps[-1].rms[1]
     assert before is not None
     assert after is not None
     noise = outcome.fit_after[1].noise
     seen = observed_at_every_sample(first.step)
-    variation = wls(seen).variation
-    assert variation is not None
+    estimate = wls(seen)
+    assert estimate.variation is not None
+    variation = estimate.variation if estimate.offsets is None else estimate.variation.beside_offsets
     share = (before**2 - after**2) / (before**2 - variation.mean_squares(seen.joints)[1] - noise**2)
     assert share < CRITERIA.least_of_repeatable
     assert abs(float(refused.why.split("remove ")[1].split("%")[0]) - 100.0 * share) < 2.0
