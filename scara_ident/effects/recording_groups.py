@@ -16,6 +16,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.effects.links import tool_of
 from scara_ident.effects.signals import Scene
+from scara_ident.model.offsets import offset_columns
 from scara_ident.motion.motion import Motion
 
 # Probability that noise alone, over all ways to part the recordings, makes two groups.
@@ -28,6 +29,8 @@ WIDE = 3.0
 SLOWEST = 0.01
 # Directions of columns of unit size below this share are rounding.
 _RANK = 1e-11
+# Share of the squared residual that offsets of recordings' own must leave at the most.
+MOST = 0.5
 # Fits, each weighted by what the last leaves of each joint.
 _ROUNDS = 3
 
@@ -108,9 +111,30 @@ def _more_than_others(scene: Scene, names: Sequence[str], shown: Sequence[int]) 
                 places = [*scene.model.active[joint], *range(p, p + k + 1)]
                 products[run, joint][np.ix_(places, places)] += rows @ rows.T
                 counts[run, joint] += rows.shape[1]
+    prior = np.tile(_prior(scene, shown), runs)
+    value, covariance, noise = _fitted(products, counts, prior, p)
+    own = _own_offsets(products, offset_columns(scene.model))
+    freed = _fitted(own, counts, prior, p)
+    # Where runs differ in their offsets, what a load weighs is seen beside these alone.
+    return freed[:2] if np.sum((freed[2] / noise) ** 2) < MOST * len(noise) else (value, covariance)
+
+
+def _own_offsets(products: Array, columns: Sequence[int | None]) -> Array:
+    """Return products (R, n, c, c) with an offset of each recording's own, which takes nothing from what its motion says."""
+    result = products.copy()
+    for joint, column in enumerate(columns):
+        if column is not None:
+            size = products[:, joint, column, column]
+            across = products[:, joint, column] / np.sqrt(np.where(size > 0.0, size, 1.0))[:, None]
+            result[:, joint] -= across[:, :, None] * across[:, None, :]
+    return result
+
+
+def _fitted(products: Array, counts: Array, prior: Array, p: int) -> tuple[Array, Array, Array]:
+    """Return what each recording has more (R k,), its covariance, and the noise of each joint (n,)."""
+    runs, k = len(products), products.shape[-1] - p - 1
     whole = np.maximum(np.sum(counts, axis=0), 1.0)
     noise = np.sqrt(np.maximum(np.sum(products[:, :, -1, -1], axis=0) / whole, np.finfo(float).tiny))
-    prior = np.tile(_prior(scene, shown), runs)
     for _ in range(_ROUNDS):
         # Of each joint's rows in units of its noise.
         each = np.einsum("rjab,j->rab", products, noise**-2.0)
@@ -129,7 +153,7 @@ def _more_than_others(scene: Scene, names: Sequence[str], shown: Sequence[int]) 
         full = np.array([[*base, *value[run * k : (run + 1) * k], -1.0] for run in range(runs)])
         left = np.einsum("ra,rjab,rb->j", full, products, full)
         noise = np.sqrt(np.maximum(left / whole, np.finfo(float).eps * noise**2))
-    return value, covariance
+    return value, covariance, noise
 
 
 def _rows(scene: Scene, motion: Motion, columns: tuple[Array, ...], shown: Sequence[int]) -> list[Array]:

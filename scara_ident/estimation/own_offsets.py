@@ -13,7 +13,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import Information, joint_noise, merge, triangular, weighted
 from scara_ident.model.model import TorqueModel
-from scara_ident.model.terms.friction import Offset
+from scara_ident.model.offsets import offset_columns
 
 # Share of the squared residual that offsets of their own must leave at the most.
 MOST = 0.5
@@ -38,11 +38,10 @@ def value_beside_offsets(model: TorqueModel, each: Sequence[Sequence[Information
     if len(each) < 2:
         return value
     # Beside one offset for all, the rest of the model takes up what it can of the others: it is not seen in what is left.
-    places = offset_places(model)
-    freed = [
-        item if place is None else merge([without(run[joint], place) for run in each])
-        for joint, (item, place) in enumerate(zip(joints, places, strict=True))
-    ]
+    freed = []
+    for joint, (item, active, column) in enumerate(zip(joints, model.active, offset_columns(model), strict=True)):
+        place = None if column is None else int(np.flatnonzero(active == column)[0])
+        freed.append(item if place is None else merge([without(run[joint], place) for run in each]))
     own, _ = _fit(model, freed)
     return own if _left(model, freed, own, noise) < MOST * _left(model, joints, value, noise) else value
 
@@ -58,15 +57,6 @@ def _left(model: TorqueModel, joints: Sequence[Information], value: Array, noise
     """Return the squared residual of all joints in units of the noise."""
     triples = zip(joints, model.active, noise, strict=True)
     return float(sum(item.residual_sum(value[own]) / sigma**2 for item, own, sigma in triples))
-
-
-def offset_places(model: TorqueModel) -> list[int | None]:
-    """Return the place of each joint's offset among the columns that act on it; None of a joint without one."""
-    places = [model.place(term) for term in model.terms if isinstance(term, Offset)]
-    return [
-        next((k for k, column in enumerate(own) if any(p.start <= column < p.stop for p in places)), None)
-        for own in model.active
-    ]
 
 
 def without(information: Information, column: int) -> Information:

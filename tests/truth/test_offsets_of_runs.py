@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from scara_ident.diagnosis.diagnose import diagnose
@@ -76,3 +77,20 @@ def test_a_fit_that_bounds_blocks_of_time_agrees(tmp_path: Path, method: str):
     found = identify(robot, made(robot, 0.5, 1, 0.0), model="basic", bands=(8.0, 8.0), method=method)
     assert not any("bounds" in note for note in found.notes)
     assert found.events == ()
+
+
+def test_a_payload_in_some_runs_is_found_beside_offsets_of_all(tmp_path: Path):
+    """Groups of runs were told apart by gravity with one offset for all, so that none was."""
+    robot, loaded = (load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R)) for _ in range(2))
+    body = pin.Inertia(0.5, np.array([0.3, 0.0, 0.0]), 0.002 * np.eye(3))
+    loaded.model.inertias[2] = loaded.model.inertias[2] + body
+    rng, runs = np.random.default_rng(2), []
+    for k in range(6):
+        run = noisy(swing(loaded if k % 2 else robot, f"m{k}_1", k, 10.0, 200.0), rng, 0.05)
+        runs.append(replace(run, effort=run.effort + 0.5 * rng.standard_normal((2, 1))))
+    families = effects_named("payload_change", "spring", "base_tilt")
+    (payload,) = diagnose(robot, runs, model="basic", bands=(8.0, 8.0), catalogue=families).effects
+    assert "m1_1, m3_1, m5_1, not in the others" in payload.description
+    mass, first = payload.parameters["mass"], payload.parameters["mx"]
+    assert abs(mass.value - 0.5) < 3.0 * mass.std < 0.15
+    assert abs(first.value - 0.15) < 3.0 * first.std < 0.03

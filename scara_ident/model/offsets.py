@@ -1,0 +1,15 @@
+"""Where a model has the constant torque of each joint."""
+
+from __future__ import annotations
+
+from scara_ident.model.model import TorqueModel
+from scara_ident.model.terms.friction import Offset
+
+
+def offset_columns(model: TorqueModel) -> tuple[int | None, ...]:
+    """Return the column of each joint's offset; None of a joint without one."""
+    places = [model.place(term) for term in model.terms if isinstance(term, Offset)]
+    return tuple(
+        next((int(column) for column in own if any(place.start <= column < place.stop for place in places)), None)
+        for own in model.active
+    )
