@@ -17,6 +17,7 @@ from scara_ident.diagnosis.outcome import Outcome
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.estimation.another_run import of_another_run
+from scara_ident.estimation.days import widening
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.events import Event
 from scara_ident.identification.recording_check import held_out_events, own_uncertainty, quiet_blocks
@@ -69,7 +70,10 @@ def validated(outcome: Outcome, data: PreparedData) -> Validation:
     before = observe(found.base, held.data)
     after = _with_effects(found, held, before)
     unsure = unsure_of_others(model, after)
-    apart = np.zeros(robot.n) if model.variation is None else of_another_run(model.variation, after, value)
+    apart = np.zeros(robot.n)
+    if model.variation is not None:
+        # Of few runs how far they lie apart is known badly.
+        apart = widening(len(outcome.training.each)) * of_another_run(model.variation, after, value)
     known = [dict(zip(robot.joints, each, strict=True)) for each in (unsure, apart)]
     events = [own_uncertainty(event, *known) for event in held_out_events(value, outcome.training, after)]
     if outcome.unexplained is not None:

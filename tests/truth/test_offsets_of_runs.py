@@ -94,3 +94,17 @@ def test_a_payload_in_some_runs_is_found_beside_offsets_of_all(tmp_path: Path):
     mass, first = payload.parameters["mass"], payload.parameters["mx"]
     assert abs(mass.value - 0.5) < 3.0 * mass.std < 0.15
     assert abs(first.value - 0.15) < 3.0 * first.std < 0.03
+
+
+def test_an_offset_held_out_is_no_error_of_the_model(tmp_path: Path):
+    """`undecided`: "the error on the recordings held out is 3 times that of the training", all of it an offset as six runs may have."""
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
+    *runs, last = made(robot, 0.5, 5)
+    held_out = replace(last, name="held_1", trajectory="held", repetition=1, effort=last.effort + 1.6)
+    families = effects_named("spring", "stribeck")
+    found = diagnose(robot, runs, validation=[held_out], model="basic", bands=(8.0, 8.0), catalogue=families)
+    assert found.verdict == "explained"
+    for item in found.effects:
+        assert item.held_out is not None
+        assert item.held_out.size == pytest.approx(1.0, abs=0.1)
+        assert item.held_out.std < 0.05
