@@ -90,7 +90,7 @@ def _not_repeating(found: Outcome, left: frozenset[str] | set[str]) -> Mapping[s
     """Return it for each joint of which repetitions tell."""
     joints, variation = found.search.base.robot.joints, found.after.variation
     if variation is not None and found.after.offsets is not None:
-        variation = variation.beside_offsets
+        variation = variation.without_offsets
     varied = np.zeros(len(joints)) if variation is None else variation.mean_squares(found.training.joints)
     differing = dict(zip(joints, varied.tolist(), strict=True))
     made = dict(zip(joints, noise_torque(found.training, found.after.value).tolist(), strict=True))

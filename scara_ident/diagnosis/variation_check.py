@@ -74,7 +74,7 @@ def _dwarfs(step: SelectionStep, decision: Decision, variation: RunVariation) ->
         return False
     joints = with_columns(step.observations, step.columns.rows(step.scene, step.chosen))
     if step.offsets is not None:
-        joints, variation = step.offsets.whitened_rows(joints), variation.beside_offsets
+        joints, variation = step.offsets.whitened_rows(joints), variation.without_offsets
     rows, value = joints[joint], step.model.root @ step.model.projected
     left = rows.left(value)
     removed = decision.gain * float(left @ left) / rows.samples

@@ -153,7 +153,7 @@ class RunVariation:
         return signals if item is None else item.whitened(signals)
 
     @property
-    def beside_offsets(self) -> RunVariation:
+    def without_offsets(self) -> RunVariation:
         """The same without the offsets, as rows have it on which these are noise already."""
         told = np.arange(len(KINDS)) != OFFSET
         joints = [

@@ -117,7 +117,7 @@ def test_an_effect_that_stands_for_one_outside_the_catalogue_is_not_counted() ->
     seen = observed_at_every_sample(first.step)
     estimate = wls(seen)
     assert estimate.variation is not None
-    variation = estimate.variation if estimate.offsets is None else estimate.variation.beside_offsets
+    variation = estimate.variation if estimate.offsets is None else estimate.variation.without_offsets
     share = (before**2 - after**2) / (before**2 - variation.mean_squares(seen.joints)[1] - noise**2)
     assert share < CRITERIA.least_of_repeatable
     assert abs(float(refused.why.split("remove ")[1].split("%")[0]) - 100.0 * share) < 2.0
