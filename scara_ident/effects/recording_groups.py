@@ -16,7 +16,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.effects.links import tool_of
 from scara_ident.effects.signals import Scene
-from scara_ident.model.offsets import offset_columns
+from scara_ident.model.offsets import OWN_LEAVE, offset_columns
 from scara_ident.motion.motion import Motion
 
 # Probability that noise alone, over all ways to part the recordings, makes two groups.
@@ -29,8 +29,6 @@ WIDE = 3.0
 SLOWEST = 0.01
 # Directions of columns of unit size below this share are rounding.
 _RANK = 1e-11
-# Share of the squared residual that offsets of recordings' own must leave at the most.
-MOST = 0.5
 # Fits, each weighted by what the last leaves of each joint.
 _ROUNDS = 3
 
@@ -116,7 +114,7 @@ def _more_than_others(scene: Scene, names: Sequence[str], shown: Sequence[int]) 
     own = _own_offsets(products, offset_columns(scene.model))
     freed = _fitted(own, counts, prior, p)
     # Where runs differ in their offsets, what a load weighs is seen beside these alone.
-    return freed[:2] if np.sum((freed[2] / noise) ** 2) < MOST * len(noise) else (value, covariance)
+    return freed[:2] if np.sum((freed[2] / noise) ** 2) < OWN_LEAVE * len(noise) else (value, covariance)
 
 
 def _own_offsets(products: Array, columns: Sequence[int | None]) -> Array:

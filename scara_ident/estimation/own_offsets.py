@@ -13,10 +13,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import Information, joint_noise, merge, triangular, weighted
 from scara_ident.model.model import TorqueModel
-from scara_ident.model.offsets import offset_columns
-
-# Share of the squared residual that offsets of their own must leave at the most.
-MOST = 0.5
+from scara_ident.model.offsets import OWN_LEAVE, offset_columns
 
 
 def value_beside_offsets(model: TorqueModel, each: Sequence[Sequence[Information]]) -> Array:
@@ -43,7 +40,7 @@ def value_beside_offsets(model: TorqueModel, each: Sequence[Sequence[Information
         place = None if column is None else int(np.flatnonzero(active == column)[0])
         freed.append(item if place is None else merge([without(run[joint], place) for run in each]))
     own, _ = _fit(model, freed)
-    return own if _left(model, freed, own, noise) < MOST * _left(model, joints, value, noise) else value
+    return own if _left(model, freed, own, noise) < OWN_LEAVE * _left(model, joints, value, noise) else value
 
 
 def _fit(model: TorqueModel, joints: Sequence[Information]) -> tuple[Array, Array]:
