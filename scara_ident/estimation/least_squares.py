@@ -149,7 +149,7 @@ def least_squares(observations: Observations, weigh: Weigh, method: str, prior: 
         As the estimate is called; of `wls` offsets of runs are noise.
     prior : Information, optional
     """
-    fit, offsets, influence = _fit(observations, weigh, method, prior), None, observations
+    fit, rows = _fit(observations, weigh, method, prior), beside_offsets(observations, None)
     variation, spread = side_by_side(
         lambda work: work(),
         [
@@ -159,12 +159,11 @@ def least_squares(observations: Observations, weigh: Weigh, method: str, prior: 
     )
     if method == "wls" and variation.offsets:
         for _ in range(ROUNDS):
-            offsets = variation.offsets or offsets
-            rows = beside_offsets(observations, offsets)
-            fit, influence = _fit(rows.fitted, weigh, method, prior), rows.influence
+            rows = beside_offsets(observations, variation.offsets or rows.offsets)
+            fit = _fit(rows.fitted, weigh, method, prior)
             variation = _variation(observations, fit.value)
-        spread = block_covariance(fit.inverse, fit.value, influence.joints, observations.owner, fit.weights)
-    covariance = spread.matrix + variation.covariance(fit.inverse, influence.joints, fit.weights)
+        spread = block_covariance(fit.inverse, fit.value, rows.influence.joints, observations.owner, fit.weights)
+    covariance = spread.matrix + variation.covariance(fit.inverse, rows.influence.joints, fit.weights)
     if len(observations.data.recordings) < LEAST_RUNS:
         # What else two runs might differ by is not told, and nothing is said of it.
         variation = RunVariation((None,) * len(observations.joints))
@@ -172,7 +171,7 @@ def least_squares(observations: Observations, weigh: Weigh, method: str, prior: 
     if fit.told is not None:
         covariance += fit.told.prior
     elif prior is None:
-        bias = noise_bias(observations, fit.weights, fit.value if offsets is None else None)
+        bias = noise_bias(observations, fit.weights, fit.value if rows.offsets is None else None)
     if bias is not None:
         covariance += np.outer(bias, bias)
     if prior is not None:
@@ -190,7 +189,7 @@ def least_squares(observations: Observations, weigh: Weigh, method: str, prior: 
         fit.weights,
         spread.kind,
         variation=variation,
-        offsets=offsets,
+        offsets=rows.offsets,
         noise_bias=bias,
     )
 

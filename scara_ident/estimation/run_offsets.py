@@ -9,6 +9,7 @@ and torque scale, and to weigh those down would leave it to the motions that it 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -26,13 +27,18 @@ class OffsetRows:
     fitted : Observations
         Their rows times V^-1/2, with V the covariance of a row's noise and of the offsets, in units of the noise: ordinary
         least squares on them is generalised least squares.
-    influence : Observations
-        Their rows times V^-1: the columns are by what a row moves that estimate, and what is left is the noise without the
-        offsets.
+    offsets : RunVariation or None
     """
 
     fitted: Observations
-    influence: Observations
+    offsets: RunVariation | None
+
+    @cached_property
+    def influence(self) -> Observations:
+        """Their rows times V^-1: columns are by what a row moves that estimate, and the noise without the offsets is left."""
+        if self.offsets is None:
+            return self.fitted
+        return replace(self.fitted, joints=self.offsets.whitened_rows(self.fitted.joints))
 
 
 def beside_offsets(observations: Observations, offsets: RunVariation | None) -> OffsetRows:
@@ -45,10 +51,8 @@ def beside_offsets(observations: Observations, offsets: RunVariation | None) -> 
         How far they lie apart, see `RunVariation.offsets`; None where they do not.
     """
     if offsets is None:
-        return OffsetRows(observations, observations)
-    once = offsets.whitened_rows(observations.joints)
-    twice = offsets.whitened_rows(once)
-    return OffsetRows(replace(observations, joints=once), replace(observations, joints=twice))
+        return OffsetRows(observations, None)
+    return OffsetRows(replace(observations, joints=offsets.whitened_rows(observations.joints)), offsets)
 
 
 def offsets_on(observations: Observations, offsets: RunVariation | None) -> RunVariation | None:
@@ -62,10 +66,8 @@ def offsets_on(observations: Observations, offsets: RunVariation | None) -> RunV
     """
     if offsets is None:
         return None
-    joints, firsts = (
-        list(offsets.joints),
-        np.searchsorted(observations.owner, np.arange(len(observations.data.recordings) + 1)),
-    )
+    joints = list(offsets.joints)
+    firsts = np.searchsorted(observations.owner, np.arange(len(observations.data.recordings) + 1))
     for joint, (item, rows) in enumerate(zip(offsets.joints, observations.joints, strict=True)):
         if item is not None:
             directions = np.zeros((len(item.std), rows.table.shape[1]))
