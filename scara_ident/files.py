@@ -71,8 +71,6 @@ def unreadable(path: Path, error: OSError, instead: str) -> ScaraIdentError:
 
     Parameters
     ----------
-    path : Path
-    error : OSError
     instead : str
         What to give.
     """

@@ -41,7 +41,6 @@ def map_in_order(
 
     Parameters
     ----------
-    work : callable
     items : iterable
         The results are sent to the caller.
     processes : int, optional
@@ -125,7 +124,6 @@ def halved(work: Callable[[Item], Result], items: Sequence[Item], sizes: Sequenc
     ----------
     work : callable
         What it keeps of the other half is lost with that process.
-    items : sequence
     sizes : sequence of float
         How long each takes, relative to each other.
     """

@@ -29,7 +29,6 @@ class Work:
 
     Attributes
     ----------
-    tell : callable
     start, stop : float
         Shares of the whole, 0 to 1.
     """

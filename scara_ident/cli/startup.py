@@ -44,7 +44,6 @@ def read_beside(arm: Robot, *each: Words) -> Iterator[Callable[[], list[Usable]]
 
     Parameters
     ----------
-    arm : Robot
     *each : sequence of path or str
         Of each that names any, at least one has to be usable, see `read_usable`.
     """

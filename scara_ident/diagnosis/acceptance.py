@@ -19,10 +19,6 @@ class Decision:
 
     Attributes
     ----------
-    candidate : Candidate
-    label : str
-    examination : Examination
-    accepted : bool
     why : str
         In words.
     gain : float
@@ -52,14 +48,10 @@ def decide(
 
     Parameters
     ----------
-    candidate : Candidate
-    examination : Examination
     gain : float
         See `gains`.
-    scene : Scene
     tried : int
         Candidates and scan points tried, for the correction of the p-value.
-    criteria : SelectionCriteria
     """
     unseen = _unseen(examination, criteria)
     small = hopeless(candidate, examination, scene, criteria) or _small(candidate, examination, scene, gain, criteria)

@@ -27,7 +27,6 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
 
     Parameters
     ----------
-    found : Search
     weights : ndarray, shape (n,)
         Of each joint's rows in the last fit.
     """
@@ -104,7 +103,6 @@ def beaten_by_impossible(found: Search, weights: Array) -> list[Decision]:
 
     Parameters
     ----------
-    found : Search
     weights : ndarray, shape (n,)
         See `unsettled`.
     """
@@ -134,7 +132,6 @@ def suspected(found: Search, weights: Array) -> list[Decision]:
 
     Parameters
     ----------
-    found : Search
     weights : ndarray, shape (n,)
         See `unsettled`.
     """
@@ -151,7 +148,6 @@ def left_open(found: Search, weights: Array, demoted: Sequence[Decision] = ()) -
 
     Parameters
     ----------
-    found : Search
     weights : ndarray, shape (n,)
         See `unsettled`.
     demoted : sequence of Decision, optional
@@ -187,7 +183,6 @@ def superfluous(found: Search, weights: Array, others: Sequence[Decision]) -> li
 
     Parameters
     ----------
-    found : Search
     weights : ndarray, shape (n,)
         See `unsettled`.
     others : sequence of Decision
@@ -216,7 +211,6 @@ def uncertain(own: Coefficients, examination: Examination, essential: slice, lea
 
     Parameters
     ----------
-    own : Coefficients
     examination : Examination
         Of the effect beside all others.
     essential : slice

@@ -66,7 +66,6 @@ def weighted(model: FittedModel, found: Products, weights: Array) -> Weighted:
 
     Parameters
     ----------
-    model : FittedModel
     found : Products
         Of candidates, in units in which the products of all blocks are the identity.
     weights : ndarray, shape (g, blocks)

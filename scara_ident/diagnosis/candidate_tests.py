@@ -83,10 +83,8 @@ def examine(
 
     Parameters
     ----------
-    model : FittedModel
     candidates : sequence of mapping of int to ndarray, shape (k, N)
         Columns of each on the rows of every joint that it acts on.
-    criteria : SelectionCriteria, optional
     """
     model.ready_for(sum(len(next(iter(rows.values()))) for rows in candidates))
     return _in_groups(model, candidates, lambda group: _examinations(model, products_of(model, group), criteria))
@@ -131,7 +129,6 @@ def gains(
 
     Parameters
     ----------
-    model : FittedModel
     candidates : sequence of mapping of int to ndarray, shape (k, N)
     joints : sequence of int or None
         Whose each is; None counts all joints.

@@ -115,7 +115,6 @@ def fitted_beside(
 
     Parameters
     ----------
-    step : SelectionStep
     candidates : sequence of Decision
         Grid points of families that are fitted first.
     best : float
@@ -154,7 +153,6 @@ def fitted_with(step: SelectionStep, candidate: Candidate, *, coarse: bool = Fal
     ----------
     step : SelectionStep
         The model without it.
-    candidate : Candidate
     coarse : bool, optional
         See `scara_ident.diagnosis.nonlinear_fit.tune`.
     """
@@ -172,7 +170,6 @@ def objection(step: SelectionStep, decision: Decision) -> str | None:
     ----------
     step : SelectionStep
         The model that it was tried beside.
-    decision : Decision
     """
     return (
         _insignificant(step, decision.candidate)

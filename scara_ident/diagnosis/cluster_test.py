@@ -65,7 +65,6 @@ def cluster_test(
 
     Parameters
     ----------
-    model : FittedModel
     products : Products
         Of the candidates.
     whole : ndarray, shape (g, k, k)
@@ -375,7 +374,6 @@ def _if_white(neighbours: _Neighbours, alone: Array, links: Array, signs: Array)
 
     Parameters
     ----------
-    neighbours : _Neighbours
     alone : ndarray, shape (g, blocks, k, k)
     links : ndarray, shape (g, blocks, k, m)
     signs : ndarray, shape (m,)

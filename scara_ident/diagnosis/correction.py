@@ -23,7 +23,6 @@ class Correction:
 
     Attributes
     ----------
-    candidate : Candidate
     value : ndarray, shape (k,)
         In all.
     """

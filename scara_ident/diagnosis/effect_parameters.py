@@ -33,7 +33,6 @@ class RotorInertia:
 
     Attributes
     ----------
-    joint : str
     armature : float
         N^2 Jm at the joint, kg m^2 or kg.
     factor : float or None
@@ -81,7 +80,6 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
 
     Parameters
     ----------
-    step : SelectionStep
     scatter_alone : bool, optional
         Whether standard deviations leave out what runs differ by and what the noise of the positions does.
 

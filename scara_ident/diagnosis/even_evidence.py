@@ -31,11 +31,8 @@ def even_evidence(
 
     Parameters
     ----------
-    shown : sequence of Evidence
-    after : Estimate
     training : Observations
         Of the same model.
-    criteria : SelectionCriteria, optional
     """
     if len(training.each) < 2:
         return tuple(shown)

@@ -40,7 +40,6 @@ class Evidence:
 
     Attributes
     ----------
-    joint : str
     shown : bool
         Whether it was shown to be noise, by recordings that would have shown otherwise.
     by : {"repetition", "whiteness", ""}
@@ -73,7 +72,6 @@ def evidence(
 
     Parameters
     ----------
-    found : Search
     residuals : Residuals
         What is left of the training recordings.
     fit : sequence of LackOfFit
@@ -84,7 +82,6 @@ def evidence(
         What of it the noise of the positions makes, which may be white.
     suspected : sequence of Decision, optional
         On effects that explain some of it and are not believed.
-    criteria : SelectionCriteria, optional
     made : callable, optional
         Returns what the noise of the positions makes in the torque of each stretch, shape (n, N): it is not white.
     """
@@ -173,14 +170,12 @@ def held_out_evidence(
 
     Parameters
     ----------
-    shown : sequence of Evidence
     training, held_out : sequence of float or None
         Rms error of each joint; None without rows.
     unsure : ndarray, shape (n,)
         Rms error on the recordings held out that a right model has there, see `unsure_of_others`.
     differing : ndarray, shape (n,)
         Rms torque by which these are expected to differ from the training's, see `of_another_run`.
-    criteria : SelectionCriteria, optional
     """
     found = []
     for item, own, other, known, apart in zip(shown, training, held_out, unsure, differing, strict=True):
@@ -205,7 +200,6 @@ def unsure_of_others(after: Estimate, held_out: Observations) -> Array:
 
     Parameters
     ----------
-    after : Estimate
     held_out : Observations
         Of the same model.
 
@@ -261,10 +255,8 @@ def least_found(found: Search, decision: Decision, criteria: SelectionCriteria =
 
     Parameters
     ----------
-    found : Search
     decision : Decision
         On one of the candidates at the end.
-    criteria : SelectionCriteria, optional
     """
     examined, candidate, scene = decision.examination, decision.candidate, found.scene
     if len(examined.value) != 1 or examined.outside < criteria.least_outside or not examined.products[0, 0] > 0.0:
@@ -287,7 +279,6 @@ def coloured_shares(residuals: Residuals, made: Sequence[Array] | None = None) -
 
     Parameters
     ----------
-    residuals : Residuals
     made : sequence of ndarray, shape (n, N), optional
         What of each stretch's torque is known to be noise: its power is taken off before.
 

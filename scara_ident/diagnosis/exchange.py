@@ -100,7 +100,6 @@ def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate
         The model without the effect.
     found : Decision
         On the effect beside it.
-    pool : sequence of Candidate
     first : Scene
         Where the columns of the pool are at hand.
     """

@@ -213,7 +213,6 @@ def products_of(model: FittedModel, candidates: Sequence[Rows]) -> Products:
 
     Parameters
     ----------
-    model : FittedModel
     candidates : sequence of mapping of int to ndarray, shape (k, N)
         Columns of each on the rows of every joint that it acts on.
     """

@@ -23,10 +23,6 @@ class FoundEffect:
 
     Attributes
     ----------
-    effect : str
-    joint : str or None
-    description : str
-    parameters : mapping of str to Parameter
     confounded_with : tuple of Confounder
         Effects that these recordings cannot tell from it.
     p_value : float
@@ -162,7 +158,6 @@ def uncounted_correction(found: Search, parameters: PhysicalParameters) -> str |
 
     Parameters
     ----------
-    found : Search
     parameters : PhysicalParameters
         Of `Search.whole`, the correction last.
     """

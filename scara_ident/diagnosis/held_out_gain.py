@@ -77,7 +77,6 @@ def held_out_gains(
 
     Parameters
     ----------
-    found : Search
     after : Estimate
         With the effects found.
     held_out : Observations

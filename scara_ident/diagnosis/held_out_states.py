@@ -34,7 +34,6 @@ class HeldOut:
         That knows when they began.
     chosen : tuple of Candidate
         The effects found, which also act in those of them that they were seen in.
-    notes : tuple of str
     """
 
     data: PreparedData
@@ -48,7 +47,6 @@ def held_out_states(found: Search, value: Array, weights: Array, data: PreparedD
 
     Parameters
     ----------
-    found : Search
     value : ndarray, shape (p,)
         Parameters of the model with the effects found.
     weights : ndarray, shape (n,)

@@ -42,12 +42,10 @@ def line_candidates(
 
     Parameters
     ----------
-    scene : Scene
     residuals : Residuals
         Of the model with the effects found so far.
     catalogue : sequence of Effect
         Only families that are in it are offered.
-    criteria : SelectionCriteria, optional
     """
     seeded = [effect for effect in catalogue if effect.seeded_by is not None]
     if not seeded:
@@ -120,7 +118,6 @@ def lines_in_time(
         See `whitened`.
     rate, highest : float
         Samples per second, and Hz.
-    criteria : SelectionCriteria
     cut : float, optional
         Hz above which the residuals have nothing.
     """

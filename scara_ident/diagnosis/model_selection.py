@@ -33,7 +33,6 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
 
     Parameters
     ----------
-    task : SearchTask
     observations : Observations
         Of the base model, in the bands to begin with.
     free : bool

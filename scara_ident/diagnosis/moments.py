@@ -41,7 +41,6 @@ def examine_moments(step: SelectionStep, candidate: Candidate) -> Examination:
     ----------
     step : SelectionStep
         The model that it is tried beside.
-    candidate : Candidate
     """
     model = step.model
     (own,) = step.rows(step.scene, [candidate])

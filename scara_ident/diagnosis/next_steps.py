@@ -31,7 +31,6 @@ class NextStep:
 
     Attributes
     ----------
-    question : str
     motion : str
         ``excite --tell``, or an experiment in words.
     seconds : float or None
@@ -70,12 +69,7 @@ class NextStep:
 
 
 def next_steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
-    """Return what to do next, the most useful first: motions, then recordings of another kind, then experiments.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    """
+    """Return what to do next, the most useful first: motions, then recordings of another kind, then experiments."""
     found = _FOUND.get(diagnosis)
     if found is None:
         found = _FOUND[diagnosis] = _steps(diagnosis)

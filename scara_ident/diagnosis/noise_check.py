@@ -103,7 +103,6 @@ def less_noise(step: SelectionStep, decisions: Sequence[Decision], scene: Scene 
     ----------
     step : SelectionStep
         The model.
-    decisions : sequence of Decision
     scene : Scene, optional
         By whose columns they are judged; default: the step's.
     """

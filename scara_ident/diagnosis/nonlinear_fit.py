@@ -44,9 +44,6 @@ class Linearised:
 
     Attributes
     ----------
-    scene : Scene
-    chosen : tuple of Candidate
-    unknowns : tuple of Unknown
     places : tuple of slice
         Columns of each effect.
     joints : tuple of JointRows
@@ -152,11 +149,9 @@ def linearise(
 
     Parameters
     ----------
-    scene : Scene
     columns : CandidateColumns
         On the rows of the base model.
     weights : ndarray, shape (n,)
-    chosen : sequence of Candidate
     rotor_inertia_std : float
         Standard deviation of a stated rotor inertia, as a share of it.
     offsets : RunVariation, optional

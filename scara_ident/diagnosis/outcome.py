@@ -28,7 +28,6 @@ class Unexplained:
 
     Attributes
     ----------
-    joint : str
     signals : tuple of str
         What it depends on; empty where no signal or pair of signals shows it.
     rms : float
@@ -49,7 +48,6 @@ class Outcome:
 
     Attributes
     ----------
-    search : Search
     after : Estimate
         With the effects found.
     training : Observations
@@ -60,7 +58,6 @@ class Outcome:
         Per joint; empty without repetitions.
     dependences : tuple of Dependence
         What the remainder depends on, ranked.
-    unexplained : Unexplained or None
     small : tuple of float
         What is too small on each joint to be called a remainder, where one is significant; 0 elsewhere. N m or N.
     of_positions : tuple of float

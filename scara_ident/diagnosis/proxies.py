@@ -52,11 +52,6 @@ def proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
     """Return the decisions on effects that remove little of a remainder most of which stays, with why.
 
     Nor is one believed beside a remainder that is significant only since motions were repeated.
-
-    Parameters
-    ----------
-    found : Outcome
-    criteria : SelectionCriteria
     """
     # Not to believe an effect less is asked than to say that something is left: it may stand for what is too small, too.
     left = found.repeating | ({found.unexplained.joint} if found.unexplained else set())

@@ -33,7 +33,6 @@ def examine_rows(model: FittedModel, candidate: Rows, found: Examination) -> Exa
 
     Parameters
     ----------
-    model : FittedModel
     candidate : mapping of int to ndarray, shape (k, N)
         Its columns on the rows of every joint that it acts on.
     found : Examination

@@ -36,7 +36,6 @@ class SelectionStep:
 
     Attributes
     ----------
-    scene : Scene
     columns : CandidateColumns
         On the rows of the base model.
     chosen : tuple of Candidate
@@ -44,7 +43,6 @@ class SelectionStep:
     weights : ndarray, shape (n,)
     tried : int
         Candidates and scan points tried.
-    criteria : SelectionCriteria
     variation : RunVariation or None
         What runs differ by, where all rows are to weigh it as the noise it is: their offsets, or all of it.
     """
@@ -217,10 +215,8 @@ def folds_of(data: PreparedData, owner: NDArray[np.intp], filled: NDArray[np.int
 
     Parameters
     ----------
-    data : PreparedData
     owner, filled : ndarray of int, shape (blocks,)
         Recording of each block, and its place among all blocks.
-    parts : int
     """
     names = data.trajectories
     if len(names) == 1:

@@ -59,8 +59,6 @@ def shape_over(robot: Robot, names: Sequence[str], joint: int) -> Shape | None:
 
     Parameters
     ----------
-    robot : Robot
-    names : sequence of str
     joint : int
         Whose remainder it is.
     """

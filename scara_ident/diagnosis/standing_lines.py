@@ -35,7 +35,6 @@ class StandingLine:
 
     Attributes
     ----------
-    joint : int
     frequency : float
         Hz.
     amplitude : float
@@ -75,7 +74,6 @@ def standing_lines(residuals: Residuals, criteria: SelectionCriteria = CRITERIA)
     ----------
     residuals : Residuals
         Of the model with the effects found.
-    criteria : SelectionCriteria, optional
     """
     data = residuals.data
 
@@ -165,9 +163,6 @@ def tentative_lines(
 
     Parameters
     ----------
-    lines : sequence of StandingLine or None
-    found : Search
-    families : sequence of Effect
     told : collection of (str, str or None)
         Name and joint of the effects in the model and of those worth a look, which are not listed again.
     """

@@ -33,11 +33,8 @@ def steady_evidence(
 
     Parameters
     ----------
-    shown : sequence of Evidence
-    after : Estimate
     training : Observations
         Of the same model.
-    criteria : SelectionCriteria, optional
     """
     if not any(item.shown for item in shown):
         return tuple(shown)

@@ -19,9 +19,6 @@ class TentativeEffect:
 
     Attributes
     ----------
-    effect : str
-    joint : str or None
-    description : str
     why : str
         Why it is not believed.
     settled_by : str
@@ -51,7 +48,6 @@ def tentative_effects(
 
     Parameters
     ----------
-    found : Search
     demoted : sequence of Decision
         On effects that were let in and did not stay.
     believed : collection of (str, str or None)

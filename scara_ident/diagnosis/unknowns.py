@@ -38,8 +38,6 @@ class Unknown:
         Place of the effect whose it is; None for the logarithm of an armature.
     place : int
         Which of the effect's, or the joint.
-    value : float
-    lower, upper : float
     nominal, spread : float
         Prior mean and standard deviation; infinite spread without one.
     """

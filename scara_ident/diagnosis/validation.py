@@ -42,7 +42,6 @@ class Validation:
         Rms error that a right model has there, N m (N), see `unsure_of_others`.
     apart : ndarray, shape (n,)
         Rms torque by which runs were found to differ, N m (N).
-    notes : tuple of str
     """
 
     before: Observations
@@ -60,7 +59,6 @@ def validated(outcome: Outcome, data: PreparedData) -> Validation:
 
     Parameters
     ----------
-    outcome : Outcome
     data : PreparedData
         The recordings held out, in the bands of the search.
     """

@@ -38,12 +38,8 @@ def weighed_evidence(
 
     Parameters
     ----------
-    outcome : Outcome
-    held_out : Validation
-    effects : sequence of FoundEffect
     lines : sequence of StandingLine or None
         For each joint.
-    criteria : SelectionCriteria
     """
     found, after = outcome.search, outcome.after
     doubtful = (*outcome.suspected, *left_open(found, after.weights, outcome.demoted))

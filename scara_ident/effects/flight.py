@@ -57,8 +57,6 @@ class FreeLink:
 
     Attributes
     ----------
-    signals : Signals
-    joint : int
     width : float
         rad or m at the joint.
     """

@@ -97,7 +97,6 @@ def gravity_columns(robot: Robot, axis: int, q: Array) -> Array:
 
     Parameters
     ----------
-    robot : Robot
     axis : {0, 1}
         Which of `sideways`.
     q : ndarray, shape (n, N)
@@ -225,8 +224,6 @@ def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Ar
 
     Parameters
     ----------
-    signals : Signals
-    joint : int
     lag : tuple of ndarray (N,)
         Motor's position less the link's, at the joint, with its first two derivatives; may be of the first samples alone.
 
@@ -248,7 +245,6 @@ def lagging_slopes(
 
     Parameters
     ----------
-    signals : Signals
     joint : int
         That whose link lags.
     bodies : sequence of ndarray, shape (k, N)

@@ -178,7 +178,6 @@ def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = N
 
     Parameters
     ----------
-    recording : Recording
     delay : float
         s, positive where effort lags position.
     joints : sequence of int, optional

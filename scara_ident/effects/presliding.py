@@ -89,7 +89,6 @@ def dahl_state(q: Array, distance: float, start: float = 0.0) -> Array:
     ----------
     q : ndarray, shape (N,)
         Positions.
-    distance : float
     start : float
         State at the first sample.
 
@@ -123,7 +122,6 @@ def turning_points(q: Array, least: float) -> NDArray[np.intp]:
     Parameters
     ----------
     q : ndarray, shape (N,)
-    least : float
 
     Returns
     -------

@@ -225,7 +225,6 @@ def lines(
         2 for a sum over all samples, 2 R for an average over R recordings of about the same length.
     neighbours : float
         Line widths on either side that give the mean.
-    significance : float
 
     Returns
     -------

@@ -59,8 +59,6 @@ class TwoMasses:
 
     Attributes
     ----------
-    signals : Signals
-    joint : int
     frequency : float
         Of the link against its held motor, Hz: with its usual inertia it is the square root of stiffness over inertia.
     damping_ratio : float

@@ -42,8 +42,6 @@ def variance_of_another_run(
 
     Parameters
     ----------
-    variation : RunVariation
-    observations : Observations
     value : ndarray, shape (p,)
         As of `of_another_run`.
     signals : sequence of ndarray, shape (N,)

@@ -99,12 +99,10 @@ class _Fit:
     Attributes
     ----------
     weights : ndarray, shape (n,)
-    information : Information
     value : ndarray, shape (p,)
     undetermined : ndarray of bool, shape (p,)
     inverse : ndarray, shape (p, p)
         Of ``W.T @ W`` of all weighted rows, within the directions that are told.
-    told : Told or None
     """
 
     weights: Array
@@ -142,12 +140,10 @@ def least_squares(observations: Observations, weigh: Weigh, method: str, prior: 
 
     Parameters
     ----------
-    observations : Observations
     weigh : callable
         Returns the weight of each joint's rows, shape (n,), from all of them.
     method : str
         As the estimate is called; of `wls` offsets of runs are noise.
-    prior : Information, optional
     """
     fit, rows = _fit(observations, weigh, method, prior), beside_offsets(observations, None)
     variation, spread = side_by_side(
@@ -214,7 +210,6 @@ def value_and_weights(observations: Observations, offsets: RunVariation | None =
 
     Parameters
     ----------
-    observations : Observations
     offsets : RunVariation, optional
         Offsets of runs that are noise, see `Estimate.offsets`.
     """
@@ -230,7 +225,6 @@ def told_value_and_weights(observations: Observations, offsets: RunVariation | N
 
     Parameters
     ----------
-    observations : Observations
     offsets : RunVariation, optional
         Offsets of runs that are noise, see `Estimate.offsets`.
     """

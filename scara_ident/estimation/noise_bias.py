@@ -35,7 +35,6 @@ def noise_bias(observations: Observations, weights: Array, value: Array | None) 
 
     Parameters
     ----------
-    observations : Observations
     weights : ndarray, shape (n,)
         Of each joint's rows.
     value : ndarray, shape (p,), or None
@@ -60,7 +59,6 @@ def noise_torque(observations: Observations, value: Array) -> Array:
 
     Parameters
     ----------
-    observations : Observations
     value : ndarray, shape (p,)
     """
     known = _LAST.get(observations)
@@ -74,7 +72,6 @@ def noise_signals(observations: Observations, value: Array) -> list[Array]:
 
     Parameters
     ----------
-    observations : Observations
     value : ndarray, shape (p,)
     """
     model, data = observations.model, noisier(observations.data)
@@ -121,7 +118,6 @@ def bias_sentence(names: Sequence[str], bias: Array, std: Array) -> str | None:
 
     Parameters
     ----------
-    names : sequence of str, of length p
     bias, std : ndarray, shape (p,)
         The standard deviations hold the bias.
     """

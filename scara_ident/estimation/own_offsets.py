@@ -21,7 +21,6 @@ def value_beside_offsets(model: TorqueModel, each: Sequence[Sequence[Information
 
     Parameters
     ----------
-    model : TorqueModel
     each : sequence of sequence of Information
         Of every run the rows of every joint, in the columns that act on it.
 

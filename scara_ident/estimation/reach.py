@@ -111,8 +111,6 @@ def reach_of(model: TorqueModel, data: PreparedData, value: Array, *, widening: 
 
     Parameters
     ----------
-    model : TorqueModel
-    data : PreparedData
     value : ndarray, shape (p,)
     widening : bool, optional
         Whether further recordings widen the bands.

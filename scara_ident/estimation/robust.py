@@ -160,7 +160,6 @@ def disagreement(estimate: Estimate, robust: RobustFit) -> str | None:
 
     Parameters
     ----------
-    estimate : Estimate
     robust : RobustFit
         Of the same model on the same rows.
     """

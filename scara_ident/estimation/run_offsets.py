@@ -27,7 +27,6 @@ class OffsetRows:
     fitted : Observations
         Their rows times V^-1/2, with V the covariance of a row's noise and of the offsets, in units of the noise: ordinary
         least squares on them is generalised least squares.
-    offsets : RunVariation or None
     """
 
     fitted: Observations
@@ -46,7 +45,6 @@ def beside_offsets(observations: Observations, offsets: RunVariation | None) -> 
 
     Parameters
     ----------
-    observations : Observations
     offsets : RunVariation or None
         How far they lie apart, see `RunVariation.offsets`; None where they do not.
     """
@@ -62,7 +60,6 @@ def offsets_on(observations: Observations, offsets: RunVariation | None) -> RunV
     ----------
     observations : Observations
         Of a model with the same offsets.
-    offsets : RunVariation or None
     """
     if offsets is None:
         return None
@@ -82,7 +79,6 @@ def rms_of(value: Array, observations: Observations, offsets: RunVariation | Non
     Parameters
     ----------
     value : ndarray, shape (p,)
-    observations : Observations
     offsets : RunVariation, optional
         Offsets of runs, which count as no more than the noise then, see `Estimate.offsets`.
     """

@@ -97,12 +97,7 @@ class JointVariation:
 
 @dataclass(frozen=True, eq=False)
 class RunVariation:
-    """How runs differ, joint by joint; None where they do not.
-
-    Attributes
-    ----------
-    joints : tuple of JointVariation or None
-    """
+    """How runs differ, joint by joint; None where they do not."""
 
     joints: tuple[JointVariation | None, ...]
 
@@ -119,7 +114,6 @@ class RunVariation:
 
         Parameters
         ----------
-        robot : Robot
         unexplained : str, optional
             Joint of which no model explains the torque: what it lacks differs from motion to motion too.
         """

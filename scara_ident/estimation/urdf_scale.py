@@ -27,11 +27,6 @@ def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, floa
     Gravity and inertia are taken together, along the recorded motion, and only parameters of which the URDF says
     something.
 
-    Parameters
-    ----------
-    estimate : Estimate
-    observations : Observations
-
     Returns
     -------
     dict of str to float

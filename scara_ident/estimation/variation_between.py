@@ -98,7 +98,6 @@ class _Sums:
     aims : ndarray, shape (runs, kinds)
     back : ndarray, shape (kinds,)
         The unit of each direction; 0 where a kind does nothing.
-    noise : float
     memory : float
         See `JointVariation.memory`.
     bounds : ndarray of int, shape (runs + 1,)

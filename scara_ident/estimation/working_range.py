@@ -75,7 +75,6 @@ def told_directions(observations: Observations, noise: Array) -> Told | None:
 
     Parameters
     ----------
-    observations : Observations
     noise : ndarray, shape (n,)
         Std of each joint's rows, N m or N, see `Information.noise`.
 
@@ -113,7 +112,6 @@ def believable(observations: Observations, value: Array, noise: Array) -> Array:
 
     Parameters
     ----------
-    observations : Observations
     value : ndarray, shape (p,)
         The estimate.
     noise : ndarray, shape (n,)

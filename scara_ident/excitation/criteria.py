@@ -160,7 +160,6 @@ def block_of(model: TorqueModel, names: Sequence[str]) -> BlockLogDet:
 
     Parameters
     ----------
-    model : TorqueModel
     names : sequence of str
         Parameters, or whole terms such as ``friction``.
 

@@ -71,7 +71,6 @@ class Basis:
         ----------
         time : ndarray, shape (N,)
             s, from 0 to the duration.
-        derivative : int, optional
 
         Returns
         -------
@@ -148,9 +147,6 @@ class ExcitationTrajectory:
 
     Attributes
     ----------
-    name : str
-    joints : tuple of str
-    basis : Basis
     posture : ndarray, shape (n,)
         Positions about which the coefficients move the joints, rad or m.
     coefficients : ndarray, shape (n, m)

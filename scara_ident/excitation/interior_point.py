@@ -63,7 +63,6 @@ class Minimum:
     x : ndarray, shape (k, n, m)
     cost : float
         Of the sharpest criterion.
-    steps : int
     """
 
     x: Array
@@ -76,7 +75,6 @@ def shrunk_inside(problem: Problem, x: Array, room: float = 0.03, factor: float 
 
     Parameters
     ----------
-    problem : Problem
     x : ndarray, shape (k, n, m)
     room : float
         Least distance from each limit, as a share of it.
@@ -96,10 +94,8 @@ def minimise(problem: Problem, x: Array, schedule: Schedule | None = None) -> Mi
 
     Parameters
     ----------
-    problem : Problem
     x : ndarray, shape (k, n, m)
         Strictly inside the limits.
-    schedule : Schedule, optional
     """
     plan = Schedule() if schedule is None else schedule
     span = np.log(plan.first / plan.last)

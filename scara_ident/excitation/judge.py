@@ -44,8 +44,6 @@ class Judge:
 
     Attributes
     ----------
-    inquiry : Inquiry
-    basis : Basis
     posture : ndarray, shape (n,)
     """
 

@@ -19,7 +19,6 @@ def read_parameters(path: Path, model: TorqueModel) -> dict[str, float]:
 
     Parameters
     ----------
-    path : Path
     model : TorqueModel
         The model that the design is for.
 

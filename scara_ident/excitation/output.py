@@ -135,7 +135,6 @@ def excitation_dict(design: Design, stopping: Stopping | None = None) -> dict[st
 
     Parameters
     ----------
-    design : Design
     stopping : Stopping, optional
         When more recordings no longer pay, where a std is asked.
 

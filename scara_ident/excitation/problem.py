@@ -34,7 +34,6 @@ class Task:
         Torques are what Coulomb friction leaves of them; see `without_coulomb`.
     nominal : ndarray, shape (p,)
         Parameters of which torques are foreseen, without Coulomb friction.
-    criterion : Criterion
     bases : tuple of Basis
         Of each of the k trajectories that are designed together.
     posture : ndarray, shape (n,)
@@ -75,13 +74,11 @@ class Point:
     Attributes
     ----------
     x : ndarray, shape (k, n, m)
-    motion : Motion
     cost : float
         Infinite where limits are broken.
     values : ndarray, shape (R, k M)
         Rows of limits; only the first ones where these are broken.
     regressor : ndarray, shape (n, p, k M), or None
-    tool : ToolMotion or None
     near : Nearest or None
         Distances, where they are measured.
     uphill : ndarray, shape (p, p), or None
@@ -104,7 +101,6 @@ class Problem:
 
     Attributes
     ----------
-    task : Task
     rows : ndarray, shape (4, k, M, m)
         Bases and their derivatives at the M times of limits and criterion.
     bounds : ndarray, shape (R,)

@@ -110,8 +110,6 @@ def search(task: Task, effort: Effort, progress: Callable[[Progress], None] | No
 
     Parameters
     ----------
-    task : Task
-    effort : Effort
     progress : callable, optional
         Called after every local search.
 

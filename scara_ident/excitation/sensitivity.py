@@ -31,7 +31,6 @@ class SmoothModel:
 
     Attributes
     ----------
-    model : TorqueModel
     width : ndarray, shape (n,)
         Speed over which ``tanh(v / width)`` stands for sign(v).
     """

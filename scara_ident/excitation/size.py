@@ -69,7 +69,6 @@ def check_size(chosen: int | Sequence[int], joints: int, trajectories: int, samp
     ----------
     chosen : int or sequence of int
         How many harmonics, or which.
-    joints, trajectories, samples : int
 
     Raises
     ------

@@ -17,7 +17,6 @@ class Slopes:
 
     Attributes
     ----------
-    cost : float
     gradient : ndarray, shape (k, n m)
     values : ndarray, shape (R, k M)
         All rows.

@@ -87,7 +87,6 @@ def tool_of(robot: Robot, frame: str | None = None) -> Tool:
 
     Parameters
     ----------
-    robot : Robot
     frame : str, optional
         A frame (link) of the URDF; without it the one that is farthest out on the last joint: 0.33 m along the
         second link of the SCARA03.
@@ -113,7 +112,6 @@ def tool_motion(tool: Tool, q: Array, v: Array | None = None, a: Array | None = 
 
     Parameters
     ----------
-    tool : Tool
     q, v, a : ndarray, shape (n, N)
         In the order of ``robot.joints``.
     """

@@ -26,10 +26,8 @@ class Reached:
         ``<joint>.position.lower``, ``<joint>.position.upper``, ``<joint>.velocity``, ``<joint>.acceleration``,
         ``<joint>.jerk``, ``<joint>.torque``, ``tool.acceleration``, ``tool.speed``, ``tool.height``, or
         ``distance.self``, ``distance.floor``, ``distance.box1``, ....
-    bound : float
     reached : float
         The largest value, the smallest of lower bounds, of height and of distances; between the samples too.
-    unit : str
     share : float
         Of the bound that is used, of a range's half from its middle; above 1 the limit is broken. Of height and
         distances 1 at the bound and less with what room there is beyond it.
@@ -76,7 +74,6 @@ def extremes(task: Task, x: Array, times: int) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    task : Task
     x : ndarray, shape (k, n, m)
     times : int
         Samples per trajectory.
@@ -111,7 +108,6 @@ def reached(task: Task, torque: Array, x: Array, times: int) -> tuple[Reached, .
 
     Parameters
     ----------
-    task : Task
     torque : ndarray, shape (n,)
         Torque limits before Coulomb friction was taken off.
     x : ndarray, shape (k, n, m)

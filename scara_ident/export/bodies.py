@@ -59,7 +59,6 @@ def check_standard(robot: Robot, standard: Array) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    robot : Robot
     standard : ndarray, shape (11 n,)
         See `Robot.standard_parameters`.
 
@@ -114,7 +113,6 @@ class Member:
 
     Attributes
     ----------
-    link : str
     placement : pinocchio.SE3
         The link's frame in the frame of the joint that moves the body.
     parameters : ndarray, shape (10,)

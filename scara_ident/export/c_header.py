@@ -65,7 +65,6 @@ def c_header(model: TracedModel, about: Sequence[str] = ()) -> str:
 
     Parameters
     ----------
-    model : TracedModel
     about : sequence of str, optional
         What the reader of the file should know, one line each.
     """

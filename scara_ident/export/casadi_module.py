@@ -84,7 +84,6 @@ def casadi_module(model: TracedModel, about: Sequence[str] = ()) -> str:
 
     Parameters
     ----------
-    model : TracedModel
     about : sequence of str, optional
         What the reader of the file should know, one line each.
     """

@@ -65,8 +65,6 @@ def code_lines(trace: Trace, outputs: Sequence[Scalar], language: Language, join
         Inputs are q, v and a of ``joints`` joints, one after the other.
     outputs : sequence of Expr or float
         Elements of ``out``.
-    language : Language
-    joints : int
     """
     names: dict[int, str] = {}
     lines: list[str] = []

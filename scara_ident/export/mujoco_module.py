@@ -70,7 +70,6 @@ def mujoco_module(further: TracedModel, friction: JointSideFriction, offset: Arr
     ----------
     further : TracedModel
         Its ``friction`` is what is lost beyond dry and viscous friction and the offset.
-    friction : JointSideFriction
     offset : ndarray, shape (n,)
         Recorded side.
     about : sequence of str, optional

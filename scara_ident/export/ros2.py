@@ -25,7 +25,6 @@ def ros2_text(found: IdentifiedModel, value: Array, armature: Array, urdf: str, 
 
     Parameters
     ----------
-    found : IdentifiedModel
     value : ndarray, shape (p,)
         The model's parameters as they are written.
     armature : ndarray, shape (n,)

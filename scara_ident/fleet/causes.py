@@ -31,7 +31,6 @@ class Cause:
     ----------
     effect : str
         Name of the effect, or ``friction``, ``torque_scale``, ``offset`` or ``inertia`` for what the model has anyway.
-    joint : str or None
     words : str
         What it is, for a person.
     weights : tuple of ndarray, each of shape (k, s)
@@ -70,7 +69,6 @@ def causes_of(
 
     Parameters
     ----------
-    model : TorqueModel
     scene : Scene
         With the reference's parameters.
     effects : sequence of Candidate

@@ -73,11 +73,8 @@ class History:
 
     Attributes
     ----------
-    arm : str
     dates : tuple of str
         In order.
-    visits : tuple of Visit
-    model : TorqueModel
     """
 
     arm: str
@@ -182,7 +179,6 @@ def run_scatter(histories: Sequence[History]) -> tuple[Array, float]:
     Returns
     -------
     std : ndarray, shape (4 n,)
-    freedom : float
     """
     several = [item for item in histories if len(item.dates) > 1]
     if not several:

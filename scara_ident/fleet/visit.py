@@ -82,7 +82,6 @@ class Visit:
         For each joint the triangular factor of its columns and its torque.
     rows : ndarray, shape (n,)
         Rows behind each factor.
-    reference : Reference
     faults : tuple of Fault
         Recordings that were left out.
     """
@@ -128,7 +127,6 @@ def look(
     ----------
     robot : bytes
         A pickled `Robot`.
-    model : str
     files : sequence of RecordingFile
         At least one; of one arm and date.
     reference : Reference, optional

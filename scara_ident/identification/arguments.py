@@ -23,7 +23,6 @@ def recordings_of(recordings: Recordings, robot: Robot, what: str = "recordings"
     ----------
     recordings : Recording, path, or several of these
         Paths are those of `read_recordings`.
-    robot : Robot
     what : str, optional
         Names the argument in errors.
 

@@ -36,7 +36,6 @@ class Binned:
     ----------
     recording : int
         Place of its recording.
-    part : PreparedStretch
     size : int
         Samples in a bin.
     raw : ndarray, shape (n, M * size)

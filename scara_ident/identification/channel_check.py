@@ -50,7 +50,6 @@ class ChannelFault:
     signal : {"effort", "position", "effort and position"}
     joints : tuple of str
         Those whose sign is opposite, or the two that are exchanged.
-    exchanged : bool
     error, mended : float
         Rms of what is left as a share of the torque, geometric mean over the joints, on blocks of time that the
         parameters were not fitted to, as mapped and as it should be.

@@ -91,7 +91,6 @@ class _Sums:
 
     Attributes
     ----------
-    rows : JointRows
     lag : ndarray, shape (N,)
         What the torque changes by when its own recording is late.
     others : ndarray, shape (2, N)

@@ -32,8 +32,6 @@ class TrajectorySummary:
 
     Attributes
     ----------
-    name : str
-    recordings : tuple of str
     log_det, condition : float
         J_d and J_k for 2500 samples.
     sigma : ndarray, shape (n,) or None

@@ -61,8 +61,6 @@ class Segment:
 
     Attributes
     ----------
-    binned : Binned
-    ends : Ends
     score : ndarray, shape (n,)
         By how much each joint stands out, 1 where that alone would be an event.
     """

@@ -52,7 +52,6 @@ class Event:
 
     Attributes
     ----------
-    recording : str
     start, stop : float
         Seconds since the recording began.
     joints : tuple of str
@@ -204,7 +203,6 @@ def without_events(observations: Observations, events: Sequence[Event]) -> Obser
 
     Parameters
     ----------
-    observations : Observations
     events : sequence of Event
         Those of other recordings do not matter.
 

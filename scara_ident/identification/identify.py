@@ -247,8 +247,6 @@ def known_information(
 
     Parameters
     ----------
-    model : TorqueModel
-    recordings : sequence of Recording
     rate : float
         Samples per second that the design they are to be joined with counts.
     weights : ndarray, shape (n,), optional

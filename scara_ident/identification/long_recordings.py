@@ -59,7 +59,6 @@ def with_all_samples(
         Found in them.
     value : ndarray, shape (p,), or None
         Parameters that no event has steered; None where no events are looked for.
-    progress : callable, optional
 
     Raises
     ------

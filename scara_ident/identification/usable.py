@@ -35,7 +35,6 @@ def usable_in_bands(
 
     Parameters
     ----------
-    model : TorqueModel
     recordings : sequence of Recording
         At least one of them is left.
     validation : sequence of Recording, optional
@@ -47,7 +46,6 @@ def usable_in_bands(
 
     Returns
     -------
-    data, held_out : PreparedData
     notes : list of str
         What was found in the data, and what was left out and why.
 
@@ -117,7 +115,6 @@ def with_rows(data: PreparedData, *, needed: bool) -> tuple[PreparedData, list[s
 
     Parameters
     ----------
-    data : PreparedData
     needed : bool
         Whether at least one has to be left; if all have too few, all are.
     """

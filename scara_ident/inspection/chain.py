@@ -22,7 +22,6 @@ def arm_of(urdf: Path, pattern: str | None = None) -> Robot:
 
     Parameters
     ----------
-    urdf : Path
     pattern : str, optional
         Regular expression that the whole name of a joint must match.
 
@@ -79,7 +78,6 @@ def with_locked(
         Columns by joint; no efforts where the file has none.
     numbers : mapping of str to ndarray
         Columns of the file.
-    robot : Robot
 
     Returns
     -------
@@ -87,7 +85,6 @@ def with_locked(
         Those to identify.
     locked : dict of str to float or None
         The others and where they stood, rad or m; None where the file does not say it.
-    notes : list of str
     """
     notes = []
     lacking = [robot.joints[k] for k in range(robot.n) if k not in joints]

@@ -32,13 +32,10 @@ class Guess:
 
     Attributes
     ----------
-    time, time_unit : str
-    signals : dict of str to Signal
     joints : list of int
         Those of the URDF that can be identified from the file.
     locked : dict of str to float or None
         The others, and where they stood, rad or m; None where the file does not say it.
-    notes, problems : list of str
     """
 
     time: str | None = None

@@ -29,11 +29,8 @@ def second_encoder(
     ----------
     position : Signal
         As it was taken, with units.
-    joints : sequence of int
-    meanings : mapping of str to Meaning
     numbers : mapping of str to ndarray
         Each column has as many, on the same rows.
-    robot : Robot
 
     Returns
     -------

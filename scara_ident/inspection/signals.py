@@ -16,8 +16,6 @@ class Signal:
 
     Attributes
     ----------
-    quantity : str
-    columns : dict of int to str
     template : str
         The columns with the joint or its number as a placeholder.
     first_number : int or None

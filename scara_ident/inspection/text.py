@@ -25,7 +25,6 @@ def description_text(guess: Guess, robot: Robot, described: Mapping[str, Any], u
 
     Parameters
     ----------
-    guess : Guess
     robot : Robot
         All joints of the URDF.
     described : mapping

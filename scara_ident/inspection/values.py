@@ -49,7 +49,6 @@ def position_readings(robot: Robot, joints: list[int], time: Array, position: Ar
 
     Parameters
     ----------
-    robot : Robot
     joints : list of int
         Joints that all turn or all translate.
     time : ndarray, shape (N,)

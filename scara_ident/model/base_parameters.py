@@ -119,7 +119,6 @@ def standard_regressor(robot: Robot, q: Array, v: Array, a: Array) -> Array:
 
     Parameters
     ----------
-    robot : Robot
     q, v, a : ndarray, shape (n, N)
         Positions, velocities and accelerations in the order of ``robot.joints``.
 
@@ -276,7 +275,6 @@ def constant_torques(robot: Robot, *, seed: int = 0) -> tuple[int, ...]:
 
     Parameters
     ----------
-    robot : Robot
     seed : int, optional
         Of the random states; it does not change the result.
     """

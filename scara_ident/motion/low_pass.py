@@ -68,7 +68,6 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int, wei
         Samples per second.
     cut : float or None
         Frequency in Hz where half the amplitude is left; None filters nothing.
-    step : int
     weight : ndarray, shape (N,) or (k, N), optional
         The signal is multiplied by it first.
 

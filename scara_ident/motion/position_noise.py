@@ -70,10 +70,6 @@ def encoder_step(position: Array) -> float | None:
 def coarse_positions(item: PreparedRecording) -> str | None:
     """Name the joints whose encoders are too coarse for their bands: what counts as at rest is as fast as they move.
 
-    Parameters
-    ----------
-    item : PreparedRecording
-
     Returns
     -------
     str or None
@@ -160,13 +156,7 @@ def _both_sides(signal: Array, rate: float) -> tuple[Array, Array]:
 
 
 def noise_level(part: PreparedStretch, joint: int) -> float:
-    """Return the standard deviation of a position's noise, taken as white, from what its filter took out.
-
-    Parameters
-    ----------
-    part : PreparedStretch
-    joint : int
-    """
+    """Return the standard deviation of a position's noise, taken as white, from what its filter took out."""
     stretch = part.stretch
     smooth, cut = _smooth(part, joint)
     # The median ignores the moments at which real motion is faster than the filter.
@@ -206,7 +196,6 @@ def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
 
     Parameters
     ----------
-    data : PreparedData
     seed : int, optional
         Of the draw; with the same seed the same data is drawn and prepared once.
     """

@@ -91,7 +91,6 @@ def fading(rest: NDArray[np.bool_], rate: float, bands: Bands) -> Array:
     rest : ndarray of bool, shape (n, N)
     rate : float
         Samples per second.
-    bands : sequence of float or None, one per joint
     """
     result = np.ones(rest.shape)
     for j, band in enumerate(bands):

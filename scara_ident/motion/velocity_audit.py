@@ -24,7 +24,6 @@ class VelocityAudit:
 
     Attributes
     ----------
-    joint : str
     gain : float
         Recorded velocity per derivative of the position; 1 when they agree, 57.3 for degrees.
     lag : float
@@ -60,7 +59,6 @@ def audit_velocity(recording: Recording, part: Stretch) -> tuple[VelocityAudit, 
 
     Parameters
     ----------
-    recording : Recording
     part : Stretch
         A gapless part of it.
 

@@ -24,8 +24,6 @@ class Parameter:
         Such as ``P_d1``, ``a01`` (order 0, joint 1) or ``p_o2``.
     joint : str or None
         Joint of the SCARA03 it belongs to; None where both share it.
-    unit : str
-    meaning : str
     """
 
     name: str

@@ -14,7 +14,6 @@ class Subject:
     ----------
     section : str
         What the check belongs to; rows of one section follow each other.
-    quantity : str
     trajectory, joint : str
         Empty where the check concerns no single one.
     unit : str

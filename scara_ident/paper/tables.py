@@ -49,7 +49,6 @@ class ErrorTable:
 
     Attributes
     ----------
-    name : str
     unit : str
         "N m", or "1" where normalised.
     errors : pair of 5x5 tuples

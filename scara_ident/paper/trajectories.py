@@ -20,7 +20,6 @@ class Trajectory:
 
     Attributes
     ----------
-    name : str
     duration : float
         s.
     offset : tuple of float

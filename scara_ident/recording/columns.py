@@ -18,7 +18,6 @@ def recording_columns(recording: Recording, effort_gain: Array | None = None) ->
 
     Parameters
     ----------
-    recording : Recording
     effort_gain : ndarray, shape (n,), optional
         The robot's gains, by which efforts are divided.
 

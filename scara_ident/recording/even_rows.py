@@ -28,15 +28,8 @@ def with_even_clock(
         Columns that there are.
     read : callable
         Returns some of them, each of shape (N,).
-    channels : Channels
     shared_clock : bool
         Whether rows may hold only some of the channels, so that they are not even.
-
-    Returns
-    -------
-    names : sequence of str
-    read : callable
-    findings : list of Finding
 
     Raises
     ------

@@ -38,7 +38,6 @@ class LongFile:
 
     Attributes
     ----------
-    path : Path
     bounds : tuple of int
         Rows at which its pieces begin, from 0 on, and the number of its rows.
     """
@@ -78,7 +77,6 @@ def long_file(path: Path, time: str, names: Sequence[str]) -> LongFile | None:
 
     Parameters
     ----------
-    path : Path
     time : str
         Column of the clock.
     names : sequence of str

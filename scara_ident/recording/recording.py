@@ -249,7 +249,6 @@ def recording_of(
         Columns that there are.
     read : callable
         Returns some of them, each of shape (N,).
-    robot : Robot
     channels : Channels
         Where the robot's signals stand.
     need_effort : bool

@@ -35,10 +35,6 @@ def shared_samples(
     sketch: Broder, "On the resemblance and containment of documents", 1997), so that time is proportional to the
     samples and memory is constant. Times are not compared: a copy may begin anywhere and have another clock.
 
-    Parameters
-    ----------
-    known, others : sequence of Recording
-
     Yields
     ------
     other, first, share : Recording, Recording, float

@@ -44,8 +44,6 @@ def binned_means(x: Array, y: Array, limits: tuple[float, float], bins: int = ME
     Parameters
     ----------
     x, y : ndarray, shape (N,)
-    limits : tuple of float
-    bins : int, optional
     """
     place = np.floor((x - limits[0]) / (limits[1] - limits[0]) * bins).astype(int)
     centres = limits[0] + (np.arange(bins) + 0.5) * (limits[1] - limits[0]) / bins

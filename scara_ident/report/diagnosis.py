@@ -39,7 +39,6 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     worth : mapping, optional
         What `scara_ident.report.use.worth_dict` says of the effects found.
     """

@@ -19,7 +19,6 @@ def diagnosis_markdown(
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     pictures : sequence of (str, str), optional
         Title and file name of figures that stand beside it; see `scara_ident.report.pictures`.
     content : mapping, optional

@@ -61,7 +61,6 @@ def draw(path: Path, title: str, rows: Sequence[Sequence[Figure]]) -> None:
         Its suffix is of a format that Matplotlib writes, such as ``.png``.
     title : str
         Of the whole picture.
-    rows : sequence of sequence of Figure
 
     Raises
     ------

@@ -44,7 +44,6 @@ def torque_picture(path: Path, context: IdentificationContext) -> None:
     ----------
     path : Path
         PNG file.
-    context : IdentificationContext
 
     Raises
     ------
@@ -79,7 +78,6 @@ def diagnosis_pictures(
     ----------
     folder : Path
         Where the PNG files are written.
-    context : DiagnosisContext
     *others : callable
         What else is done meanwhile in other processes, such as to draw the page.
 
@@ -124,7 +122,6 @@ def remove_stale(folder: Path, written: Sequence[str]) -> None:
 
     Parameters
     ----------
-    folder : Path
     written : sequence of str
         Names of this diagnosis' pictures.
     """
@@ -144,7 +141,6 @@ def design_picture(path: Path, design: Design) -> None:
     ----------
     path : Path
         PNG, SVG or PDF file.
-    design : Design
 
     Raises
     ------
@@ -206,7 +202,6 @@ def path_views(paths: Sequence[Array], tool: str) -> list[Figure]:
     ----------
     paths : sequence of ndarray, shape (3, N)
         m.
-    tool : str
     """
     reach = np.ptp(np.concatenate(paths, axis=1), axis=1)
     side = 0 if reach[0] >= reach[1] else 1

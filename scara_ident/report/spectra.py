@@ -83,8 +83,6 @@ def orders(robot: Robot, traces: Sequence[Trace], j: int, residuals: Sequence[Ar
 
     Parameters
     ----------
-    robot : Robot
-    traces : sequence of Trace
     j : int
         Joint.
     residuals : sequence of ndarray, shape (N,)

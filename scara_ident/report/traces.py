@@ -30,7 +30,6 @@ class Trace:
 
     Attributes
     ----------
-    recording : str
     start : float
         Time at which the recording began, s.
     motion : Motion

@@ -22,10 +22,6 @@ def collision_shapes(robot: Robot) -> pin.GeometryModel:
 
     A mesh is replaced by its convex hull, which holds all of it: distances are rather too small than too large.
 
-    Parameters
-    ----------
-    robot : Robot
-
     Returns
     -------
     pinocchio.GeometryModel

@@ -33,7 +33,6 @@ def tool_frame(robot: Robot, link: str | None = None) -> pin.Frame:
 
     Parameters
     ----------
-    robot : Robot
     link : str, optional
         A link of the URDF; without it the one that is farthest out on the last joint.
 

@@ -48,7 +48,6 @@ def guess_rotors(
 
     Parameters
     ----------
-    model : pinocchio.Model
     order : ndarray of int, shape (n,)
         Velocity index of each joint.
     reduction, effort_limit : ndarray, shape (n,)

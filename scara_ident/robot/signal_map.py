@@ -45,7 +45,6 @@ class Channels:
 
     Attributes
     ----------
-    time : Channel
     position, velocity, acceleration, effort, temperature, link_position : tuple of Channel
         One for each joint, in the robot's order. Efforts are converted to N m (N), or to A where a gain makes torque
         of them.
@@ -244,7 +243,6 @@ def check_rated_torque(
     ----------
     described : SignalDescription or None
         Of the effort.
-    joints : sequence of str
     gain : ndarray, shape (n,)
         ``effort_gain``: with such a unit the rated torque, N m (N).
     limit : ndarray, shape (n,)

@@ -21,7 +21,6 @@ def read_urdf(urdf: Path, source: Path) -> ElementTree.Element:
 
     Parameters
     ----------
-    urdf : Path
     source : Path
         What named it, for messages.
 

@@ -46,7 +46,6 @@ def push(plant: Plant, t: float, e: Array, p: Array, force: Array, bias: Array) 
 
     Parameters
     ----------
-    t : float
     e, p : ndarray, shape (n, 9) and (n, 3)
         Placements of the joints, as `dynamics` leaves them.
     force : ndarray, shape (n, 3)

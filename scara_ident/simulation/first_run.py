@@ -19,7 +19,6 @@ def compiled_first(arm: VirtualArm, progress: Tell) -> Work:
     ----------
     arm : VirtualArm
         Any: the machine code is the same for all.
-    progress : callable
 
     Returns
     -------

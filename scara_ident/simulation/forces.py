@@ -174,7 +174,6 @@ def accelerate(
 
     Parameters
     ----------
-    t : float
     x : State
         Its presliding states are those at the start of the step.
     start : ndarray, shape (n,)

@@ -25,7 +25,6 @@ def inverse_dynamics(arm: VirtualArm, bodies: Array, q: Array, v: Array, a: Arra
 
     Parameters
     ----------
-    arm : VirtualArm
     bodies : ndarray, shape (n, 10)
         Instead of the arm's own.
     q, v, a : ndarray, shape (n, N)

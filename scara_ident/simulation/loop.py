@@ -184,7 +184,6 @@ def track(
 
     Returns
     -------
-    trace : Trace
     events : int
         How often a joint stopped; negative is -1 - the sample at which the motion became infinite.
     """

@@ -52,7 +52,6 @@ class Tool:
 
     Attributes
     ----------
-    robot : Robot
     point : ndarray, shape (3,)
         In the frame of the last joint, m.
     oriented : bool
@@ -118,7 +117,6 @@ def line(
 
     Parameters
     ----------
-    robot : Robot
     start, end : sequence of float
         Points in the base's frame, m: x, y, z, or x, y at the height of the tool at ``near``.
     duration : float
@@ -132,7 +130,6 @@ def line(
         See `tool_of`.
     rate : float
         Samples per second.
-    name : str
 
     Raises
     ------
@@ -163,7 +160,6 @@ def circle(
 
     Parameters
     ----------
-    robot : Robot
     centre : sequence of float
         In the base's frame, m: x, y, z, or x, y at the height of the tool at ``near``.
     radius : float

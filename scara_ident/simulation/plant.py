@@ -98,7 +98,6 @@ class PlantDraft:
 
     Attributes
     ----------
-    n : int
     scale : ndarray, shape (n,)
         Torque at the joint per recorded torque, Pinocchio's order.
     reduction : ndarray, shape (n,)

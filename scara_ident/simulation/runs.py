@@ -43,7 +43,6 @@ class TorqueNoise:
 
         Parameters
         ----------
-        random : Generator
         shape : (int, int)
             Joints and samples.
         rate : float

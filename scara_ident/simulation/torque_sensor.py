@@ -16,7 +16,6 @@ def recorded_effort(
 
     Parameters
     ----------
-    arm : VirtualArm
     draft : PlantDraft
         With what its effects do to the measurement.
     effort, position : ndarray, shape (n, N)

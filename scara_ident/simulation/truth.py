@@ -22,7 +22,6 @@ def truth(arm: VirtualArm, effects: Sequence[Effect] = ()) -> dict[str, Any]:
 
     Parameters
     ----------
-    arm : VirtualArm
     effects : sequence of Effect
         Sizes that were left open are taken from the arm.
 
@@ -66,7 +65,6 @@ def write_simulation(result: SimulationResult, folder: Path | str) -> Path:
 
     Parameters
     ----------
-    result : SimulationResult
     folder : path
         Made if it is not there. ``<trajectory>_<repetition>.parquet`` is the recording, with efforts divided by the
         robot's gains; ``<trajectory>_<repetition>.truth.json`` is beside it.

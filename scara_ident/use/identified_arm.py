@@ -63,15 +63,10 @@ def arm_with(robot: Robot, parameters: Mapping[str, float], near: Array | None =
 
     Parameters
     ----------
-    robot : Robot
     parameters : mapping of str to float
         By the names of the complete model; those that it lacks are zero.
     near : ndarray, shape (11 n,), optional
         Standard parameters of bodies and rotors: those of an estimate that has them, by default the URDF's.
-
-    Returns
-    -------
-    VirtualArm
 
     Raises
     ------
@@ -156,7 +151,6 @@ def simulated(found: Sequence[Entry]) -> tuple[tuple[tuple[Effect, Entry], ...],
     -------
     pairs : tuple of (Effect, mapping)
         Each effect with what it was made of.
-    missing : tuple of str
     """
     made: list[tuple[Effect, Entry]] = []
     missing: list[str] = []

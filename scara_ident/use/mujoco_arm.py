@@ -27,10 +27,6 @@ def mujoco_arm(model: IdentifiedModel) -> Iterator[Free]:
 
     MuJoCo has one callback for all models; it is this one's until the end. Limits of joints do not act.
 
-    Parameters
-    ----------
-    model : IdentifiedModel
-
     Raises
     ------
     ScaraIdentError

@@ -26,8 +26,6 @@ def trial_motion(arm: VirtualArm, seed: int = 0, *, poses: int = POSES) -> Refer
 
     Parameters
     ----------
-    arm : VirtualArm
-    seed : int, optional
     poses : int, optional
         How many it goes through.
 

@@ -47,12 +47,10 @@ class Worth:
 
     Attributes
     ----------
-    model : IdentifiedModel
     motion : ReferenceMotion
         That the arm followed.
     rms : mapping of str to ndarray, shape (n,)
         Rms tracking error by feed-forward, as of `Use.rms`.
-    each : tuple of EffectWorth
     missing : tuple of str
         Effects that the virtual arm cannot have.
     notes : tuple of str

@@ -91,12 +91,7 @@ class Statement:
 
     Parameters
     ----------
-    cones : sequence of Cone
     x : cvxpy.Expression, shape (unknowns,)
-
-    Attributes
-    ----------
-    constraints : list of cvxpy.Constraint
     """
 
     def __init__(self, cones: Sequence[Cone], x: Any) -> None:
@@ -161,7 +156,6 @@ def active_set(cones: Iterable[Cone], x: Array, multipliers: Iterable[Array]) ->
 
     Parameters
     ----------
-    cones : iterable of Cone
     x : ndarray, shape (unknowns,)
     multipliers : iterable of ndarray
         Of each cone, shape (k,), packed where the cone is of matrices.

@@ -153,7 +153,6 @@ def furthest_inside(unknowns: Unknowns, value: Array, given: Fixed) -> BestArm:
 
     Parameters
     ----------
-    unknowns : Unknowns
     value : ndarray, shape (p,)
         The model's parameters.
     given : Fixed
@@ -260,7 +259,6 @@ def check_consistency(
 
     Parameters
     ----------
-    model : TorqueModel
     value : ndarray, shape (p,)
         Parameters, estimated by whatever method.
     information : Information, optional

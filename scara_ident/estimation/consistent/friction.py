@@ -35,7 +35,6 @@ class Certificate:
 
     Attributes
     ----------
-    cones : tuple of Cone
     auxiliary : int
         Number of auxiliary unknowns.
     unit : ndarray
@@ -52,7 +51,6 @@ def certificate(polynomial: BrakingPolynomial, shape: Shape, margin: float = MAR
 
     Parameters
     ----------
-    polynomial : BrakingPolynomial
     shape : {"dissipative", "lubricated"}
         ``dissipative``: between 0 and the motor's limit at every speed up to the velocity limit. Without a
         velocity limit it is at least 0 at every speed, and the motor's limit cannot be used.
@@ -148,7 +146,6 @@ class FrictionFault:
 
     Attributes
     ----------
-    joint : str
     kind : {"pushes", "exceeds"}
         It feeds energy in, or is more than the motor can overcome.
     start, stop : float
@@ -166,7 +163,6 @@ def friction_faults(polynomial: BrakingPolynomial, parameters: Array) -> tuple[F
 
     Parameters
     ----------
-    polynomial : BrakingPolynomial
     parameters : ndarray
         In the order of the polynomial's columns.
 

@@ -63,7 +63,6 @@ def prior_rows(u: Unknowns, rows: Array, target: Array, weight: float) -> Array:
 
     Parameters
     ----------
-    u : Unknowns
     rows : ndarray, shape (r, size)
         Data on x, divided by the noise.
     target : ndarray, shape (r,)

@@ -68,8 +68,6 @@ class Unknowns:
 
     Attributes
     ----------
-    model : TorqueModel
-    nominal : Nominal
     to_parameters : ndarray, shape (p, size)
         Takes x to the model's parameters.
     held : ndarray, shape (k, size)
@@ -86,7 +84,6 @@ class Unknowns:
         What each of them fulfils.
     nonnegative : ndarray of int
         Columns of the model that other terms declare nonnegative.
-    auxiliary : int
     place : slice
         Where the columns of bodies and rotors stand in the model.
     """
@@ -260,18 +257,7 @@ class Point:
 
 
 class Problem:
-    """The compiled problem of one model and set of options; not to be shared by threads.
-
-    Parameters
-    ----------
-    model : TorqueModel
-    options : ConsistentOptions, optional
-
-    Attributes
-    ----------
-    options : ConsistentOptions
-    unknowns : Unknowns
-    """
+    """The compiled problem of one model and set of options; not to be shared by threads."""
 
     def __init__(self, model: TorqueModel, options: ConsistentOptions | None = None) -> None:
         self.options = options or ConsistentOptions()

@@ -48,11 +48,9 @@ class ShapeChoice:
 
     Attributes
     ----------
-    joint : str
     shape : {"lubricated", "dissipative", "free"}
     p_value : float or None
         Of the test that the data do not contradict the lubricated shape; None where nothing was tested.
-    why : str
     """
 
     joint: str
@@ -70,8 +68,6 @@ def choose_shapes(
     ----------
     polynomials : sequence of BrakingPolynomial
         Of each joint, with columns counted in the model.
-    options : ConsistentOptions
-    observations : Observations
     plain : Estimate
         By weighted least squares, of the same observations.
 
@@ -103,7 +99,6 @@ def lubricated_p_value(polynomial: BrakingPolynomial, observations: Observations
     ----------
     polynomial : BrakingPolynomial
         With a velocity limit.
-    observations : Observations
     plain : Estimate
         By weighted least squares, of the same observations.
     """

@@ -87,16 +87,13 @@ def solve_joints(
 
     Parameters
     ----------
-    problem : Problem
     joints : sequence of Information
         All rows of each joint.
     parameter_prior : Information, optional
         Rows of priors on the model's parameters.
-    standard_prior : StandardPrior, optional
 
     Returns
     -------
-    solution : ConsistentSolution
     information : Information
         The rows that it was found from.
     weights : ndarray, shape (n,)
@@ -145,10 +142,8 @@ def solve_consistent(
 
     Parameters
     ----------
-    problem : Problem
     information : Information
         All rows, weighted, with those of priors on the model's parameters.
-    standard_prior : StandardPrior, optional
 
     Raises
     ------
@@ -207,7 +202,6 @@ def nearest_arm(
 
     Parameters
     ----------
-    problem : Problem
     information : Information
         The rows that x was found from.
     x : ndarray

@@ -29,7 +29,6 @@ def gradient(values: Sequence[Scalar], seeds: Sequence[Scalar], variables: Seque
 
     Parameters
     ----------
-    values : sequence of Expr or float
     seeds : sequence of Expr or float
         One per value, not differentiated.
     variables : sequence of Expr
@@ -81,7 +80,6 @@ def derivative(values: Sequence[Scalar], variable: Expr) -> list[Scalar]:
 
     Parameters
     ----------
-    values : sequence of Expr or float
     variable : Expr
         An input of the same trace.
 

@@ -174,13 +174,8 @@ def pinocchio_regressor(model: pin.Model, q: ArrayLike, v: ArrayLike, a: ArrayLi
 
     Parameters
     ----------
-    model : pin.Model
     q, v, a : array_like (nv, samples)
         As for `RegressorKernel`: one angle for a continuous joint too.
-
-    Returns
-    -------
-    ndarray (nv, 10 nbodies, samples)
     """
     v, a = np.asarray(v, dtype=np.float64), np.asarray(a, dtype=np.float64)
     full = configurations(model, np.asarray(q, dtype=np.float64))

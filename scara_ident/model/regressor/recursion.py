@@ -45,7 +45,6 @@ class JointGeometry:
         Index of the parent joint, 0 for the base.
     velocity_index : int
         Row of the joint in q, v and a.
-    prismatic : bool
     axis : ndarray (3,)
         Unit axis in the joint's frame.
     rotation : ndarray (3, 3)

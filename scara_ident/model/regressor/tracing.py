@@ -193,8 +193,6 @@ def vanishing(trace: Trace, values: Sequence[Scalar], inputs: Array) -> list[boo
 
     Parameters
     ----------
-    trace : Trace
-    values : sequence of Expr or float
     inputs : ndarray (inputs, states)
         Random states.
     """

@@ -37,7 +37,6 @@ class BrakingPolynomial:
 
     Attributes
     ----------
-    joint : str
     columns : tuple of int
         Places among the term's columns.
     powers : tuple of int

@@ -34,8 +34,6 @@ class CsvLayout:
 
     Attributes
     ----------
-    separator : str
-    decimal_comma : bool
     names : tuple of str
         Of the columns, without surrounding blanks, with the unit in brackets where a line of units says one that is not
         SI; ``column_1``, ``column_2``, ... where no line names them.

@@ -25,7 +25,6 @@ def column_names(path: Path, *, separator: str = "/") -> tuple[str, ...]:
 
     Parameters
     ----------
-    path : Path
     separator : str
         What stands between a group and its members.
 

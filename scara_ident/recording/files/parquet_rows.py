@@ -68,8 +68,6 @@ def read_rows(path: Path, names: Sequence[str], start: int, stop: int) -> dict[s
     ----------
     path : Path
         For which `seekable` holds.
-    names : sequence of str
-    start, stop : int
 
     Returns
     -------

@@ -20,13 +20,10 @@ class Chapter:
 
     Attributes
     ----------
-    number : int
-    effect : str
     joint : int
         The joint whose residual is shown.
     before, after : sequence of Trace
         Of the same recordings in the same order.
-    bands : sequence of float or None
     own_joint : str or None
         The joint that the effect belongs to; None where it belongs to no one joint.
     view : View

@@ -189,7 +189,6 @@ def comparison_report(path: Path, content: Mapping[str, Any]) -> None:
 
     Parameters
     ----------
-    path : Path
     content : mapping
         The content of ``comparison.json``.
 

@@ -25,7 +25,6 @@ def gain_blocks(content: Mapping[str, Any], robot: Robot) -> list[Block]:
     ----------
     content : mapping
         Of ``diagnosis.json``.
-    robot : Robot
     """
     times = ("before", "after") if content["effects"] else ("before",)
     rows: list[list[Cell | str]] = []
@@ -146,13 +145,7 @@ def evidence_blocks(content: Mapping[str, Any]) -> Sequence[Block]:
 
 
 def events_blocks(robot: Robot, events: Sequence[Event]) -> Sequence[Block]:
-    """Return a table of events; nothing without.
-
-    Parameters
-    ----------
-    robot : Robot
-    events : sequence of Event
-    """
+    """Return a table of events; nothing without."""
     rows: list[list[Cell | str]] = [
         [
             name(event.recording),
@@ -180,8 +173,6 @@ def variation_blocks(robot: Robot, variation: RunVariation | None, runs: Sequenc
 
     Parameters
     ----------
-    robot : Robot
-    variation : RunVariation or None
     runs : sequence of str
         Names of the recordings fitted, in their order.
     """

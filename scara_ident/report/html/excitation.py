@@ -43,7 +43,6 @@ class ExcitationContext:
     ----------
     content : mapping
         The content of ``excitation.json``.
-    robot : Robot
     motions : sequence of Motion
         The trajectories; torque, where there is one, is what the design expects.
     """

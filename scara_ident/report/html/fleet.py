@@ -175,11 +175,6 @@ SECTIONS: tuple[Section, ...] = (
 def fleet_report(path: Path, fleet: Fleet) -> None:
     """Write the report of a fleet as one HTML file.
 
-    Parameters
-    ----------
-    path : Path
-    fleet : Fleet
-
     Raises
     ------
     ScaraIdentError
@@ -208,8 +203,6 @@ def write_fleet(folder: Path, fleet: Fleet, table: pl.DataFrame) -> None:
 
     Parameters
     ----------
-    folder : Path
-    fleet : Fleet
     table : DataFrame
         See `scara_ident.fleet.table.fleet_table`.
 

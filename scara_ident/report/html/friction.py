@@ -27,7 +27,6 @@ def friction_group(estimate: Estimate, traces: Sequence[Trace]) -> Group | None:
 
     Parameters
     ----------
-    estimate : Estimate
     traces : sequence of Trace
         Of the recordings that were fitted.
     """

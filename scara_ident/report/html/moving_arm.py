@@ -22,8 +22,6 @@ def moving_arm(robot: Robot, motion: Motion, name: str) -> Arm:
 
     Parameters
     ----------
-    robot : Robot
-    motion : Motion
     name : str
         Unique on the page.
     """
@@ -46,7 +44,6 @@ def joint_points(robot: Robot, q: Array) -> Array:
 
     Parameters
     ----------
-    robot : Robot
     q : ndarray, shape (n, N)
         In the robot's order, rad or m.
 

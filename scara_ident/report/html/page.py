@@ -37,10 +37,8 @@ class Page:
 
     Attributes
     ----------
-    title, subtitle : str
     verdict : sequence of str
         The first is the verdict in a sentence.
-    parts : sequence of Part
     warn : bool
         Whether the verdict is bad news.
     picture : Gains, optional

@@ -27,8 +27,6 @@ def remainder_group(robot: Robot, remainder: Unexplained, traces: Sequence[Trace
 
     Parameters
     ----------
-    robot : Robot
-    remainder : Unexplained
     traces : sequence of Trace
         Of the training recordings, with the effects found.
 

@@ -37,7 +37,6 @@ def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None]) -> 
 
     Parameters
     ----------
-    robot : Robot
     sets : mapping of str to sequence of Trace
         Such as the fitted and the held-out recordings; empty ones are left out.
     bands : sequence of float or None, one per joint

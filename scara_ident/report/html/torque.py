@@ -31,7 +31,6 @@ def torque_group(robot: Robot, parts: Sequence[tuple[str, Sequence[Trace]]], ban
 
     Parameters
     ----------
-    robot : Robot
     parts : sequence of (str, sequence of Trace)
         Recordings, by the words of the selector.
     bands : sequence of float or None, one per joint
@@ -59,7 +58,6 @@ def torque_plot(robot: Robot, traces: Sequence[Trace], j: int, band: float | Non
 
     Parameters
     ----------
-    robot : Robot
     traces : sequence of Trace
         Of one recording.
     j : int
@@ -121,7 +119,6 @@ def error_table(robot: Robot, names: Sequence[str], errors: Sequence[Sequence[Jo
 
     Parameters
     ----------
-    robot : Robot
     names : sequence of str
         In the order of the torque figure's selector.
     errors : sequence of sequence of JointError or None

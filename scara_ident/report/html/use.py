@@ -94,11 +94,6 @@ SECTIONS: tuple[Section, ...] = (
 def use_report(path: Path, result: Use) -> None:
     """Write the report of a model in use as one HTML file.
 
-    Parameters
-    ----------
-    path : Path
-    result : Use
-
     Raises
     ------
     ScaraIdentError
