@@ -6,23 +6,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from scara_ident.model.regressor.tracing import (
-    ABS,
-    ADD,
-    ADD_CONST,
-    COS,
-    EXP,
-    MUL,
-    MUL_CONST,
-    SIGN,
-    SIN,
-    SUB,
-    VAR,
-    Expr,
-    Scalar,
-    Trace,
-    needed,
-)
+from scara_ident.model.regressor import tracing as op
+from scara_ident.model.regressor.tracing import Expr, Scalar, Trace, needed
 
 
 @dataclass(frozen=True)
@@ -50,7 +35,7 @@ class Language:
 PYTHON = Language(
     "{name} = {value}",
     "out[{place}] = {value}",
-    {SIN: "sin({x})", COS: "cos({x})", ABS: "fabs({x})", SIGN: "sign({x})", EXP: "exp({x})"},
+    {op.SIN: "sin({x})", op.COS: "cos({x})", op.ABS: "fabs({x})", op.SIGN: "sign({x})", op.EXP: "exp({x})"},
     repr,
 )
 """Python, with numbers or whatever else its functions take."""
@@ -70,16 +55,16 @@ def code_lines(trace: Trace, outputs: Sequence[Scalar], language: Language, join
     lines: list[str] = []
     for node in needed(trace, outputs):
         operation, first, second = trace.nodes[node]
-        if operation == VAR:
+        if operation == op.VAR:
             names[node] = f"{'qva'[first // joints]}[{first % joints}]"
             continue
         x = names[first]
-        if operation in (ADD, SUB, MUL):
-            value = f"{x} {'+-*'[(ADD, SUB, MUL).index(operation)]} {names[second]}"
-        elif operation in (ADD_CONST, MUL_CONST):
-            value = f"{x} {'+' if operation == ADD_CONST else '*'} {_constant(second, language)}"
+        if operation in (op.ADD, op.SUB, op.MUL):
+            value = f"{x} {'+-*'[(op.ADD, op.SUB, op.MUL).index(operation)]} {names[second]}"
+        elif operation in (op.ADD_CONST, op.MUL_CONST):
+            value = f"{x} {'+' if operation == op.ADD_CONST else '*'} {_constant(second, language)}"
         else:
-            value = language.functions[operation].replace("{x}", f"-{x}" if operation == EXP and second < 0 else x)
+            value = language.functions[operation].replace("{x}", f"-{x}" if operation == op.EXP and second < 0 else x)
         names[node] = f"t{len(lines)}"
         lines.append(language.statement.replace("{name}", names[node]).replace("{value}", value))
     for place, output in enumerate(outputs):
@@ -90,7 +75,7 @@ def code_lines(trace: Trace, outputs: Sequence[Scalar], language: Language, join
 
 def inputs_of(trace: Trace, outputs: Iterable[Scalar], joints: int) -> str:
     """Return which of the letters q, v and a outputs depend on."""
-    found = {trace.nodes[node][1] // joints for node in needed(trace, outputs) if trace.nodes[node][0] == VAR}
+    found = {trace.nodes[node][1] // joints for node in needed(trace, outputs) if trace.nodes[node][0] == op.VAR}
     return "".join("qva"[k] for k in sorted(found))
 
 

@@ -4,22 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scara_ident.model.regressor.tracing import (
-    ABS,
-    ADD,
-    ADD_CONST,
-    COS,
-    EXP,
-    MUL,
-    MUL_CONST,
-    SIGN,
-    SIN,
-    SUB,
-    VAR,
-    Expr,
-    Scalar,
-    needed,
-)
+from scara_ident.model.regressor import tracing as op
+from scara_ident.model.regressor.tracing import Expr, Scalar, needed
 
 
 def gradient(values: Sequence[Scalar], seeds: Sequence[Scalar], variables: Sequence[Expr]) -> list[Scalar]:
@@ -51,26 +37,26 @@ def gradient(values: Sequence[Scalar], seeds: Sequence[Scalar], variables: Seque
     for node in reversed(needed(trace, values)):
         operation, first, second = trace.nodes[node]
         slope = slopes.get(node, 0.0)
-        if operation in (VAR, SIGN) or (isinstance(slope, float) and slope == 0.0):
+        if operation in (op.VAR, op.SIGN) or (isinstance(slope, float) and slope == 0.0):
             continue
         x = Expr(trace, first, 1)
-        if operation in (ADD, SUB):
+        if operation in (op.ADD, op.SUB):
             add(first, slope)
-            add(second, slope if operation == ADD else -slope)
-        elif operation == MUL:
+            add(second, slope if operation == op.ADD else -slope)
+        elif operation == op.MUL:
             add(first, slope * Expr(trace, second, 1))
             add(second, slope * x)
-        elif operation == ADD_CONST:
+        elif operation == op.ADD_CONST:
             add(first, slope)
-        elif operation == MUL_CONST:
+        elif operation == op.MUL_CONST:
             add(first, slope * second)
-        elif operation == SIN:
+        elif operation == op.SIN:
             add(first, slope * x.cos())
-        elif operation == COS:
+        elif operation == op.COS:
             add(first, -slope * x.sin())
-        elif operation == ABS:
+        elif operation == op.ABS:
             add(first, slope * x.direction())
-        elif operation == EXP:
+        elif operation == op.EXP:
             add(first, slope * Expr(trace, node, second))
     return [slopes.get(variable.node, 0.0) * variable.sign for variable in variables]
 
@@ -94,24 +80,24 @@ def derivative(values: Sequence[Scalar], variable: Expr) -> list[Scalar]:
         operation, first, second = trace.nodes[node]
         x, along = Expr(trace, first, 1), slopes.get(first, 0.0)
         found: Scalar = 0.0
-        if operation == ADD:
+        if operation == op.ADD:
             found = along + slopes.get(second, 0.0)
-        elif operation == SUB:
+        elif operation == op.SUB:
             found = along - slopes.get(second, 0.0)
-        elif operation == MUL:
+        elif operation == op.MUL:
             found = Expr(trace, second, 1) * along + x * slopes.get(second, 0.0)
-        elif operation == ADD_CONST:
+        elif operation == op.ADD_CONST:
             found = along
-        elif operation == MUL_CONST:
+        elif operation == op.MUL_CONST:
             found = along * second
-        elif operation == SIN:
+        elif operation == op.SIN:
             found = x.cos() * along
-        elif operation == COS:
+        elif operation == op.COS:
             found = -x.sin() * along
-        elif operation == ABS:
+        elif operation == op.ABS:
             found = x.direction() * along
-        elif operation == EXP:
+        elif operation == op.EXP:
             found = Expr(trace, node, second) * along
-        if operation != SIGN and not (isinstance(found, float) and found == 0.0):
+        if operation != op.SIGN and not (isinstance(found, float) and found == 0.0):
             slopes.setdefault(node, found)
     return [slopes.get(value.node, 0.0) * value.sign if isinstance(value, Expr) else 0.0 for value in values]
