@@ -29,48 +29,40 @@ def diagnosis_markdown(
     lines += [f"{sentence}  " for sentence in content["summary"]]
     for kind in ("training", "validation"):
         part = content[kind]
-        if not part["before"]:
-            continue
-        lines += [
-            "",
-            f"## Error on the {kind} recordings",
-            "",
-            "| joint | before | after | before, share | after, share |",
-        ]
-        lines += ["|---|---|---|---|---|"]
-        for joint in diagnosis.robot.joints:
-            cells = [part[key][joint] for key in ("before", "after", "before_relative", "after_relative")]
-            lines.append(f"| {joint} | " + " | ".join(_cell(x, k > 1) for k, x in enumerate(cells)) + " |")
+        if part["before"]:
+            head = ("joint", "before", "after", "before, share", "after, share")
+            keys = ("before", "after", "before_relative", "after_relative")
+            rows = [
+                (joint, *(_cell(part[key][joint], key.endswith("relative")) for key in keys))
+                for joint in diagnosis.robot.joints
+            ]
+            lines += _table(f"Error on the {kind} recordings", head, rows)
     if pictures:
         lines += ["", "## Residual before and after"]
         for title, name in pictures:
             lines += ["", f"### {title[:1].upper()}{title[1:]}", "", f"![{title}]({name})"]
     if content["moved"]:
-        lines += [
-            "",
-            "## Parameters that moved when the effects came in",
-            "",
-            "| name | URDF | before | after | in std |",
-        ]
-        lines += ["|---|---|---|---|---|"]
-        lines += [
-            f"| {m['name']} | {_cell(m['urdf'], share=False)} | {m['before']:.4g} | {m['after']:.4g} | {m['in_std']:+.1f} |"
+        rows = [
+            (m["name"], _cell(m["urdf"]), f"{m['before']:.4g}", f"{m['after']:.4g}", f"{m['in_std']:+.1f}")
             for m in content["moved"]
         ]
+        head = ("name", "URDF", "before", "after", "in std")
+        lines += _table("Parameters that moved when the effects came in", head, rows)
     lines += _certainty(content, diagnosis)
-    lines += ["", "## Candidates", "", "| candidate | gain held out | p | decision | why |", "|---|---|---|---|---|"]
-    for row in content["candidates"]:
-        lines.append(
-            f"| {row['label']} | {row['gain']:.2%} | {row['p_value']:.1e} | {row['decision']} | {row['why']} |"
-        )
+    rows = [
+        (row["label"], f"{row['gain']:.2%}", f"{row['p_value']:.1e}", row["decision"], row["why"])
+        for row in content["candidates"]
+    ]
+    lines += _table("Candidates", ("candidate", "gain held out", "p", "decision", "why"), rows)
     if content["not_identifiable"]:
-        lines += ["", "## What no such recording can show", ""]
-        lines += ["| effect | joints | absorbed by | opened by |", "|---|---|---|---|"]
-        lines += [
-            f"| {row['effect']} | {', '.join(row['joints']) or '-'} | {', '.join(row['absorbed_by']) or 'no torque at all'} | "
-            f"{row['opened_by']} |"
+        rows = [
+            (
+                row["effect"], ", ".join(row["joints"]) or "-", ", ".join(row["absorbed_by"]) or "no torque at all",
+                row["opened_by"],
+            )
             for row in content["not_identifiable"]
-        ]
+        ]  # fmt: skip
+        lines += _table("What no such recording can show", ("effect", "joints", "absorbed by", "opened by"), rows)
     if content["worth"] is not None:
         lines += ["", "## What the effects cost", "", *content["worth"]["summary"]]
     return "\n".join(lines) + "\n"
@@ -78,47 +70,49 @@ def diagnosis_markdown(
 
 def _certainty(content: Mapping[str, Any], diagnosis: Diagnosis) -> list[str]:
     """Return events, what is worth a look, whether what is left is noise, and how runs differ, as Markdown."""
-    lines = []
+    lines: list[str] = []
+    rows: list[tuple[str, ...]]
     if content["events"]:
-        lines += ["", "## Events", "", "| recording | from | to | joints | rms | kind |", "|---|---|---|---|---|---|"]
-        lines += [
-            f"| {row['recording']} | {row['from']:.2f} | {row['to']:.2f} | {', '.join(row['joints'])} | {row['rms']:.3g} | {row['kind']} |"
+        rows = [
+            (
+                row["recording"], f"{row['from']:.2f}", f"{row['to']:.2f}", ", ".join(row["joints"]),
+                f"{row['rms']:.3g}", row["kind"],
+            )
             for row in content["events"]
-        ]
+        ]  # fmt: skip
+        lines += _table("Events", ("recording", "from", "to", "joints", "rms", "kind"), rows)
     if content["tentative"]:
-        lines += [
-            "",
-            "## Worth a look, not added",
-            "",
-            "| effect | joint | gain | p over all tried | why not | settled by |",
-        ]
-        lines += ["|---|---|---|---|---|---|"]
-        lines += [
-            f"| {row['effect']} | {row['joint'] or '-'} | {row['gain']:.2%} | {row['p_value']:.1e} | {row['why']} | {row['settled_by']} |"
+        rows = [
+            (
+                row["effect"], row["joint"] or "-", f"{row['gain']:.2%}", f"{row['p_value']:.1e}", row["why"],
+                row["settled_by"],
+            )
             for row in content["tentative"]
-        ]
-    lines += [
-        "",
-        "## Is what is left noise?",
-        "",
-        "| joint | shown | by | detection limit | why |",
-        "|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| {joint} | {'yes' if row['noise'] else 'no'} | {row['by'] or '-'} | {_cell(row['detection_limit'], share=True)} | {row['why']} |"
+        ]  # fmt: skip
+        head = ("effect", "joint", "gain", "p over all tried", "why not", "settled by")
+        lines += _table("Worth a look, not added", head, rows)
+    rows = [
+        (joint, "yes" if row["noise"] else "no", row["by"] or "-", _cell(row["detection_limit"], True), row["why"])
         for joint, row in content["evidence"].items()
     ]
+    lines += _table("Is what is left noise?", ("joint", "shown", "by", "detection limit", "why"), rows)
     if content["run_variation"]:
-        lines += ["", "## How runs differ", "", "| joint | what | std between runs | unit |", "|---|---|---|---|"]
-        lines += [
-            f"| {joint} | {kind} | {std:.3g} | {unit_of_kind(diagnosis.robot, joint, kind)} |"
+        rows = [
+            (joint, kind, f"{std:.3g}", unit_of_kind(diagnosis.robot, joint, kind))
             for joint, kinds in content["run_variation"].items()
             for kind, std in kinds.items()
         ]
+        lines += _table("How runs differ", ("joint", "what", "std between runs", "unit"), rows)
     return lines
 
 
-def _cell(value: float | None, share: bool) -> str:
+def _table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return a heading with a table below it."""
+    top, *below = (f"| {' | '.join(row)} |" for row in (head, *rows))
+    return ["", f"## {title}", "", top, "|" + "---|" * len(head), *below]
+
+
+def _cell(value: float | None, share: bool = False) -> str:
     if value is None or np.isnan(value):
         return "-"
     return f"{value:.1%}" if share else f"{value:.4g}"
