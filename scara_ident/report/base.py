@@ -38,10 +38,5 @@ def base_dict(robot: Robot) -> dict[str, Any]:
         "never_enter": [names[i] for i in base.absent],
         "only_in_sums": [names[i] for i in base.only_in_sums()],
         "approximate": [{"name": names[i], "share": share} for i, share in base.approximate],
-        "check": {
-            "rank": check.rank,
-            "torque_error": check.torque_error,
-            "null_error": check.null_error,
-            "passed": check.passed,
-        },
+        "check": {key: getattr(check, key) for key in ("rank", "torque_error", "null_error", "passed")},
     }

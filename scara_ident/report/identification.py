@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
@@ -98,14 +99,7 @@ def _errors(robot: Robot, errors: Mapping[str, tuple[JointError | None, ...]]) -
 
 
 def _error(error: JointError | None) -> dict[str, float | None]:
-    if error is None:
-        return {"rms": None, "relative": None, "rms_unfiltered": None, "relative_unfiltered": None}
-    return {
-        "rms": error.rms,
-        "relative": error.relative,
-        "rms_unfiltered": error.rms_unfiltered,
-        "relative_unfiltered": error.relative_unfiltered,
-    }
+    return dict.fromkeys(field.name for field in fields(JointError)) if error is None else asdict(error)
 
 
 def _left_out(robot: Robot, item: Observations) -> dict[str, Any]:

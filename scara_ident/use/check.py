@@ -257,17 +257,8 @@ def check_dict(found: Check) -> dict[str, Any]:
 
 
 def _entry(each: Margin) -> dict[str, Any]:
-    return {
-        "joint": each.joint,
-        "kind": each.kind,
-        "time": each.time,
-        "bound": each.bound,
-        "reached": each.reached,
-        "margin": each.margin,
-        "share": each.share,
-        "unit": each.unit,
-        "beyond": [list(span) for span in each.beyond],
-    }
+    keys = ("joint", "kind", "time", "bound", "reached", "margin", "share", "unit", "beyond")
+    return {key: getattr(each, key) for key in keys}
 
 
 def sentences(found: Check) -> list[str]:
