@@ -39,7 +39,7 @@ def description_text(guess: Guess, robot: Robot, described: Mapping[str, Any], u
         "# Check every line; what is marked STATE the program cannot know.",
         f"urdf: {_word(str(urdf))}",
         "",
-        *_side(robot, guess),
+        *_side(robot),
         "",
         "# Joints to identify, in order. reduction: motor turns per joint turn (from the URDF's transmissions, else 1);",
         "# effort_gain: torque in N m (N) = effort_gain x recorded effort.",
@@ -72,7 +72,7 @@ def mapping(guess: Guess, robot: Robot) -> dict[str, Any]:
     return result
 
 
-def _side(robot: Robot, guess: Guess) -> list[str]:
+def _side(robot: Robot) -> list[str]:
     if all(robot.reduction == 1.0):
         return [
             "# Side of the gear on which effort is measured, motor or joint. No gear is known, which makes them one;",

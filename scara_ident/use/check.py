@@ -18,7 +18,6 @@ from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.files import column_names
 from scara_ident.recording.recording import read_recording
-from scara_ident.robot.robot import Robot
 from scara_ident.simulation.reference import read_trajectory
 from scara_ident.use.energy import Drive, Energy, drive, energy_of
 from scara_ident.use.joint_limits import JointLimits, Margin, margins
@@ -310,7 +309,7 @@ def _named(each: Margin) -> str:
     return f"{each.kind.partition('.')[0]} of {each.joint}"
 
 
-def limits_of_joint(robot: Robot, limits: JointLimits, joint: int) -> dict[str, tuple[float, float]]:
+def limits_of_joint(limits: JointLimits, joint: int) -> dict[str, tuple[float, float]]:
     """Return lower and upper limit of a joint's signals by name, infinite where there is none."""
     both = {
         kind: (-float(bound[joint]), float(bound[joint]))

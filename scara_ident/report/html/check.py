@@ -124,7 +124,7 @@ def _panel(found: Check, j: int, kind: str, height: int = 110) -> Panel:
         signal = {"position": motion.q, "velocity": motion.v, "acceleration": motion.a}.get(kind)
         own = (each.torque if kind == "torque" else each.power) if signal is None else signal
         layers.append(thin_line(motion.time, own[j], MOST_POINTS, "blue", kind))
-    bounds = limits_of_joint(robot, found.limits, j)[kind]
+    bounds = limits_of_joint(found.limits, j)[kind]
     layers += [Level(bound, "vermillion", "limit") for bound in bounds if np.isfinite(bound)]
     worst = found.limited_by
     if worst is not None and worst.joint == robot.joints[j] and worst.kind.startswith(kind):

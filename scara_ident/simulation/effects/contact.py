@@ -25,7 +25,6 @@ class Push(Effect):
     """
 
     name: ClassVar[str] = "push"
-    equation: ClassVar[str] = "u -= J(q)^T force direction, from <= t <= from + duration"
     units: ClassVar[dict[str, str]] = {
         "force": "N", "time": "s", "duration": "s", "direction": "1", "point": "m", "edge": "s",
     }  # fmt: skip

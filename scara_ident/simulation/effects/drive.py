@@ -21,7 +21,6 @@ class TorqueRipple(Effect):
     """
 
     name: ClassVar[str] = "torque_ripple"
-    equation: ClassVar[str] = "u += amplitude sin(order N q + phase)"
     units: ClassVar[dict[str, str]] = {"order": "1 / motor turn", "amplitude": "N m", "phase": "rad"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"order": (0.0, np.inf), "amplitude": (0.0, np.inf)}
     shares: ClassVar[dict[str, float]] = {"amplitude": 0.06}
@@ -45,7 +44,6 @@ class Spring(Effect):
     """A spring across the joint, such as a cable: ``stiffness (q - rest_position)``; not seen by the gear's loss."""
 
     name: ClassVar[str] = "spring"
-    equation: ClassVar[str] = "u += stiffness (q - rest_position)"
     units: ClassVar[dict[str, str]] = {"stiffness": "N m/rad", "rest_position": "rad"}
     arrays: ClassVar[dict[str, str]] = {"stiffness": "spring", "rest_position": "spring_rest"}
     joint_side = ("stiffness",)
@@ -66,7 +64,6 @@ class Vibration(Effect):
     """
 
     name: ClassVar[str] = "vibration"
-    equation: ClassVar[str] = "u += amplitude sin(2 pi frequency t + phase)"
     units: ClassVar[dict[str, str]] = {"frequency": "Hz", "amplitude": "N m", "phase": "rad"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"frequency": (0.0, np.inf), "amplitude": (0.0, np.inf)}
     shares: ClassVar[dict[str, float]] = {"amplitude": 0.05}

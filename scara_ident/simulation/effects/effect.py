@@ -29,7 +29,6 @@ class Effect:
     """
 
     name: ClassVar[str] = ""
-    equation: ClassVar[str] = ""
     # Parameter -> unit, in the contract's words.
     units: ClassVar[dict[str, str]] = {}
     # Parameter -> smallest and largest value; both may be reached.

@@ -17,7 +17,6 @@ class Stribeck(Effect):
     """More friction at low speed: ``amplitude sign(v) exp(-(v/velocity)^2)``."""
 
     name: ClassVar[str] = "stribeck"
-    equation: ClassVar[str] = "u += amplitude sign(v) exp(-(v/velocity)^2)"
     units: ClassVar[dict[str, str]] = {"amplitude": "N m", "velocity": "rad/s"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"amplitude": (0.0, np.inf), "velocity": (1e-6, np.inf)}
     arrays: ClassVar[dict[str, str]] = {"amplitude": "stribeck_amplitude", "velocity": "stribeck_velocity"}
@@ -38,7 +37,6 @@ class AsymmetricFriction(Effect):
     """
 
     name: ClassVar[str] = "asymmetric_friction"
-    equation: ClassVar[str] = "u += viscous_difference/2 |v|"
     units: ClassVar[dict[str, str]] = {"viscous_difference": "N m s/rad"}
     viscous_difference: float = BY_ARM
 
@@ -62,7 +60,6 @@ class Presliding(Effect):
     """
 
     name: ClassVar[str] = "presliding"
-    equation: ClassVar[str] = "sign(v) -> z in the dry friction, dz/dt = v/presliding_distance (1 - z sign(v))"
     units: ClassVar[dict[str, str]] = {"presliding_distance": "rad"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"presliding_distance": (0.0, np.inf)}
     arrays: ClassVar[dict[str, str]] = {"presliding_distance": "presliding"}
@@ -74,7 +71,6 @@ class WarmUp(Effect):
     """Friction that is larger at the start of a run: the polynomial times ``1 + share exp(-t/time_constant)``."""
 
     name: ClassVar[str] = "warm_up"
-    equation: ClassVar[str] = "u += share exp(-t/time_constant) (a0 sign(v) + a1 v + a2 sign(v) v^2 + a3 v^3)"
     units: ClassVar[dict[str, str]] = {"share": "1", "time_constant": "s"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"share": (-1.0, np.inf), "time_constant": (1e-6, np.inf)}
     arrays: ClassVar[dict[str, str]] = {"share": "warm_share", "time_constant": "warm_time"}
@@ -87,7 +83,6 @@ class PositionDependentFriction(Effect):
     """Coulomb friction that varies with the joint's position: a0 times ``1 + share sin(q + phase)``."""
 
     name: ClassVar[str] = "position_dependent_friction"
-    equation: ClassVar[str] = "u += a0 share sin(q + phase) sign(v)"
     units: ClassVar[dict[str, str]] = {"share": "1", "phase": "rad"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"share": (-1.0, 1.0)}
     arrays: ClassVar[dict[str, str]] = {"share": "position_share", "phase": "position_phase"}
@@ -103,7 +98,6 @@ class FrictionCoupling(Effect):
     """
 
     name: ClassVar[str] = "friction_coupling"
-    equation: ClassVar[str] = "u_j += viscous v_k + coulomb sign(v_k)"
     units: ClassVar[dict[str, str]] = {"viscous": "N m s/rad", "coulomb": "N m"}
     viscous: float = BY_ARM
     coulomb: float = BY_ARM

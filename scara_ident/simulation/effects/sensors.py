@@ -18,7 +18,6 @@ class TimeDelay(Effect):
     """Effort that is recorded later than position: ``recorded(t) = u(t - delay)``; of the whole arm or of a joint."""
 
     name: ClassVar[str] = "time_delay"
-    equation: ClassVar[str] = "recorded(t) = u(t - delay)"
     units: ClassVar[dict[str, str]] = {"delay": "s"}
     whole_arm = "may be"
     delay: float = 0.004
@@ -35,7 +34,6 @@ class TorqueSensorNonlinearity(Effect):
     """A torque that is recorded as ``u + cubic u^3``."""
 
     name: ClassVar[str] = "torque_sensor_nonlinearity"
-    equation: ClassVar[str] = "recorded = u + cubic u^3"
     units: ClassVar[dict[str, str]] = {"cubic": "1/(N m)^2"}
     arrays: ClassVar[dict[str, str]] = {"cubic": "cubic"}
     cubic: float = BY_ARM
@@ -50,7 +48,6 @@ class TorqueGainMismatch(Effect):
     """A torque scale that is ``ratio`` times the first joint's."""
 
     name: ClassVar[str] = "torque_gain_mismatch"
-    equation: ClassVar[str] = "recorded = ratio u"
     units: ClassVar[dict[str, str]] = {"ratio": "1"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"ratio": (1e-6, np.inf)}
     ratio: float = 1.1
@@ -75,7 +72,6 @@ class OffsetDrift(Effect):
     """A torque offset that grows in time: ``rate t``."""
 
     name: ClassVar[str] = "offset_drift"
-    equation: ClassVar[str] = "recorded = u + rate t"
     units: ClassVar[dict[str, str]] = {"rate": "N m/s"}
     shares: ClassVar[dict[str, float]] = {"rate": 0.01}
     arrays: ClassVar[dict[str, str]] = {"rate": "drift"}
@@ -90,7 +86,6 @@ class EncoderEccentricity(Effect):
     """
 
     name: ClassVar[str] = "encoder_eccentricity"
-    equation: ClassVar[str] = "measured = q + amplitude sin(order N q + phase)"
     units: ClassVar[dict[str, str]] = {"amplitude": "rad", "order": "1 / motor turn", "phase": "rad"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"amplitude": (0.0, np.inf), "order": (0.0, np.inf)}
     amplitude: float = BY_ARM

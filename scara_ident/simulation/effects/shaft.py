@@ -25,9 +25,6 @@ class CoupledShaft(Effect):
     """
 
     name: ClassVar[str] = "coupled_shaft"
-    equation: ClassVar[str] = (
-        "u_j += T, u_k += sign T, T = inertia dw/dt + viscous w + coulomb sign(w), w = v_j + sign v_k"
-    )
     units: ClassVar[dict[str, str]] = {"inertia": "kg m^2", "viscous": "N m s/rad", "coulomb": "N m", "sign": "1"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {
         "inertia": (0.0, np.inf), "viscous": (0.0, np.inf), "coulomb": (0.0, np.inf), "sign": (-1.0, 1.0),

@@ -24,7 +24,6 @@ class BaseTilt(Effect):
     """
 
     name: ClassVar[str] = "base_tilt"
-    equation: ClassVar[str] = "gravity += (-g tilt_x, -g tilt_y, -g tilt_z)"
     units: ClassVar[dict[str, str]] = {"tilt_x": "rad", "tilt_y": "rad", "tilt_z": "rad"}
     whole_arm = "always"
     tilt_x: float = 0.02
@@ -50,7 +49,6 @@ class Payload(Effect):
     """
 
     name: ClassVar[str] = "payload"
-    equation: ClassVar[str] = "last body += mass, mass com, inertia for from <= t < to"
     units: ClassVar[dict[str, str]] = {"mass": "kg", "time": "s", "com": "m", "inertia": "kg m^2", "until": "s"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"mass": (0.0, np.inf), "time": (0.0, np.inf)}
     whole_arm = "always"

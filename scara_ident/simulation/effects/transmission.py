@@ -28,7 +28,6 @@ class TransmissionLoss(Effect):
     """
 
     name: ClassVar[str] = "transmission_loss"
-    equation: ClassVar[str] = "u_l = tau_l/N sqrt(1 + loss_coefficient^2) + loss_coefficient |tau_l/N| sign(v)"
     units: ClassVar[dict[str, str]] = {"loss_coefficient": "1"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"loss_coefficient": (0.0, 5.0)}
     loss_coefficient: float = 0.15
@@ -49,7 +48,7 @@ class TransmissionLoss(Effect):
         return super().as_dict() | {"efficiency": self.efficiency}
 
 
-def _needs_rotor(effect: Effect, arm: VirtualArm, draft: PlantDraft, j: int) -> None:
+def _needs_rotor(effect: Effect, draft: PlantDraft, j: int) -> None:
     if draft.arrays["armature"][j] <= 0.0:
         raise UsageError(f"{effect.name}: {effect.joint} has no rotor inertia; an elastic joint needs one on its motor")
 
@@ -63,7 +62,6 @@ class JointElasticity(Effect):
     """
 
     name: ClassVar[str] = "joint_elasticity"
-    equation: ClassVar[str] = "q_link = q - tau_l/stiffness"
     units: ClassVar[dict[str, str]] = {"stiffness": "N m/rad", "damping_ratio": "1"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"stiffness": (1e-6, np.inf), "damping_ratio": (0.0, 5.0)}
     stiffness: float = BY_ARM
@@ -76,7 +74,7 @@ class JointElasticity(Effect):
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Give the joint its own link coordinate."""
         j = self.place(arm)
-        _needs_rotor(self, arm, draft, j)
+        _needs_rotor(self, draft, j)
         vacant(self, 0.0 if draft.arrays["width"][j] else draft.arrays["elastic"][j])
         reduced = _reduced_inertia(arm, arm.robot.joint_index(self.joint or arm.robot.joints[0]))
         draft.arrays["elastic"][j] = 1.0
@@ -93,7 +91,6 @@ class Backlash(Effect):
     """
 
     name: ClassVar[str] = "backlash"
-    equation: ClassVar[str] = "q_link = q - width/2 sign(tau_l) in contact"
     units: ClassVar[dict[str, str]] = {"width": "rad", "contact_stiffness": "N m/rad", "contact_damping_ratio": "1"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {
         "width": (0.0, np.inf),
@@ -113,7 +110,7 @@ class Backlash(Effect):
         if self.width == 0.0:
             return
         j = self.place(arm)
-        _needs_rotor(self, arm, draft, j)
+        _needs_rotor(self, draft, j)
         vacant(self, draft.arrays["width"][j])
         draft.arrays["width"][j] = self.width
         if not draft.arrays["elastic"][j]:

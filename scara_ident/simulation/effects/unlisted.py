@@ -29,7 +29,6 @@ class UnlistedSignedSine(_OfOtherJoint):
     """Dry friction that varies with the other joint's position: ``amplitude sin(3 q_k) sign(v_j)``."""
 
     name: ClassVar[str] = "unlisted_1"
-    equation: ClassVar[str] = "u_j += amplitude sin(3 q_k) sign(v_j)"
     units: ClassVar[dict[str, str]] = {"amplitude": "N m"}
     shares: ClassVar[dict[str, float]] = {"amplitude": 0.06}
     arrays: ClassVar[dict[str, str]] = {"amplitude": "signed_sine"}
@@ -43,7 +42,6 @@ class UnlistedSwingingViscous(_OfOtherJoint):
     """Smooth viscous friction that varies with the other joint's position: ``viscous cos(2 q_k) v_j``."""
 
     name: ClassVar[str] = "unlisted_2"
-    equation: ClassVar[str] = "u_j += viscous cos(2 q_k) v_j"
     units: ClassVar[dict[str, str]] = {"viscous": "N m s/rad"}
     shares: ClassVar[dict[str, float]] = {"viscous": 0.06}
     arrays: ClassVar[dict[str, str]] = {"viscous": "swinging_viscous"}
