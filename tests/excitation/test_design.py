@@ -135,7 +135,8 @@ def test_the_condition_can_be_preferred_to_the_log_det(short):
 
 @pytest.mark.slow
 def test_a_design_fills_what_existing_recordings_lack():
-    still = information_of(COMPLETE, design_excitation(COMPLETE, **SHORT, effort=QUICK).trajectories[0], 400)
+    alone = design_excitation(COMPLETE, **SHORT, effort=QUICK)
+    still = information_of(COMPLETE, alone.trajectories[0], 400)
     # Recordings in which friction was seen a thousand times better than bodies.
     factor = still.regressor_factor.copy()
     gram = factor.T @ factor
@@ -143,9 +144,7 @@ def test_a_design_fills_what_existing_recordings_lack():
     gram[friction, friction] *= 1e6
     known = Information(np.pad(np.linalg.cholesky(gram).T, ((0, 1), (0, 1))), 400.0)
     bodies = block_of(COMPLETE, ["rigid_body"])
-    made = {}
-    for name, prior in (("alone", None), ("after", known)):
-        made[name] = design_excitation(COMPLETE, **SHORT, prior=prior, effort=QUICK)
+    made = {"alone": alone, "after": design_excitation(COMPLETE, **SHORT, prior=known, effort=QUICK)}
     together = {
         name: gram + each.information.regressor_factor.T @ each.information.regressor_factor
         for name, each in made.items()
