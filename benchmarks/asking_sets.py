@@ -15,6 +15,7 @@ from virtual_sets import _random_effect
 
 from scara_ident.diagnosis import Diagnosis, diagnose
 from scara_ident.diagnosis.answerability import inquire, knowing
+from scara_ident.diagnosis.belief import believed
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.correction import corrected
@@ -24,7 +25,7 @@ from scara_ident.diagnosis.selection_step import fitted_model
 from scara_ident.diagnosis.torque_noise import noise_density
 from scara_ident.estimation.observations import observe
 from scara_ident.excitation import Design, Effort, Limits, design_excitation, limits_of
-from scara_ident.excitation.promise import sure_of
+from scara_ident.excitation.promise import all_rows
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import Recording
@@ -163,7 +164,8 @@ def said(first: Diagnosis, design: Design, truth: Effect, quiet: Sequence[Record
         widening=True,
     )
     # Without what is known this size alone is asked for, not all that the first recordings would show as well.
-    return sure_of(replace(inquiry, known=None), [design.motion()])[own.label] >= 1.0
+    alone = replace(inquiry, known=None)
+    return believed(alone, all_rows(alone, [design.motion()]))[own.label] >= 1.0
 
 
 def record(arm: VirtualArm, motion: ReferenceMotion, truth: Effect, seed: int, repetition: int = 1) -> Recording:
@@ -298,7 +300,7 @@ def best(
     inquiry = replace(inquire(first, [question]), noise=noise_density(whole), bands=whole.search.bands)
     inquiry = knowing(inquiry, first.search.step.columns, widening=True)
     design = design_excitation(first.before.model, duration=seconds, tell=inquiry, limits=limits, effort=EFFORT)
-    (times,) = sure_of(inquiry, [design.motion()]).values()
+    (times,) = believed(inquiry, all_rows(inquiry, [design.motion()])).values()
     return times, as_reference(design)
 
 

@@ -157,11 +157,6 @@ def _least(scene: Scene, suspect: Suspect, times: float) -> Mapping[str, Paramet
     return dict([next(iter(found.items()))]) if len(value) == 1 or len(found) == 1 else {}
 
 
-def sure_of(inquiry: Inquiry, motions: Sequence[Motion]) -> dict[str, float]:
-    """Return `believed` of what is known and motions to be recorded."""
-    return believed(inquiry, all_rows(inquiry, motions))
-
-
 def all_rows(
     inquiry: Inquiry, motions: Sequence[Motion], known: KnownBlocks = known_blocks, *, in_short: bool = False
 ) -> Blocks:

@@ -268,19 +268,14 @@ def _random_columns(robot: Robot, seed: int) -> Array:
     return np.ascontiguousarray(regressor.transpose(2, 0, 1)).reshape(samples * n, -1)
 
 
-def constant_torques(robot: Robot, *, seed: int = 0) -> tuple[int, ...]:
+def constant_torques(robot: Robot) -> tuple[int, ...]:
     """Return the joints, by their places, on which bodies can make a constant torque and none elsewhere: that of a weight.
 
     Only an axis that moves along gravity wherever the arm is has one.
-
-    Parameters
-    ----------
-    seed : int, optional
-        Of the random states; it does not change the result.
     """
     if not np.any(robot.prismatic) or not np.any(robot.model.gravity.linear):
         return ()
-    columns = _random_columns(robot, seed)
+    columns = _random_columns(robot, 0)
     size = np.linalg.norm(columns, axis=0)
     left, singular, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
     basis = left[:, singular > RANK_TOLERANCE * singular[0]]

@@ -70,9 +70,9 @@ def virtual_arm(robot: Robot | None = None) -> VirtualArm:
     )
 
 
-def placed_poles(inertia: Array, pole: float = POLE) -> Controller:
-    """Return PID gains that give each joint of this inertia, alone, three poles at ``-pole`` rad/s."""
-    return Controller(3.0 * pole**2 * inertia, pole**3 * inertia, 3.0 * pole * inertia)
+def placed_poles(inertia: Array) -> Controller:
+    """Return PID gains that give each joint of this inertia, alone, three poles at ``-POLE`` rad/s."""
+    return Controller(3.0 * POLE**2 * inertia, POLE**3 * inertia, 3.0 * POLE * inertia)
 
 
 def _usual(robot: Robot) -> tuple[Array, Array]:

@@ -247,7 +247,7 @@ def mass_and_bias(model: pin.Model, bodies: Array, q: Array, v: Array) -> tuple[
     return mass, bias
 
 
-def check_against_pinocchio(model: pin.Model, bodies: Array, *, states: int = 3, seed: int = 0) -> float:
+def check_against_pinocchio(model: pin.Model, bodies: Array, *, states: int = 3) -> float:
     """Compare the compiled recursion with Pinocchio on random states.
 
     Returns
@@ -264,7 +264,7 @@ def check_against_pinocchio(model: pin.Model, bodies: Array, *, states: int = 3,
     floating = pin.Model(model)
     floating.gravity = pin.Motion.Zero()
     rest, unit = np.zeros(model.nv), np.eye(model.nv)
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     worst = 0.0
     for _ in range(states):
         q, v = random.uniform(-2.0, 2.0, model.nv), random.uniform(-2.0, 2.0, model.nv)

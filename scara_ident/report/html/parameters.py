@@ -24,6 +24,8 @@ MOST_FIGURES = 18
 # Share of a body's largest moment below which one of its products is rounding.
 NO_INERTIA = 1e-9
 PER_PAGE = 12
+# Pairs of parameters that are told in words, at the most, and the least size of their correlation.
+MOST_PAIRS, STRONG = 4, 0.9
 
 
 def parameter_table(estimate: Estimate) -> Table:
@@ -90,18 +92,18 @@ def correlation_group(estimate: Estimate) -> Group:
     return Group("correlation-group", (figure,))
 
 
-def strongest_pairs(estimate: Estimate, most: int = 4, least: float = 0.9) -> list[str]:
+def strongest_pairs(estimate: Estimate) -> list[str]:
     """Return in words the pairs of parameters with the strongest correlation."""
     std = estimate.std
     known = np.isfinite(std) & (std > 0.0) & ~estimate.undetermined
     size = np.where(known, std, np.inf)
     with np.errstate(invalid="ignore"):
         correlation = np.triu(np.nan_to_num(estimate.covariance / np.outer(size, size), posinf=0.0, neginf=0.0), 1)
-    order = np.argsort(-np.abs(correlation), axis=None)[:most]
+    order = np.argsort(-np.abs(correlation), axis=None)[:MOST_PAIRS]
     names = estimate.model.names
     pairs = [np.unravel_index(place, correlation.shape) for place in order]
     return [
-        f"{names[i]} and {names[k]} ({correlation[i, k]:+.3f})" for i, k in pairs if abs(correlation[i, k]) >= least
+        f"{names[i]} and {names[k]} ({correlation[i, k]:+.3f})" for i, k in pairs if abs(correlation[i, k]) >= STRONG
     ]
 
 
