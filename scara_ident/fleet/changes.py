@@ -11,7 +11,7 @@ wrong on average, and one in fifty reports of a fleet in which nothing changed n
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -92,28 +92,26 @@ def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Chan
 
     if len(history.dates) < 2:
         return ()
-    rows = history.whitened(scatter.runs)
-    left, basis = common_removed(rows)
-    shapes = list(_shapes(history.days))
+    search = first = _search(history, scatter)
     found: list[tuple[_Trial, tuple[Cause, ...]]] = []
-    first = left, basis
     while len(found) < MOST_CAUSES:
-        trials = _in_order(history, rows, left, basis, shapes, scatter)
+        trials = search.in_order(history.causes)
         if not trials or trials[0].p_value * tried >= LEVEL:
             break
         best, sizes = trials[0], history.causes[trials[0].cause].sizes
         enough = sizes * float(fdtri(sizes, scatter.freedom, 1.0 - AS_GOOD))
         alike = tuple(history.causes[item.cause] for item in trials[1:] if best.explained - item.explained < enough)
         found.append((best, alike))
-        left, basis = _without(best, rows, left, basis, shapes)
+        search = search.without(best)
     named = []
     for trial, alike in found:
-        left, basis = first
+        search = first
         for other, _ in found:
             if other is not trial:
-                left, basis = _without(other, rows, left, basis, shapes)
-        cause, (start, gradual, _) = history.causes[trial.cause], shapes[trial.shape]
-        beside = _best(trial.cause, cause, rows, left, basis, [shapes[trial.shape]], scatter) or trial
+                search = search.without(other)
+        cause, shape = history.causes[trial.cause], first.shapes[trial.shape]
+        start, gradual, _ = shape
+        beside = replace(search, shapes=[shape]).best(trial.cause, cause) or trial
         chance = min(1.0, trial.p_value * tried)
         since = history.dates[start]
         named.append(Change(cause, cause.joint, since, gradual, beside.size, beside.covariance, chance, alike))
@@ -136,9 +134,7 @@ def arms_counted(probabilities: Sequence[float]) -> float:
 
 def least_probability(history: History, scatter: Scatter, tried: float) -> float:
     """Return the probability of the surest change of an arm, corrected for what was tried on it."""
-    rows = history.whitened(scatter.runs)
-    left, basis = common_removed(rows)
-    trials = _in_order(history, rows, left, basis, list(_shapes(history.days)), scatter)
+    trials = _search(history, scatter).in_order(history.causes)
     return min(1.0, tried * trials[0].p_value) if trials else 1.0
 
 
@@ -241,63 +237,57 @@ def _shapes(days: Array) -> Iterator[tuple[int, bool, Array]]:
         yield start, True, np.clip((days - before) / (days[-1] - before), 0.0, 1.0)
 
 
-def _best(
-    k: int,
-    cause: Cause,
-    rows: Sequence[DateRows],
-    left: Sequence[Array],
-    basis: Sequence[Array],
-    shapes: Sequence[tuple[int, bool, Array]],
-    scatter: Scatter,
-) -> _Trial | None:
-    """Return the best shape of a cause; None where the common parameters leave nothing of it."""
-    from scipy.special import fdtrc
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Rows of every date, what is left of them beside a basis of what is known, and the shapes that are tried."""
 
-    own = [row.directions[k] for row in rows]
-    aims = np.array([each.T @ rest for each, rest in zip(own, left, strict=True)])
-    share = np.array([share for _, _, share in shapes])
-    inverse, told, kept = _left_of(own, basis, share)
-    if not np.any(kept):
-        return None
-    wider = np.sqrt(scatter.causes.get(cause.label, np.ones(cause.sizes)))
-    value = np.einsum("sij,sj->si", inverse, share @ aims)
-    explained = np.where(kept, np.einsum("si,sij,sj->s", value / wider, told, value / wider), -1.0)
-    best = int(np.argmax(explained))
-    # Causes are compared as if all were as sure: else the surest scatter, not the best explanation, would come first.
-    freedoms = np.array([scatter.freedom, scatter.freedoms.get(cause.label, scatter.freedom)])
-    order, p_value = (float(p) for p in fdtrc(cause.sizes, freedoms, explained[best] / cause.sizes))
-    covariance = np.outer(wider, wider) * inverse[best]
-    return _Trial(k, best, float(explained[best]), order, p_value, value[best], covariance)
+    rows: Sequence[DateRows]
+    left: Sequence[Array]
+    basis: Sequence[Array]
+    shapes: Sequence[tuple[int, bool, Array]]
+    scatter: Scatter
+
+    def best(self, k: int, cause: Cause) -> _Trial | None:
+        """Return the best shape of the k-th cause; None where the common parameters leave nothing of it."""
+        from scipy.special import fdtrc
+
+        own = [row.directions[k] for row in self.rows]
+        aims = np.array([each.T @ rest for each, rest in zip(own, self.left, strict=True)])
+        share = np.array([share for _, _, share in self.shapes])
+        inverse, told, kept = _left_of(own, self.basis, share)
+        if not np.any(kept):
+            return None
+        wider = np.sqrt(self.scatter.causes.get(cause.label, np.ones(cause.sizes)))
+        value = np.einsum("sij,sj->si", inverse, share @ aims)
+        explained = np.where(kept, np.einsum("si,sij,sj->s", value / wider, told, value / wider), -1.0)
+        best = int(np.argmax(explained))
+        # Causes are compared as if all were as sure: else the surest scatter, not the best explanation, would come first.
+        freedom = self.scatter.freedom
+        freedoms = np.array([freedom, self.scatter.freedoms.get(cause.label, freedom)])
+        order, p_value = (float(p) for p in fdtrc(cause.sizes, freedoms, explained[best] / cause.sizes))
+        covariance = np.outer(wider, wider) * inverse[best]
+        return _Trial(k, best, float(explained[best]), order, p_value, value[best], covariance)
+
+    def in_order(self, causes: Sequence[Cause]) -> list[_Trial]:
+        """Return the best shape of each cause, the best explanation first."""
+        each = (self.best(k, cause) for k, cause in enumerate(causes))
+        return sorted((trial for trial in each if trial is not None), key=lambda item: item.order)
+
+    def without(self, trial: _Trial) -> _Search:
+        """Return the search beside a cause that was found."""
+        share = self.shapes[trial.shape][2]
+        added = np.concatenate([x * row.directions[trial.cause] for x, row in zip(share, self.rows, strict=True)])
+        known, rest = np.concatenate(self.basis), np.concatenate(self.left)
+        added = added - known @ (known.T @ added)
+        turned, _ = np.linalg.qr(added)
+        ends = np.cumsum([len(part) for part in self.left])[:-1]
+        left, basis = np.split(rest - turned @ (turned.T @ rest), ends), np.split(np.hstack([known, turned]), ends)
+        return replace(self, left=left, basis=basis)
 
 
-def _in_order(
-    history: History,
-    rows: Sequence[DateRows],
-    left: Sequence[Array],
-    basis: Sequence[Array],
-    shapes: Sequence[tuple[int, bool, Array]],
-    scatter: Scatter,
-) -> list[_Trial]:
-    """Return the best shape of each cause, the best explanation first."""
-    each = (_best(k, cause, rows, left, basis, shapes, scatter) for k, cause in enumerate(history.causes))
-    return sorted((trial for trial in each if trial is not None), key=lambda item: item.order)
-
-
-def _without(
-    trial: _Trial,
-    rows: Sequence[DateRows],
-    left: Sequence[Array],
-    basis: Sequence[Array],
-    shapes: Sequence[tuple[int, bool, Array]],
-) -> tuple[list[Array], list[Array]]:
-    """Return what is left beside a cause that was found, and the basis with it."""
-    share = shapes[trial.shape][2]
-    added = np.concatenate([x * row.directions[trial.cause] for x, row in zip(share, rows, strict=True)])
-    known, rest = np.concatenate(basis), np.concatenate(left)
-    added = added - known @ (known.T @ added)
-    turned, _ = np.linalg.qr(added)
-    ends = np.cumsum([len(part) for part in left])[:-1]
-    return np.split(rest - turned @ (turned.T @ rest), ends), np.split(np.hstack([known, turned]), ends)
+def _search(history: History, scatter: Scatter) -> _Search:
+    rows = history.whitened(scatter.runs)
+    return _Search(rows, *common_removed(rows), list(_shapes(history.days)), scatter)
 
 
 def _left_of(own: Sequence[Array], basis: Sequence[Array], share: Array) -> tuple[Array, Array, Array]:

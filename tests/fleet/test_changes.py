@@ -9,13 +9,13 @@ import pytest
 
 from scara_ident.fleet.changes import (
     LEVEL,
-    _best,
+    _search,
     find_changes,
     grown_residuals,
     residual_scatter,
     trials_of,
 )
-from scara_ident.fleet.history import History, common_removed
+from scara_ident.fleet.history import History
 from scara_ident.fleet.scatter import fleet_scatter
 from scara_ident.fleet.visit import Visit, _visit
 from tests.fleet.made import DATES, WEAR, WORN, run_of
@@ -100,12 +100,11 @@ def test_what_dates_differ_by_in_one_size_widens_that_one_only(histories, noise)
     arm = histories[0]
     k, cause = next((k, item) for k, item in enumerate(arm.causes) if item.sizes == 2)
     assert noise.causes[cause.label].shape == (2,) and np.all(noise.causes[cause.label] >= 1.0)
-    rows = arm.whitened(noise.runs)
-    left, basis = common_removed(rows)
-    step = [(1, False, (np.arange(len(rows)) >= 1).astype(float))]
+    step = [(1, False, (np.arange(len(arm.dates)) >= 1).astype(float))]
     ratios = [np.ones(2), np.array([1.0, 25.0])]
     even, uneven = (
-        _best(k, cause, rows, left, basis, step, replace(noise, causes={cause.label: ratio})) for ratio in ratios
+        replace(_search(arm, replace(noise, causes={cause.label: ratio})), shapes=step).best(k, cause)
+        for ratio in ratios
     )
     assert even is not None and uneven is not None
     np.testing.assert_allclose(uneven.covariance, even.covariance * np.array([[1.0, 5.0], [5.0, 25.0]]))
