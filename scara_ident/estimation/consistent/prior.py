@@ -25,6 +25,7 @@ by Newton's method, which converges for such a self-concordant function (Nestero
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -159,27 +160,19 @@ def nearest_to_nominal(start: Array, free: Array, limits: Sequence[Cone] = (), r
     # The share of its weight at which the nominal arm is as heavy as the start.
     heavy = 5.0 * n / max(5.0 * n, float(np.tile(PACKED_IDENTITY, n) @ start[: 10 * n] + start[10 * n :].sum()))
     while heavy < 1.0:
-        x = _newton(x, free, limits, rotors, weights[0], heavy, ROUGH)
+        x = _newton(x, free, _Cost(limits, rotors, weights[0], heavy), ROUGH)
         heavy *= STRIDE
     for weight in weights:
-        x = _newton(x, free, limits, rotors, weight, 1.0, PRECISION)
+        x = _newton(x, free, _Cost(limits, rotors, weight, 1.0), PRECISION)
     return x
 
 
-def _newton(
-    start: Array,
-    free: Array,
-    limits: Sequence[Cone],
-    rotors: Array | float,
-    weight: float,
-    heavy: float,
-    precision: float,
-) -> Array:
+def _newton(start: Array, free: Array, cost: _Cost, precision: float) -> Array:
     n = len(start) // 11
     directions = unpack(np.moveaxis(free[: 10 * n].reshape(n, 10, -1), 2, 1))
-    x, value = start, _value(start, limits, rotors, weight, heavy)
+    x, value = start, cost.value(start)
     for _ in range(MOST_STEPS):
-        gradient, root, local = _slopes(x, n, directions, free, limits, rotors, weight, heavy)
+        gradient, root, local = cost.slopes(x, directions, free)
         triangular = np.asarray(np.linalg.qr(root, mode="r"))
         half = np.linalg.solve(triangular.T, gradient)
         step = -np.linalg.solve(triangular, half)
@@ -187,11 +180,11 @@ def _newton(
         change = free @ step
         if decrement < precision * max(1.0, abs(value)):
             # The last step squares what error is left, and too little is gained to measure it.
-            return x + change if np.isfinite(_value(x + change, limits, rotors, weight, heavy)) else x
-        length = 1.0 if weight else _length(np.tensordot(local, step, axes=(1, 0)), change, x, rotors, heavy)
+            return x + change if np.isfinite(cost.value(x + change)) else x
+        length = 1.0 if cost.weight else cost.length(np.tensordot(local, step, axes=(1, 0)), change, x)
         while True:
             trial = x + length * change
-            new = _value(trial, limits, rotors, weight, heavy)
+            new = cost.value(trial)
             if new < value:
                 break
             length *= 0.5
@@ -206,70 +199,70 @@ def _newton(
     )
 
 
-def _length(local: Array, change: Array, x: Array, rotors: Array | float, heavy: float) -> float:
-    """Length of the step that makes the divergence smallest along it.
+@dataclass(frozen=True, eq=False)
+class _Cost:
+    """The divergence from nominal, whose linear part counts ``heavy`` times, and a barrier of a weight at the limits."""
 
-    Near the edge Newton's own length only doubles the distance from it; along a line the divergence is a sum of
-    logarithms, and its best length is the root of a rising function. Limits are not seen.
-    """
-    n = len(local)
-    rates = np.concatenate([np.linalg.eigvalsh(local).ravel(), change[10 * n :] / x[10 * n :]])
-    each = _each(n, rotors)
-    linear = heavy * float(np.tile(PACKED_IDENTITY, n) @ change[: 10 * n] + each[4 * n :] @ change[10 * n :])
-    fastest = float(np.min(rates))
-    low, high = 0.0, (1.0 / -fastest if fastest < 0.0 else 1e12)
-    length = min(1.0, 0.5 * high)
-    for _ in range(LINE_STEPS):
-        share = rates / (1.0 + length * rates)
-        slope = linear - float(each @ share)
-        if slope > 0.0:
-            high = length
-        else:
-            low = length
-        trial = length - slope / max(float(each @ share**2), np.finfo(float).tiny)
-        # Newton along the line where it stays between the bounds, their middle in ratio where not.
-        length = trial if low < trial < high else (np.sqrt(low * high) if low > 0.0 else 0.1 * high)
-    return float(length)
+    limits: Sequence[Cone]
+    rotors: Array | float
+    weight: float
+    heavy: float
 
-
-def _value(x: Array, limits: Sequence[Cone], rotors: Array | float, weight: float, heavy: float) -> float:
-    value = divergence(x, heavy, rotors)
-    if weight == 0.0 or not np.isfinite(value):
+    def value(self, x: Array) -> float:
+        """Return the cost of bodies; infinite where they are none, or beyond a limit."""
+        value = divergence(x, self.heavy, self.rotors)
+        if self.weight == 0.0 or not np.isfinite(value):
+            return value
+        for limit in self.limits:
+            if not limit.margin(x) > 0.0:
+                return np.inf
+            distances = limit(x) if limit.kind == "nonnegative" else _LORENTZ @ limit(x) ** 2
+            value -= self.weight * float(np.sum(np.log(distances)))
         return value
-    for limit in limits:
-        if not limit.margin(x) > 0.0:
-            return np.inf
-        distances = limit(x) if limit.kind == "nonnegative" else _LORENTZ @ limit(x) ** 2
-        value -= weight * float(np.sum(np.log(distances)))
-    return value
 
+    def slopes(self, x: Array, directions: Array, free: Array) -> tuple[Array, Array, Array]:
+        """Return the gradient along the free directions, a square root of the Hessian as rows, and the directions seen from x."""
+        n = len(directions)
+        inverse_root = np.linalg.inv(np.linalg.cholesky(unpack(x[: 10 * n].reshape(n, 10))))
+        # In the metric of the point itself, each direction is a symmetric matrix per body.
+        local = inverse_root[:, None] @ directions @ np.swapaxes(inverse_root, 1, 2)[:, None]
+        weights = _each(n, self.rotors)[4 * n :]
+        own = free[10 * n :] / x[10 * n :, None]
+        trace = np.trace(local, axis1=2, axis2=3)
+        linear = np.tile(PACKED_IDENTITY, n) @ free[: 10 * n] + weights @ free[10 * n :]
+        gradient = self.heavy * linear - trace.sum(axis=0) - weights @ own
+        count = free.shape[1]
+        rows = [np.moveaxis(local, 1, 3).reshape(16 * n, count), np.sqrt(weights)[:, None] * own]
+        for limit in self.limits:
+            slope, root_of_hessian = _barrier(limit, x)
+            gradient = gradient + self.weight * (slope @ limit.matrix @ free)
+            rows.append(np.sqrt(self.weight) * (root_of_hessian @ limit.matrix @ free))
+        return gradient, np.vstack(rows), local
 
-def _slopes(
-    x: Array,
-    n: int,
-    directions: Array,
-    free: Array,
-    limits: Sequence[Cone],
-    rotors: Array | float,
-    weight: float,
-    heavy: float,
-) -> tuple[Array, Array, Array]:
-    """Gradient along the free directions, a square root of the Hessian as rows, and the directions seen from x."""
-    inverse_root = np.linalg.inv(np.linalg.cholesky(unpack(x[: 10 * n].reshape(n, 10))))
-    # In the metric of the point itself, each direction is a symmetric matrix per body.
-    local = inverse_root[:, None] @ directions @ np.swapaxes(inverse_root, 1, 2)[:, None]
-    weights = _each(n, rotors)[4 * n :]
-    own = free[10 * n :] / x[10 * n :, None]
-    trace = np.trace(local, axis1=2, axis2=3)
-    linear = np.tile(PACKED_IDENTITY, n) @ free[: 10 * n] + weights @ free[10 * n :]
-    gradient = heavy * linear - trace.sum(axis=0) - weights @ own
-    count = free.shape[1]
-    rows = [np.moveaxis(local, 1, 3).reshape(16 * n, count), np.sqrt(weights)[:, None] * own]
-    for limit in limits:
-        slope, root_of_hessian = _barrier(limit, x)
-        gradient = gradient + weight * (slope @ limit.matrix @ free)
-        rows.append(np.sqrt(weight) * (root_of_hessian @ limit.matrix @ free))
-    return gradient, np.vstack(rows), local
+    def length(self, local: Array, change: Array, x: Array) -> float:
+        """Return the length of the step that makes the divergence smallest along it.
+
+        Near the edge Newton's own length only doubles the distance from it; along a line the divergence is a sum of
+        logarithms, and its best length is the root of a rising function. Limits are not seen.
+        """
+        n = len(local)
+        rates = np.concatenate([np.linalg.eigvalsh(local).ravel(), change[10 * n :] / x[10 * n :]])
+        each = _each(n, self.rotors)
+        linear = self.heavy * float(np.tile(PACKED_IDENTITY, n) @ change[: 10 * n] + each[4 * n :] @ change[10 * n :])
+        fastest = float(np.min(rates))
+        low, high = 0.0, (1.0 / -fastest if fastest < 0.0 else 1e12)
+        length = min(1.0, 0.5 * high)
+        for _ in range(LINE_STEPS):
+            share = rates / (1.0 + length * rates)
+            slope = linear - float(each @ share)
+            if slope > 0.0:
+                high = length
+            else:
+                low = length
+            trial = length - slope / max(float(each @ share**2), np.finfo(float).tiny)
+            # Newton along the line where it stays between the bounds, their middle in ratio where not.
+            length = trial if low < trial < high else (np.sqrt(low * high) if low > 0.0 else 0.1 * high)
+        return float(length)
 
 
 _LORENTZ = np.array([1.0, -1.0, -1.0, -1.0])
