@@ -40,7 +40,8 @@ def modules(package: Path) -> dict[str, Path]:
 def imports(tree: ast.AST) -> Iterator[str]:
     """Names within the package that a module imports, in functions too, but not for the type checker alone."""
     for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+        # No expression holds one.
+        if isinstance(node, ast.expr) or (isinstance(node, ast.If) and _for_types(node.test)):
             continue
         if isinstance(node, ast.ImportFrom):
             assert node.level == 0, "imports are written in full"
@@ -52,6 +53,10 @@ def imports(tree: ast.AST) -> Iterator[str]:
                 alias.name.removeprefix("scara_ident.") for alias in node.names if alias.name.startswith("scara_ident.")
             )
         yield from imports(node)
+
+
+def _for_types(test: ast.expr) -> bool:
+    return any(isinstance(node, ast.Name) and node.id == "TYPE_CHECKING" for node in ast.walk(test))
 
 
 def graph(package: Path) -> dict[str, set[str]]:
