@@ -72,7 +72,7 @@ def validated(outcome: Outcome, data: PreparedData) -> Validation:
     if model.variation is not None:
         # Of few runs how far they lie apart is known badly.
         apart = widening(len(outcome.training.each)) * of_another_run(model.variation, after, value)
-    known = [dict(zip(robot.joints, each, strict=True)) for each in (unsure, apart)]
+    known = [robot.by_joint(each) for each in (unsure, apart)]
     events = [own_uncertainty(event, *known) for event in held_out_events(value, outcome.training, after)]
     if outcome.unexplained is not None:
         # That something stays unexplained is why a whole recording is, and no event.

@@ -177,7 +177,7 @@ def excitation_dict(design: Design, stopping: Stopping | None = None) -> dict[st
         **({} if stopping is None else {"stopping": stopping.entry()}),
         "active_limits": [each.name for each in design.reached if each.active],
         "verified_samples": design.verified,
-        "noise_weights": dict(zip(design.model.robot.joints, design.weights.tolist(), strict=True)),
+        "noise_weights": design.model.robot.by_joint(design.weights.tolist()),
         "parameters": [
             {"name": column.name, "joint": column.joint, "unit": column.unit, "std": float(std)}
             for column, std in zip(design.model.columns, design.std(), strict=True)

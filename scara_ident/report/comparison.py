@@ -14,47 +14,45 @@ from scara_ident.model.urdf_values import urdf_values
 
 def comparison_dict(comparison: Comparison) -> dict[str, Any]:
     """Return the content of ``comparison.json``."""
-    joints = comparison.model.robot.joints
+    robot = comparison.model.robot
     names = [summary.name for summary in comparison.trajectories]
     own = np.array([comparison.errors[i, i] for i in range(len(names))])
     nominal = urdf_values(comparison.model)
     return {
-        "robot": comparison.model.robot.name,
+        "robot": robot.name,
         "model": comparison.model.name,
         "method": comparison.method,
         "trajectories": names,
-        "joints": list(joints),
+        "joints": list(robot.joints),
         "units": {
             joint: {
-                "torque": comparison.model.robot.torque_unit(j),
-                "velocity": f"{comparison.model.robot.position_unit(j)}/s",
-                "acceleration": f"{comparison.model.robot.position_unit(j)}/s^2",
+                "torque": robot.torque_unit(j),
+                "velocity": f"{robot.position_unit(j)}/s",
+                "acceleration": f"{robot.position_unit(j)}/s^2",
             }
-            for j, joint in enumerate(joints)
+            for j, joint in enumerate(robot.joints)
         },
-        "band_hz": dict(zip(joints, comparison.bands, strict=True)),
+        "band_hz": robot.by_joint(comparison.bands),
         "characteristics": {
             summary.name: {
                 "recordings": list(summary.recordings),
                 "log_det": summary.log_det,
                 "condition": summary.condition,
-                "sigma": None if summary.sigma is None else dict(zip(joints, summary.sigma, strict=True)),
-                "peak_velocity": dict(zip(joints, summary.peak_velocity, strict=True)),
-                "peak_acceleration": dict(zip(joints, summary.peak_acceleration, strict=True)),
+                "sigma": None if summary.sigma is None else robot.by_joint(summary.sigma),
+                "peak_velocity": robot.by_joint(summary.peak_velocity),
+                "peak_acceleration": robot.by_joint(summary.peak_acceleration),
             }
             for summary in comparison.trajectories
         },
-        "torque_rms": {
-            summary.name: dict(zip(joints, summary.torque_rms, strict=True)) for summary in comparison.trajectories
-        },
+        "torque_rms": {summary.name: robot.by_joint(summary.torque_rms) for summary in comparison.trajectories},
         "errors": _cells(comparison, comparison.errors),
         "predicted_by_covariance": _cells(comparison, comparison.expected),
         "normalised": _cells(comparison, comparison.errors / own[:, None]),
         "average_of_predicted": {
-            name: dict(zip(joints, comparison.errors[i].mean(axis=0), strict=True)) for i, name in enumerate(names)
+            name: robot.by_joint(comparison.errors[i].mean(axis=0)) for i, name in enumerate(names)
         },
         "average_of_estimated": {
-            name: dict(zip(joints, comparison.errors[:, k].mean(axis=0), strict=True)) for k, name in enumerate(names)
+            name: robot.by_joint(comparison.errors[:, k].mean(axis=0)) for k, name in enumerate(names)
         },
         "parameters": {
             summary.name: {
@@ -76,9 +74,9 @@ def comparison_dict(comparison: Comparison) -> dict[str, Any]:
 
 def _cells(comparison: Comparison, values: Any) -> dict[str, dict[str, dict[str, float]]]:
     names = [summary.name for summary in comparison.trajectories]
-    joints = comparison.model.robot.joints
+    robot = comparison.model.robot
     return {
-        predicted: {estimated: dict(zip(joints, values[i, k], strict=True)) for k, estimated in enumerate(names)}
+        predicted: {estimated: robot.by_joint(values[i, k]) for k, estimated in enumerate(names)}
         for i, predicted in enumerate(names)
     }
 

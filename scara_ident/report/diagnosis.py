@@ -42,17 +42,17 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
     worth : mapping, optional
         What `scara_ident.report.use.worth_dict` says of the effects found.
     """
-    joints = diagnosis.robot.joints
+    robot = diagnosis.robot
     nominal = urdf_values(diagnosis.after.model)
     suspects = {item.candidate: item for item in suspects_in_model(diagnosis)}
     return {
-        "robot": diagnosis.robot.name,
+        "robot": robot.name,
         "model": diagnosis.before.model.name,
         "verdict": diagnosis.verdict,
         "summary": list(sentences(diagnosis)),
-        "band_hz": dict(zip(joints, diagnosis.search.bands, strict=True)),
+        "band_hz": robot.by_joint(diagnosis.search.bands),
         "band_given": diagnosis.bands_given,
-        "noise_floor": {fit.joint: fit.noise for fit in diagnosis.fit_after} or dict.fromkeys(joints),
+        "noise_floor": {fit.joint: fit.noise for fit in diagnosis.fit_after} or dict.fromkeys(robot.joints),
         "lack_of_fit": {
             "before": {fit.joint: fit.missing for fit in diagnosis.fit_before},
             "after": {fit.joint: fit.missing for fit in diagnosis.fit_after},
@@ -83,7 +83,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
             {name: value for name, value in vars(item).items() if name != "decision"} for item in diagnosis.tentative
         ],
         "next": [item.entry() for item in next_steps(diagnosis)],
-        "noise_density": dict(zip(joints, noise_density(diagnosis).tolist(), strict=True)),
+        "noise_density": robot.by_joint(noise_density(diagnosis).tolist()),
         "events": [event.entry for event in diagnosis.events],
         "evidence": {
             item.joint: {
@@ -100,8 +100,8 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
         "recordings": {
             kind: {
                 item.name: {
-                    "before": dict(zip(joints, rms_of(diagnosis.before.value, item), strict=True)),
-                    "after": dict(zip(joints, rms_of(diagnosis.after.value, later), strict=True)),
+                    "before": robot.by_joint(rms_of(diagnosis.before.value, item)),
+                    "after": robot.by_joint(rms_of(diagnosis.after.value, later)),
                 }
                 for item, later in zip(before.each, after.each, strict=True)
             }

@@ -48,7 +48,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
             | {"undetermined": bool(estimate.undetermined[k])}
             for k, column in enumerate(identification.model.columns)
         ],
-        "weights": dict(zip(robot.joints, estimate.weights, strict=True)),
+        "weights": robot.by_joint(estimate.weights),
         "urdf_scale": urdf_scale(estimate, identification.training),
         "std_from": estimate.std_kind,
         "run_variation": estimate.variation.sizes(robot) if estimate.variation else {},
@@ -59,15 +59,12 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         "physically_consistent": possible.possible,
         "contradictions": list(possible.reasons),
         "distance_to_possible_std": possible.distance_std,
-        "band_hz": dict(zip(robot.joints, identification.bands, strict=True)),
+        "band_hz": robot.by_joint(identification.bands),
         "errors": {
             "training": _errors(robot, identification.training_errors()),
             "validation": _errors(robot, identification.validation_errors()),
         },
-        "repeatability": {
-            trajectory: dict(zip(robot.joints, sigma, strict=True))
-            for trajectory, sigma in identification.noise.items()
-        },
+        "repeatability": {trajectory: robot.by_joint(sigma) for trajectory, sigma in identification.noise.items()},
         "left_out": {
             kind: {item.name: _left_out(robot, item) for item in items.each}
             for kind, items in (("training", identification.training), ("validation", identification.validation))
@@ -82,7 +79,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         content["links"] = [
             {"name": link.name, "mass": link.mass, "com": link.com, "inertia": link.inertia} for link in links(estimate)
         ]
-        content["armature"] = dict(zip(robot.joints, estimate.standard[10 * robot.n :], strict=True))
+        content["armature"] = robot.by_joint(estimate.standard[10 * robot.n :])
         content["held_by"] = list(estimate.active)
         content["friction_shape"] = {
             choice.joint: {"shape": choice.shape, "p_value": choice.p_value, "why": choice.why}
@@ -92,10 +89,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
 
 
 def _errors(robot: Robot, errors: Mapping[str, tuple[JointError | None, ...]]) -> dict[str, Any]:
-    return {
-        recording: {joint: _error(error) for joint, error in zip(robot.joints, found, strict=True)}
-        for recording, found in errors.items()
-    }
+    return {recording: robot.by_joint(map(_error, found)) for recording, found in errors.items()}
 
 
 def _error(error: JointError | None) -> dict[str, float | None]:
@@ -103,7 +97,7 @@ def _error(error: JointError | None) -> dict[str, float | None]:
 
 
 def _left_out(robot: Robot, item: Observations) -> dict[str, Any]:
-    return {"ends_s": item.left_out_ends, "at_rest_share": dict(zip(robot.joints, item.left_out_rest, strict=True))}
+    return {"ends_s": item.left_out_ends, "at_rest_share": robot.by_joint(item.left_out_rest)}
 
 
 def sentences(identification: Identification) -> tuple[str, ...]:

@@ -39,13 +39,11 @@ def use_dict(result: Use) -> dict[str, Any]:
         "effects": [effect.as_dict() for effect in result.effects],
         "not_simulated": list(result.missing),
         "notes": list(result.notes),
-        "tracking": {
-            name: dict(zip(robot.joints, value.tolist(), strict=True)) for name, value in result.rms().items()
-        },
-        "units": dict(zip(robot.joints, map(robot.position_unit, range(robot.n)), strict=True)),
+        "tracking": {name: robot.by_joint(value.tolist()) for name, value in result.rms().items()},
+        "units": robot.by_joint(map(robot.position_unit, range(robot.n))),
         "rollout": {
             name: {
-                f"{horizon:g}": dict(zip(robot.joints, row.tolist(), strict=True))
+                f"{horizon:g}": robot.by_joint(row.tolist())
                 for horizon, row in zip(result.horizons, rows, strict=True)
                 if np.all(np.isfinite(row))
             }
@@ -67,25 +65,21 @@ def worth_dict(model: IdentifiedModel) -> dict[str, Any]:
     except ScaraIdentError as error:
         return {"tracking": None, "why": str(error), "summary": [f"What the effects cost is not told: {error}."]}
     robot = model.robot
-
-    def by_joint(errors: Array) -> dict[str, float]:
-        return dict(zip(robot.joints, errors.tolist(), strict=True))
-
     return {
         "summary": [_shares_said(found.rms), *(_cost_said(item, found.rms) for item in found.each), *found.notes],
         "trajectory": {"name": found.motion.name, "duration": found.motion.duration},
-        "tracking": {name: by_joint(errors) for name, errors in found.rms.items()},
+        "tracking": {name: robot.by_joint(errors.tolist()) for name, errors in found.rms.items()},
         "effects": [
             {
                 "effect": item.entry["effect"],
                 "joint": item.entry["joint"],
-                "pid_without_it": by_joint(item.alone),
-                "fed_without_it": None if item.not_fed is None else by_joint(item.not_fed),
+                "pid_without_it": robot.by_joint(item.alone.tolist()),
+                "fed_without_it": None if item.not_fed is None else robot.by_joint(item.not_fed.tolist()),
             }
             for item in found.each
         ],
         "not_simulated": list(found.missing),
-        "units": dict(zip(robot.joints, map(robot.position_unit, range(robot.n)), strict=True)),
+        "units": robot.by_joint(map(robot.position_unit, range(robot.n))),
         "why": None,
     }
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -26,6 +26,8 @@ from scara_ident.robot.signal_map import Channels, build_channels, check_rated_t
 from scara_ident.robot.transmissions import reductions, rotor_inertias
 from scara_ident.robot.urdf_file import pinocchio_model, read_urdf
 from scara_ident.robot.urdf_validation import MOVABLE, XACRO
+
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -134,6 +136,10 @@ class Robot(Frozen):
         if name not in self.joints:
             raise UsageError(f"{self.name} has no joint {name!r}; its joints are {', '.join(self.joints)}")
         return self.joints.index(name)
+
+    def by_joint(self, values: Iterable[Value]) -> dict[str, Value]:
+        """Return one value for each joint by its name."""
+        return dict(zip(self.joints, values, strict=True))
 
     def torque_unit(self, joint: int) -> str:
         """Return the unit of the recorded torque of a joint after ``effort_gain``."""

@@ -234,10 +234,8 @@ def check_dict(found: Check) -> dict[str, Any]:
             each.joint: {key: getattr(each, key) for key in ("torque", "time", "model_std", "std")}
             for each in found.peaks
         },
-        "model_error": dict(zip(robot.joints, found.known.rms, strict=True)),
-        "recorded_minus_foreseen": None
-        if found.recorded_rms is None
-        else dict(zip(robot.joints, found.recorded_rms, strict=True)),
+        "model_error": robot.by_joint(found.known.rms),
+        "recorded_minus_foreseen": None if found.recorded_rms is None else robot.by_joint(found.recorded_rms),
         "energy": {
             joint: {
                 "given": energy.given[j],
