@@ -5,6 +5,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Median of a normal variable's size.
+NORMAL_MEDIAN = 0.6745
+
 
 def median(values: Array) -> float:
     """Return the median of at least one number, shape (N,), NaN if one of them is."""

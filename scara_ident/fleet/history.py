@@ -13,15 +13,13 @@ from functools import cached_property
 
 import numpy as np
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import NORMAL_MEDIAN, Array
 from scara_ident.effects import Scene
 from scara_ident.estimation.information import UNDETERMINED, orthonormal, triangular
 from scara_ident.fleet.causes import RUN_KINDS, Cause, causes_of, run_directions
 from scara_ident.fleet.visit import Visit, watched
 from scara_ident.model.model import TorqueModel
 
-# Median of the absolute value of a standard normal number.
-NORMAL_MEDIAN = 0.6745
 # Differences beyond so many of their standard deviations, as the median has it, are left out of their rms, and what share
 # of a normal variance is left.
 CUT, LEFT = 3.0, 0.9733

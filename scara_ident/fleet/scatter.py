@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import NORMAL_MEDIAN, Array
 from scara_ident.fleet.history import (
     CUT,
     LEFT,
-    NORMAL_MEDIAN,
     History,
     common_removed,
     pseudo_inverses,

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from scara_ident.arrays import Array, median
+from scara_ident.arrays import NORMAL_MEDIAN, Array, median
 from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import Stretch
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
@@ -32,8 +32,6 @@ _SIZES: WeakKeyDictionary[PreparedData, tuple[tuple[NoiseSizes, ...], ...]] = We
 STEPLESS = 0.02
 # Steps about two zeros that lie so much of a step apart are uncorrelated: ``1 - 6 x (1 - x)`` is zero.
 UNLIKE = 0.5 - np.sqrt(1.0 / 12.0)
-# Median of a normal variable's size.
-NORMAL_MEDIAN = 0.6745
 # Torque and acceleration beyond any band that are so much alike are one swing of the arm; noise of either is no part of
 # the other.
 ALIKE = 0.5

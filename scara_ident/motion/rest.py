@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array, median, runs_of
+from scara_ident.arrays import NORMAL_MEDIAN, Array, median, runs_of
 from scara_ident.motion.low_pass import HIGHEST_CUT, low_pass
 from scara_ident.motion.motion import Motion, Stretch
 
@@ -124,6 +124,6 @@ def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | N
     rest = np.abs(stretch.position[joint] - smooth)
     removed = max(0.5 * stretch.rate - cut, 0.05 * stretch.rate)
     # The median ignores the moments at which real motion is faster than the filter.
-    gain = 2.0 * np.pi * float(np.sqrt(reach**3 / (3.0 * removed))) / 0.6745
+    gain = 2.0 * np.pi * float(np.sqrt(reach**3 / (3.0 * removed))) / NORMAL_MEDIAN
     small = 2 * np.count_nonzero(gain * rest <= least) > len(rest)
     return least if small else max(least, gain * median(rest))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import NORMAL_MEDIAN, Array
 from scara_ident.recording.audit.samples import GAP_STEPS, Samples
 
 # Samples on either side over which the even clock is the median of the stamps, and over which a lost sample shows.
@@ -32,8 +32,6 @@ KNOWN = 0.1
 NO_WAY = 0.01
 # Speeds by the stamps tell the intervals, these tell better speeds; the third time little changes any more.
 ROUNDS = 3
-# Median of a normal variable's size.
-NORMAL_MEDIAN = 0.6745
 
 
 def even_clocks(samples: Samples) -> list[Array]:

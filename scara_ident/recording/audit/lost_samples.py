@@ -6,7 +6,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import NORMAL_MEDIAN, Array
 from scara_ident.manners import several
 from scara_ident.recording.audit.samples import Finding, Samples
 
@@ -30,8 +30,6 @@ MOST = 0.01
 LEAST, FEWEST = 1e-3, 3
 # A step in time that differs from the median by more than this share is one that the clock tells itself.
 EVEN = 0.3
-# Median of a normal variable's size; losses within less than half of the windows leave it alone.
-NORMAL_MEDIAN = 0.6745
 # Rounding of positions, as a share of the way of the fastest sample.
 ROUNDING = 1e-4
 
@@ -73,6 +71,7 @@ def _missing(samples: Samples) -> Array:
     for j, inside in enumerate(moving):
         # Of a joint that stands still all is rounding.
         if np.count_nonzero(inside) >= ENOUGH and not idle[j]:
+            # Losses within less than half of the windows leave it alone.
             usual = float(np.median(np.abs(jump[j, inside]))) / NORMAL_MEDIAN
             floor = ROUNDING * float(np.max(np.abs(way[j])))
             weight[j, inside] = 1.0 / max(usual, floor) ** 2

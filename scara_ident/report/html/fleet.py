@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scara_ident.arrays import NORMAL_MEDIAN
 from scara_ident.files import written_together
 from scara_ident.fleet import Fleet
 from scara_ident.fleet.changes import LEVEL
@@ -154,7 +155,7 @@ def _scatter(fleet: Fleet) -> list[Block]:
     for quantity, each in values.items():
         numbers = np.array([pair[:2] for pair in each])
         middle, std = np.median(numbers, axis=0)
-        spread = float(np.median(np.abs(numbers[:, 0] - middle))) / 0.6745
+        spread = float(np.median(np.abs(numbers[:, 0] - middle))) / NORMAL_MEDIAN
         unit = "" if each[0][2] == "1" else superscripts(each[0][2])
         rows.append(
             [name(quantity), number(float(middle)), number(float(std), 2), number(spread, 2), Cell(unit, "unit")]
