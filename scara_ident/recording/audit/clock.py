@@ -7,9 +7,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.manners import several
-from scara_ident.recording.audit.samples import GAP_STEPS, Finding, Samples, runs
-
-Checked = tuple[Samples, list[Finding]]
+from scara_ident.recording.audit.samples import GAP_STEPS, Checked, Finding, Samples, runs
 
 # Fifteen parameters a joint are asked of one equation a joint and sample: fewer than three equations a parameter, after
 # a filter has used up both ends, say nothing.

@@ -11,6 +11,7 @@ from scara_ident.arrays import Array
 from scara_ident.manners import several
 from scara_ident.recording.audit.samples import (
     IDLE_TRAVEL,
+    Checked,
     Finding,
     Samples,
     joint_range,
@@ -18,8 +19,6 @@ from scara_ident.recording.audit.samples import (
     resolution,
     runs,
 )
-
-Checked = tuple[Samples, list[Finding]]
 
 # An effort that keeps one value for longer than this while its joint moves is stuck ...
 STUCK_SECONDS = 0.2

@@ -7,9 +7,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.manners import several
-from scara_ident.recording.audit.samples import Finding, Samples, resolution, runs
-
-Checked = tuple[Samples, list[Finding]]
+from scara_ident.recording.audit.samples import Checked, Finding, Samples, resolution, runs
 
 # A joint moves where its speed is above this share of its rms speed over the recording.
 MOVING = 0.2

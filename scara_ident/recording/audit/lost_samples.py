@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import NORMAL_MEDIAN, Array
 from scara_ident.manners import several
-from scara_ident.recording.audit.samples import Finding, Samples
-
-Checked = tuple[Samples, list[Finding]]
+from scara_ident.recording.audit.samples import Checked, Finding, Samples
 
 # Samples on either side of a step that a parabola with a jump at the step is fitted to.
 SIDE = 3

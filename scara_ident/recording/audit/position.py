@@ -13,6 +13,7 @@ from scara_ident.manners import several
 from scara_ident.recording.audit.samples import (
     GAP_STEPS,
     IDLE_TRAVEL,
+    Checked,
     Finding,
     Samples,
     joint_range,
@@ -21,8 +22,6 @@ from scara_ident.recording.audit.samples import (
 
 if TYPE_CHECKING:
     from scara_ident.robot.robot import Robot
-
-Checked = tuple[Samples, list[Finding]]
 
 # Positions are judged by these percentiles and speeds by that one, so that a few wild samples decide nothing.
 LOW, HIGH, FAST = 2.0, 98.0, 95.0

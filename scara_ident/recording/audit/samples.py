@@ -135,6 +135,10 @@ class Samples:
         return idle
 
 
+Checked = tuple[Samples, list[Finding]]
+"""What a step of the audit leaves of the rows, and what it says."""
+
+
 def joint_range(robot: Robot) -> Array:
     """Return the range of each joint, shape (n,); a turn or a metre where the URDF gives none."""
     span = robot.upper - robot.lower

@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.manners import several
 from scara_ident.recording.audit.even_clock import ENOUGH, REACH, even_clocks
-from scara_ident.recording.audit.samples import GAP_STEPS, Finding, Samples
-
-Checked = tuple[Samples, list[Finding]]
+from scara_ident.recording.audit.samples import GAP_STEPS, Checked, Finding, Samples
 
 # A stamp is off an even clock from this share of the interval on.
 OFF = 0.05
