@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import LEAST_NOISE
@@ -20,7 +19,7 @@ from scara_ident.identification.usable import check_rows
 from scara_ident.model.regressor.kernel import configurations
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
 from scara_ident.motion.trajectories import LARGEST_SHIFT, SAME_RATE, alignment
-from scara_ident.robot.kinematics import tool_frame
+from scara_ident.robot.kinematics import constant_force, force_torques
 from scara_ident.robot.robot import Robot
 from scara_ident.threads import one_blas_thread
 
@@ -305,13 +304,8 @@ def _of_tool_force(robot: Robot, item: Binned, start: int, stop: int) -> Array |
 
 def _per_force(robot: Robot, item: Binned, bins: Sequence[int]) -> Iterator[Array]:
     """Give what a unit of each force on the tool takes from the torque of the drives, recorded side, shape (n, 3)."""
-    place = robot.model.getFrameId(tool_frame(robot).name, pin.FrameType.BODY)
-    model_data, back = robot.model.createData(), np.argsort(robot.order)
-    for k in bins:
-        q = configurations(robot.model, item.state[0][back, k : k + 1])[:, 0]
-        jacobian = pin.computeFrameJacobian(robot.model, model_data, q, place, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        # Of a single joint it comes as a vector.
-        yield -(jacobian.reshape(6, -1)[:3, robot.order] * robot.row_scale).T
+    states = configurations(robot.model, item.state[0][np.argsort(robot.order)][:, list(bins)])
+    return (-turned for turned in force_torques(robot, states.T))
 
 
 def tool_force(robot: Robot, item: Binned, start: int, stop: int) -> tuple[Array, float]:
@@ -329,10 +323,7 @@ def tool_force(robot: Robot, item: Binned, start: int, stop: int) -> tuple[Array
         weight = np.where(item.known[:, k] > 0.5, 1.0 / spread, 0.0)
         rows.append(weight[:, None] * turned)
         rights.append(weight * left[:, k])
-    matrix, right = np.concatenate(rows), np.concatenate(rights)
-    force = np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-3)[0])
-    total = float(right @ right)
-    return force, 1.0 - float(np.sum((right - matrix @ force) ** 2)) / total if total > 0.0 else 0.0
+    return constant_force(rows, rights)
 
 
 def _repeated(segment: Segment, stretches: Sequence[Binned], data: PreparedData) -> bool:

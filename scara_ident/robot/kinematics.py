@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
+
 import numpy as np
 import pinocchio as pin
 
@@ -52,6 +54,24 @@ def tool_frame(robot: Robot, link: str | None = None) -> pin.Frame:
     if found.parentJoint == 0:
         raise RobotError(f"{robot.urdf}: no identified joint moves {link!r}; name a link that moves")
     return found
+
+
+def force_torques(robot: Robot, configurations: Iterable[Array]) -> Iterator[Array]:
+    """Give what a unit of each force on the tool, base frame, is at the joints, recorded side, shape (n, 3): ``J.T``."""
+    frame = robot.model.getFrameId(tool_frame(robot).name, pin.FrameType.BODY)
+    data = robot.model.createData()
+    for q in configurations:
+        jacobian = pin.computeFrameJacobian(robot.model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        # Of a single joint it comes as a vector.
+        yield (jacobian.reshape(6, -1)[:3, robot.order] * robot.row_scale).T
+
+
+def constant_force(rows: Sequence[Array], torques: Sequence[Array]) -> tuple[Array, float]:
+    """Return the force, N, shape (3,), of which rows (n, 3) make torques (n,) best, and the share of their square that it explains."""
+    matrix, right = np.concatenate(rows), np.concatenate(torques)
+    force = np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-3)[0])
+    total = float(right @ right)
+    return force, 1.0 - float(np.sum((right - matrix @ force) ** 2)) / total if total > 0.0 else 0.0
 
 
 def farthest_point(robot: Robot) -> Array:

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
 from scara_ident.estimation.tail import clusters
 from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.recording.recording import Recording
-from scara_ident.robot.kinematics import tool_frame
+from scara_ident.robot.kinematics import constant_force, force_torques
 from scara_ident.robot.robot import Robot
 from scara_ident.use.alarm import Alarm, calibrate
 from scara_ident.use.external_torque import (
@@ -294,21 +293,11 @@ def tool_force(observer: ContactObserver, observed: Observed, threshold: Array, 
     A force f on the tool at the end of the Jacobian J is the external torque ``J^T f``. Joints are weighted by their
     thresholds.
     """
-    robot, momentum = observer.known.robot, observer.external.arm
-    frame = robot.model.getFrameId(tool_frame(robot).name, pin.FrameType.BODY)
-    data = robot.model.createData()
-    rows, rights = [], []
-    for k in places[:: max(1, len(places) // STATES)]:
-        q = momentum.configuration(observed.position[:, k])
-        jacobian = pin.computeFrameJacobian(robot.model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        # Of a single joint it comes as a vector.
-        turned = (jacobian.reshape(6, -1)[:3, robot.order] * robot.row_scale).T
-        rows.append(turned / threshold[:, k, None])
-        rights.append(observed.torque[:, k] / threshold[:, k])
-    matrix, right = np.concatenate(rows), np.concatenate(rights)
-    force = np.linalg.lstsq(matrix, right, rcond=1e-3)[0]
-    total = float(right @ right)
-    return force, 1.0 - float(np.sum((right - matrix @ force) ** 2)) / total if total > 0.0 else 0.0
+    some = places[:: max(1, len(places) // STATES)]
+    states = (observer.external.arm.configuration(observed.position[:, k]) for k in some)
+    turned = force_torques(observer.known.robot, states)
+    rows = [each / threshold[:, k, None] for k, each in zip(some, turned, strict=True)]
+    return constant_force(rows, [observed.torque[:, k] / threshold[:, k] for k in some])
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from scara_ident.errors import RobotError
-from scara_ident.robot.kinematics import axis, parent, place_of, tool_frame
+from scara_ident.robot.kinematics import axis, constant_force, force_torques, parent, place_of, tool_frame
 from scara_ident.robot.robot import load_robot
 from tests.arms import example_urdf
 from tests.simulation.made import tree
@@ -52,3 +52,24 @@ def test_positions_have_the_unit_of_their_joint(tmp_path: Path):
     robot = tree(tmp_path)
     assert [robot.position_unit(j) for j in range(robot.n)] == ["m" if slides else "rad" for slides in robot.prismatic]
     assert {"m", "rad"} == {robot.position_unit(j) for j in range(robot.n)}
+
+
+def test_a_force_on_the_tool_is_found_from_what_it_is_at_the_joints():
+    for robot in (load_robot(), load_robot(example_urdf("ur5_robot.urdf"))):
+        force, rng = np.array([3.0, -2.0, 1.0]), np.random.default_rng(0)
+        states = rng.uniform(-1.0, 1.0, (20, robot.model.nq))
+        rows = list(force_torques(robot, states))
+        # Against the power that the force has at the tool as the joints move.
+        speed, data = rng.standard_normal(robot.n), robot.model.createData()
+        turned = np.zeros(robot.n)
+        turned[robot.order] = speed
+        pin.forwardKinematics(robot.model, data, states[0], turned)
+        frame = robot.model.getFrameId(tool_frame(robot).name)
+        moved = pin.getFrameVelocity(robot.model, data, frame, pin.LOCAL_WORLD_ALIGNED).linear
+        assert force @ moved == pytest.approx(speed @ (rows[0] @ force / robot.row_scale))
+        found, share = constant_force(rows, [row @ force for row in rows])
+        # Nothing tells what pushes across the plane of a planar arm.
+        told = 3 if robot.n > 2 else 2
+        np.testing.assert_allclose(found[:told], force[:told], atol=1e-9)
+        assert share == pytest.approx(1.0)
+    assert constant_force(rows, [np.zeros(6)] * 20)[1] == 0.0
