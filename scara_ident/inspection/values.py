@@ -8,22 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.recording.audit.clock import FASTEST, SLOWEST, USUAL_INTERVAL
+from scara_ident.recording.audit.position import COUNTS, FAST, HIGH, LOW, SPEED_ROWS
 from scara_ident.robot.robot import Robot
 from scara_ident.robot.units import COUNT, TIME, TURN, table_of
 
-# No arm is logged slower than 5 Hz or faster than 100 kHz, and most near 500 Hz.
-SLOWEST, FASTEST, USUAL = 0.2, 1e-5, 2e-3
 # Positions may lie beyond the limits by this share of the range, and move this many times faster than the limit.
 SLACK, HASTE = 0.1, 2.0
 # A joint of which nothing is known turns less than this either way, and not faster.
 WIDEST, FASTEST_JOINT = 2 * TURN, 4 * TURN
 LONGEST, FASTEST_SLIDE = 10.0, 10.0
-# Wild samples decide nothing: of positions these percentiles count, and of speeds that one over so many rows.
-LOW, HIGH, FAST, ROWS = 2.0, 98.0, 95.0, 20
 # A recorded velocity is that of the position where it correlates so well with its slope, and fits within this share.
 ALIKE, NEAR = 0.9, 0.1
-# Whole numbers over a wider range are encoder counts: as degrees they would be three turns.
-COUNTS = 1000.0
 
 
 @dataclass(frozen=True)
@@ -41,7 +37,7 @@ def time_unit(time: Array) -> str | None:
         return None
     median = float(np.median(step[step > 0]))
     fitting = {name: unit.factor * median for name, unit in TIME.items() if FASTEST <= unit.factor * median <= SLOWEST}
-    return min(fitting, key=lambda name: abs(np.log(fitting[name] / USUAL))) if fitting else None
+    return min(fitting, key=lambda name: abs(np.log(fitting[name] / USUAL_INTERVAL))) if fitting else None
 
 
 def position_readings(robot: Robot, joints: list[int], time: Array, position: Array) -> list[Reading]:
@@ -100,7 +96,7 @@ def velocity_reading(slope: Array, velocity: Array, reduction: Array, *, linear:
 
 def slopes(time: Array, values: Array) -> tuple[Array, NDArray[np.intp]]:
     """Return the slope of signals (k, N) over a few samples, shape (k, M), and the rows at which it stands."""
-    rows = max(1, min(ROWS // 2, len(time) // 8))
+    rows = max(1, min(SPEED_ROWS // 2, len(time) // 8))
     middle = np.arange(rows, len(time) - rows)
     lasting = time[middle + rows] - time[middle - rows]
     good = lasting > 0
