@@ -26,8 +26,8 @@ from scara_ident.export.xml_text import (
     set_numbers,
 )
 from scara_ident.robot.robot import Robot
+from scara_ident.robot.urdf_validation import INERTIA
 
-_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _ARMATURE_COMMENT = re.compile(rb"\s*armature [^ ]+ kg( m\^2)? at the joint\s*")
 
 
@@ -97,7 +97,7 @@ def _nominal(links: dict[str, Element]) -> dict[str, Array]:
             continue
         parts = {child.tag: child.attributes for child in reversed(inertial.children)}
         origin, moments = parts.get("origin", {}), parts.get("inertia", {})
-        ixx, ixy, ixz, iyy, iyz, izz = (float(moments.get(key, 0.0)) for key in _INERTIA)
+        ixx, ixy, ixz, iyy, iyz, izz = (float(moments.get(key, 0.0)) for key in INERTIA)
         turn = pin.rpy.rpyToMatrix(_vector(origin.get("rpy", "0 0 0")))
         about_com = turn @ np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) @ turn.T
         mass = float(parts.get("mass", {}).get("value", 0.0))
@@ -134,7 +134,7 @@ def _set_inertial(content: bytes, link: Element, parameters: Array) -> Iterator[
     pose = {"xyz": body.com.tolist(), "rpy": [0.0, 0.0, 0.0]}
     mass = {"value": [body.mass]}
     upper = body.inertia[np.triu_indices(3)].tolist()
-    moments = {key: [value] for key, value in zip(_INERTIA, upper, strict=True)}
+    moments = {key: [value] for key, value in zip(INERTIA, upper, strict=True)}
     wanted = {"origin": pose, "mass": mass, "inertia": moments}
     if inertial is None:
         if np.any(parameters):

@@ -8,7 +8,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.paper.model import criteria, regressor
-from scara_ident.paper.report import Check, Subject, equality, inequality, information
+from scara_ident.paper.report import JOINTS, Check, Subject, equality, inequality, information
 from scara_ident.paper.tables import (
     POSITION_LIMITS,
     POSITION_RANGE_2,
@@ -23,7 +23,6 @@ from scara_ident.paper.tables import (
 from scara_ident.paper.trajectories import OJD, OJK, Trajectory, tool_acceleration
 
 PRINTED_AS_FORMULA = (OJK, OJD)
-JOINTS = ("joint1", "joint2")
 
 LOG_DET_TOLERANCE = 0.02
 CONDITION_TOLERANCE = 0.10

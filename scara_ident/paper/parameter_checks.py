@@ -9,10 +9,8 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.paper.model import LINK_LENGTH, PARAMETERS
-from scara_ident.paper.report import Check, Subject, inequality, information
+from scara_ident.paper.report import JOINTS, Check, Subject, inequality, information
 from scara_ident.paper.tables import TABLE_1, TRAJECTORIES, VELOCITY_LIMIT, table5_parameters
-
-JOINTS = ("joint1", "joint2")
 
 
 def inertia() -> Iterator[Check]:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+# Of the SCARA that the paper is about.
+JOINTS = ("joint1", "joint2")
+
 
 @dataclass(frozen=True)
 class Subject:

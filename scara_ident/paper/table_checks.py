@@ -7,10 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.paper.report import Check, Subject, equality, inequality
+from scara_ident.paper.report import JOINTS, Check, Subject, equality, inequality
 from scara_ident.paper.tables import TABLE_1, TABLE_2, TABLE_3, TABLE_4, TORQUE_RMS, TRAJECTORIES, ErrorTable
 
-JOINTS = ("joint1", "joint2")
 HALF_DIGIT = 0.0005
 """Errors and averages are printed with three decimals."""
 ROUNDING = 2.0 * HALF_DIGIT

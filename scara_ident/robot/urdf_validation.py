@@ -19,7 +19,7 @@ FARTHEST_COM = 10.0
 # An axis shorter than this has no direction; it is a unit vector, or nearly.
 SHORTEST_AXIS = 1e-6
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
-_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 # How many numbers an attribute holds, by element.
 _COUNTS = {
     "origin": {"xyz": 3, "rpy": 3},
@@ -28,7 +28,7 @@ _COUNTS = {
     "dynamics": {"damping": 1, "friction": 1},
     "mimic": {"multiplier": 1, "offset": 1},
     "mass": {"value": 1},
-    "inertia": dict.fromkeys(_INERTIA, 1),
+    "inertia": dict.fromkeys(INERTIA, 1),
     "box": {"size": 3},
     "sphere": {"radius": 1},
     "cylinder": {"radius": 1, "length": 1},
@@ -146,11 +146,11 @@ def _impossible_bodies(tree: ElementTree.Element) -> str | None:
             continue
         mass, inertia = inertial.find("mass"), inertial.find("inertia")
         given = {} if mass is None or mass.get("value") is None else {"mass": _value(mass, "value")}
-        given |= {key: _value(inertia, key) for key in _INERTIA if inertia is not None and inertia.get(key) is not None}
-        lacking = next((key for key in ("mass", *_INERTIA) if key not in given), None)
+        given |= {key: _value(inertia, key) for key in INERTIA if inertia is not None and inertia.get(key) is not None}
+        lacking = next((key for key in ("mass", *INERTIA) if key not in given), None)
         if lacking is not None:
             return f"{owner}: its <inertial> has no {lacking}; give it, or leave out <inertial>"
-        rounding = ROUNDING * max(abs(given[key]) for key in _INERTIA)
+        rounding = ROUNDING * max(abs(given[key]) for key in INERTIA)
         for key in ("mass", "ixx", "iyy", "izz"):
             if given[key] < (0.0 if key == "mass" else -rounding):
                 return f"{owner}: {key} is {given[key]:g}, and nothing has less than 0; correct it"

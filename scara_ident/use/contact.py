@@ -13,6 +13,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
 from scara_ident.estimation.tail import clusters
 from scara_ident.export.identified_model import IdentifiedModel
+from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.kinematics import constant_force, force_torques
 from scara_ident.robot.robot import Robot
@@ -20,7 +21,6 @@ from scara_ident.use.alarm import Alarm, calibrate
 from scara_ident.use.external_torque import (
     BANDWIDTH,
     FEATURES,
-    GAP_STEPS,
     SETTLES,
     ExternalTorque,
     Observed,

@@ -12,6 +12,7 @@ from scara_ident.errors import UsageError
 from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.model.terms import Friction, Offset, RigidBody, Term
 from scara_ident.motion.motion import Motion
+from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.use.momentum import arm_momentum
 
 # Cut-off of the observer, and of the low-pass on positions and efforts where velocities are not given, Hz.
@@ -215,8 +216,8 @@ class Observed:
     settled: np.typing.NDArray[np.bool_]
 
 
-# Time constants of the observer after which it has forgotten how it began, and median steps that are a gap.
-SETTLES, GAP_STEPS = 10.0, 5.0
+# Time constants of the observer after which it has forgotten how it began.
+SETTLES = 10.0
 
 
 def observe_recording(
