@@ -15,7 +15,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_variation import OFFSET, RunVariation, offset_direction
+from scara_ident.estimation.run_variation import OFFSET, JointVariation, RunVariation, offset_direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +53,25 @@ def beside_offsets(observations: Observations, offsets: RunVariation | None) -> 
     if offsets is None:
         return OffsetRows(observations, None)
     return OffsetRows(replace(observations, joints=offsets.whitened_rows(observations.joints)), offsets)
+
+
+def larger_offsets(one: RunVariation | None, other: RunVariation | None) -> RunVariation | None:
+    """Return of each joint the offsets that lie further apart; None where there are none.
+
+    Parameters
+    ----------
+    one, other : RunVariation or None
+        Of the same rows.
+    """
+    if one is None or other is None:
+        return one or other
+    pairs = zip(one.joints, other.joints, strict=True)
+    joints = [max((item for item in pair if item is not None), key=_apart, default=None) for pair in pairs]
+    return RunVariation(tuple(joints))
+
+
+def _apart(item: JointVariation) -> float:
+    return float(item.std[OFFSET])
 
 
 def offsets_on(observations: Observations, offsets: RunVariation | None) -> RunVariation | None:
