@@ -95,6 +95,32 @@ def offsets_on(observations: Observations, offsets: RunVariation | None) -> RunV
     return RunVariation(tuple(joints))
 
 
+def rms_beside_own(value: Array, observations: Observations) -> Array:
+    """Return the rms of each joint over recordings that have an offset of their own, within the band; NaN without rows.
+
+    Parameters
+    ----------
+    value : ndarray, shape (p,)
+    observations : Observations
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    firsts = np.searchsorted(observations.owner, np.arange(len(observations.data.recordings) + 1))
+    found = np.full(len(observations.joints), np.nan)
+    for joint, rows in enumerate(observations.joints):
+        bounds = rows.starts[firsts]
+        if rows.samples and bounds[-1] > bounds[0]:
+            left, constant = rows.left(value), offset_direction(observations.model, rows)
+            squares, along, size = (
+                np.diff(np.append(0.0, np.cumsum(item))[bounds]) for item in (left**2, left * constant, constant**2)
+            )
+            left_of_each = squares - np.divide(along**2, size, out=np.zeros(len(size)), where=size > 0.0)
+            found[joint] = np.sqrt(max(float(np.sum(left_of_each)), 0.0) / rows.samples)
+    return found
+
+
 def rms_of(value: Array, observations: Observations, offsets: RunVariation | None = None) -> tuple[float | None, ...]:
     """Return the rms of each joint over recordings, within the band; None without rows.
 

@@ -42,6 +42,9 @@ def diagnosis_markdown(
         for joint in diagnosis.robot.joints:
             cells = [part[key][joint] for key in ("before", "after", "before_relative", "after_relative")]
             lines.append(f"| {joint} | " + " | ".join(_cell(x, k > 1) for k, x in enumerate(cells)) + " |")
+        for joint, before in part.get("before_own_offset", {}).items():
+            after = part["after_own_offset"][joint]
+            lines.append(f"| {joint}, own offsets | {_cell(before, share=False)} | {_cell(after, share=False)} | | |")
     if pictures:
         lines += ["", "## Residual before and after"]
         for title, name in pictures:

@@ -98,14 +98,8 @@ def _errors(robot: Robot, errors: Mapping[str, tuple[JointError | None, ...]]) -
 
 
 def _error(error: JointError | None) -> dict[str, float | None]:
-    if error is None:
-        return {"rms": None, "relative": None, "rms_unfiltered": None, "relative_unfiltered": None}
-    return {
-        "rms": error.rms,
-        "relative": error.relative,
-        "rms_unfiltered": error.rms_unfiltered,
-        "relative_unfiltered": error.relative_unfiltered,
-    }
+    names = ("rms", "relative", "rms_unfiltered", "relative_unfiltered", "rms_own_offset")
+    return {name: None if error is None else getattr(error, name) for name in names}
 
 
 def _left_out(robot: Robot, item: Observations) -> dict[str, Any]:
@@ -118,9 +112,11 @@ def sentences(identification: Identification) -> tuple[str, ...]:
     worst = worst_validation(identification)
     if worst is not None:
         recording, joint, error = worst
+        rms, share = error.beside_own_offset
+        beside = "" if error.rms_own_offset is None else " beside an offset of its own"
+        unit = robot.torque_unit(robot.joints.index(joint))
         found.append(
-            f"It generalises worst to {recording}, {joint}: {error.rms:.3g} "
-            f"{robot.torque_unit(robot.joints.index(joint))} rms, {error.relative:.1%} of the torque."
+            f"It generalises worst to {recording}, {joint}: {rms:.3g} {unit} rms{beside}, {share:.1%} of the torque."
         )
     else:
         found.append("Nothing was held out: give --validate recordings to learn how well it predicts.")
