@@ -108,6 +108,8 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
             # An underscore marks a parameter that only serves the shape of the columns.
             if not parameter.name.startswith("_"):
                 variance = covariance[len(state.value) + position, len(state.value) + position]
+                # Any value of a range that no row tells apart is as likely.
+                variance += candidate.effect.gap(step.scene, candidate.member)[unknown.place] ** 2 / 12.0
                 unit = parameter.unit.format(**candidate.effect.words(step.scene, candidate.member))
                 parameters[parameter.name] = Parameter(unknown.value, float(np.sqrt(max(variance, 0.0))), unit)
         found.append(parameters)
