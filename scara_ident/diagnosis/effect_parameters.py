@@ -19,6 +19,7 @@ from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
+from scara_ident.estimation.run_variation import LEAST_RUNS
 from scara_ident.estimation.variation_between import run_variation
 
 # A rotor is told by the data where they leave less than this share of its prior's standard deviation.
@@ -105,6 +106,8 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
             # An underscore marks a parameter that only serves the shape of the columns.
             if not parameter.name.startswith("_"):
                 variance = covariance[len(state.value) + position, len(state.value) + position]
+                # Any value of a range that no row tells apart is as likely.
+                variance += candidate.effect.gap(step.scene, candidate.member)[unknown.place] ** 2 / 12.0
                 unit = parameter.unit.format(**candidate.effect.words(step.scene, candidate.member))
                 parameters[parameter.name] = Parameter(unknown.value, float(np.sqrt(max(variance, 0.0))), unit)
         found.append(parameters)
@@ -177,6 +180,8 @@ def _covariance(step: SelectionStep, state: Linearised, *, scatter_alone: bool) 
     spread = block_covariance(inverse, value, influence, step.observations.owner, step.weights).matrix
     if not scatter_alone:
         variation = run_variation(step.observations, state.joints, value)
+        if step.offsets is not None and len(step.observations.data.recordings) < LEAST_RUNS:
+            variation = step.offsets
         bias = _noise_bias(step, state)
         spread = spread + variation.covariance(inverse, influence, step.weights) + np.outer(bias, bias)
     known = state.prior.factor[:, :-1]

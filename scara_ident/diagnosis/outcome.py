@@ -17,9 +17,12 @@ from scara_ident.diagnosis.screening import Dependence, screen
 from scara_ident.diagnosis.search import Search, SearchTask
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.estimation import Estimate, wls
+from scara_ident.estimation.assumed_variation import assumed_variation
+from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
+from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation
 
 
 @dataclass(frozen=True)
@@ -90,18 +93,26 @@ class Outcome:
         return suspected(self.search, self.after.weights)
 
 
+def _least_offsets(found: Search, training: Observations) -> RunVariation | None:
+    """Return the offsets that runs differ by at least: two do not say, and what one of them alone carries takes them up."""
+    runs = len(training.data.recordings)
+    if runs >= LEAST_RUNS or not any(item.effect.by_recording for item in found.chosen):
+        return None
+    return assumed_variation(training, training.joints, value_and_weights(training)[0]).offsets
+
+
 def outcome_of(task: SearchTask, found: Search) -> Outcome:
     """Say what a search leaves."""
     training = observed_at_every_sample(found.step)
     before = found.uncorrected.residuals(found.start.value)
     after, left = found.start, before
     if training is not found.uncorrected:
-        after = wls(training)
+        after = wls(training, least=_least_offsets(found, training))
         if found.chosen and (after.offsets or found.step.offsets):
             # With the effects in the model offsets of runs are others, or none.
             found = found.beside(after.offsets)
             training = observed_at_every_sample(found.step)
-            after = wls(training)
+            after = wls(training, least=_least_offsets(found, training))
         left = training.residuals(after.value)
     joints, criteria = task.model.robot.joints, task.criteria
     least = dict.fromkeys(joints, criteria.remainder)

@@ -254,6 +254,10 @@ class Effect(ABC):
         """
         return ""
 
+    def gap(self, scene: Scene, member: Member) -> tuple[float, ...]:
+        """Return, for every nonlinear parameter, how wide a range of its values leaves every row the same."""
+        return (0.0,) * len(self.nonlinear)
+
     def resolution(self, scene: Scene, member: Member) -> tuple[float, ...] | None:
         """Return, for every nonlinear parameter, how far apart two values must be to be told apart.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import islice
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,7 +15,8 @@ from scara_ident.effects.effect import DOUBT_STDS, Effect, View
 from scara_ident.effects.links import point_mass, shared, tool_of
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
 from scara_ident.effects.periodic import TorqueRipple
-from scara_ident.effects.recording_groups import groups_by_torque
+from scara_ident.effects.pickups import PARTS, taken_up
+from scara_ident.effects.recording_groups import SLOWEST, groups_by_torque
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid
 from scara_ident.effects.spanned import rows_by_sample
@@ -35,6 +37,8 @@ FREE_COLUMN_SHARE = 0.02
 BODY_COLUMNS, BODY_COLUMN_SHARE = 10, 1e-3
 # Masses and moments of inertia are seen to be there this many standard deviations from none: 0.3 % two-sided.
 SEEN_STDS = 3.0
+# Joints on which a payload's torque is below this share of its largest hardly tell when it came.
+LOADED = 0.2
 # A tool nearer to the last joint than this, m, says nothing of how far out an unknown payload sits.
 SHORTEST_ARM = 0.1
 
@@ -43,19 +47,36 @@ class PayloadChange(Effect):
     """A mass at the tool point that is there from some time in the run on; negative where it was put down."""
 
     name = "payload_change"
-    summary = "a payload taken up or put down in the run"
+    summary = "a payload taken up or put down in {run}"
     coefficients = (Coefficient("mass", "kg", "mass at the tool from some time in the run on"),)
     nonlinear: ClassVar[tuple[NonlinearParameter, ...]] = (NonlinearParameter("time", "s", 0.0, np.inf, False),)
     view = View("time")
     experiment = "repeat the run with the payload fastened, and once without it"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
-        """Return instants spread over the longest run."""
+        """Return instants spread over the longest run, and those of single recordings that their torque tells."""
         return _instants(scene, INSTANTS)
+
+    def words(self, scene: Scene, member: Member) -> dict[str, Any]:
+        """Add the run: all alike, or one."""
+        run = "the run" if member.partner is None else _recording(scene, member.partner)
+        return super().words(scene, member) | {"run": run}
+
+    def gap(self, scene: Scene, member: Member) -> tuple[float, ...]:
+        """Return how long no joint that a payload loads moves about the instant: where it rests it tells nothing."""
+        name = None if member.partner is None else _recording(scene, member.partner)
+        rests = [
+            _rest_about(scene, motion, member.nonlinear[0]) for motion in scene.columns if name in (None, motion.name)
+        ]
+        return (min(rests, default=0.0),)
+
+    def resolution(self, scene: Scene, member: Member) -> tuple[float, ...] | None:
+        """Return how far apart the instants of a single recording are tried."""
+        return None if member.partner is None else (scene.duration / PARTS,)
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque of 1 kg at the tool from then on."""
-        return [_at_tool(signals) * _after(signals, member.nonlinear[0])]
+        return [_at_tool(signals) * _after(signals, member)]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where an arm would carry or drop more than it weighs."""
@@ -78,7 +99,7 @@ class FreePayloadChange(PayloadChange):
 
     whole: bool = False
 
-    summary = "a payload of unknown mounting taken up or put down in the run"
+    summary = "a payload of unknown mounting taken up or put down in {run}"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return instants spread over the longest run."""
@@ -97,7 +118,7 @@ class FreePayloadChange(PayloadChange):
         """Return the torque per standard parameter of the payload from then on."""
         robot = signals.scene.robot
         columns = _body(signals)[:, list(self._told(robot))]
-        return np.moveaxis(columns * _after(signals, member.nonlinear[0]), 1, 0)
+        return np.moveaxis(columns * _after(signals, member), 1, 0)
 
     def in_full(self) -> Effect | None:
         """Return the family with all columns."""
@@ -260,12 +281,32 @@ class GravityCounterbalance(Sinusoid):
 
 
 def _instants(scene: Scene, count: int) -> tuple[Member, ...]:
-    return tuple(Member(None, ((k + 0.5) * scene.duration / count,)) for k in range(count))
+    """Return instants of all recordings alike, and of single ones; a member's partner is the place of the recording."""
+    alike = (Member(None, ((k + 0.5) * scene.duration / count,)) for k in range(count))
+    told = shared(scene, "taken up", lambda: taken_up(scene, _shown(scene.robot)))
+    return (*alike, *(Member(None, (instant,), int(place)) for place, instant in told.tolist()))
 
 
-def _after(signals: Signals, instant: float) -> Array:
-    """Return 0 before and 1 after an instant, over one sample, shape (N,)."""
-    return np.clip((signals.time - instant) * signals.motion.rate + 0.5, 0.0, 1.0)
+def _recording(scene: Scene, place: int) -> str | None:
+    """Return the name of a recording; None in a scene of others, as of motions that are made."""
+    return next(islice(scene.start, place, None), None)
+
+
+def _after(signals: Signals, member: Member) -> Array:
+    """Return 0 before and 1 after an instant, over one sample, shape (N,); 0 in recordings that it is not of."""
+    if member.partner is not None and _recording(signals.scene, member.partner) != signals.motion.name:
+        return np.zeros(signals.motion.samples)
+    return np.clip((signals.time - member.nonlinear[0]) * signals.motion.rate + 0.5, 0.0, 1.0)
+
+
+def _rest_about(scene: Scene, motion: Motion, instant: float) -> float:
+    """Return how long joints rest about an instant of a recording that a mass at the tool loads, s; infinite off the motion."""
+    time = motion.time - scene.start.get(motion.name, float(motion.time[0]))
+    load = np.sqrt(np.mean(_at_tool(Signals(scene, motion)) ** 2, axis=1)) / np.abs(scene.robot.row_scale)
+    moving = np.abs(motion.v) >= SLOWEST * scene.speed[:, None]
+    telling = time[np.any(moving[load >= LOADED * np.max(load)], axis=0)]
+    place = int(np.searchsorted(telling, instant))
+    return float(telling[place] - telling[place - 1]) if 0 < place < len(telling) else np.inf
 
 
 def _at_tool(signals: Signals) -> Array:

@@ -105,7 +105,7 @@ def _more_than_others(scene: Scene, names: Sequence[str], shown: Sequence[int]) 
     for motion, columns in scene.columns.items():
         if motion.name in names:
             run = names.index(motion.name)
-            for joint, rows in enumerate(_rows(scene, motion, columns, shown)):
+            for joint, (_, rows) in enumerate(rows_of_last_link(scene, motion, columns, shown)):
                 places = [*scene.model.active[joint], *range(p, p + k + 1)]
                 products[run, joint][np.ix_(places, places)] += rows @ rows.T
                 counts[run, joint] += rows.shape[1]
@@ -154,12 +154,30 @@ def _fitted(products: Array, counts: Array, prior: Array, p: int) -> tuple[Array
     return value, covariance, noise
 
 
-def _rows(scene: Scene, motion: Motion, columns: tuple[Array, ...], shown: Sequence[int]) -> list[Array]:
-    """Return for each joint the base model's columns, those of the last link and the torque, over half periods of the band."""
+def rows_of_last_link(
+    scene: Scene, motion: Motion, columns: tuple[Array, ...], shown: Sequence[int]
+) -> list[tuple[Array, Array]]:
+    """Return means over half periods of the band, less those in which a joint is too slow for its friction to be sure.
+
+    Parameters
+    ----------
+    scene : Scene
+    motion : Motion
+    columns : tuple of ndarray
+        The base model's on it.
+    shown : sequence of int
+        Standard parameters of a body on the last link.
+
+    Returns
+    -------
+    list of tuple
+        Of each joint when they begin, s, shape (M,), and the base model's columns, those of the last link and the torque,
+        shape (p_j + k + 1, M).
+    """
     robot = scene.robot
     torque = motion.torque
     if torque is None:
-        return [np.zeros((len(own) + len(shown) + 1, 0)) for own in columns]
+        return [(np.zeros(0), np.zeros((len(own) + len(shown) + 1, 0))) for own in columns]
     payload = tool_of(robot).columns(robot, motion)[:, list(shown)]
     step = max(1, int(0.5 * motion.rate / scene.band))
     starts = np.arange(0, motion.samples - step + 1, step)
@@ -168,7 +186,8 @@ def _rows(scene: Scene, motion: Motion, columns: tuple[Array, ...], shown: Seque
         table = np.concatenate([own, payload[joint], torque[joint : joint + 1]])
         means = np.add.reduceat(table[:, : len(starts) * step], starts, axis=1) / step
         slow = np.abs(motion.v[joint, : len(starts) * step]) < SLOWEST * scene.speed[joint]
-        found.append(means[:, ~np.any(slow.reshape(-1, step), axis=1)])
+        sure = ~np.any(slow.reshape(-1, step), axis=1)
+        found.append((motion.time[starts[sure]], means[:, sure]))
     return found
 
 

@@ -45,6 +45,6 @@ def assumed_variation(
         std = np.array([ASSUMED_FRICTION, scale, offset, ASSUMED_DELAY])
         told = noise > 0.0 and bool(np.any(directions[std > 0.0]))
         nothing = np.zeros((runs, len(KINDS)))
-        item = JointVariation(directions, std, nothing, noise, rows.starts[firsts], nothing)
+        item = JointVariation(directions, std, nothing, noise, rows.starts[firsts], nothing, assumed=True)
         found.append(item if told else None)
     return RunVariation(tuple(found))

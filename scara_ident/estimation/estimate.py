@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.run_offsets import rms_beside_own
 from scara_ident.estimation.run_variation import RunVariation
 from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
@@ -34,12 +35,22 @@ class JointError:
         Rms residual of the torque as recorded.
     relative_unfiltered : float or None
         That, as a share of the recorded torque's rms.
+    rms_own_offset : float or None
+        Rms residual within the band beside an offset of each recording's own; None where offsets were not seen to differ.
     """
 
     rms: float
     relative: float | None
     rms_unfiltered: float
     relative_unfiltered: float | None
+    rms_own_offset: float | None = None
+
+    @property
+    def beside_own_offset(self) -> tuple[float, float | None]:
+        """The rms beside an offset of the recording's own, where offsets differ, and as a share of the torque's."""
+        if self.rms_own_offset is None or self.relative is None:
+            return self.rms, self.relative
+        return self.rms_own_offset, self.relative * self.rms_own_offset / self.rms if self.rms else 0.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,18 +114,29 @@ class Estimate(Saved, told_by="estimate"):
 
     def errors(self, observations: Observations) -> tuple[JointError | None, ...]:
         """Return the error on recordings, joint by joint; None where no sample of a joint was used."""
-        return joint_errors(self.value, observations)
+        return joint_errors(self.value, observations, own_offsets=self.offsets is not None)
 
 
-def joint_errors(value: Array, observations: Observations) -> tuple[JointError | None, ...]:
-    """Return the error of parameters on recordings together, joint by joint; None where no sample of a joint was used."""
+def joint_errors(
+    value: Array, observations: Observations, *, own_offsets: bool = False
+) -> tuple[JointError | None, ...]:
+    """Return the error of parameters on recordings together, joint by joint; None where no sample of a joint was used.
+
+    Parameters
+    ----------
+    value : ndarray, shape (p,)
+    observations : Observations
+    own_offsets : bool, optional
+        Whether to say what is left beside an offset of each recording's own too.
+    """
     left, torque = observations.unfiltered_rms(value), observations.unfiltered_torque_rms
+    beside = rms_beside_own(value, observations).tolist() if own_offsets else [None] * len(observations.joints)
     found: list[JointError | None] = []
-    for rows, rms, whole in zip(observations.joints, left, torque, strict=True):
+    for rows, rms, whole, own in zip(observations.joints, left, torque, beside, strict=True):
         known = rows.samples > 0.0 and np.isfinite(rms)
         within = rows.rms(value)
         recorded = float(np.linalg.norm(rows.table[-1]) / np.sqrt(max(rows.samples, 1.0)))
-        error = JointError(within, _share(within, recorded), float(rms), _share(float(rms), float(whole)))
+        error = JointError(within, _share(within, recorded), float(rms), _share(float(rms), float(whole)), own)
         found.append(error if known else None)
     return tuple(found)
 

@@ -15,7 +15,7 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, merge, residual_noise, weighted
 from scara_ident.estimation.noise_bias import noise_bias
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_offsets import beside_offsets, offsets_on
+from scara_ident.estimation.run_offsets import beside_offsets, larger_offsets, offsets_on
 from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation
 from scara_ident.estimation.variation_between import run_variation
 from scara_ident.estimation.working_range import Told, told_directions
@@ -47,7 +47,7 @@ def ols(observations: Observations) -> Estimate:
     return least_squares(observations, equally, "ols")
 
 
-def wls(observations: Observations, noise: Array | None = None) -> Estimate:
+def wls(observations: Observations, noise: Array | None = None, least: RunVariation | None = None) -> Estimate:
     """Estimate by least squares with each joint's rows divided by its noise.
 
     Offsets that differ from run to run are noise too, see `scara_ident.estimation.run_offsets`.
@@ -58,6 +58,8 @@ def wls(observations: Observations, noise: Array | None = None) -> Estimate:
     noise : ndarray, shape (n,), optional
         Standard deviation of each joint's torque, from repetitions; by default each joint's residual within the band,
         in rounds: at first a bad joint spoils the good one's.
+    least : RunVariation, optional
+        Offsets that runs are taken to differ by at least.
 
     Returns
     -------
@@ -71,7 +73,7 @@ def wls(observations: Observations, noise: Array | None = None) -> Estimate:
         If there is nothing to estimate from, or a joint's noise is not a positive number.
     """
     if noise is None:
-        return least_squares(observations, by_noise, "wls")
+        return least_squares(observations, by_noise, "wls", least=least)
     joints = observations.model.robot.joints
     noise = np.asarray(noise)
     if noise.shape != (len(joints),):
@@ -79,7 +81,7 @@ def wls(observations: Observations, noise: Array | None = None) -> Estimate:
     for joint, sigma in zip(joints, noise, strict=True):
         if not 0.0 < sigma < np.inf:
             raise EstimationError(f"noise of joint {joint} is {sigma:g}; expected a positive number to weigh by")
-    return least_squares(observations, lambda _: 1.0 / noise, "wls")
+    return least_squares(observations, lambda _: 1.0 / noise, "wls", least=least)
 
 
 def equally(joints: Sequence[Information]) -> Array:
@@ -135,7 +137,13 @@ def _fit(observations: Observations, weigh: Weigh, method: str, prior: Informati
 
 
 @one_blas_thread()
-def least_squares(observations: Observations, weigh: Weigh, method: str, prior: Information | None = None) -> Estimate:
+def least_squares(
+    observations: Observations,
+    weigh: Weigh,
+    method: str,
+    prior: Information | None = None,
+    least: RunVariation | None = None,
+) -> Estimate:
     """Least squares with a weight per joint and, if given, rows of a prior.
 
     Parameters
@@ -144,6 +152,8 @@ def least_squares(observations: Observations, weigh: Weigh, method: str, prior: 
         Returns the weight of each joint's rows, shape (n,), from all of them.
     method : str
         As the estimate is called; of `wls` offsets of runs are noise.
+    least : RunVariation, optional
+        Offsets that runs are taken to differ by at least.
     """
     fit, rows = _fit(observations, weigh, method, prior), beside_offsets(observations, None)
     variation, spread = side_by_side(
@@ -153,16 +163,17 @@ def least_squares(observations: Observations, weigh: Weigh, method: str, prior: 
             lambda: block_covariance(fit.inverse, fit.value, observations.joints, observations.owner, fit.weights),
         ],
     )
-    if method == "wls" and variation.offsets:
+    if method == "wls" and (variation.offsets or least):
         for _ in range(ROUNDS):
-            rows = beside_offsets(observations, variation.offsets or rows.offsets)
+            rows = beside_offsets(observations, larger_offsets(variation.offsets or rows.offsets, least))
             fit = _fit(rows.fitted, weigh, method, prior)
             variation = _variation(observations, fit.value)
         spread = block_covariance(fit.inverse, fit.value, rows.influence.joints, observations.owner, fit.weights)
-    covariance = spread.matrix + variation.covariance(fit.inverse, rows.influence.joints, fit.weights)
+    differing = variation if least is None else larger_offsets(variation.offsets, least) or least
+    covariance = spread.matrix + differing.covariance(fit.inverse, rows.influence.joints, fit.weights)
     if len(observations.data.recordings) < LEAST_RUNS:
-        # What else two runs might differ by is not told, and nothing is said of it.
-        variation = RunVariation((None,) * len(observations.joints))
+        # What else two runs might differ by is not told.
+        variation = variation.offsets or RunVariation((None,) * len(observations.joints))
     bias = None
     if fit.told is not None:
         covariance += fit.told.prior

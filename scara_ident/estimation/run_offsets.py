@@ -15,7 +15,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_variation import OFFSET, RunVariation, offset_direction
+from scara_ident.estimation.run_variation import OFFSET, JointVariation, RunVariation, offset_direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +53,25 @@ def beside_offsets(observations: Observations, offsets: RunVariation | None) -> 
     return OffsetRows(replace(observations, joints=offsets.whitened_rows(observations.joints)), offsets)
 
 
+def larger_offsets(one: RunVariation | None, other: RunVariation | None) -> RunVariation | None:
+    """Return of each joint the offsets that lie further apart; None where there are none.
+
+    Parameters
+    ----------
+    one, other : RunVariation or None
+        Of the same rows.
+    """
+    if one is None or other is None:
+        return one or other
+    pairs = zip(one.joints, other.joints, strict=True)
+    joints = [max((item for item in pair if item is not None), key=_apart, default=None) for pair in pairs]
+    return RunVariation(tuple(joints))
+
+
+def _apart(item: JointVariation) -> float:
+    return float(item.std[OFFSET])
+
+
 def offsets_on(observations: Observations, offsets: RunVariation | None) -> RunVariation | None:
     """Return the same offsets on other rows of the same runs, as of another band; white noise of a row is the same there.
 
@@ -71,6 +90,32 @@ def offsets_on(observations: Observations, offsets: RunVariation | None) -> RunV
             directions[OFFSET] = offset_direction(observations.model, rows)
             joints[joint] = replace(item, directions=directions, bounds=rows.starts[firsts])
     return RunVariation(tuple(joints))
+
+
+def rms_beside_own(value: Array, observations: Observations) -> Array:
+    """Return the rms of each joint over recordings that have an offset of their own, within the band; NaN without rows.
+
+    Parameters
+    ----------
+    value : ndarray, shape (p,)
+    observations : Observations
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    firsts = np.searchsorted(observations.owner, np.arange(len(observations.data.recordings) + 1))
+    found = np.full(len(observations.joints), np.nan)
+    for joint, rows in enumerate(observations.joints):
+        bounds = rows.starts[firsts]
+        if rows.samples and bounds[-1] > bounds[0]:
+            left, constant = rows.left(value), offset_direction(observations.model, rows)
+            squares, along, size = (
+                np.diff(np.append(0.0, np.cumsum(item))[bounds]) for item in (left**2, left * constant, constant**2)
+            )
+            left_of_each = squares - np.divide(along**2, size, out=np.zeros(len(size)), where=size > 0.0)
+            found[joint] = np.sqrt(max(float(np.sum(left_of_each)), 0.0) / rows.samples)
+    return found
 
 
 def rms_of(value: Array, observations: Observations, offsets: RunVariation | None = None) -> tuple[float | None, ...]:

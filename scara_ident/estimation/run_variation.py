@@ -58,6 +58,8 @@ class JointVariation:
         Variance of what each run lies off by.
     memory : float
         How many times the variance of white noise the noise has along the offset: what a model lacks changes slowly.
+    assumed : bool
+        Whether they are no estimates of these runs but what any are taken to differ by.
     """
 
     directions: Array
@@ -67,6 +69,7 @@ class JointVariation:
     bounds: NDArray[np.intp]
     unsure: Array
     memory: float = 1.0
+    assumed: bool = False
 
     @property
     def off(self) -> Array:
@@ -225,7 +228,7 @@ class RunVariation:
                     each = np.array([np.sum(each[days == day], axis=0) for day in np.unique(days)])
                     means = [np.mean(item.of_run[days == day, kind]) for day in np.unique(days)]
                     std = float(np.std(means, ddof=1))
-                moved = widening(len(each)) * std * each
+                moved = (1.0 if item.assumed else widening(len(each))) * std * each
                 total += moved.T @ moved
         return total
 

@@ -10,15 +10,18 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
-from scara_ident.estimation import Estimate
+from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.estimate import paper_criteria
-from scara_ident.estimation.information import Information
+from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.own_offsets import without
+from scara_ident.estimation.run_offsets import rms_beside_own
 from scara_ident.identification.arguments import Recordings, model_of, recordings_of
 from scara_ident.identification.identify import check_bands, estimate_by
 from scara_ident.identification.usable import check_rows, usable_in_bands
 from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
+from scara_ident.model.offsets import OWN_LEAVE, offset_columns
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.progress import Tell, log_notes, silent
 from scara_ident.robot.robot import Robot
@@ -70,7 +73,8 @@ class Comparison(Saved, told_by="comparison"):
     expected : ndarray, shape (t, t, n)
         The same as the covariance of the parameters and the error of i's own parameters predict it: where the
         error is much larger, bias is at work and not noise. Infinite where k leaves open a parameter that the joint
-        depends on: nothing is known then of what noise explains.
+        depends on: nothing is known then of what noise explains. Where offsets of recordings make most of all errors, both
+        are beside an offset of each one's own.
     notes : tuple of str
     """
 
@@ -148,6 +152,9 @@ def compare(
             )
         )
     names, rows = list(each), [own.by_joint for own in each.values()]
+    if _offsets_differ(observations):
+        rows = [_beside_own_offsets(own) for own in each.values()]
+        notes = [*notes, "offsets differ from recording to recording: errors are beside an offset of each one's own"]
     summaries = []
     for k, (name, own) in enumerate(each.items()):
         progress(f"estimating from {name}", 0.5 + 0.4 * k / len(names))
@@ -167,6 +174,23 @@ def compare(
                 )
     log_notes(_LOG, (*notes, *useless))
     return Comparison(equation, method, data.bands, tuple(summaries), errors, expected, (*notes, *useless))
+
+
+def _offsets_differ(observations: Observations) -> bool:
+    """Whether offsets of recordings differ so that they make most of what parameters of all leave."""
+    found = wls(observations)
+    if found.offsets is None:
+        return False
+    left = np.array([rows.rms(found.value) if rows.samples else np.nan for rows in observations.joints])
+    shares = (rms_beside_own(found.value, observations) / left) ** 2
+    return bool(np.nanmean(shares) < OWN_LEAVE)
+
+
+def _beside_own_offsets(observations: Observations) -> tuple[Information, ...]:
+    """Return what rows of each joint say with an offset of every recording's own."""
+    each = [item.by_joint for item in observations.each]
+    pairs = zip(zip(*each, strict=True), offset_columns(observations.model), strict=True)
+    return tuple(merge([item if column is None else without(item, column) for item in runs]) for runs, column in pairs)
 
 
 def _with_enough(observations: Observations) -> tuple[dict[str, Observations], list[str]]:

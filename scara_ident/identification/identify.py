@@ -341,12 +341,11 @@ def not_told_from_zero(identification: Identification) -> list[str]:
 
 
 def worst_validation(identification: Identification) -> tuple[str, str, JointError] | None:
-    """Return the held-out recording and joint with the largest relative error within the band."""
-    worst: tuple[str, str, JointError] | None = None
-    for name, errors in identification.validation_errors().items():
-        for joint, error in zip(identification.model.robot.joints, errors, strict=True):
-            if error is None or error.relative is None:
-                continue
-            if worst is None or worst[2].relative is None or error.relative > worst[2].relative:
-                worst = (name, joint, error)
-    return worst
+    """Return the held-out recording and joint with the largest relative error within the band, beside offsets that differ."""
+    found = [
+        (error.beside_own_offset[1], name, joint, error)
+        for name, errors in identification.validation_errors().items()
+        for joint, error in zip(identification.model.robot.joints, errors, strict=True)
+        if error is not None and error.relative is not None
+    ]
+    return max(found, key=lambda item: item[0] or 0.0)[1:] if found else None

@@ -225,11 +225,15 @@ def _before_after(diagnosis: Diagnosis, old: Observations, new: Observations) ->
     if not old.data.recordings:
         return {"before": {}, "after": {}}
     result: dict[str, dict[str, float | None]] = {}
+    differ = diagnosis.after.offsets is not None
     for name, estimate, observations in (("before", diagnosis.before, old), ("after", diagnosis.after, new)):
-        pairs = list(zip(diagnosis.robot.joints, joint_errors(estimate.value, observations), strict=True))
+        errors = joint_errors(estimate.value, observations, own_offsets=differ)
+        pairs = list(zip(diagnosis.robot.joints, errors, strict=True))
         result[name] = {joint: error.rms if error else None for joint, error in pairs}
         result[f"{name}_relative"] = {joint: error.relative if error else None for joint, error in pairs}
         result[f"{name}_unfiltered"] = {joint: error.rms_unfiltered if error else None for joint, error in pairs}
+        if differ:
+            result[f"{name}_own_offset"] = {joint: error.rms_own_offset if error else None for joint, error in pairs}
     return result
 
 

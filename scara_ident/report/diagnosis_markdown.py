@@ -36,6 +36,10 @@ def diagnosis_markdown(
                 (joint, *(_cell(part[key][joint], key.endswith("relative")) for key in keys))
                 for joint in diagnosis.robot.joints
             ]
+            rows += [
+                (f"{joint}, own offsets", _cell(before), _cell(part["after_own_offset"][joint]), "", "")
+                for joint, before in part.get("before_own_offset", {}).items()
+            ]
             lines += _table(f"Error on the {kind} recordings", head, rows)
     if pictures:
         lines += ["", "## Residual before and after"]

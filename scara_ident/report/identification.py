@@ -106,9 +106,11 @@ def sentences(identification: Identification) -> tuple[str, ...]:
     worst = worst_validation(identification)
     if worst is not None:
         recording, joint, error = worst
+        rms, share = error.beside_own_offset
+        beside = "" if error.rms_own_offset is None else " beside an offset of its own"
+        unit = robot.torque_unit(robot.joints.index(joint))
         found.append(
-            f"It generalises worst to {recording}, {joint}: {error.rms:.3g} "
-            f"{robot.torque_unit(robot.joints.index(joint))} rms, {error.relative:.1%} of the torque."
+            f"It generalises worst to {recording}, {joint}: {rms:.3g} {unit} rms{beside}, {share:.1%} of the torque."
         )
     else:
         found.append("Nothing was held out: give --validate recordings to learn how well it predicts.")

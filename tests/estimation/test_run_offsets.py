@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.estimation import ols, wls
+from scara_ident.estimation import Estimate, ols, wls
 from scara_ident.estimation.least_squares import told_value_and_weights
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.estimation.run_offsets import beside_offsets, offsets_on
+from scara_ident.estimation.run_offsets import beside_offsets, larger_offsets, offsets_on, rms_beside_own
 from scara_ident.model.model import build_model
 from scara_ident.model.urdf_values import urdf_values
 from scara_ident.motion.prepared import prepare
@@ -110,3 +110,43 @@ def test_offsets_of_one_band_are_those_of_another(robot: Robot):
         np.testing.assert_allclose(one.std[2] / one.noise, other.std[2] / other.noise, rtol=0.2)
     value = [wls(narrow).value, told_value_and_weights(narrow, there)[0]]
     assert np.linalg.norm((value[1] - value[0]) / wls(narrow).std) < 0.1
+
+
+def test_errors_beside_own_offsets_are_those_of_runs_without(robot: Robot):
+    """Of a sensor zeroed before each run the error on what is held out was its zero, ten times the noise."""
+    shifted, same = observed(robot, 0.5), observed(robot, 0.0)
+    found, steady = wls(shifted), wls(same)
+    for item, other in zip(shifted.each, same.each, strict=True):
+        for joint, (error, usual) in enumerate(zip(found.errors(item), steady.errors(other), strict=True)):
+            assert error is not None and usual is not None
+            assert error.rms_own_offset == pytest.approx(usual.rms, rel=0.05)
+            assert usual.rms_own_offset is None
+            assert error.relative is not None
+            share = error.relative * error.rms_own_offset / error.rms
+            assert error.beside_own_offset == (error.rms_own_offset, pytest.approx(share))
+            # By its definition, with the offset as an unknown.
+            rows = item.joints[joint]
+            left, constant = (
+                rows.left(found.value),
+                rows.table[list(found.model.active[joint]).index(_offset(found, joint))],
+            )
+            rest = left - constant * np.linalg.lstsq(constant[:, None], left, rcond=None)[0]
+            assert error.rms_own_offset == pytest.approx(np.sqrt(rest @ rest / rows.samples), rel=1e-9)
+    together = rms_beside_own(found.value, shifted)
+    for joint, rows in enumerate(shifted.joints):
+        each = [rms_beside_own(found.value, item)[joint] ** 2 * item.joints[joint].samples for item in shifted.each]
+        assert together[joint] ** 2 * rows.samples == pytest.approx(sum(each), rel=1e-9)
+
+
+def _offset(found: Estimate, joint: int) -> int:
+    return list(found.model.names).index(f"p_o{joint + 1}")
+
+
+def test_the_larger_offsets_are_taken_joint_by_joint(robot: Robot):
+    small, large = (wls(observed(robot, offset)).offsets for offset in (0.1, 0.5))
+    assert small is not None and large is not None
+    mixed = replace(large, joints=(large.joints[0], None))
+    found = larger_offsets(small, mixed)
+    assert found is not None and found.joints == (large.joints[0], small.joints[1])
+    assert larger_offsets(None, large) is large and larger_offsets(small, None) is small
+    assert larger_offsets(None, None) is None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,20 @@ def test_repeatability_is_the_noise_and_names_are_kept(clean):
         assert np.all(summary.peak_velocity > 0.5)
         assert np.isfinite(summary.log_det)
         assert summary.condition > 1.0
+
+
+def test_sensors_zeroed_before_each_run_are_no_bias(clean):
+    """`Bias, not noise, is at work`: 6 times what the covariance promises, on runs that differed in their zeros alone."""
+    rng = np.random.default_rng(7)
+    runs = [
+        replace(run, effort=run.effort + 20.0 * np.array(NOISE)[:, None] * rng.standard_normal((2, 1)))
+        for run in exact_runs(3)
+    ]
+    found = compare(ROBOT, runs, bands=BANDS)
+    assert "an offset of each one's own" in " ".join(found.notes)
+    assert not any("an offset of each" in note for note in clean.notes)
+    np.testing.assert_allclose(found.errors, clean.errors, rtol=0.1)
+    assert np.all(found.errors / found.expected < 1.5)
 
 
 def test_one_trajectory_is_not_a_comparison():

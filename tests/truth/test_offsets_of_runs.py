@@ -96,6 +96,26 @@ def test_a_payload_in_some_runs_is_found_beside_offsets_of_all(tmp_path: Path):
     assert abs(first.value - 0.15) < 3.0 * first.std < 0.03
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.5])
+def test_of_two_runs_with_one_loaded_the_mass_takes_up_no_offset(tmp_path: Path, offset: float):
+    """It was -0.06 to 1.73 +- 0.01 of 0.5 kg beside offsets: both of them equal and the mass what that leaves."""
+    robot, loaded = (load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R)) for _ in range(2))
+    body = pin.Inertia(0.5, np.array([0.3, 0.0, 0.0]), 0.002 * np.eye(3))
+    loaded.model.inertias[2] = loaded.model.inertias[2] + body
+    families, off = effects_named("payload_change", "spring", "base_tilt"), []
+    for seed in range(6):
+        rng, runs = np.random.default_rng(seed), []
+        for k, arm in enumerate((robot, loaded)):
+            run = noisy(swing(arm, f"m{k}_1", k, 10.0, 200.0), rng, 0.05)
+            runs.append(replace(run, effort=run.effort + offset * rng.standard_normal((2, 1))))
+        (payload,) = diagnose(robot, runs, model="basic", bands=(8.0, 8.0), catalogue=families).effects
+        mass, first = payload.parameters["mass"], payload.parameters["mx"]
+        assert mass.std < 0.1 and first.std < 0.01
+        off += [(mass.value - 0.5) / mass.std, (first.value - 0.15) / first.std]
+    assert np.max(np.abs(off)) < 3.5
+    assert 0.3 < np.sqrt(np.mean(np.square(off))) < 1.5
+
+
 def test_an_offset_held_out_is_no_error_of_the_model(tmp_path: Path):
     """`undecided`: "the error on the recordings held out is 3 times that of the training", all of it an offset as six runs may have."""
     robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))

@@ -30,12 +30,14 @@ def gain_blocks(content: Mapping[str, Any], robot: Robot) -> list[Block]:
     rows: list[list[Cell | str]] = []
     for kind, words in RECORDINGS:
         part = content[kind]
-        for j, joint in enumerate(robot.joints) if part["before"] else ():
-            values = [part[when][joint] for when in times]
-            left = [_left(*values)] if len(times) > 1 else []
-            shares = [share_words(part[f"{when}_relative"][joint]) for when in times]
-            floor = number(content["noise_floor"].get(joint))
-            rows.append([words, name(joint), *map(number, values), *left, *shares, floor, robot.torque_unit(j)])
+        for own in ("", "_own_offset"):
+            for j, joint in enumerate(robot.joints) if part.get(f"before{own}") else ():
+                values = [part[f"{when}{own}"][joint] for when in times]
+                left = [_left(*values)] if len(times) > 1 else []
+                shares = ["" if own else share_words(part[f"{when}_relative"][joint]) for when in times]
+                cells: list[Cell | str] = [*map(number, values), *left, *shares]
+                cells.append(number(content["noise_floor"].get(joint)))
+                rows.append([f"{words}, own offsets" if own else words, name(joint), *cells, robot.torque_unit(j)])
     found = ["before", "after", "what is left", "before, of torque", "after, of torque"]
     head = ["recordings", "joint", *(found if len(times) > 1 else ["error", "of torque"]), "noise floor", "unit"]
     numeric = [k for k in range(2, len(head) - 1) if head[k] != "what is left"]
@@ -50,6 +52,8 @@ def gain_blocks(content: Mapping[str, Any], robot: Robot) -> list[Block]:
         for when in times
     ]
     said = "Rms residual within the band. Held-out recordings took no part in any choice; the noise floor is what does not repeat."
+    if any("after_own_offset" in content[kind] for kind, _ in RECORDINGS):
+        said += " Offsets of the torques differ from recording to recording: own offsets is what is left beside one of each's own."
     return [
         Paragraph(said if len(times) > 1 else f"{said} Nothing came into the model: before and after are the same."),
         Table(head, rows, numeric),

@@ -139,4 +139,5 @@ def _error_cell(error: JointError | None, recording: int, j: int, most: float) -
     choose = ("torque-group", (recording, j))
     if error.relative is None:
         return Cell(number(error.rms), "num", choose=choose)
-    return Cell(number(error.rms), strength=error.relative / most, note=f"{error.relative:.1%}", choose=choose)
+    beside = "" if error.rms_own_offset is None else f", {number(error.rms_own_offset)} with its own offset"
+    return Cell(number(error.rms), strength=error.relative / most, note=f"{error.relative:.1%}{beside}", choose=choose)

@@ -63,6 +63,9 @@ def tables(held: dict[str, Any], *, all_candidates: bool = False) -> list[Table]
     for kind in ("training", "validation"):
         for joint, before in held[kind]["before"].items():
             errors.add_row(kind, joint, _number(before), _number(held[kind]["after"][joint]))
+        for joint, before in held[kind].get("before_own_offset", {}).items():
+            after = held[kind]["after_own_offset"][joint]
+            errors.add_row(f"{kind}, own offsets", joint, _number(before), _number(after))
     rows = table("candidates", "candidate", "gain", "p", "why", right=("gain", "p"))
     tried = held["candidates"]
     # One that chance explains says nothing that the others do not.

@@ -48,15 +48,17 @@ def tables(identification: Identification) -> list[Table]:
     ):
         if not errors:
             continue
-        numbers = ("rms", "of torque", "unfiltered")
+        own_offsets = any(error and error.rms_own_offset is not None for own in errors.values() for error in own)
+        numbers = ("rms", "of torque", "unfiltered", *(["own offset"] if own_offsets else []))
         rows = table(f"rms error within the band, recordings {kind}", "recording", "joint", *numbers, right=numbers)
         for name, own in errors.items():
             for joint, error in zip(joints, own, strict=True):
                 if error is None:
-                    rows.add_row(name, joint, "-", "at rest", "-")
+                    rows.add_row(name, joint, "-", "at rest", *["-"] * (len(numbers) - 2))
                     continue
                 share = "-" if error.relative is None else f"{error.relative:.1%}"
-                rows.add_row(name, joint, f"{error.rms:.3g}", share, f"{error.rms_unfiltered:.3g}")
+                beside = [] if error.rms_own_offset is None else [f"{error.rms_own_offset:.3g}"]
+                rows.add_row(name, joint, f"{error.rms:.3g}", share, f"{error.rms_unfiltered:.3g}", *beside)
         found.append(rows)
     return found
 

@@ -57,6 +57,18 @@ def test_what_is_left_is_after_over_before_and_without_effects_there_is_one_erro
     assert len(folded.inside.head) == len(folded.inside.rows[0])
 
 
+def test_beside_offsets_that_differ_errors_are_told_without_them_too():
+    """What an effect leaves could not be seen beside the offsets: 99 % of it."""
+    content = errors(["spring"])
+    content["training"]["before_own_offset"] = {"joint1": 0.01, "joint2": 0.01}
+    content["training"]["after_own_offset"] = {"joint1": 0.001, "joint2": 0.01}
+    said, table, _ = gain_blocks(content, ROBOT)
+    texts = [[cell.text if isinstance(cell, Cell) else cell for cell in row] for row in table.rows]
+    assert texts[2] == ["training, own offsets", "joint1", "0.0100", "0.00100", "10%", "", "", "0.00400", "N m"]
+    assert "own offsets" in said.text
+    assert all(len(row) == len(table.head) for row in table.rows)
+
+
 def row(name: str, gain: float, decision: str = "rejected") -> dict[str, Any]:
     return {"label": name, "why": f"why {name}", "gain": gain, "p_value": 0.2, "helps_in": (1, 3), "decision": decision}
 
