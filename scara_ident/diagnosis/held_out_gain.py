@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
+from scara_ident.diagnosis.correction import Correction
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.search import Search
@@ -20,6 +20,7 @@ from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.least_squares import told_value_and_weights
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_offsets import offsets_on
+from scara_ident.recording.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -99,11 +100,13 @@ def held_out_gains(
     gains = {}
     for label, own, others, beside in _each_left_out(found, after, held_out, uncorrected, quiet):
         without = _squares(others, after.weights)
-        removed, left = float(np.sum(without - whole)), float(np.sum(whole if own is None else whole[own]))
-        place = int(np.argmax(np.abs(without - whole)))
+        # What all else becomes without it may change other joints by what the training leaves unsure there.
+        joint = slice(None) if own is None else own
+        removed, left = float(np.sum((without - whole)[joint])), float(np.sum(whole[joint]))
+        place = int(np.argmax(np.abs(without - whole))) if own is None else own
         count = max(1.0, float(np.sum(held_out.joints[place].counts)))
         before, now = (float(np.sqrt(np.sum(each[place] ** 2) / count)) for each in (others, errors))
-        size, std = _shown(held_out, others, beside, after)
+        size, std = _shown(held_out, others, beside, after, own)
         share = removed / (max(removed, 0.0) + left) if left > 0.0 or removed > 0.0 else 0.0
         gains[label] = HeldOutGain(share, size, std, joints[place], before, now)
     return gains
@@ -151,19 +154,34 @@ def _each_left_out(
         if any(np.any(rows.table[:-1][np.isin(rows.columns, columns)]) for rows in held_out.joints):
             value, _ = told_value_and_weights(observed(found.step.without(place)), after.offsets)
             value = np.insert(value, np.full(len(columns), columns[0]), 0.0)
-            yield candidate.label(scene), candidate.member.joint, _errors(held_out.joints, value), errors
+            own = None if candidate.effect.all_joints else candidate.member.joint
+            yield candidate.label(scene), own, _errors(held_out.joints, value), errors
     if found.correction is not None:
         step = replace(found.step, columns=found.step.columns.beside(found.uncorrected))
         value, _ = told_value_and_weights(observed(step), after.offsets)
         candidate = found.correction.candidate
         joints = held_out.with_torque(uncorrected.data).faded(quiet).joints
         # Both of the recordings as they are: what correcting makes of their noise would count as half of the effect.
-        here = replace(scene, value=after.value[: uncorrected.parameters], columns=columns_at_hand(uncorrected))
-        (made,) = CandidateColumns(uncorrected).rows(here, [candidate])
         beside = _errors(joints, after.value)
-        for j, rows in made.items():
-            beside[j] = beside[j] - np.repeat(quiet, np.diff(joints[j].starts)) * (found.correction.value @ rows)
+        for j, change in enumerate(_put_in(held_out, found.correction, after.value)):
+            beside[j] = beside[j] - np.repeat(quiet, np.diff(joints[j].starts)) * change
         yield candidate.label(scene), candidate.member.joint, _errors(joints, value), beside
+
+
+def _put_in(observations: Observations, correction: Correction, value: Array) -> list[Array]:
+    """Return on the rows of each joint what the effect that was taken out of the recordings makes of the torque predicted."""
+    effect, member = correction.candidate.effect, correction.candidate.member
+    predicted, parts = iter(observations.predicted(value)), []
+    for item in observations.data.recordings:
+        for part in item.stretches:
+            torque = next(predicted)
+            one = Recording(item.name, item.name, 1, item.recording.joints, part.motion.time, part.motion.q, torque)
+            moved = effect.corrected(one, member, -correction.value).effort
+            parts.append((part, np.zeros_like(torque) if moved is None else moved - torque))
+    return [
+        np.concatenate([part.rows(j, change[j : j + 1])[0] for part, change in parts if part.usable])
+        for j in range(len(observations.joints))
+    ]
 
 
 def _errors(joints: Sequence[JointRows], value: Array) -> list[Array]:
@@ -177,9 +195,9 @@ def _squares(errors: Sequence[Array], weights: Array) -> Array:
 
 
 def _shown(
-    held_out: Observations, without: Sequence[Array], whole: Sequence[Array], after: Estimate
+    held_out: Observations, without: Sequence[Array], whole: Sequence[Array], after: Estimate, own: int | None
 ) -> tuple[float, float]:
-    """Return how much of the change that an effect makes is seen, and its standard deviation.
+    """Return how much of the change that an effect makes on its own joint, or on all, is seen, and its standard deviation.
 
     By moments of motions; by what the training leaves unsure of the parameters, for motions that are faster than it tell how
     far those go wrong there, not whether the effect is; and by what runs were seen to differ by, their offsets weighed as such.
@@ -189,6 +207,9 @@ def _shown(
     changes: list[Array] = []
     offsets = offsets_on(held_out, after.offsets)
     for joint, (rows, before, now, weight) in enumerate(zip(joints, without, whole, after.weights, strict=True)):
+        if own not in (None, joint):
+            changes.append(np.zeros(len(before)))
+            continue
         both, signals = np.array([before, before - now]), rows.table[:-1]
         if offsets is not None:
             # A run's offset says nothing of it, and is noise here as it is to the fit.

@@ -69,7 +69,7 @@ def validated(outcome: Outcome, data: PreparedData) -> Validation:
     after = _with_effects(found, held, before)
     unsure = unsure_of_others(model, after)
     apart = np.zeros(robot.n)
-    if model.variation is not None:
+    if model.variation:
         # Of few runs how far they lie apart is known badly.
         apart = widening(len(outcome.training.each)) * of_another_run(model.variation, after, value)
     known = [robot.by_joint(each) for each in (unsure, apart)]

@@ -12,7 +12,8 @@ from scara_ident.effects.friction import PositionDependentFriction
 from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
-from tests.diagnosis.made import BANDS
+from scara_ident.simulation import simulate, virtual_arm
+from tests.diagnosis.made import BANDS, NOISE, multisine
 from tests.diagnosis.test_held_out_gain import UNEVEN, runs
 
 
@@ -71,3 +72,23 @@ def test_the_base_model_is_predicted_beside_it():
     assert after[0] is not None
     assert after[0] < 0.9 * before[0]
     assert np.array_equal(result.validation_before.owner, result.validation_after.owner)
+
+
+def test_of_one_recording_runs_are_not_known_to_differ():
+    """`complete` with 9 times the error on what was held out, "as runs were found to differ": one run, and no number to compare with."""
+    arm = replace(virtual_arm(), torque_noise=np.array(NOISE))
+    fitted, other = (
+        simulate(arm, multisine(f"m{seed}", seed, 30.0, 0.8), seed=seed, rate=250.0).recording for seed in (2, 7)
+    )
+    assert other.effort is not None
+    held_out = [replace(other, effort=1.1 * other.effort)]
+    result = diagnose(
+        load_robot(),
+        [fitted],
+        model="basic",
+        validation=held_out,
+        bands=BANDS,
+        catalogue=(PositionDependentFriction(),),
+    )
+    assert all("times that of the training" in item.why for item in result.evidence)
+    assert result.verdict == "undecided"
