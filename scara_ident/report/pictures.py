@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.processes import all_beside
-from scara_ident.report.drawing import draw
+from scara_ident.processes import map_in_order
+from scara_ident.report.drawing import draw, drawn
 from scara_ident.report.html.diagnosis import DiagnosisContext
 from scara_ident.report.html.identification import IdentificationContext
 from scara_ident.report.html.moving_arm import ROUNDING
@@ -70,38 +69,30 @@ def torque_figures(
     return "Measured and predicted torque", rows
 
 
-def diagnosis_pictures(
-    folder: Path, context: DiagnosisContext, *others: Callable[[], None]
-) -> tuple[tuple[str, str], ...]:
-    """Draw every effect found, and what no effect accounts for.
+@dataclass(frozen=True)
+class Picture:
+    """A picture beside a report: its title, the name of its file, and what that holds."""
+
+    title: str
+    name: str
+    content: bytes
+
+
+def diagnosis_pictures(context: DiagnosisContext) -> tuple[Picture, ...]:
+    """Draw every effect found, and what no effect accounts for, as PNG files.
 
     Parameters
     ----------
-    folder : Path
-        Where the PNG files are written.
     context : DiagnosisContext
-    *others : callable
-        What else is done meanwhile in other processes, such as to draw the page.
-
-    Returns
-    -------
-    tuple of (str, str)
-        Title and file name of each.
-
-    Raises
-    ------
-    ScaraIdentError
-        If a file cannot be written.
     """
     parts = effect_figures(context)
-    found = tuple((title, name) for title, name, _ in parts)
-    if len(found) > 1:
+    if len(parts) > 1:
         # Loaded once, for all processes.
         import_module("matplotlib.figure")
 
     # Matplotlib holds the interpreter's lock, so that threads would not help.
-    all_beside([*(partial(draw, folder / name, title, figures) for title, name, figures in parts), *others])
-    return found
+    contents = map_in_order(lambda part: drawn(part[0], part[2]), parts)
+    return tuple(Picture(title, name, content) for (title, name, _), content in zip(parts, contents, strict=True))
 
 
 def effect_figures(context: DiagnosisContext) -> list[tuple[str, str, list[Sequence[Figure]]]]:
