@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.processes import map_in_order
 from scara_ident.report.drawing import draw, drawn
 from scara_ident.report.html.diagnosis import DiagnosisContext
 from scara_ident.report.html.identification import IdentificationContext
@@ -85,14 +83,7 @@ def diagnosis_pictures(context: DiagnosisContext) -> tuple[Picture, ...]:
     ----------
     context : DiagnosisContext
     """
-    parts = effect_figures(context)
-    if len(parts) > 1:
-        # Loaded once, for all processes.
-        import_module("matplotlib.figure")
-
-    # Matplotlib holds the interpreter's lock, so that threads would not help.
-    contents = map_in_order(lambda part: drawn(part[0], part[2]), parts)
-    return tuple(Picture(title, name, content) for (title, name, _), content in zip(parts, contents, strict=True))
+    return tuple(Picture(title, name, drawn(title, rows)) for title, name, rows in effect_figures(context))
 
 
 def effect_figures(context: DiagnosisContext) -> list[tuple[str, str, list[Sequence[Figure]]]]:
