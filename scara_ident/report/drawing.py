@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -76,6 +77,13 @@ def draw(path: Path, title: str, rows: Sequence[Sequence[Figure]]) -> None:
             raise ScaraIdentError(f"{path}: cannot be written: {' '.join(str(error).split())}") from None
 
     write_whole(path, write)
+
+
+def drawn(title: str, rows: Sequence[Sequence[Figure]]) -> bytes:
+    """Return what `draw` writes into a PNG file."""
+    content = BytesIO()
+    canvas(title, rows).savefig(content, dpi=DPI, format="png")
+    return content.getvalue()
 
 
 def canvas(title: str, rows: Sequence[Sequence[Figure]], *, least_width: float = LEAST_WIDTH) -> Canvas:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
-from importlib import import_module
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.processes import all_beside
-from scara_ident.report.drawing import draw
+from scara_ident.report.drawing import draw, drawn
 from scara_ident.report.html.diagnosis import DiagnosisContext
 from scara_ident.report.html.identification import IdentificationContext
 from scara_ident.report.html.moving_arm import ROUNDING
@@ -44,6 +41,7 @@ def torque_picture(path: Path, context: IdentificationContext) -> None:
     ----------
     path : Path
         PNG file.
+    context : IdentificationContext
 
     Raises
     ------
@@ -69,37 +67,23 @@ def torque_figures(
     return "Measured and predicted torque", rows
 
 
-def diagnosis_pictures(
-    folder: Path, context: DiagnosisContext, *others: Callable[[], None]
-) -> tuple[tuple[str, str], ...]:
-    """Draw every effect found, and what no effect accounts for.
+@dataclass(frozen=True)
+class Picture:
+    """A picture beside a report: its title, the name of its file, and what that holds."""
+
+    title: str
+    name: str
+    content: bytes
+
+
+def diagnosis_pictures(context: DiagnosisContext) -> tuple[Picture, ...]:
+    """Draw every effect found, and what no effect accounts for, as PNG files.
 
     Parameters
     ----------
-    folder : Path
-        Where the PNG files are written.
-    *others : callable
-        What else is done meanwhile in other processes, such as to draw the page.
-
-    Returns
-    -------
-    tuple of (str, str)
-        Title and file name of each.
-
-    Raises
-    ------
-    ScaraIdentError
-        If a file cannot be written.
+    context : DiagnosisContext
     """
-    parts = effect_figures(context)
-    found = tuple((title, name) for title, name, _ in parts)
-    if len(found) > 1:
-        # Loaded once, for all processes.
-        import_module("matplotlib.figure")
-
-    # Matplotlib holds the interpreter's lock, so that threads would not help.
-    all_beside([*(partial(draw, folder / name, title, figures) for title, name, figures in parts), *others])
-    return found
+    return tuple(Picture(title, name, drawn(title, rows)) for title, name, rows in effect_figures(context))
 
 
 def effect_figures(context: DiagnosisContext) -> list[tuple[str, str, list[Sequence[Figure]]]]:
@@ -122,6 +106,7 @@ def remove_stale(folder: Path, written: Sequence[str]) -> None:
 
     Parameters
     ----------
+    folder : Path
     written : sequence of str
         Names of this diagnosis' pictures.
     """
@@ -141,6 +126,7 @@ def design_picture(path: Path, design: Design) -> None:
     ----------
     path : Path
         PNG, SVG or PDF file.
+    design : Design
 
     Raises
     ------
@@ -202,6 +188,7 @@ def path_views(paths: Sequence[Array], tool: str) -> list[Figure]:
     ----------
     paths : sequence of ndarray, shape (3, N)
         m.
+    tool : str
     """
     reach = np.ptp(np.concatenate(paths, axis=1), axis=1)
     side = 0 if reach[0] >= reach[1] else 1

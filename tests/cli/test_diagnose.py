@@ -105,3 +105,17 @@ def test_joints_that_hardly_move_leave_the_one_that_does_its_diagnosis(command, 
     run = shared_path("data", "ur10e", "jointwise_1.parquet")
     result = command("diagnose", run, "--robot", arm, "--output", tmp_path / "out")
     assert result.status == 0 and "DLASCL" not in result.out
+
+
+def test_no_process_is_begun_for_pictures_where_there_is_nothing_to_draw(
+    command, folder: Path, tmp_path: Path, monkeypatch
+):
+    from scara_ident.report import pictures
+
+    monkeypatch.setattr(pictures, "diagnosis_pictures", None)
+    run, out = folder / "OJD_1.parquet", tmp_path / "out"
+    # No family is tried that the run, which has no effect, could be mistaken for.
+    assert command("diagnose", run, "--effects", "spring", "--output", out).status == 0
+    content = json.loads((out / "diagnosis.json").read_text())
+    assert not content["effects"] and content["unexplained"] is None
+    assert {path.name for path in out.iterdir()} == {"diagnosis.json", "diagnosis.md", "report.html"}

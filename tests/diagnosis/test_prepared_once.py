@@ -73,7 +73,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         patch.setattr(noise_module, "_drawn", lambda *given: drawn.append(draw(*given)) or drawn[-1])
         found = diagnose(load_robot(), runs, validation=[held_out])
         context = DiagnosisContext(found)
-        diagnosis_pictures(folder, context)
+        diagnosis_pictures(context)
         diagnosis_report(folder / "report.html", context)
     return counts, found, {states(part.motion) for data in drawn for part in data.stretches}
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import ScaraIdentError
-from scara_ident.report.drawing import draw
+from scara_ident.report.drawing import draw, drawn
 from scara_ident.report.plot import Figure, Grid, Level, Line, Matrix, Panel, Plot, single
 from tests.report.pixels import share
 
@@ -38,13 +38,13 @@ def test_what_is_not_to_be_fitted_does_not_widen_the_axis(tmp_path: Path):
 
 
 def test_a_matrix_has_the_colour_of_its_signs(tmp_path: Path):
-    def drawn(values: list[list[float]]) -> tuple[float, float]:
+    def colours(values: list[list[float]]) -> tuple[float, float]:
         matrix = single("m", "", "", Matrix(["a"], ["b", "c"], np.array(values)))
         draw(tmp_path / "m.png", "", [[matrix]])
         return share(tmp_path / "m.png", "blue"), share(tmp_path / "m.png", "vermillion")
 
-    bar = drawn([[0.0, 0.0]])
-    both, up = drawn([[1.0, -1.0]]), drawn([[1.0, 1.0]])
+    bar = colours([[0.0, 0.0]])
+    both, up = colours([[1.0, -1.0]]), colours([[1.0, 1.0]])
     assert up[0] > both[0] > bar[0]
     assert both[1] > up[1]
 
@@ -72,3 +72,9 @@ def test_equal_scales_are_drawn_without_a_word(tmp_path: Path, caplog: pytest.Lo
     wide = Plot("x [m]", (Panel("y [m]", (Line([0.0, 9.0], [0.0, 1.0], "blue"),), limits=(-1.0, 1.0)),), equal=True)
     draw(tmp_path / "equal.png", "", [[single("name", "title", "", wide)]])
     assert caplog.text == ""
+
+
+def test_a_picture_in_the_hand_is_that_of_its_file(tmp_path: Path):
+    figure = line(Line(np.linspace(0.0, 1.0, 50), np.linspace(-1.0, 1.0, 50), "blue"))
+    draw(tmp_path / "a.png", "title", [[figure]])
+    assert drawn("title", [[figure]]) == (tmp_path / "a.png").read_bytes()

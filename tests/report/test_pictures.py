@@ -44,22 +44,22 @@ def with_remainder():
 
 def test_an_effect_is_drawn_before_and_after_and_stands_in_the_story(with_spring, tmp_path):
     _, found = with_spring
-    pictures = diagnosis_pictures(tmp_path, DiagnosisContext(found))
-    assert pictures == (("spring on joint2", "effect_1.png"),)
-    assert [path.name for path in tmp_path.iterdir()] == ["effect_1.png"]
+    (picture,) = diagnosis_pictures(DiagnosisContext(found))
+    assert (picture.title, picture.name) == ("spring on joint2", "effect_1.png")
+    (tmp_path / picture.name).write_bytes(picture.content)
     # Before, after, and what is measured of the effect; a stroke of the legend alone has not half as many pixels.
     for color in ("vermillion", "blue", "green"):
         assert share(tmp_path / "effect_1.png", color) > 2e-4
-    text = diagnosis_markdown(found, pictures)
+    text = diagnosis_markdown(found, [(picture.title, picture.name)])
     assert "![spring on joint2](effect_1.png)" in text
     assert "png" not in diagnosis_markdown(found)
 
 
 def test_a_remainder_is_drawn_over_what_it_depends_on(with_remainder, tmp_path):
     _, found = with_remainder
-    assert diagnosis_pictures(tmp_path, DiagnosisContext(found)) == (
-        ("what no effect accounts for on joint2", "unexplained.png"),
-    )
+    (picture,) = diagnosis_pictures(DiagnosisContext(found))
+    assert (picture.title, picture.name) == ("what no effect accounts for on joint2", "unexplained.png")
+    (tmp_path / picture.name).write_bytes(picture.content)
     assert share(tmp_path / "unexplained.png", "vermillion") > 2e-4
     diagnosis_report(tmp_path / "report.html", DiagnosisContext(found))
     assert 'data-figure="remainder-0"' in (tmp_path / "report.html").read_text(encoding="utf-8")

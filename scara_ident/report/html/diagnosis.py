@@ -71,12 +71,14 @@ class DiagnosisContext(FittedContext):
 
     @one_blas_thread()
     def make_ready(self) -> None:
-        """Make what takes long and waits for nothing: what pictures are of, and what to do next."""
-        _ = self.chapters, self.groups, next_steps(self.diagnosis)
+        """Make what pictures and page are of, before both are drawn side by side."""
+        _ = self.chapters, self.groups
 
     @cached_property
     def content(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
+        # What to do next takes long: what the effects cost is waited for after it.
+        _ = next_steps(self.diagnosis)
         return diagnosis_dict(self.diagnosis, self.worth)
 
     @cached_property

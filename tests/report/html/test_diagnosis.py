@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from scara_ident.report.diagnosis import diagnosis_dict
-from scara_ident.report.html.diagnosis import _verdict
+from scara_ident.report.html import diagnosis as page_module
+from scara_ident.report.html.diagnosis import DiagnosisContext, _verdict
 from tests.report.html.document import data_of, document
 
 
@@ -65,3 +66,14 @@ def test_a_joints_name_stays_whole_in_the_verdict(diagnosis):
     effect = replace(diagnosis.effects[0], effect="torque_ripple", joint="shoulder_pan_joint")
     first, *_ = _verdict(replace(diagnosis, effects=(effect,)), ())
     assert "torque ripple on shoulder_pan_joint" in first
+
+
+def test_what_is_made_elsewhere_is_waited_for_after_what_to_do_next(diagnosis, monkeypatch):
+    order: list[str] = []
+    original = page_module.next_steps
+    monkeypatch.setattr(page_module, "next_steps", lambda found: (order.append("next"), original(found))[1])
+    context = DiagnosisContext(diagnosis, lambda: order.append("worth"))
+    context.make_ready()
+    assert order == []
+    assert context.content["next"] and context.content["worth"] is None
+    assert order == ["next", "worth"]
