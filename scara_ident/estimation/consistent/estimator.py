@@ -141,7 +141,9 @@ def _estimate(
     u = problem.unknowns
     value = u.parameters(x)
     free, labels = _free_directions(u, found.point)
-    inverse = _inverse_along(information, free, u.sizes(value))
+    sizes = u.sizes(value)
+    along = _half_along(information, free, sizes)
+    inverse = along @ along.T
     spread = block_covariance(inverse, value, influence.joints, observations.owner, weights)
     undetermined = information.solve().undetermined
     variation = run_variation(observations, observations.joints, value)
@@ -153,13 +155,11 @@ def _estimate(
             plain.information.regressor_factor.T @ (plain.information.regressor_factor @ plain.noise_bias)
         )
         covariance += np.outer(bias, bias)
-    # What constraints leave a parameter less than that of is rounding: they hold it. Where it is held is as sure as the data
-    # alone make it: had they been others, the constraint would not have held it, or elsewhere.
-    alone = _inverse_along(information, np.eye(len(value)), u.sizes(value))
-    held = np.diag(inverse) < DIGITS**2 * np.diag(alone)
-    covariance[held] = covariance[:, held] = 0.0
-    variance = np.where(held & np.isfinite(np.diag(plain.covariance)), np.diag(plain.covariance), np.diag(covariance))
-    covariance[np.diag_indices_from(covariance)] = np.where(undetermined, np.inf, variance)
+    held = _half_along(information, np.eye(len(value)), sizes).shape[1] - along.shape[1]
+    if held > 0:
+        apart = float(np.sum((information.regressor_factor @ (value - plain.value)) ** 2)) / held
+        covariance = _beyond_constraints(covariance, plain.covariance, apart)
+    covariance[np.diag_indices_from(covariance)] = np.where(undetermined, np.inf, np.diag(covariance))
     return ConsistentEstimate(
         model=observations.model,
         method="consistent",
@@ -234,19 +234,45 @@ def _free_directions(u: Unknowns, point: Point | None) -> tuple[Array, tuple[str
     return u.to_parameters @ free, labels
 
 
-def _inverse_along(information: Information, directions: Array, size: Array) -> Array:
-    """Inverse of ``W.T @ W`` on the determined part of the directions, shape (p, p)."""
+def _beyond_constraints(covariance: Array, plain: Array, apart: float) -> Array:
+    """Return the covariance with what data leave open across the constraints that hold them.
+
+    Had data been others, a constraint would not have held them, or another would: what is found on it is no more sure for it
+    than the constraint is strong. What is known of a parameter that data put so far beyond a bound, on the other side
+    of it, is the tail of their normal distribution, whose mean square about the bound is the share of their variance that stays.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (p, p)
+        Along the constraints.
+    plain : ndarray, shape (p, p)
+        Of the data alone; infinite variances where they leave a parameter open.
+    apart : float
+        By how many standard deviations, squared, the data lie beyond a constraint in the mean over these.
+    """
+    from scipy.special import log_ndtr
+
+    beyond = np.sqrt(apart)
+    tail = float(np.exp(-0.5 * apart - log_ndtr(-beyond)) / np.sqrt(2.0 * np.pi))
+    share = float(np.clip(1.0 + apart - beyond * tail, 0.0, 1.0))
+    known = np.isfinite(np.diag(plain))
+    found = covariance.copy()
+    found[np.ix_(known, known)] += share * (plain - covariance)[np.ix_(known, known)]
+    return found
+
+
+def _half_along(information: Information, directions: Array, size: Array) -> Array:
+    """Return a root of the inverse of ``W.T @ W`` on the determined part of the directions, shape (p, k)."""
     left, singular, _ = np.linalg.svd(directions / size[:, None], full_matrices=False)
     basis = size[:, None] * left[:, singular > DIGITS * singular[0]] if singular.size else np.zeros((len(size), 0))
     seen = information.regressor_factor @ basis
     length = np.linalg.norm(seen, axis=0)
     basis, seen = basis[:, length > 0.0] / length[length > 0.0], seen[:, length > 0.0] / length[length > 0.0]
     if not seen.shape[1]:
-        return np.zeros((len(size), len(size)))
+        return np.zeros((len(size), 0))
     _, singular, right = np.linalg.svd(seen, full_matrices=False)
     known = singular > UNDETERMINED * singular[0]
-    half = basis @ (right[known].T / singular[known])
-    return np.asarray(half @ half.T)
+    return np.asarray(basis @ (right[known].T / singular[known]))
 
 
 def _notes(u: Unknowns, active: tuple[str, ...], value: Array, covariance: Array) -> tuple[str, ...]:
