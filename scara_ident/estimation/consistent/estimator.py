@@ -48,8 +48,8 @@ class ConsistentEstimate(Estimate):
     """An estimate that belongs to an arm that can exist, and that arm.
 
     Where weighted least squares already belongs to one it is the estimate, and ``std`` is its standard deviation.
-    Where constraints hold the estimate, ``std`` is that of the directions in which it can still move, and a parameter that
-    active constraints hold is as sure as the data alone make it. The curvature of the constraints is left out, which makes
+    Where constraints hold the estimate, ``std`` is that of the directions in which it can still move, with the share of that of
+    the data alone that the data leave beyond the constraints. The curvature of the constraints is left out, which makes
     ``std`` rather too large than too small.
 
     Attributes
