@@ -107,6 +107,16 @@ def gravity_sentence(gravity: UrdfGravity | None) -> str | None:
             "Gravity does not show in these efforts while the inertia of the URDF does: the controller may subtract it, or "
             "springs bear it; log the whole effort, or state gravity: [0, 0, 0] in robot.yaml."
         )
+    if gravity.elsewhere:
+        size = float(np.linalg.norm(gravity.found))
+        along = ", ".join(f"{part:.2g}" for part in np.round(gravity.found / size, 2) + 0.0)
+        stated = ", ".join(
+            f"{part:.3g}" for part in np.round(np.linalg.norm(gravity.stated) * gravity.found / size, 1) + 0.0
+        )
+        return (
+            f"Gravity seems to point along [{along}] of the base, {gravity.degrees:.0f} degrees from what the description "
+            f"says: if the arm is mounted so, state gravity: [{stated}] in robot.yaml."
+        )
     return None
 
 

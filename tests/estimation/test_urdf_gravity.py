@@ -50,6 +50,8 @@ def fitted(robot: Robot, run: Recording) -> UrdfGravity:
 @pytest.mark.parametrize(
     ("gravity", "said"),
     [
+        ((9.81, 0.0, 0.0), "point along [1, 0, 0] of the base, 90 degrees"),
+        ((0.0, 0.0, 9.81), "point along [0, 0, 1] of the base, 180 degrees"),
         ((0.0, 0.0, 0.0), "does not show in these efforts"),
     ],
 )
