@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.observations import Observations
@@ -151,7 +150,8 @@ def _fitted(observations: Observations) -> UrdfGravity | None:
     if not shared:
         return None
     columns, torque = np.concatenate(shared), np.concatenate(rights)
-    if not _shows(columns[:, 1:] @ stated, np.linalg.norm(columns[:, 0])):
+    # On upright axes gravity makes no torque.
+    if not np.linalg.norm(columns[:, 1:] @ stated) > RANK * np.linalg.norm(columns[:, 0]):
         return None
     value, covariance, left = _solved(columns, torque)
     if not np.all(np.isfinite(covariance)):
@@ -164,11 +164,6 @@ def _fitted(observations: Observations) -> UrdfGravity | None:
     return UrdfGravity(
         stated, value[1:], covariance[1:, 1:], float(value[0]), float(np.sqrt(covariance[0, 0])), left, stated_left
     )
-
-
-def _shows(torque: Array, inertia: ArrayLike) -> bool:
-    """Tell whether gravity makes any torque, as it does not on axes that are upright."""
-    return bool(np.linalg.norm(torque) > RANK * float(inertia))
 
 
 def _outside(columns: Array, signals: Array) -> Array:

@@ -31,9 +31,9 @@ def made(folder: Path, gravity: tuple[float, ...], heavier: float = 1.0, gain: f
     true = load_robot(write_urdf(folder / "true.urdf", [replace(link, mass=heavier * link.mass) for link in ARM]))
     true.model.gravity.linear = np.array(gravity)
     rng, time = np.random.default_rng(3), np.arange(2400) / 200.0
-    motion = sines(rng, time, 3)
-    effort = gain * recorded_torque(true, *motion, ((0.4, 0.3, 0.0, 0.0, 0.1),) * 3)
-    run = noisy(recording(true, "run_1", time, motion[0], effort), rng, 0.05)
+    q, v, a = sines(rng, time, 3)
+    effort = gain * recorded_torque(true, q, v, a, ((0.4, 0.3, 0.0, 0.0, 0.1),) * 3)
+    run = noisy(recording(true, "run_1", time, q, effort), rng, 0.05)
     return load_robot(write_urdf(folder / "arm.urdf", ARM)), run
 
 
@@ -74,8 +74,8 @@ def test_nothing_is_said_of_upright_axes(tmp_path: Path) -> None:
     upright = [replace(link, axis=(0.0, 0.0, 1.0)) for link in PLANAR_2R]
     robot = load_robot(write_urdf(tmp_path / "arm.urdf", upright))
     time = np.arange(2400) / 200.0
-    motion = sines(np.random.default_rng(3), time, 2)
-    run = recording(robot, "run_1", time, motion[0], recorded_torque(robot, *motion, ((0.4, 0.3, 0.0, 0.0, 0.1),) * 2))
+    q, v, a = sines(np.random.default_rng(3), time, 2)
+    run = recording(robot, "run_1", time, q, recorded_torque(robot, q, v, a, ((0.4, 0.3, 0.0, 0.0, 0.1),) * 2))
     assert urdf_gravity(seen(robot, noisy(run, np.random.default_rng(0), 0.05))) is None
 
 
