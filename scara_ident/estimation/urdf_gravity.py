@@ -21,6 +21,8 @@ FAR_LESS = 0.5
 TURNED = 15.0
 # Directions of columns below this share of the largest are rounding.
 RANK = 1e-9
+# Components of gravity whose torque is below this share of the largest do not show: angles of few digits in a URDF make as much.
+SHOWN = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +155,10 @@ def _fitted(observations: Observations) -> UrdfGravity | None:
     # On upright axes gravity makes no torque.
     if not np.linalg.norm(columns[:, 1:] @ stated) > RANK * np.linalg.norm(columns[:, 0]):
         return None
-    value, covariance, left = _solved(columns, torque)
+    # Along the axes of a pendulum nothing shows of gravity; there it is taken as stated.
+    _, shown, axes = np.linalg.svd(columns[:, 1:], full_matrices=False)
+    seen = axes[shown > SHOWN * shown[0]]
+    value, covariance, left = _solved(np.column_stack([columns[:, 0], columns[:, 1:] @ seen.T]), torque)
     if not np.all(np.isfinite(covariance)):
         return None
     along = np.column_stack([columns[:, 0], columns[:, 1:] @ stated / size])
@@ -161,9 +166,9 @@ def _fitted(observations: Observations) -> UrdfGravity | None:
     if as_stated[1] < 0.0:
         # The other way round is another direction.
         _, _, stated_left = _solved(along[:, :1], torque)
-    return UrdfGravity(
-        stated, value[1:], covariance[1:, 1:], float(value[0]), float(np.sqrt(covariance[0, 0])), left, stated_left
-    )
+    found = stated + seen.T @ (value[1:] - seen @ stated)
+    spread = seen.T @ covariance[1:, 1:] @ seen
+    return UrdfGravity(stated, found, spread, float(value[0]), float(np.sqrt(covariance[0, 0])), left, stated_left)
 
 
 def _outside(columns: Array, signals: Array) -> Array:

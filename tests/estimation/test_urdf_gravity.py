@@ -70,6 +70,22 @@ def test_nothing_is_said_of_the_stated_one(tmp_path: Path, heavier: float, gain:
     assert gravity_sentence(found) is None
 
 
+@pytest.mark.parametrize(
+    ("gravity", "said"), [(STATED, None), ((9.81, 0.0, 0.0), "point along [1, "), ((0.0, 0.0, 0.0), "does not show")]
+)
+def test_a_pendulum_shows_gravity_across_its_axes(tmp_path: Path, gravity: tuple[float, ...], said: str | None) -> None:
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
+    true = load_robot(write_urdf(tmp_path / "true.urdf", PLANAR_2R))
+    true.model.gravity.linear = np.array(gravity)
+    rng, time = np.random.default_rng(3), np.arange(2400) / 200.0
+    q, v, a = sines(rng, time, 2)
+    run = recording(robot, "run_1", time, q, recorded_torque(true, q, v, a, ((0.4, 0.3, 0.0, 0.0, 0.1),) * 2))
+    found = fitted(robot, noisy(run, rng, 0.05))
+    np.testing.assert_allclose(found.found, gravity, atol=0.1)
+    sentence = gravity_sentence(found)
+    assert sentence is None if said is None else said in str(sentence)
+
+
 def test_nothing_is_said_of_upright_axes(tmp_path: Path) -> None:
     upright = [replace(link, axis=(0.0, 0.0, 1.0)) for link in PLANAR_2R]
     robot = load_robot(write_urdf(tmp_path / "arm.urdf", upright))
