@@ -19,6 +19,8 @@ NONE = 0.15
 FAR_LESS = 0.5
 # A base that leans by less than this, degrees, may stand so in truth; that is an effect, and is looked for as one.
 TURNED = 15.0
+# Arms are mounted square: so many degrees are what rough masses make of it.
+SQUARE = 3.0
 # Directions of columns below this share of the largest are rounding.
 RANK = 1e-9
 # Components of gravity whose torque is below this share of the largest do not show: angles of few digits in a URDF make as much.
@@ -53,8 +55,7 @@ class UrdfGravity:
     @property
     def degrees(self) -> float:
         """Angle between gravity as found and as stated."""
-        cosine = self.stated @ self.found / (np.linalg.norm(self.stated) * np.linalg.norm(self.found))
-        return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+        return angle(self.found, self.stated)
 
     @property
     def missing(self) -> bool:
@@ -109,16 +110,31 @@ def gravity_sentence(gravity: UrdfGravity | None) -> str | None:
             "springs bear it; log the whole effort, or state gravity: [0, 0, 0] in robot.yaml."
         )
     if gravity.elsewhere:
-        size = float(np.linalg.norm(gravity.found))
-        along = ", ".join(f"{part:.2g}" for part in np.round(gravity.found / size, 2) + 0.0)
-        stated = ", ".join(
-            f"{part:.3g}" for part in np.round(np.linalg.norm(gravity.stated) * gravity.found / size, 1) + 0.0
-        )
+        along = _near_axis(gravity.found / np.linalg.norm(gravity.found))
+        stated = float(np.linalg.norm(gravity.stated)) * along
         return (
-            f"Gravity seems to point along [{along}] of the base, {gravity.degrees:.0f} degrees from what the description "
-            f"says: if the arm is mounted so, state gravity: [{stated}] in robot.yaml."
+            f"Gravity seems to point along {_listed(along)} of the base, {angle(along, gravity.stated):.0f} degrees from what "
+            f"the description says: if the arm is mounted so, state gravity: {_listed(stated)} in robot.yaml."
         )
     return None
+
+
+def angle(one: Array, other: Array) -> float:
+    """Return the angle between two directions, degrees."""
+    cosine = one @ other / (np.linalg.norm(one) * np.linalg.norm(other))
+    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def _near_axis(along: Array) -> Array:
+    """Return the axis of the base that a direction of length 1 is close to, or the direction itself."""
+    place = int(np.argmax(np.abs(along)))
+    axis = np.sign(along[place]) * np.eye(3)[place]
+    return axis if angle(along, axis) < SQUARE else along
+
+
+def _listed(vector: Array) -> str:
+    # Adding nothing takes the sign off what is rounded to zero.
+    return f"[{', '.join(f'{part:.3g}' for part in np.round(vector, 2) + 0.0)}]"
 
 
 def _fitted(observations: Observations) -> UrdfGravity | None:

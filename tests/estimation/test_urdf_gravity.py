@@ -51,6 +51,8 @@ def fitted(robot: Robot, run: Recording) -> UrdfGravity:
     ("gravity", "said"),
     [
         ((9.81, 0.0, 0.0), "point along [1, 0, 0] of the base, 90 degrees"),
+        ((9.81, 0.0, 0.0), "state gravity: [9.81, 0, 0] in robot.yaml"),
+        ((6.94, 0.0, -6.94), "point along [0.7"),
         ((0.0, 0.0, 9.81), "point along [0, 0, 1] of the base, 180 degrees"),
         ((0.0, 0.0, 0.0), "does not show in these efforts"),
     ],
@@ -60,7 +62,7 @@ def test_another_gravity_is_told(tmp_path: Path, gravity: tuple[float, ...], sai
     # Noise of 0.05 N m, beside gravity of some 10 N m, in hundreds of independent rows.
     np.testing.assert_allclose(found.found, gravity, atol=0.05)
     assert np.all(np.abs(found.found - gravity) < 5.0 * np.sqrt(np.diag(found.covariance)))
-    assert said in str(gravity_sentence(found)).replace("-0.01", "0").replace("0.01", "0")
+    assert said in str(gravity_sentence(found))
 
 
 @pytest.mark.parametrize(("heavier", "gain"), [(1.0, 1.0), (1.5, 1.0), (1.0, 0.01), (1.0, -1.0)])
