@@ -33,6 +33,10 @@ class MemoryLimit(RecordingError):
     """A recording that takes more memory than is allowed."""
 
 
+class LostArm(ScaraIdentError):
+    """A simulated arm that leaves all bounds."""
+
+
 class RegressorMismatch(ScaraIdentError):
     """A batch kernel that does not reproduce Pinocchio's regressor."""
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +22,28 @@ USUAL = 2.0
 ALIKE = 1.5
 
 
+@dataclass(frozen=True)
+class JointScale:
+    """The torque of the identified bodies on a joint beside that of the URDF's.
+
+    Attributes
+    ----------
+    scale : float
+        The first as a multiple of the second.
+    told : bool
+        Whether the scale is told from zero.
+    sure : bool
+        Whether what is left is told from zero.
+    left : float
+        Share of the identified torque that the URDF's does not explain in any scale.
+    """
+
+    scale: float
+    told: bool
+    sure: bool
+    left: float
+
+
 def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, float]:
     """Return the torque of the identified bodies as a multiple of that of the URDF's bodies.
 
@@ -33,6 +56,18 @@ def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, floa
         By joint, negative where the signs are opposite; without those where it is not told from zero, or the identified
         torque is not that of the URDF in any scale.
     """
+    each = joint_scales(estimate, observations)
+    return {joint: own.scale for joint, own in each.items() if own.told and own.left < MOST_LEFT}
+
+
+def unlike_urdf(estimate: Estimate, observations: Observations) -> tuple[str, ...]:
+    """Return the joints whose identified bodies surely take another torque than the URDF's in any scale."""
+    each = joint_scales(estimate, observations)
+    return tuple(joint for joint, own in each.items() if own.sure and not own.left < MOST_LEFT)
+
+
+def joint_scales(estimate: Estimate, observations: Observations) -> dict[str, JointScale]:
+    """Compare the torque of the identified bodies with that of the URDF's on each joint where these take any."""
     model = observations.model
     stated = urdf_values(model)
     # What has no finite variance is not told, though the estimate may have a value for it.
@@ -51,14 +86,32 @@ def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, floa
         # Of a covariance rounding may leave less than nothing along what is known best.
         variance = max(0.0, float(share @ estimate.covariance[np.ix_(own, own)] @ share))
         scale, std = float(share @ estimate.value[own]), float(np.sqrt(variance))
+        own_size = float(np.linalg.norm(identified))
         left = float(np.linalg.norm(identified - scale * nominal))
-        if abs(scale) > SURE * std and left < MOST_LEFT * np.linalg.norm(identified):
-            found[joint] = scale
+        spread = float(np.sum(columns * (estimate.covariance[np.ix_(own, own)] @ columns)))
+        sure = left > SURE * np.sqrt(max(0.0, spread))
+        found[joint] = JointScale(scale, abs(scale) > SURE * std, sure, left / own_size if own_size else np.inf)
     return found
 
 
-def scale_sentence(scales: Mapping[str, float] | None, robot: Robot) -> str:
-    """Say what scale recordings cannot tell, and how the URDF's compares, where scales are given."""
+def scale_sentence(scales: Mapping[str, float] | None, robot: Robot, unlike: Sequence[str] = ()) -> str:
+    """Say what scale recordings cannot tell, and how the URDF's compares, where scales are given.
+
+    Parameters
+    ----------
+    scales : mapping of str to float, or None
+        See `urdf_scale`.
+    robot : Robot
+    unlike : sequence of str, optional
+        See `unlike_urdf`.
+    """
+    said = _compared(scales, robot)
+    if not scales or not unlike:
+        return said
+    return f"{said} On {', '.join(unlike)} they are not the URDF's in any scale."
+
+
+def _compared(scales: Mapping[str, float] | None, robot: Robot) -> str:
     geared = np.any(robot.reduction != 1.0)
     rest = "effort_gain, effort_side and the clock" if geared else "effort_gain and the clock"
     said = f"No recording tells a scale common to all torques and masses, nor, without gravity, that of time: they rest on {rest}"

@@ -15,6 +15,7 @@ from scara_ident.errors import RecordingError
 from scara_ident.estimation.least_squares import weighted_value, wls
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.urdf_scale import urdf_scale
+from scara_ident.identification.magnitude_check import signed_fits
 from scara_ident.model.terms.friction import Friction
 from scara_ident.motion.prepared import PreparedData, PreparedStretch
 
@@ -53,6 +54,8 @@ class ChannelFault:
     error, mended : float
         Rms of what is left as a share of the torque, geometric mean over the joints, on blocks of time that the
         parameters were not fitted to, as mapped and as it should be.
+    unsigned : bool
+        Whether the effort is a magnitude; its errors are those of the fit, of these joints alone.
     """
 
     signal: Signal
@@ -60,11 +63,17 @@ class ChannelFault:
     exchanged: bool
     error: float
     mended: float
+    unsigned: bool = False
 
     def __str__(self) -> str:
         """Say what, and what to do."""
         gain = f"what is left of the torque falls from {100 * self.error:.2g} to {100 * self.mended:.2g} %"
         names = (" and " if self.exchanged else ", ").join(self.joints)
+        if self.unsigned:
+            return (
+                f"effort of {names} seems to be logged without its sign: it never changes it, and with the signs that the "
+                f"motion asks for {gain}; log the effort with its sign"
+            )
         if self.exchanged:
             return (
                 f"{self.signal} of {names} look exchanged: the other way round {gain}; exchange their columns under "
@@ -85,7 +94,7 @@ class ChannelFault:
 
 
 def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
-    """Find efforts and positions of opposite sign, and those of two joints that are exchanged.
+    """Find efforts and positions of opposite sign, those of two joints that are exchanged, and efforts without a sign.
 
     A sign is suspected where friction would feed energy in, an exchange where two joints are hardly explained; only
     then are other readings tried. One counts if it leaves at most half of the error, on blocks of time that it was not
@@ -108,6 +117,10 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     model = observations.model
     joints = model.robot.joints
     few = any(0 < rows.table.shape[1] < ENOUGH_ROWS * len(rows.columns) for rows in held.joints)
+    unsigned = None if few else _unsigned(held)
+    if unsigned is not None:
+        # What else is read into magnitudes is of no channel.
+        return (unsigned,)
     faults: list[ChannelFault] = []
     for _ in range(2 * len(joints)):
         fitted = weighted_value(held.by_joint)
@@ -140,14 +153,24 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
 
 
 def refuse_exchanged(faults: Sequence[ChannelFault]) -> None:
-    """Refuse joints that are exchanged: whatever is fitted to them is of no joint.
+    """Refuse joints that are exchanged, and efforts without a sign: whatever is fitted to them is of no joint.
 
     Raises
     ------
     RecordingError
     """
-    if any(fault.exchanged for fault in faults):
+    if any(fault.exchanged or fault.unsigned for fault in faults):
         raise RecordingError("; ".join(str(fault) for fault in faults))
+
+
+def _unsigned(observations: Observations) -> ChannelFault | None:
+    """Return the joints whose effort is explained far better as the magnitude of a torque of both signs."""
+    fits = {j: fit for j, fit in signed_fits(observations).items() if fit[1] < MENDED * fit[0]}
+    if not fits:
+        return None
+    error, mended = np.exp(np.mean(np.log(np.maximum(list(fits.values()), ROUNDING)), axis=0)).tolist()
+    names = tuple(observations.model.robot.joints[j] for j in fits)
+    return ChannelFault("effort", names, False, error, mended, unsigned=True)
 
 
 def _suspects(errors: Array, pushing: NDArray[np.bool_]) -> list[tuple[Signal, tuple[int, ...], bool]]:

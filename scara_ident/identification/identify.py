@@ -166,7 +166,7 @@ def identify(
         that the slowest recording carries, or options are given to another method than ``consistent``; an `ArgumentError` where something of another kind is given.
     RecordingError
         If none of the recordings to fit can be used, or they have fewer rows than the model has parameters, or two joints are
-        exchanged (see `channel_faults`). One of several that cannot be used, or one that is held out, is left out with a note.
+        exchanged or efforts have no sign (see `channel_faults`). One of several that cannot be used, or one that is held out, is left out with a note.
 
     Examples
     --------

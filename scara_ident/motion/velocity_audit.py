@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,31 @@ GAIN_ERROR = 0.02
 UNRELATED = 0.05
 # Cut-off for the comparison as a share of the sample rate.
 COMPARE_BAND = 0.04
+
+
+@dataclass(frozen=True)
+class VelocityFault:
+    """What is wrong with a recorded velocity.
+
+    Attributes
+    ----------
+    words : str
+        With ``{}`` in the place of how much; what has the same words is the same fault.
+    size : float
+    form : str
+        How it is written.
+    """
+
+    words: str
+    size: float = 0.0
+    form: str = ""
+
+
+def told_together(faults: Sequence[VelocityFault]) -> str:
+    """Return the words of the same fault on several joints or recordings, with the range of its size."""
+    sizes = [fault.size for fault in faults]
+    ends = dict.fromkeys(format(size, faults[0].form) for size in (min(sizes), max(sizes)))
+    return faults[0].words.format(" to ".join(ends))
 
 
 @dataclass(frozen=True)
@@ -37,18 +63,24 @@ class VelocityAudit:
     lag: float
     unrelated: float
 
-    def verdict(self, rate: float) -> str | None:
+    def fault(self, rate: float) -> VelocityFault | None:
         """Return what a person should know, None when the velocity is what it says."""
         if self.gain == 0.0:
-            return "it is 0 while the position moves"
+            return VelocityFault("it is 0 while the position moves")
         if self.unrelated > UNRELATED:
-            return f"{self.unrelated:.0%} of it is not the derivative of the position"
+            return VelocityFault("{} of it is not the derivative of the position", self.unrelated, ".0%")
         if abs(self.gain - 1.0) > GAIN_ERROR:
             degrees = " (looks like degrees)" if abs(self.gain / np.degrees(1.0) - 1.0) < GAIN_ERROR else ""
-            return f"it is {self.gain:.4g} times the derivative of the position{degrees}"
+            return VelocityFault(f"it is {{}} times the derivative of the position{degrees}", self.gain, ".4g")
         if abs(self.lag) * rate > LAG_SAMPLES:
-            return f"it {'lags' if self.lag > 0 else 'leads'} the position by {abs(self.lag) * 1e3:.2g} ms, as a filter does"
+            verb = "lags" if self.lag > 0 else "leads"
+            return VelocityFault(f"it {verb} the position by {{}} ms, as a filter does", abs(self.lag) * 1e3, ".2g")
         return None
+
+    def verdict(self, rate: float) -> str | None:
+        """Return `fault` in words."""
+        fault = self.fault(rate)
+        return None if fault is None else told_together([fault])
 
 
 def audit_velocity(recording: Recording, part: Stretch) -> tuple[VelocityAudit, ...]:

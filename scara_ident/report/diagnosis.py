@@ -21,7 +21,8 @@ from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_offsets import rms_of
-from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
+from scara_ident.estimation.urdf_gravity import gravity_sentence, urdf_gravity
+from scara_ident.estimation.urdf_scale import scale_sentence, unlike_urdf, urdf_scale
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.model.terms.friction import Friction
 from scara_ident.model.urdf_values import urdf_values
@@ -356,5 +357,9 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
             f"Unexplained: on {remainder.joint} a remainder of {remainder.rms:.3g} {unit} rms {on}; "
             f"no effect of the catalogue accounts for it{_curved(diagnosis, remainder)}."
         )
-    found.append(scale_sentence(urdf_scale(diagnosis.after, diagnosis.training_after), diagnosis.robot))
+    seen = diagnosis.after, diagnosis.training_after
+    found.append(scale_sentence(urdf_scale(*seen), diagnosis.robot, unlike_urdf(*seen)))
+    gravity = gravity_sentence(urdf_gravity(diagnosis.training_before))
+    if gravity is not None:
+        found.append(gravity)
     return tuple(found)

@@ -15,7 +15,8 @@ from scara_ident.estimation.estimate import PAPER_SAMPLES
 from scara_ident.estimation.noise_bias import bias_sentence
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.saved import estimate_dict
-from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
+from scara_ident.estimation.urdf_gravity import gravity_sentence, urdf_gravity
+from scara_ident.estimation.urdf_scale import scale_sentence, unlike_urdf, urdf_scale
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
 from scara_ident.manners import listed
@@ -143,8 +144,11 @@ def sentences(identification: Identification) -> tuple[str, ...]:
         found.append(biased)
     if isinstance(identification.estimate, ConsistentEstimate):
         found += _shapes_said(identification.estimate.shapes)
-    scales = urdf_scale(identification.estimate, identification.training)
-    found.append(scale_sentence(scales, robot))
+    seen = identification.estimate, identification.training
+    found.append(scale_sentence(urdf_scale(*seen), robot, unlike_urdf(*seen)))
+    gravity = gravity_sentence(urdf_gravity(identification.training))
+    if gravity is not None:
+        found.append(gravity)
     return tuple(found)
 
 

@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from scara_ident.use import Use
     from scara_ident.use.worth import EffectWorth
 
-# What is fed forward does harm where it leaves so many times the error that is left without.
-HARM = 1.1
+# What is fed forward does harm where it leaves so many times the error that is left without, and more of that of the PID alone
+# than a draw of the arm changes, and than is told: in whole per cent the two would be one number.
+HARM, HARM_OF_PID = 1.1, 0.01
 # What is fed forward, in words.
 WORDS = {
     "pid": "PID alone",
@@ -91,8 +92,13 @@ def _cost_said(item: EffectWorth, rms: Mapping[str, Array]) -> str:
     if item.not_fed is None:
         return f"{said}."
     fed, without = total(rms["effects"], alone), total(item.not_fed, alone)
-    harm = ": it does harm, so leave it out of what is fed forward" if fed > HARM * without else ""
+    harm = ": it does harm, so leave it out of what is fed forward" if _harms(fed, without) else ""
     return f"{said}; fed forward with all else it leaves {fed:.0%}, and all else without it {without:.0%}{harm}."
+
+
+def _harms(fed: float, without: float) -> bool:
+    """Tell whether errors with and without what is fed forward, in shares of that of the PID alone, speak against it."""
+    return fed > HARM * without and fed - without > HARM_OF_PID
 
 
 def total(errors: Array, alone: Array) -> float:
@@ -118,7 +124,7 @@ def _harm_said(joints: Sequence[str], rms: Mapping[str, Array]) -> list[str]:
     worse = [
         f"{joint} ({fed / alone:.0%} of the PID's error, without them {without / alone:.0%})"
         for joint, alone, without, fed in zip(joints, rms["pid"], rms["identified"], rms["effects"], strict=True)
-        if fed > HARM * without and alone > 0.0
+        if alone > 0.0 and _harms(fed / alone, without / alone)
     ]
     return [f"Fed forward the effects do harm on {', '.join(worse)}: leave them out there."] if worse else []
 
@@ -128,16 +134,19 @@ def sentences(result: Use) -> list[str]:
     said = [_shares_said(result.rms()), *_harm_said(result.model.robot.joints, result.rms())]
     said += [f"{doubt[0].upper()}{doubt[1:]}; it is in what is fed forward." for doubt in result.model.doubts]
     for name, rows in result.rollouts.items():
+        words = WORDS[name]
+        if name == "effects" and result.missing:
+            words += f" but {', '.join(result.missing)}"
         place = int(np.argmin(np.abs(np.array(result.horizons) - 0.2)))
         if not np.all(np.isfinite(rows[place])):
             gone = np.any(np.isinf(rows))
-            said.append(f"Simulated {WORDS[name]} the arm {'gets lost' if gone else 'was recorded for too short'}.")
+            said.append(f"Simulated {words} the arm {'gets lost' if gone else 'was recorded for too short'}.")
             continue
         ends = ", ".join(
             f"{joint} {value:.2g} {result.model.robot.position_unit(j)}"
             for j, (joint, value) in enumerate(zip(result.model.robot.joints, rows[place], strict=True))
         )
-        said.append(f"Simulated {WORDS[name]} the arm is off after {result.horizons[place]:g} s by {ends}.")
+        said.append(f"Simulated {words} the arm is off after {result.horizons[place]:g} s by {ends}.")
     if result.not_mujoco:
         said.append(f"Not simulated in MuJoCo: {result.not_mujoco}.")
     if result.missing:

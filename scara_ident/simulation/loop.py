@@ -31,6 +31,12 @@ class Gains(NamedTuple):
     filter: Array
 
 
+def no_gains(n: int) -> Gains:
+    """Return the gains of no controller, whose velocity is not filtered."""
+    none = np.zeros(n)
+    return Gains(none, none, none, np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
+
+
 class Trace(NamedTuple):
     """What happened at every tick, each of shape (N, n), Pinocchio's order, joint side.
 

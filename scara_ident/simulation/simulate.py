@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
+from scara_ident.errors import LostArm, RecordingError, UsageError
 from scara_ident.manners import Reported
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation.arm import VirtualArm
@@ -163,7 +163,7 @@ def simulate(
     UsageError
         If the motion is not of this arm's joints, an effect does not fit, ``ticks`` is under 1, or ``feed`` is too short or
         too long.
-    ScaraIdentError
+    LostArm
         If the controller loses the arm.
 
     Examples
@@ -263,6 +263,11 @@ def free_motion(
     -------
     time : ndarray, shape (N,)
     motion : TrueMotion
+
+    Raises
+    ------
+    LostArm
+        If the arm leaves all bounds.
     """
     draft = _draft(arm, resolved_effects(arm, effects))
     n, samples = arm.robot.n, round(duration * rate) + 1
@@ -327,17 +332,18 @@ def _run(
     what: str,
     controlled: bool = True,
 ) -> tuple[Array, Array, TrueMotion, int]:
-    from scara_ident.simulation.loop import track
+    from scara_ident.simulation.loop import no_gains, track
 
     plant = draft.plant()
+    # What no controller acts on has no filter either, which the rate could be too low for.
+    gains = arm.controller.gains(rate, arm.robot.order) if controlled else no_gains(arm.robot.n)
     link = position - _stretch(draft, start)
     trace, stops = track(
-        plant, draft.sensing(), arm.controller.gains(rate, arm.robot.order), period=1.0 / rate, substeps=substeps,
-        reference=reference, feed=feed, start=start, initial=(link, velocity, position, velocity),
-        controlled=controlled,
+        plant, draft.sensing(), gains, period=1.0 / rate, substeps=substeps, reference=reference, feed=feed, start=start,
+        initial=(link, velocity, position, velocity), controlled=controlled,
     )  # fmt: skip
     if stops < 0:
-        raise ScaraIdentError(
+        raise LostArm(
             f"{what}: the arm got out of control at {(-1 - stops) / rate:.3f} s; lower the gains or use more substeps"
         )
     order = arm.robot.order

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import ScaraIdentError
+from scara_ident.errors import LostArm
 from scara_ident.motion.prepared import PreparedStretch
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.simulate import free_motion
-from scara_ident.use.mujoco_arm import Free
+from scara_ident.use.mujoco_arm import STEP, Free
 
 # Starts along a recording, at the most.
 STARTS = 40
@@ -20,14 +20,22 @@ HORIZONS = (0.05, 0.1, 0.2, 0.5)
 
 
 def virtual_free(arm: VirtualArm, effects: Sequence[Effect]) -> Free:
-    """Return the free motion of a virtual arm; effects that depend on the time since a run began start anew each time."""
+    """Return the free motion of a virtual arm; effects that depend on the time since a run began start anew each time.
+
+    Torque is a straight line from each sample to the next; held, it would come half a sample late.
+    """
 
     def free(q: Array, v: Array, torque: Array, rate: float) -> Array:
-        duration = (torque.shape[1] - 1) / rate
+        samples = torque.shape[1]
+        ticks = int(np.ceil(1.0 / (rate * STEP)))
+        middles = (np.arange((samples - 1) * ticks + 1) + 0.5) / ticks
+        held = np.array([np.interp(middles, np.arange(samples), own) for own in torque])
+        duration = (samples - 1) / rate
         try:
-            return free_motion(arm, q, v, duration, torque=torque, effects=effects, rate=rate)[1].position
-        except ScaraIdentError:
+            _, true = free_motion(arm, q, v, duration, torque=held, effects=effects, rate=ticks * rate)
+        except LostArm:
             return np.full_like(torque, np.inf)
+        return true.every(ticks).position
 
     return free
 

@@ -10,7 +10,7 @@ import pytest
 
 from scara_ident.estimation import wls
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
+from scara_ident.estimation.urdf_scale import scale_sentence, unlike_urdf, urdf_scale
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
@@ -84,3 +84,18 @@ def test_what_has_no_finite_variance_says_nothing_of_scale(arm):
     covariance[np.ix_(free, free)] = -1.0
     covariance[free, free] = np.inf
     assert list(urdf_scale(replace(estimate, covariance=covariance), observations)) == ["j1"]
+
+
+def test_joints_left_out_are_named(arm, tmp_path):
+    """The second link carries beside its axis what the URDF has before it: as a torque it is another, in any scale."""
+    robot, run = arm
+    other = load_robot(write_urdf(tmp_path / "other.urdf", [PLANAR_2R[0], replace(PLANAR_2R[1], com=(0.0, 0.0, 0.12))]))
+    observations = observe(build_model(other, "basic"), prepare([run], (8.0, 8.0)))
+    seen = wls(observations), observations
+    assert list(urdf_scale(*seen)) == ["j1"]
+    assert unlike_urdf(*seen) == ("j2",)
+    assert scale_sentence(urdf_scale(*seen), other, unlike_urdf(*seen)).endswith(
+        "On j2 they are not the URDF's in any scale."
+    )
+    own = observe(build_model(robot, "basic"), prepare([run], (8.0, 8.0)))
+    assert unlike_urdf(wls(own), own) == ()

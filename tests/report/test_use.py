@@ -51,7 +51,10 @@ def test_the_words_give_shares_of_the_pids_error() -> None:
     assert "off after 0.2 s by joint1 0.01 rad, joint2 0.02 rad" in others[1]
     lost = replace(result(), rollouts={"identified": np.full((2, 2), np.inf)})
     assert "gets lost" in sentences(lost)[1]
+    # What is not simulated is not among the effects that were.
+    assert others[1].startswith("Simulated with the effects found but drive_coupling the arm is off")
     assert others[-1] == "Not simulated: drive_coupling."
+    assert "with the effects found the arm" in " ".join(sentences(replace(result(), missing=())))
     assert not any("harm" in words for words in others)
     assert total(np.array([3.0, 0.0]), np.array([3.0, 1.0])) == pytest.approx(np.sqrt(0.5))
 
@@ -65,6 +68,12 @@ def test_where_an_effect_fed_forward_makes_worse_it_is_said_of_the_joint() -> No
     assert said == (
         "Fed forward the effects do harm on joint2 (60% of the PID's error, without them 25%): leave them out there."
     )
+    # 1.5 and 1.9 % are 2 % both: as a share of what is left a fourth more, and of the PID's error nothing.
+    little = {"identified": 0.06, "effects": 0.076}
+    near = tuple(replace(item, error=item.error / np.abs(item.error) * little.get(item.name, 4.0)) for item in run)
+    assert not any("harm" in words for words in sentences(replace(made, runs=(near,))))
+    small = EffectWorth({"effect": "spring", "joint": "joint1"}, np.full(2, 2.0), np.full(2, 0.06))
+    assert _cost_said(small, {"pid": np.full(2, 4.0), "effects": np.full(2, 0.076)}).endswith("without it 2%.")
     found = EffectWorth({"effect": "spring", "joint": "joint1"}, np.full(2, 2.0), np.full(2, 1.0))
     rms = {"pid": np.full(2, 4.0), "effects": np.full(2, 2.0)}
     assert _cost_said(found, rms).endswith("without it 25%: it does harm, so leave it out of what is fed forward.")

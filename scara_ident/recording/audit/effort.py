@@ -28,6 +28,9 @@ DEAD_SHARE = 0.5
 # coarse converter), and a value that lasts says nothing, unless it lasts for most of the time and so many times
 # longer than any other does.
 NOISELESS, OUTLASTING = 0.5, 10.0
+# Where more than this share of the other samples repeats the one before, values last by chance: rounded to steps like its
+# noise an effort does so for 0.3 s at 10 Hz. Less than this expected number of such runs in a recording is no chance.
+SOMETIMES, CHANCE = 0.02, 1e-3
 # An effort without noise is one value as well while all joints keep their speed, to this share of the way.
 STEADY = 1e-3
 # Differences of this order and the next tell noise, which makes the next larger; rounding makes it so many smallest steps.
@@ -169,12 +172,37 @@ def _stuck(samples: Samples, joint: int, same: NDArray[np.bool_]) -> NDArray[np.
         usual = next((length[run] for run in by_length if values[start[run]] != value and moves(run)), samples.count)
         most = max(OUTLASTING * usual, DEAD_SHARE * samples.count)
         found = [run for run in found if values[start[run]] == value and length[run] > most]
+    if found:
+        shorter = length[~np.isin(np.arange(len(length)), found)]
+        longest = _by_chance(float(np.mean(same[elsewhere])) if elsewhere.any() else 0.0, shorter, samples.count)
+        found = [run for run in found if length[run] > longest]
     if found and _without_noise(values, ~stuck):
         found = [run for run in found if not _steady(samples, start[run], end[run])]
     stuck[:] = False
     for run in found:
         stuck[start[run] : end[run] + 1] = True
     return stuck
+
+
+def _by_chance(share: float, lengths: NDArray[np.intp], count: int) -> float:
+    """Return how many samples a value may last by chance in a recording.
+
+    Parameters
+    ----------
+    share : float
+        Of the samples that repeat the one before, elsewhere.
+    lengths : ndarray of int
+        Of the runs there, at least 2.
+    count : int
+        Samples of the recording.
+    """
+    if share < SOMETIMES or share > NOISELESS:
+        return 0.0
+    # Where the effort is flat it repeats itself more often: a third sample tells how often, among the shortest runs.
+    two, three = (int(np.sum(lengths == samples)) for samples in (2, 3))
+    again = min(max(share, three / two if two else 0.0), NOISELESS)
+    # Of `count` samples so many begin a run of L: count share again^(L - 2).
+    return float(2.0 + np.log(CHANCE / (count * share)) / np.log(again))
 
 
 def _without_noise(values: Array, live: NDArray[np.bool_]) -> bool:

@@ -1,0 +1,84 @@
+"""Efforts without their sign, and those that have one sign since the joint is loaded from one side."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis import diagnose
+from scara_ident.errors import RecordingError
+from scara_ident.estimation.observations import Observations, observe
+from scara_ident.identification.channel_check import channel_faults
+from scara_ident.identification.identify import identify
+from scara_ident.identification.magnitude_check import signed_fits
+from scara_ident.model.model import build_model
+from scara_ident.motion.prepared import prepare
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import Robot, load_robot
+from tests.arms import PLANAR_2R, noisy, swing, write_urdf
+
+# An upright axis, whose effort is friction and inertia, and one whose link hangs and swings to both sides.
+ARM = (replace(PLANAR_2R[0], axis=(0.0, 0.0, 1.0)), replace(PLANAR_2R[1], com=(0.0, 0.0, -0.12)))
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Robot:
+    return load_robot(write_urdf(tmp_path / "arm.urdf", ARM))
+
+
+def runs(robot: Robot) -> list[Recording]:
+    return [noisy(swing(robot, f"s{seed}_1", seed, 12.0, 200.0), np.random.default_rng(seed), 0.02) for seed in (1, 2)]
+
+
+def unsigned(run: Recording, *joints: int, sign: float = 1.0) -> Recording:
+    assert run.effort is not None
+    effort = run.effort.copy()
+    effort[list(joints)] = sign * np.abs(effort[list(joints)])
+    return replace(run, effort=effort)
+
+
+def seen(robot: Robot, recordings: list[Recording]) -> Observations:
+    return observe(build_model(robot, "complete"), prepare(recordings, (8.0, 8.0)))
+
+
+@pytest.mark.parametrize(("joints", "sign"), [((0,), 1.0), ((1,), 1.0), ((0, 1), 1.0), ((0,), -1.0)])
+def test_magnitudes_are_told_by_joint(robot: Robot, joints: tuple[int, ...], sign: float) -> None:
+    (fault,) = channel_faults(seen(robot, [unsigned(run, *joints, sign=sign) for run in runs(robot)]))
+    assert fault.unsigned
+    assert fault.joints == tuple(robot.joints[j] for j in joints)
+    assert "log the effort with its sign" in str(fault)
+
+
+def test_nothing_is_said_of_efforts_with_signs(robot: Robot) -> None:
+    observations = seen(robot, runs(robot))
+    assert signed_fits(observations) == {}
+    assert channel_faults(observations) == ()
+
+
+@pytest.mark.parametrize("load", [1.0, 0.0])
+def test_one_sign_of_a_load_is_no_magnitude(robot: Robot, load: float) -> None:
+    """A weight, or an offset, keeps the effort's sign; friction shows where the joint turns round."""
+    loaded = []
+    for run in runs(robot):
+        assert run.effort is not None
+        # To zero at the least, or far from it.
+        effort = (
+            run.effort - np.min(run.effort, axis=1, keepdims=True) + load * np.ptp(run.effort, axis=1, keepdims=True)
+        )
+        loaded.append(replace(run, effort=effort))
+    # One recording's offset each: of two, what they differ by would be left.
+    for run in loaded:
+        observations = seen(robot, [run])
+        assert list(signed_fits(observations)) == [0, 1]
+        assert channel_faults(observations) == ()
+
+
+def test_both_refuse_magnitudes(robot: Robot) -> None:
+    wrong = [unsigned(run, 0) for run in runs(robot)]
+    for ask in (identify, diagnose):
+        with pytest.raises(RecordingError, match=r"effort of j1 seems to be logged without its sign") as caught:
+            ask(robot, wrong)
+        assert "\n" not in str(caught.value)
