@@ -49,13 +49,18 @@ def taken_up(scene: Scene, shown: Sequence[int]) -> Array:
         # What all recordings do alike is tried at instants of all.
         return np.zeros((0, 2))
     k = len(shown)
-    products, counts, duration = _products(scene, names, shown)
-    whole = np.sum(products, axis=(0, 1))
+    # Products of all recordings at once would be the most that a diagnosis holds: they are made twice.
+    size = len(scene.value) + k + 1
+    whole, counts = np.zeros((scene.robot.n, size, size)), np.zeros(scene.robot.n)
+    for name in names:
+        products, rows = _products(scene, name, shown)
+        whole += np.sum(products, axis=0)
+        counts += rows
     value, weights = _fitted(whole, counts, len(scene.value))
     change, families = _changes(scene, value, k)
     body, *others = families
     sets = [body, *others, *([*body, *other] for other in others)]
-    gains = np.array([_gains(scene, own, whole, weights, change, sets) for own in products])
+    gains = np.array([_gains(scene, _products(scene, name, shown)[0], whole, weights, change, sets) for name in names])
     alone, instead, together = gains[:, 0], gains[:, 1 : 1 + len(others)], gains[:, 1 + len(others) :]
     # What it adds beside that which explains most of it, in units of what both leave.
     more = np.min((together - instead) / np.maximum(1.0 - together / np.sum(counts), np.finfo(float).eps), axis=1)
@@ -66,32 +71,34 @@ def taken_up(scene: Scene, shown: Sequence[int]) -> Array:
         chance = float(chdtrc(k, more[run, place] / scatter)) * more.size
         # In the first part it is as good as there throughout.
         if place > 1 and chance < CHANCE and alone[run, place] > np.max(instead[run]):
-            instant = float(duration[run]) * place / PARTS
+            instant = _duration(scene, name) * place / PARTS
             found.append((-alone[run, place], list(scene.start).index(name), instant))
     return np.array([item[1:] for item in sorted(found)]).reshape(-1, 2)
 
 
-def _products(scene: Scene, names: Sequence[str], shown: Sequence[int]) -> tuple[Array, Array, Array]:
-    """Return products of columns, shape (R, PARTS, n, c, c), rows of each joint (n,), and durations (R,), s.
+def _products(scene: Scene, name: str, shown: Sequence[int]) -> tuple[Array, Array]:
+    """Return products of columns in a recording, shape (PARTS, n, c, c), and rows of each joint (n,).
 
     Columns are those of the base model, of the last link, and the torque.
     """
     n, p, k = scene.robot.n, len(scene.value), len(shown)
-    ends = {name: max(float(item.time[-1]) for item in scene.columns if item.name == name) for name in names}
-    duration = np.array([ends[name] - scene.start[name] for name in names])
-    products, counts = np.zeros((len(names), PARTS, n, p + k + 1, p + k + 1)), np.zeros(n)
+    products, counts = np.zeros((PARTS, n, p + k + 1, p + k + 1)), np.zeros(n)
     for motion, columns in scene.columns.items():
-        if motion.name not in names:
+        if motion.name != name:
             continue
-        run = names.index(motion.name)
         for joint, (time, rows) in enumerate(rows_of_last_link(scene, motion, columns, shown)):
             places = np.array([*scene.model.active[joint], *range(p, p + k + 1)])
-            parts = np.clip((time - scene.start[motion.name]) * PARTS / duration[run], 0, PARTS - 1).astype(int)
+            share = (time - scene.start[name]) / _duration(scene, name)
+            parts = np.clip(PARTS * share, 0, PARTS - 1).astype(int)
             for part in np.unique(parts):
                 own = rows[:, parts == part]
-                products[run, part, joint][np.ix_(places, places)] += own @ own.T
+                products[part, joint][np.ix_(places, places)] += own @ own.T
             counts[joint] += len(time)
-    return products, counts, duration
+    return products, counts
+
+
+def _duration(scene: Scene, name: str) -> float:
+    return max(float(item.time[-1]) for item in scene.columns if item.name == name) - scene.start[name]
 
 
 def _fitted(whole: Array, counts: Array, p: int) -> tuple[Array, Array]:
