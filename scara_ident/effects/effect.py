@@ -222,10 +222,7 @@ class Effect(ABC):
         )
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Say why coefficients cannot be those of a real arm; None where they can.
-
-        A coefficient within two standard deviations of what is possible is possible.
-        """
+        """Say why coefficients, two standard deviations given them, cannot be those of a real arm; None where they can."""
         for item, x, spread in zip(self.coefficients, value, DOUBT_STDS * std, strict=False):
             if item.positive and x < -spread:
                 return item.positive
@@ -318,10 +315,7 @@ class Effect(ABC):
     def read_directly(
         self, scene: Scene, joint: int, recordings: Sequence[PreparedRecording], rotor_std: float
     ) -> Mapping[str, Parameter]:
-        """Return those of a joint's parameters that a channel of its own tells without the fit; none where none does.
-
-        ``rotor_std`` is of the rotor's inertia where the description states it, as a share.
-        """
+        """Return a joint's parameters that a channel of its own tells without the fit, ``rotor_std`` a share of its inertia."""
         return {}
 
     def corrects_data(self, member: Member) -> bool:
@@ -338,6 +332,10 @@ class Effect(ABC):
 
     def negligible(self, scene: Scene, member: Member, value: Array) -> str | None:
         """Say why coefficients are too small to speak of, however sure; None where they are not."""
+        return None
+
+    def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
+        """Return what may be left of it in corrected recordings and is no part of an arm, and the band, Hz, that holds that."""
         return None
 
 
