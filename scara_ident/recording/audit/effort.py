@@ -170,7 +170,7 @@ def _stuck(samples: Samples, joint: int, same: NDArray[np.bool_]) -> NDArray[np.
         usual = next((length[run] for run in by_length if values[start[run]] != value and moves(run)), samples.count)
         most = max(OUTLASTING * usual, DEAD_SHARE * samples.count)
         found = [run for run in found if values[start[run]] == value and length[run] > most]
-    if found and _without_noise(values, ~stuck):
+    if found and without_noise(values, ~stuck):
         found = [run for run in found if not _steady(samples, start[run], end[run])]
     stuck[:] = False
     for run in found:
@@ -178,7 +178,7 @@ def _stuck(samples: Samples, joint: int, same: NDArray[np.bool_]) -> NDArray[np.
     return stuck
 
 
-def _without_noise(values: Array, live: NDArray[np.bool_]) -> bool:
+def without_noise(values: Array, live: NDArray[np.bool_]) -> bool:
     """Tell whether what is live of an effort is smooth to its rounding, as a simulator writes it."""
     beside = ORDER + 2
     if len(values) < beside:
