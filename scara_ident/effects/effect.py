@@ -97,6 +97,8 @@ class Effect(ABC):
         Whether it acts in some recordings and not in others; see `in_recordings`.
     same_at_all_frequencies : bool
         Whether its coefficient is the same in any part of the band, so that another one there says that it is not it.
+    in_small_ways : bool
+        Whether it is told by how positions differ by little, as setpoints do from what a controller makes of them.
     of_state : bool
         Whether the columns at a sample follow from position, velocity and acceleration there, by numpy's arithmetic, sin,
         cos, exp, abs and sign alone, so that code for a controller can have them.
@@ -122,6 +124,7 @@ class Effect(ABC):
     fitted_first: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
     same_at_all_frequencies: ClassVar[bool] = False
+    in_small_ways: ClassVar[bool] = False
     of_state: ClassVar[bool] = False
     seeded_by: ClassVar[Literal["order", "frequency"] | None] = None
     watched: ClassVar[bool] = False
