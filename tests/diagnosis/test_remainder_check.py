@@ -85,3 +85,10 @@ def test_only_what_leaves_a_rest_objects(soft: Diagnosis):
     # A rest that does all that the gear does leaves nothing to it.
     why = remainder_objection(replace(beside, rest=step.chosen[gear]), decision)
     assert why == "an elastic gear does as well in its place, and beside it 0% of this is left"
+
+
+def test_what_a_rest_leaves_too_little_of_to_come_in_is_refused_whatever_the_rest_does_in_its_place():
+    """The first joint's gear seemed to have twice its stiffness, 24300 +- 1500 N m/rad, beside means over 60 ms."""
+    found = diagnosed(["joint_elasticity:joint1:stiffness=12000"], 15)
+    assert [item.effect for item in found.effects] == ["time_delay"]
+    assert any("a filter of all positions" in item.why for item in found.tentative)
