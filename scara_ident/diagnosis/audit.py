@@ -14,6 +14,7 @@ from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters
 from scara_ident.diagnosis.moments import examine_moments
 from scara_ident.diagnosis.noise_check import made_by_noise, noise_objection, within_a_step
+from scara_ident.diagnosis.remainder_check import remainder_objection
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 from scara_ident.diagnosis.variation_check import variation_objection
@@ -46,6 +47,7 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         why = why or (small and f"within its uncertainty {small}")
         why = why or noise_objection(beside, decision)
         why = why or variation_objection(beside, decision, step.criteria.least_gain)
+        why = why or remainder_objection(beside, decision)
         why = why or _repeated(beside, decision)
         if why is not None:
             result.append(decision.refused(why))

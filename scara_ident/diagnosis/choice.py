@@ -14,7 +14,9 @@ from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import parameters_beside
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.nonlinear_fit import tune
+from scara_ident.diagnosis.remainder_check import remainder_objection
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, points_of_lines
+from scara_ident.diagnosis.setpoints import setpoint_objection
 from scara_ident.diagnosis.variation_check import best_first, variation_objection
 from scara_ident.effects import Effect, Scene
 
@@ -173,8 +175,10 @@ def objection(step: SelectionStep, decision: Decision) -> str | None:
     """
     return (
         _insignificant(step, decision.candidate)
+        or setpoint_objection(step, decision)
         or noise_objection(step, decision)
         or variation_objection(step, decision)
+        or remainder_objection(step, decision)
         or _left_again(step, decision)
     )
 

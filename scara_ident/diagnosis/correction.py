@@ -10,6 +10,7 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidate_tests import coefficients
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.selection_step import SelectionStep, observed
+from scara_ident.effects import Scene
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.motion.prepared import PreparedData
 
@@ -29,6 +30,11 @@ class Correction:
 
     candidate: Candidate
     value: Array
+
+    def left(self, scene: Scene) -> tuple[Candidate, float] | None:
+        """Return what may be left of it and is no part of an arm, and the band, Hz, that holds that; see `Effect.leaves`."""
+        found = self.candidate.effect.leaves(scene, self.candidate.member, self.value)
+        return None if found is None else (Candidate(found[0], found[1]), found[2])
 
 
 def corrected(data: PreparedData, candidate: Candidate, value: Array) -> PreparedData:

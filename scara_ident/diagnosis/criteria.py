@@ -119,6 +119,12 @@ class SelectionCriteria:
         "of its size",
         "by which it is another one there, or once it was taken out of the data: a column of first order says too little of a long delay",
     )
+    least_beside_rest: float = _criterion(
+        0.5,
+        "of what it removes",
+        "that an effect must still remove beside the rest of a correction of the data that does as well in its place",
+        "docs/diagnosis.md",
+    )
     # What is left over.
     remainder: float = _criterion(
         0.08,

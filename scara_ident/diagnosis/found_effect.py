@@ -13,6 +13,7 @@ from scara_ident.diagnosis.effect_parameters import Coefficients, PhysicalParame
 from scara_ident.diagnosis.held_out_gain import HeldOutGain
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.diagnosis.setpoints import OR_ELSE, may_be_setpoints
 from scara_ident.effects import Effect, Parameter
 from scara_ident.estimation.run_offsets import rms_of
 
@@ -132,6 +133,8 @@ def found_effects(
             beside = replace(scene, value=decision.examination.model_value[: len(scene.value)])
             coefficients = parameters.coefficients[place].value
             otherwise = candidate.effect.or_else(beside, candidate.member, coefficients)
+            if may_be_setpoints(found.data, candidate.effect, candidate.member):
+                otherwise += OR_ELSE
         results.append(
             FoundEffect(
                 candidate.effect.name,

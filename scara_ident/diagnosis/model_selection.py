@@ -51,7 +51,7 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
         promised = max(asked, _promised_band(found, criteria))
         if not looked and max(explains, promised) < criteria.wider * _widest(found.data):
             looked, promised = True, _band_beyond(task, found)
-        wider = max(explains, promised)
+        wider = min(max(explains, promised), _told(found))
         if wider < criteria.wider * _widest(found.data):
             break
         more = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands))))
@@ -120,7 +120,13 @@ def _asked_band(found: Search) -> float:
 
 
 def _within(band: float, found: Search) -> float:
-    return min(band, HIGHEST_BAND * min(part.rate for part in found.data.stretches))
+    return min(band, HIGHEST_BAND * min(part.rate for part in found.data.stretches), _told(found))
+
+
+def _told(found: Search) -> float:
+    """Return the band, Hz, beyond which the rest of a correction hides what the arm does; infinite without one."""
+    left = None if found.correction is None else found.correction.left(found.scene)
+    return np.inf if left is None else left[1]
 
 
 def _new(found: Search, before: Search) -> bool:

@@ -211,7 +211,7 @@ def search(
         task.progress(words, after_rounds(rounds))
         rounds += 1
         columns.forget_all_but(first, scene)
-        step = SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets)
+        step = SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets, _rest(correction, scene))
         decisions = step.judge(candidates, first)
         residuals = Residuals(observations.data, columns.predicted(scene, chosen, value))
         seeds = line_candidates(scene, residuals, task.catalogue, criteria)
@@ -259,10 +259,15 @@ def search(
     scene, kept = tune(scene, columns, weights, kept, criteria.rotor_inertia_std, offsets=offsets)
     labels = {item.label(scene) for item in kept}
     stayed = [item for item in steps if item.decision.label in labels or item.decision.candidate.corrects_data]
-    final = SelectionStep(scene, columns, kept, weights, tried, criteria, offsets)
+    final = SelectionStep(scene, columns, kept, weights, tried, criteria, offsets, _rest(correction, scene))
     others = [Candidate(effect, member) for effect in task.catalogue for member in effect.doubtful(first)]
     doubtful = tuple(item for item in others if item.label(scene) not in labels)
     return Search(final, uncorrected, start, tuple(stayed), correction, tuple(decisions), first, doubtful)
+
+
+def _rest(correction: Correction | None, scene: Scene) -> Candidate | None:
+    left = None if correction is None else correction.left(scene)
+    return None if left is None else left[0]
 
 
 def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Scene:

@@ -45,6 +45,8 @@ class SelectionStep:
         Candidates and scan points tried.
     variation : RunVariation or None
         What runs differ by, where all rows are to weigh it as the noise it is: their offsets, or all of it.
+    rest : Candidate or None
+        What may be left in the data of what was taken out of them, and is no part of an arm, see `Correction.left`.
     """
 
     scene: Scene
@@ -54,6 +56,7 @@ class SelectionStep:
     tried: int
     criteria: SelectionCriteria
     variation: RunVariation | None = None
+    rest: Candidate | None = None
 
     @property
     def observations(self) -> Observations:

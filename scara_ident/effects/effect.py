@@ -97,6 +97,8 @@ class Effect(ABC):
         Whether it acts in some recordings and not in others; see `in_recordings`.
     same_at_all_frequencies : bool
         Whether its coefficient is the same in any part of the band, so that another one there says that it is not it.
+    in_small_ways : bool
+        Whether it is told by how positions differ by little, as setpoints do from what a controller makes of them.
     of_state : bool
         Whether the columns at a sample follow from position, velocity and acceleration there, by numpy's arithmetic, sin,
         cos, exp, abs and sign alone, so that code for a controller can have them.
@@ -122,6 +124,7 @@ class Effect(ABC):
     fitted_first: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
     same_at_all_frequencies: ClassVar[bool] = False
+    in_small_ways: ClassVar[bool] = False
     of_state: ClassVar[bool] = False
     seeded_by: ClassVar[Literal["order", "frequency"] | None] = None
     watched: ClassVar[bool] = False
@@ -222,10 +225,7 @@ class Effect(ABC):
         )
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Say why coefficients cannot be those of a real arm; None where they can.
-
-        A coefficient within two standard deviations of what is possible is possible.
-        """
+        """Say why coefficients, two standard deviations given them, cannot be those of a real arm; None where they can."""
         for item, x, spread in zip(self.coefficients, value, DOUBT_STDS * std, strict=False):
             if item.positive and x < -spread:
                 return item.positive
@@ -318,10 +318,7 @@ class Effect(ABC):
     def read_directly(
         self, scene: Scene, joint: int, recordings: Sequence[PreparedRecording], rotor_std: float
     ) -> Mapping[str, Parameter]:
-        """Return those of a joint's parameters that a channel of its own tells without the fit; none where none does.
-
-        ``rotor_std`` is of the rotor's inertia where the description states it, as a share.
-        """
+        """Return a joint's parameters that a channel of its own tells without the fit, ``rotor_std`` a share of its inertia."""
         return {}
 
     def corrects_data(self, member: Member) -> bool:
@@ -338,6 +335,10 @@ class Effect(ABC):
 
     def negligible(self, scene: Scene, member: Member, value: Array) -> str | None:
         """Say why coefficients are too small to speak of, however sure; None where they are not."""
+        return None
+
+    def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
+        """Return what may be left of it in corrected recordings and is no part of an arm, and the band, Hz, that holds that."""
         return None
 
 

@@ -46,6 +46,7 @@ class BehindGear(Effect):
 
     all_joints = True
     at_rest = True
+    in_small_ways = True
     follows_estimate = True
 
     def geared_joint(self, member: Member) -> int:

@@ -29,6 +29,9 @@ LONGEST_DELAY_SAMPLES = 5.0
 LARGEST_MISMATCH = 0.5
 # Torque that is held from one sample to the next, or averaged over one, is up to this many samples off its time stamp.
 SAMPLING = 1.0
+# Of positions that are late by T seconds, motion faster than this over T, Hz, is half gone where a filter makes them late: a mean
+# over 2 T or a lag of first order leaves 76 or 62 % of it, and the phases that its derivatives give hold up to there.
+FILTERED = 0.2
 # Data are corrected until a further delay is below this, s.
 DELAY_STEP = 2e-5
 
@@ -168,6 +171,44 @@ class TimeDelay(Effect):
             f"effort and position are {float(value[0]) * 1e3:+.2g} ms apart, less than one sample, as when a sample is "
             "held to the next"
         )
+
+    def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
+        """Return the rest of a filter of the positions where these are the later ones by more than a sample."""
+        if value[0] >= 0.0 or self.negligible(scene, member, value):
+            return None
+        return PositionFilter(), Member(None), FILTERED / -float(value[0])
+
+
+class PositionFilter(Effect):
+    """Positions of all joints behind one filter of their own, beside the delay that it is to first order.
+
+    It is no part of an arm and in no catalogue: an elastic gear of a joint, whose link lags by its load, does to the torque
+    what a filter does by all loads. A filter that keeps what rests is ``exp(-s T) (1 + c s^2 + d s^3 + ...)``, and
+    the torque, moved by T, is that of ``(1 - c s^2 - d s^3 - ...) q``: ``-c`` times the second derivative of the bodies' torque and so
+    on, as far as inertias stay what they are meanwhile. A mean over L has ``c = L^2/24``, a lag of first order
+    ``T^2/2`` and ``d = -T^3/3``, a Butterworth filter of second order no c. The first derivative is what the delay is off by.
+    """
+
+    name = "position_filter"
+    summary = "a filter of all positions before they were recorded"
+    coefficients = tuple(
+        Coefficient(f"order_{k}", unit, f"derivative {k} of the bodies' torque")
+        for k, unit in enumerate(("s", "s^2", "s^3", "s^4"), start=1)
+    )
+    all_joints = True
+    follows_estimate = True
+    not_simulated = "it is no part of an arm"
+
+    def members(self, scene: Scene) -> tuple[Member, ...]:
+        """Return that of all joints."""
+        return (Member(None),)
+
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return the first four derivatives of the bodies' torque."""
+        rate, band = signals.motion.rate, DERIVATIVE_BAND * signals.scene.band
+        cut = band if band < HIGHEST_CUT * rate else None
+        _, first, second = differentiate(signals.rigid, rate, cut)
+        return [first, second, *differentiate(second, rate, cut)[1:]]
 
 
 def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = None) -> Recording:

@@ -44,6 +44,7 @@ class Presliding(Effect):
         ),
     )  # fmt: skip
     nonlinear = (NonlinearParameter("presliding_distance", "{position}", 1e-5, 0.3),)
+    in_small_ways = True
     view = View("reversal", along=True, distance="presliding_distance")
     experiment = "reverse often with small amplitude at two speeds: its memory is in angle, a delay's is in time"
 

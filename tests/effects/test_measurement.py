@@ -9,6 +9,7 @@ import pytest
 
 from scara_ident.effects import Member, Signals
 from scara_ident.effects.measurement import (
+    PositionFilter,
     TimeDelay,
     TorqueGainMismatch,
     TorqueSensorNonlinearity,
@@ -167,3 +168,30 @@ def test_a_delay_below_nothing_says_that_the_position_is_the_later_one():
     scene, delay = scene_of(load_robot()), TimeDelay()
     assert delay.or_else(scene, Member(None), np.array([0.005])) == ""
     assert "the position is the later one" in delay.or_else(scene, Member(None), np.array([-0.005]))
+
+
+def test_a_filter_of_the_positions_is_told_by_its_second_derivative():
+    """Of a mean over L, without its delay, the torque is that of the positions less L^2/24 of its second derivative."""
+    samples, made = 61, []
+    for item in recordings(lambda u, time: u, noise=1e-3):
+        # In the middle of the samples: no delay is left.
+        mean = np.array([np.convolve(row, np.full(samples, 1.0 / samples), "same") for row in item.position])
+        inside = slice(samples, -samples)
+        assert item.effort is not None
+        made.append(replace(item, time=item.time[inside], position=mean[:, inside], effort=item.effort[:, inside]))
+    _, value, covariance = fit(build_model(load_robot()), made, PositionFilter(), Member(None))
+    assert -value[1] == pytest.approx((samples / 500.0) ** 2 / 24.0, rel=0.1)
+    assert -value[1] > 5.0 * np.sqrt(covariance[1, 1])
+    # Less than half a sample.
+    assert abs(value[0]) < 1e-3
+
+
+def test_only_positions_that_are_late_by_more_than_a_sample_may_be_filtered():
+    scene, delay = scene_of(load_robot(), rate=500.0), TimeDelay()
+    assert delay.leaves(scene, Member(None), np.array([0.02])) is None
+    assert delay.leaves(scene, Member(None), np.array([-0.0015])) is None
+    found = delay.leaves(scene, Member(None), np.array([-0.02]))
+    assert found == (PositionFilter(), Member(None), pytest.approx(10.0))
+    assert PositionFilter().members(scene) == (Member(None),)
+    # A mean of twice its delay keeps three quarters there.
+    assert np.sinc(0.04 * found[2]) == pytest.approx(0.76, abs=0.01)

@@ -39,6 +39,7 @@ CHECKS = (
     effort.saturation,
     effort.coarse_effort,
     position.limits,
+    position.computed,
     clock.enough,
 )
 

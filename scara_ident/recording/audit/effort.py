@@ -176,7 +176,7 @@ def _stuck(samples: Samples, joint: int, same: NDArray[np.bool_]) -> NDArray[np.
         shorter = length[~np.isin(np.arange(len(length)), found)]
         longest = _by_chance(float(np.mean(same[elsewhere])) if elsewhere.any() else 0.0, shorter, samples.count)
         found = [run for run in found if length[run] > longest]
-    if found and _without_noise(values, ~stuck):
+    if found and without_noise(values, ~stuck):
         found = [run for run in found if not _steady(samples, start[run], end[run])]
     stuck[:] = False
     for run in found:
@@ -205,7 +205,7 @@ def _by_chance(share: float, lengths: NDArray[np.intp], count: int) -> float:
     return float(2.0 + np.log(CHANCE / (count * share)) / np.log(again))
 
 
-def _without_noise(values: Array, live: NDArray[np.bool_]) -> bool:
+def without_noise(values: Array, live: NDArray[np.bool_]) -> bool:
     """Tell whether what is live of an effort is smooth to its rounding, as a simulator writes it."""
     beside = ORDER + 2
     if len(values) < beside:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scara_ident.recording.audit.position import is_computed
 from tests.made_recordings import COUNT, columns
 from tests.recording.audit.made import Read, kinds, only, refusal
 
@@ -198,3 +199,32 @@ def test_a_single_one_is_left_out(read: Read, signal: str):
     recording = read(made)
     assert "row 701" in only(recording, "spike").message
     assert len(recording.time) == 1199
+
+
+def test_positions_smoother_than_any_encoder_beside_noisy_efforts_are_said_to_be_computed(read, robot):
+    def told(samples: int, interval: float, step: float) -> dict[str, np.ndarray]:
+        made, time = columns(samples, interval), interval * np.arange(samples)
+        for joint, (middle, amplitude, frequency) in {"joint1": (1.5, 1.2, 0.35), "joint2": (0.1, 1.0, 1.5)}.items():
+            exact = middle + amplitude * np.sin(2 * np.pi * frequency * time)
+            made[f"{joint}.position"] = step * np.rint(exact / step) if step else exact
+        return made
+
+    for samples, interval in ((4000, 1e-3), (1000, 8e-3)):
+        finding = only(read(told(samples, interval, 0.0)), "computed_position")
+        assert finding.count == 2
+        assert "neither noise nor an encoder's steps" in finding.message
+        assert "log the measured positions" in finding.message
+        # 24 bits on the motor, before a gear of 160.
+        assert read(told(samples, interval, 2 * np.pi / 2**24 / 160)).findings == ()
+    # A plan has no efforts, and a simulator without noise in anything is none that anybody takes for an arm.
+    made = told(4000, 1e-3, 0.0)
+    for joint in ("joint1", "joint2"):
+        made[f"{joint}.effort"] = np.gradient(np.gradient(made[f"{joint}.position"]))
+    assert read(made).findings == ()
+
+
+def test_a_joint_that_rests_on_its_encoder_is_measured():
+    position = COUNT * np.rint(np.repeat([0.0, 1.0], 500) / COUNT)
+    assert not is_computed(position)
+    assert not is_computed(np.linspace(0.0, 1.0, 50))
+    assert is_computed(np.linspace(0.0, 1.0, 500) ** 2)

@@ -1,0 +1,94 @@
+"""What a filter of the positions leaves beside its delay is no elastic gear; gears that are there stay found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
+from scara_ident.diagnosis.remainder_check import remainder_objection
+from scara_ident.effects import Member, effects_named
+from scara_ident.effects.measurement import PositionFilter
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import parse_effect, simulate, virtual_arm
+from tests.effects.scenes import wandering
+
+RATE = 250.0
+SOFT = "joint_elasticity:joint2:stiffness=2000"
+
+
+def averaged(item: Recording, samples: int) -> Recording:
+    """The recording with positions that are the mean of the last so many."""
+    before = np.repeat(item.position[:, :1], samples - 1, axis=1)
+    windows = np.lib.stride_tricks.sliding_window_view(np.concatenate([before, item.position], axis=1), samples, axis=1)
+    return replace(item, position=np.mean(windows, axis=-1))
+
+
+def diagnosed(effects: list[str], samples: int) -> Diagnosis:
+    arm, made = virtual_arm(), [parse_effect(item) for item in effects]
+    runs = [
+        averaged(
+            simulate(arm, wandering(arm, f"t{k}", 10 + k, 10.0), effects=made, seed=k, rate=RATE).recording, samples
+        )
+        for k in range(4)
+    ]
+    return diagnose(
+        load_robot(), runs[:-1], validation=runs[-1:], catalogue=effects_named("time_delay", "joint_elasticity")
+    )
+
+
+@pytest.fixture(scope="module")
+def rigid() -> Diagnosis:
+    return diagnosed([], 20)
+
+
+@pytest.fixture(scope="module")
+def soft() -> Diagnosis:
+    return diagnosed([SOFT], 10)
+
+
+def test_a_mean_of_the_positions_is_a_delay_and_no_elastic_gear(rigid: Diagnosis):
+    """Stiffness of joint1 21500 ± 1600 N m/rad, of a rigid arm whose positions are means over 80 ms."""
+    (delay,) = rigid.effects
+    assert (delay.effect, delay.joint) == ("time_delay", None)
+    # Half of its length, less half a sample.
+    assert delay.parameters["delay"].value == pytest.approx(-19 / 2 / RATE, abs=0.5 / RATE)
+    (why,) = (item.why for item in rigid.tentative if item.joint == "joint1")
+    assert why.startswith("a filter of all positions before they were recorded does as well in its place")
+
+
+def test_no_band_is_asked_for_that_the_filter_has_emptied(rigid: Diagnosis):
+    # A mean over 80 ms keeps nothing at 12.5 Hz, and 76 % at a fifth over its delay.
+    assert max(band or np.inf for band in rigid.search.bands) <= 0.21 / (19 / 2 / RATE)
+
+
+def test_an_elastic_gear_beside_a_filter_of_the_positions_is_found(soft: Diagnosis):
+    delay, gear = sorted(soft.effects, key=lambda item: item.effect, reverse=True)
+    assert delay.effect == "time_delay"
+    assert (gear.effect, gear.joint) == ("joint_elasticity", "joint2")
+    # The filter's rest is not in the model, and its mean over 40 ms takes 6 % of 8 Hz.
+    assert gear.parameters["stiffness"].value == pytest.approx(2000.0, rel=0.12)
+
+
+def test_only_what_leaves_a_rest_objects(soft: Diagnosis):
+    step = soft.search.step
+    (gear,) = (place for place, item in enumerate(step.chosen) if item.effect.name == "joint_elasticity")
+    beside = step.without(gear)
+    (decision,) = beside.judge([step.chosen[gear]])
+    assert beside.rest == Candidate(PositionFilter(), Member(None))
+    assert remainder_objection(beside, decision) is None
+    assert remainder_objection(replace(beside, rest=None), decision) is None
+    # A rest that does all that the gear does leaves nothing to it.
+    why = remainder_objection(replace(beside, rest=step.chosen[gear]), decision)
+    assert why == "an elastic gear does as well in its place, and beside it 0% of this is left"
+
+
+def test_what_a_rest_leaves_too_little_of_to_come_in_is_refused_whatever_the_rest_does_in_its_place():
+    """The first joint's gear seemed to have twice its stiffness, 24300 +- 1500 N m/rad, beside means over 60 ms."""
+    found = diagnosed(["joint_elasticity:joint1:stiffness=12000"], 15)
+    assert [item.effect for item in found.effects] == ["time_delay"]
+    assert any("a filter of all positions" in item.why for item in found.tentative)
