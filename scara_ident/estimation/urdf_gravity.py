@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.estimation.information import triangular
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.urdf_scale import SURE, USUAL
 from scara_ident.model.urdf_torque import urdf_torques
@@ -152,19 +153,20 @@ def _fitted(observations: Observations) -> UrdfGravity | None:
         made = [
             part.rows(j, np.vstack([torque[j], part.motion.a[j]])) for part, torque in zip(parts, torques, strict=True)
         ]
-        mine = np.concatenate(made, axis=1).T
-        right = own.table[-1]
+        mine = np.concatenate(made, axis=1)
+        count = mine.shape[1]
         # Friction, offset and rotor are nobody else's, so that what they do not explain is all that matters.
-        nuisance = np.column_stack([own.table[:-1][free[own.columns]].T, mine[:, 4]])
-        if len(right) <= nuisance.shape[1] + 4:
+        table = np.concatenate([own.table[:-1][free[own.columns]], mine[4:], mine[:4], own.table[-1:]])
+        if count < len(table):
             continue
-        outside = _outside(nuisance, np.column_stack([mine[:, :4], right]))
+        factor = triangular(table.T)
+        outside = _outside(factor[:, :-5], factor[:, -5:])
         alone = outside[:, 4] - outside[:, :4] @ np.linalg.lstsq(outside[:, :4], outside[:, 4], rcond=RANK)[0]
-        noise = float(np.sqrt(alone @ alone / len(right)))
+        noise = float(np.sqrt(alone @ alone / count))
         if noise > 0.0:
             shared.append(outside[:, :4] / noise)
             rights.append(outside[:, 4] / noise)
-            rows += len(right)
+            rows += count
     if not shared:
         return None
     columns, torque = np.concatenate(shared), np.concatenate(rights)
@@ -174,14 +176,14 @@ def _fitted(observations: Observations) -> UrdfGravity | None:
     # Along the axes of a pendulum nothing shows of gravity; there it is taken as stated.
     _, shown, axes = np.linalg.svd(columns[:, 1:], full_matrices=False)
     seen = axes[shown > SHOWN * shown[0]]
-    value, covariance, left = _solved(np.column_stack([columns[:, 0], columns[:, 1:] @ seen.T]), torque)
+    value, covariance, left = _solved(np.column_stack([columns[:, 0], columns[:, 1:] @ seen.T]), torque, rows)
     if not np.all(np.isfinite(covariance)):
         return None
     along = np.column_stack([columns[:, 0], columns[:, 1:] @ stated / size])
-    as_stated, _, stated_left = _solved(along, torque)
+    as_stated, _, stated_left = _solved(along, torque, rows)
     if as_stated[1] < 0.0:
         # The other way round is another direction.
-        _, _, stated_left = _solved(along[:, :1], torque)
+        _, _, stated_left = _solved(along[:, :1], torque, rows)
     found = stated + seen.T @ (value[1:] - seen @ stated)
     spread = seen.T @ covariance[1:, 1:] @ seen
     return UrdfGravity(stated, found, spread, float(value[0]), float(np.sqrt(covariance[0, 0])), left, stated_left)
@@ -194,13 +196,13 @@ def _outside(columns: Array, signals: Array) -> Array:
     return signals - scaled @ np.linalg.lstsq(scaled, signals, rcond=RANK)[0]
 
 
-def _solved(columns: Array, torque: Array) -> tuple[Array, Array, float]:
-    """Return least-squares values, their covariance, infinite where some are not told, and the rms of what is left."""
+def _solved(columns: Array, torque: Array, rows: int) -> tuple[Array, Array, float]:
+    """Return least-squares values, their covariance, infinite where some are not told, and the rms over so many rows of what is left."""
     size = np.linalg.norm(columns, axis=0)
     scale = 1.0 / np.where(size > 0.0, size, 1.0)
     value, _, rank, _ = np.linalg.lstsq(columns * scale, torque, rcond=1e-6)
     left = torque - (columns * scale) @ value
-    mean = float(left @ left) / len(torque)
+    mean = float(left @ left) / rows
     if rank < columns.shape[1]:
         return scale * value, np.full((len(scale),) * 2, np.inf), float(np.sqrt(mean))
     covariance = mean * np.linalg.inv((columns * scale).T @ (columns * scale))
