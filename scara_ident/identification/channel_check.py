@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
+from scara_ident.estimation.bands import HIGHEST_BAND
 from scara_ident.estimation.least_squares import weighted_value, wls
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.urdf_scale import urdf_scale
@@ -40,6 +41,8 @@ PUSHING = 0.02
 PUSHING_STD = 4.0
 # Residual that counts as none, as a share of the torque.
 ROUNDING = 1e-12
+# Hz up to which an arm that moves at all is moved.
+MOVED = 5.0
 
 
 @dataclass(frozen=True)
@@ -116,8 +119,10 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     held = observations.of(sorted(first.values()))
     model = observations.model
     joints = model.robot.joints
-    few = any(0 < rows.table.shape[1] < ENOUGH_ROWS * len(rows.columns) for rows in held.joints)
-    unsigned = None if few else _unsigned(held)
+    few = _few(held)
+    # No motion explains magnitudes, so that they leave no band: they are looked at in one that any arm fills.
+    wide = min(MOVED, HIGHEST_BAND * min(part.rate for part in held.data.stretches))
+    unsigned = _unsigned(observe(model, held.data.at((wide,) * len(joints))) if few else held)
     if unsigned is not None:
         # What else is read into magnitudes is of no channel.
         return (unsigned,)
@@ -163,8 +168,14 @@ def refuse_exchanged(faults: Sequence[ChannelFault]) -> None:
         raise RecordingError("; ".join(str(fault) for fault in faults))
 
 
+def _few(observations: Observations) -> bool:
+    return any(0 < rows.table.shape[1] < ENOUGH_ROWS * len(rows.columns) for rows in observations.joints)
+
+
 def _unsigned(observations: Observations) -> ChannelFault | None:
     """Return the joints whose effort is explained far better as the magnitude of a torque of both signs."""
+    if _few(observations):
+        return None
     fits = {j: fit for j, fit in signed_fits(observations).items() if fit[1] < MENDED * fit[0]}
     if not fits:
         return None

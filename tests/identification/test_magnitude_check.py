@@ -81,6 +81,20 @@ def test_one_sign_of_a_load_is_no_magnitude(robot: Robot, load: float, monkeypat
             assert channel_faults(observations) == ()
 
 
+def test_magnitudes_are_told_where_they_leave_no_band(robot: Robot) -> None:
+    """`identify` went on where no motion explained the torque at any frequency, at 0.6 Hz and with few rows."""
+    wrong = [unsigned(run, 0) for run in runs(robot)]
+    narrow = observe(build_model(robot, "basic"), prepare(wrong, (0.3, 0.3)))
+    (fault,) = channel_faults(narrow)
+    assert fault.unsigned
+    assert fault.joints == ("j1",)
+    # A second of them says nothing, and is not refused.
+    short = [
+        replace(run, time=run.time[:200], position=run.position[:, :200], effort=run.effort[:, :200]) for run in wrong
+    ]
+    assert not any(item.unsigned for item in channel_faults(seen(robot, short[:1])))
+
+
 def test_both_refuse_magnitudes(robot: Robot) -> None:
     wrong = [unsigned(run, 0) for run in runs(robot)]
     for ask in (identify, diagnose):
