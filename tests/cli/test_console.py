@@ -81,7 +81,9 @@ def test_verbose_lists_what_every_file_holds(command, folder: Path, tmp_path: Pa
     assert (terse.status, verbose.status) == (0, 0)
     assert terse.out in verbose.out
     listing = verbose.out.removesuffix(terse.out)
-    assert ["OJD_1", "3000", "12", "250", "0"] in [line.split() for line in listing.splitlines()]
+    # Found of the first: positions that no encoder gives.
+    assert "OJD_1: positions have neither noise nor an encoder's steps" in " ".join(listing.split())
+    assert ["OJD_1", "3000", "12", "250", "1"] in [line.split() for line in listing.splitlines()]
     assert ["gap_1", "2999", "2.999", "1000"] in [line.split()[:4] for line in listing.splitlines()]
 
 
