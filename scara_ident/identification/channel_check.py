@@ -122,7 +122,8 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     few = _few(held)
     # No motion explains magnitudes, so that they leave no band: they are looked at in one that any arm fills.
     wide = min(MOVED, HIGHEST_BAND * min(part.rate for part in held.data.stretches))
-    unsigned = _unsigned(observe(model, held.data.at((wide,) * len(joints))) if few else held)
+    bands = tuple(None if band is None else max(band, wide) for band in held.data.bands)
+    unsigned = _unsigned(observe(model, held.data.at(bands)) if few and bands != held.data.bands else held)
     if unsigned is not None:
         # What else is read into magnitudes is of no channel.
         return (unsigned,)
