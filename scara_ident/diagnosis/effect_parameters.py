@@ -98,7 +98,9 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
     for owner, (candidate, own) in enumerate(zip(step.chosen, state.places, strict=True)):
         linear = Coefficients(state.value[own], covariance[own, own])
         coefficients.append(linear)
-        parameters = _told(step.scene, candidate, linear, np.flatnonzero(undetermined[own]))
+        wide = np.r_[own, _beside(step, candidate, state)]
+        told = Coefficients(state.value[wide], covariance[np.ix_(wide, wide)])
+        parameters = _told(step.scene, candidate, told, np.flatnonzero(undetermined[wide]))
         for position, unknown in enumerate(state.unknowns):
             if unknown.owner != owner:
                 continue
@@ -112,6 +114,17 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
                 parameters[parameter.name] = Parameter(unknown.value, float(np.sqrt(max(variance, 0.0))), unit)
         found.append(parameters)
     return PhysicalParameters(tuple(found), tuple(coefficients), _rotors(step, state, covariance))
+
+
+def _beside(step: SelectionStep, candidate: Candidate, state: Linearised) -> NDArray[np.intp]:
+    """Return the columns of the effect beside which a candidate's parameters are told; none where it did not come in."""
+    member = candidate.effect.told_beside(step.scene, candidate.member)
+    places = [
+        np.r_[own]
+        for item, own in zip(step.chosen, state.places, strict=True)
+        if item.member == member and item.effect.name == candidate.effect.name
+    ]
+    return np.concatenate([np.array([], dtype=np.intp), *places])
 
 
 def _told(

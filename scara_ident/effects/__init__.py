@@ -1,8 +1,8 @@
 """Effects that a rigid body with polynomial friction lacks, one file per physical family."""
 
 from scara_ident.effects.catalogue import CATALOGUE, EFFECTS, available_effects, effects_named
-from scara_ident.effects.effect import Effect, EffectTerm, SpectralLine, View
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie
+from scara_ident.effects.effect import Effect, EffectTerm, SpectralLine
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, View
 from scara_ident.effects.signals import Scene, Signals
 
 __all__ = [

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import DOUBT_STDS, Effect, View
+from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.friction import friction_of, friction_torque
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, View, deviation
 from scara_ident.effects.position import offset_of
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.terms import Column

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.in_state import follows_state
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, deviation
+from scara_ident.effects.parameters import OWN, Coefficient, Member, NonlinearParameter, Parameter, Tie, View, deviation
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.errors import ScaraIdentError
 from scara_ident.model.prediction import states
@@ -40,32 +40,6 @@ class SpectralLine:
 
     kind: Literal["order", "frequency"]
     position: float
-
-
-@dataclass(frozen=True)
-class View:
-    """The signal over which an effect shows itself in a figure.
-
-    Attributes
-    ----------
-    signal : str
-        A signal of the joint; ``reversal`` is the travel since its last reversal, ``order`` and ``frequency`` are
-        spectra, ``own`` is the torque of the effect itself.
-    along : bool
-        Whether torque is taken in the direction of motion.
-    distance : str or None
-        The physical parameter that says over which distance after a reversal the effect acts.
-    """
-
-    signal: Literal[
-        "own", "position", "velocity", "acceleration", "time", "torque", "torque rate", "load", "reversal", "order", "frequency"
-    ] = "own"  # fmt: skip
-    along: bool = False
-    distance: str | None = None
-
-
-OWN = View()
-"""An effect that is shown over nothing but its own torque."""
 
 
 @dataclass(frozen=True)
@@ -236,12 +210,17 @@ class Effect(ABC):
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Turn coefficients (k,) and their covariance (k, k) into the effect's physical parameters.
 
-        The nonlinear parameters are added by the caller, who knows how sure they are.
+        The nonlinear parameters are added by the caller, who knows how sure they are. Where `told_beside` names a member
+        that was found too, its coefficients follow.
         """
         return {
             column.name: Parameter(float(value[k]), deviation(covariance, k), column.unit)
             for k, column in enumerate(self.columns(scene, member))
         }
+
+    def told_beside(self, scene: Scene, member: Member) -> Member | None:
+        """Return the member of this family by whose coefficients too, where it is found, the physical parameters are."""
+        return None
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say in a few words what the effect is, for a person."""

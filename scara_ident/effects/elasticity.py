@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import DOUBT_STDS, Effect, View
+from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.flight import FreeLink
 from scara_ident.effects.links import usual_link_inertia, usual_link_inertia_slopes
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, deviation
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, View, deviation
 from scara_ident.effects.second_encoder import gear_stiffness
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.two_mass import TwoMasses

@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import DOUBT_STDS, Effect, View
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter
+from scara_ident.effects.effect import DOUBT_STDS, Effect
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, View
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine
 from scara_ident.model.terms import Column, Friction

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import Effect, View
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter
+from scara_ident.effects.effect import Effect
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, View
 from scara_ident.effects.signals import Scene, Signals
 
 # A gear that loses more of the torque is broken.

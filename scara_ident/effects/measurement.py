@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import DOUBT_STDS, Effect, View
-from scara_ident.effects.parameters import Coefficient, Member, Parameter, deviation
+from scara_ident.effects.effect import DOUBT_STDS, Effect
+from scara_ident.effects.parameters import Coefficient, Member, Parameter, View, deviation
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.motion.low_pass import HIGHEST_CUT, differentiate
 from scara_ident.motion.motion import UNIFORM_TOLERANCE
@@ -25,8 +25,10 @@ DERIVATIVE_BAND = 3.0
 LONGEST_DELAY = 0.05
 # It may have this many samples where those last longer: a slow log is late by whole samples.
 LONGEST_DELAY_SAMPLES = 5.0
-# Torque constants of one arm that differ by more than this are a wrong unit, not a mismatch.
-LARGEST_MISMATCH = 0.5
+# Torque scales of one arm that differ by more than this factor, either way, are a wrong unit, not a mismatch.
+LARGEST_MISMATCH = 2.0
+# Of this many joints that differ in their scales either may be the one that is wrong.
+LEAST_TO_AGREE = 2
 # Torque that is held from one sample to the next, or averaged over one, is up to this many samples off its time stamp.
 SAMPLING = 1.0
 # Of positions that are late by T seconds, motion faster than this over T, Hz, is half gone where a filter makes them late: a mean
@@ -72,37 +74,60 @@ class TorqueSensorNonlinearity(Effect):
 
 
 class TorqueGainMismatch(Effect):
-    """A torque scale that differs from the first joint's: ``recorded = ratio u``.
+    """A torque scale that differs from that of the other joints: ``recorded = scale u``.
 
-    A scale that is wrong for all joints alike goes into all parameters; what the first joint's torque says of the
-    parameters that it shares with this one tells the ratio, weakly.
+    A scale that is wrong for all joints alike goes into all parameters; what two joints' torques say of the parameters
+    that they share tells the ratio of their scales, weakly. The joints of which none is named agree with one another.
+    ``ratio`` is the joint's scale over the first joint's, whether or not the first joint is found to differ too. Where it
+    is, it is named itself, with the ratio of its scale to that of the joints that are not named. Of an arm of two
+    joints nothing tells which is wrong: the second is named.
     """
 
     name = "torque_gain_mismatch"
     summary = "a torque scale that differs from the first joint's"
     coefficients = (
-        Coefficient(
-            "ratio_less_one", "1", "torque scale of {joint} over the first joint's, less 1",
-            largest=LARGEST_MISMATCH,
-            too_large="a torque scale that differs by {value:+.0%} from the first joint's is no mismatch",
-        ),
-    )  # fmt: skip
+        Coefficient("ratio_less_one", "1", "torque scale of {joint} over that of the joints that agree, less 1"),
+    )
     follows_estimate = True
     of_state = True
     view = View("torque")
-    experiment = "repeat with a known payload: it gives both joints the same scale"
+    experiment = "repeat with a known payload: it gives all joints the same scale"
+
+    def description(self, scene: Scene, member: Member) -> str:
+        """Say whose scale that of the first joint differs from."""
+        return (
+            super().description(scene, member)
+            if member.joint
+            else "a torque scale that differs from that of the joints not named"
+        )
 
     def joints(self, scene: Scene) -> list[int]:
-        """Return the joints after the first."""
-        return list(range(1, scene.robot.n))
+        """Return all joints; of two the second, as either explains what the other does."""
+        return list(range(0 if scene.robot.n > LEAST_TO_AGREE else 1, scene.robot.n))
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the predicted torque."""
         return [signals.predicted[member.place]]
 
+    def told_beside(self, scene: Scene, member: Member) -> Member | None:
+        """Return that of the first joint, to whose scale the ratio is."""
+        return Member(0) if member.joint else None
+
+    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
+        """Say so of a scale that no two torque constants of an arm differ by."""
+        spread = DOUBT_STDS * std[0]
+        if 1.0 / LARGEST_MISMATCH - spread <= 1.0 + value[0] <= LARGEST_MISMATCH + spread:
+            return None
+        return f"a torque scale {1.0 + value[0]:.3g} times that of other joints is no mismatch"
+
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
-        """Return the ratio."""
-        return {"ratio": Parameter(1.0 + float(value[0]), deviation(covariance), "1")}
+        """Return the ratio: to the first joint's scale, of which ``value[1]`` says by how much it differs where it does."""
+        scale = 1.0 + value
+        if len(value) == 1:
+            return {"ratio": Parameter(float(scale[0]), deviation(covariance), "1")}
+        ratio = float(scale[0] / scale[1])
+        slope = np.array([1.0, -ratio]) / scale[1]
+        return {"ratio": Parameter(ratio, float(np.sqrt(max(slope @ covariance @ slope, 0.0))), "1")}
 
 
 class TimeDelay(Effect):

@@ -1,8 +1,9 @@
-"""What an effect is described by: its members, coefficients and parameters."""
+"""What an effect is described by: its members, coefficients and parameters, and what a figure shows it over."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -65,6 +66,32 @@ class Coefficient:
     positive: str = ""
     largest: float = np.inf
     too_large: str = ""
+
+
+@dataclass(frozen=True)
+class View:
+    """The signal over which an effect shows itself in a figure.
+
+    Attributes
+    ----------
+    signal : str
+        A signal of the joint; ``reversal`` is the travel since its last reversal, ``order`` and ``frequency`` are
+        spectra, ``own`` is the torque of the effect itself.
+    along : bool
+        Whether torque is taken in the direction of motion.
+    distance : str or None
+        The physical parameter that says over which distance after a reversal the effect acts.
+    """
+
+    signal: Literal[
+        "own", "position", "velocity", "acceleration", "time", "torque", "torque rate", "load", "reversal", "order", "frequency"
+    ] = "own"  # fmt: skip
+    along: bool = False
+    distance: str | None = None
+
+
+OWN = View()
+"""An effect that is shown over nothing but its own torque."""
 
 
 @dataclass(frozen=True)

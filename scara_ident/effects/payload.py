@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import DOUBT_STDS, Effect, View
+from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.links import point_mass, shared, tool_of
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, View, deviation
 from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.pickups import PARTS, taken_up
 from scara_ident.effects.recording_groups import SLOWEST, groups_by_torque

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import Effect, View
-from scara_ident.effects.parameters import Coefficient, Member, Parameter, deviation
+from scara_ident.effects.effect import Effect
+from scara_ident.effects.parameters import Coefficient, Member, Parameter, View, deviation
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.terms import Column
 from scara_ident.model.terms.friction import Offset

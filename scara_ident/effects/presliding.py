@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import DOUBT_STDS, Effect, View
+from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.friction import friction_of
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, deviation
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, View, deviation
 from scara_ident.effects.signals import Scene, Signals
 
 # Distances tried, rad: three times apart, which refinement bridges, over what joints have.

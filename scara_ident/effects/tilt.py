@@ -9,9 +9,9 @@ from functools import lru_cache
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import DOUBT_STDS, Effect, View
+from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.links import first_moments, gravity_columns, gravity_torque, shared, sideways
-from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter
+from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter, View
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.spanned import rows_by_sample
 from scara_ident.model.terms import Column, RigidBody

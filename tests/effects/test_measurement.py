@@ -58,6 +58,27 @@ def test_members_are_those_that_can_be_told():
     assert [member.joint for member in TimeDelay().members(scene)] == [None, 0, 1]
 
 
+def test_of_more_than_two_joints_the_first_may_have_the_wrong_scale_too():
+    scene, effect = scene_of(load_robot("ur5")), TorqueGainMismatch()
+    assert [member.joint for member in effect.members(scene)] == [0, 1, 2, 3, 4, 5]
+    assert effect.told_beside(scene, Member(0)) is None
+    assert effect.told_beside(scene, Member(4)) == Member(0)
+    assert effect.description(scene, Member(0)) == "a torque scale that differs from that of the joints not named"
+    assert effect.description(scene, Member(4)) == "a torque scale that differs from the first joint's"
+
+
+def test_the_ratio_is_to_the_first_joint_with_what_both_scales_are_uncertain_by():
+    scene, effect = scene_of(load_robot("ur5")), TorqueGainMismatch()
+    value, covariance = np.array([-0.2, 0.25]), np.array([[4e-6, 1e-6], [1e-6, 9e-6]])
+    found = effect.parameters(scene, Member(4), value, covariance)["ratio"]
+    drawn = np.random.default_rng(0).multivariate_normal(1.0 + value, covariance, 100_000)
+    assert found.value == pytest.approx(0.64)
+    # Of so many draws a standard deviation is sure to 1 / sqrt(200,000).
+    assert found.std == pytest.approx(np.std(drawn[:, 0] / drawn[:, 1]), rel=0.01)
+    alone = effect.parameters(scene, Member(4), value[:1], covariance[:1, :1])["ratio"]
+    assert (alone.value, alone.std) == (pytest.approx(0.8), pytest.approx(2e-3))
+
+
 @pytest.mark.parametrize("cubic", [0.002, -0.002])
 def test_the_cubic_is_recovered(cubic: float):
     # Up to 10 % at the largest torques.
@@ -99,7 +120,9 @@ def test_impossible_sizes_are_refused():
     std = np.array([1e-4])
     assert TimeDelay().inadmissible(scene, Member(None), np.array([0.2]), std)
     assert TimeDelay().inadmissible(scene, Member(None), np.array([-0.004]), std) is None
-    assert TorqueGainMismatch().inadmissible(scene, Member(1), np.array([-0.8]), std)
+    # A factor of two and a bit, one way and the other: which joint is the reference makes no difference.
+    for ratio, said in ((0.2, True), (0.45, True), (0.55, False), (1.6, False), (1.9, False), (2.2, True)):
+        assert bool(TorqueGainMismatch().inadmissible(scene, Member(1), np.array([ratio - 1.0]), std)) == said
     # At 2 N m, the limit, nothing of the torque would be left.
     assert TorqueSensorNonlinearity().inadmissible(scene, Member(0), np.array([-0.3]), std)
     assert TorqueSensorNonlinearity().inadmissible(scene, Member(0), np.array([-0.1]), std) is None
