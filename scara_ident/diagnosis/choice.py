@@ -80,6 +80,8 @@ def _soundest(
         refined += step.judge(
             [replace(item, effect=full) for item in sure if (full := item.effect.in_full()) is not None]
         )
+        others = [replace(item, effect=other) for item in sure for other in item.effect.other_laws()]
+        refined += step.refine(step.judge(others)) if others else []
         pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in leaders if pair[0] is not step]
         for own, decision in best_first(pairs):
             why = objection(own, decision)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
-from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
+from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.found_effect import (
     FoundEffect,
@@ -21,6 +21,7 @@ from scara_ident.diagnosis.found_effect import (
 )
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.model_selection import select_model
+from scara_ident.diagnosis.other_laws import parameters_of_laws
 from scara_ident.diagnosis.outcome import Outcome, Unexplained
 from scara_ident.diagnosis.screening import Dependence
 from scara_ident.diagnosis.search import Search, SearchTask
@@ -240,7 +241,7 @@ def diagnose(
     held_out, useless = with_rows(held_out.at(found.bands), needed=False)
     held = validated(outcome, held_out)
     whole = replace(found.whole(step), variation=after.offsets)
-    parameters = physical_parameters(whole) if whole.chosen else PhysicalParameters((), (), ())
+    parameters = parameters_of_laws(whole) if whole.chosen else PhysicalParameters((), (), ())
     readings = direct_readings(found, families, criteria.rotor_inertia_std)
     effects = found_effects(found, step, parameters, readings, held.gains)
     refused = (*outcome.demoted, *outcome.suspected)

@@ -256,6 +256,14 @@ class Effect(ABC):
         """Return a family with more columns that may take its place once a member is to be believed; None without one."""
         return None
 
+    def other_laws(self) -> tuple[Effect, ...]:
+        """Return families of the same cause and parameters by another law, which may take its place where they explain more."""
+        return ()
+
+    def law(self) -> Mapping[str, Parameter]:
+        """Return what tells the law from that of the effect's name; nothing where it is that one."""
+        return {}
+
     def band(self, member: Member) -> float:
         """Return the band, Hz, that holds where a member shows most; 0 where every band does."""
         return 0.0

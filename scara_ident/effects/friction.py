@@ -55,11 +55,22 @@ def friction_slope(signals: Signals, joint: int) -> Array:
     return np.asarray(slope * signals.scene.robot.drive_sign[joint])
 
 
+@dataclass(frozen=True)
 class Stribeck(Effect):
     """More friction at low speed: ``u = amplitude sign(v) exp(-(v/velocity)^2)``.
 
-    Armstrong-Helouvry, Dupont, Canudas de Wit (1994), "A survey of models, analysis tools and compensation methods".
+    Armstrong-Helouvry, Dupont, Canudas de Wit (1994), "A survey of models, analysis tools and compensation methods",
+    with both exponents in use. Where ``exp(-|v|/velocity)`` explains more, it is by that, and ``exponent`` 1 is among the
+    parameters. Amplitude and velocity rest on the law: where both explain as much, they are no surer than what the two
+    differ by.
+
+    Attributes
+    ----------
+    exponent : {2, 1}
+        Of the speed over the velocity.
     """
+
+    exponent: Literal[1, 2] = 2
 
     name = "stribeck"
     summary = "more friction at low speed (Stribeck)"
@@ -78,10 +89,22 @@ class Stribeck(Effect):
         return ((share * float(scene.speed[joint]),) for share in STRIBECK_SHARES)
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
-        """Return ``sign(v) exp(-(v/velocity)^2)``."""
+        """Return ``sign(v) exp(-|v/velocity|^exponent)``."""
         j = member.place
         ratio = signals.motion.v[j] / member.nonlinear[0]
-        return [signals.sign[j] * np.exp(-(ratio * ratio))]
+        return [signals.sign[j] * np.exp(-(ratio * ratio) if self.exponent == 2 else -np.abs(ratio))]
+
+    def other_laws(self) -> tuple[Effect, ...]:
+        """Return the family of the other exponent."""
+        return (Stribeck(1 if self.exponent == 2 else 2),)
+
+    def law(self) -> Mapping[str, Parameter]:
+        """Return the exponent where it is not 2."""
+        return {} if self.exponent == 2 else {"exponent": Parameter(float(self.exponent), 0.0, "1")}
+
+    def description(self, scene: Scene, member: Member) -> str:
+        """Add the law where it is not that with the exponent 2."""
+        return super().description(scene, member) + ("" if self.exponent == 2 else ", as exp(-|v|/velocity)")
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where friction does not fall with speed, by a share of what there is."""
@@ -101,10 +124,11 @@ class Stribeck(Effect):
         if not own:
             return ""
         ratio = np.linspace(0.05, 3.0, 60)
-        slope = -2.0 * value[0] / velocity * ratio * np.exp(-(ratio**2))
-        for power, each in own.items():
-            if power:
-                slope = slope + power * each * (ratio * velocity) ** (power - 1)
+        power = self.exponent
+        slope = -power * value[0] / velocity * ratio ** (power - 1) * np.exp(-(ratio**power))
+        for k, each in own.items():
+            if k:
+                slope = slope + k * each * (ratio * velocity) ** (k - 1)
         if np.min(slope) < 0.0:
             return ""
         return "; as a whole the friction never falls with speed: it may be one that grows ever less"

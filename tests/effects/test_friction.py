@@ -163,3 +163,16 @@ def test_where_friction_as_a_whole_never_falls_that_is_said(viscous: float, fall
     # It falls by at most 0.858 times its amplitude over its velocity: 0.215 N m s/rad.
     assert ("never falls" in Stribeck().or_else(beside, member, np.array([0.05]))) is not falls
     assert AsymmetricFriction().or_else(beside, Member(1), np.array([0.05])) == ""
+
+
+def test_the_other_law_falls_by_the_speed_itself_and_is_told_as_such():
+    scene, other = scene_of(load_robot()), Stribeck(1)
+    item, member = moving(scene.robot), Member(1, (0.2,))
+    v = item.v[1] * scene.robot.drive_sign[1]
+    expected = np.sign(v) * np.exp(-np.abs(v) / 0.2)
+    np.testing.assert_allclose(columns(other, scene, item, member)[1, 0], expected, atol=1e-12)
+    assert Stribeck().other_laws() == (other,)
+    assert other.other_laws() == (Stribeck(),)
+    assert Stribeck().law() == {}
+    assert other.law()["exponent"].value == 1.0
+    assert other.description(scene, member).startswith(Stribeck().description(scene, member) + ", as exp(-|v|")
