@@ -27,8 +27,8 @@ LONGEST_DELAY = 0.05
 LONGEST_DELAY_SAMPLES = 5.0
 # Torque scales of one arm that differ by more than this factor, either way, are a wrong unit, not a mismatch.
 LARGEST_MISMATCH = 2.0
-# Of this many joints that differ in their scales either may be the one that is wrong.
-LEAST_TO_AGREE = 2
+# Of so few joints that differ in their scales either may be the one that is wrong; of more, most agree.
+MOST_TO_DOUBT = 2
 # Torque that is held from one sample to the next, or averaged over one, is up to this many samples off its time stamp.
 SAMPLING = 1.0
 # Of positions that are late by T seconds, motion faster than this over T, Hz, is half gone where a filter makes them late: a mean
@@ -103,7 +103,11 @@ class TorqueGainMismatch(Effect):
 
     def joints(self, scene: Scene) -> list[int]:
         """Return all joints; of two the second, as either explains what the other does."""
-        return list(range(0 if scene.robot.n > LEAST_TO_AGREE else 1, scene.robot.n))
+        return list(range(0 if scene.robot.n > MOST_TO_DOUBT else 1, scene.robot.n))
+
+    def or_else(self, scene: Scene, member: Member, value: Array) -> str:
+        """Say of two joints that it may be the other one."""
+        return "" if scene.robot.n > MOST_TO_DOUBT else "; of two joints nothing tells which one's is wrong"
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the predicted torque."""
