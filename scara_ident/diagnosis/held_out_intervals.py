@@ -13,7 +13,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
-from scara_ident.diagnosis.interval_fit import JointSeen, seen_by_joints
+from scara_ident.diagnosis.interval_fit import JointSeen, bounds_of_cells, seen_by_joints
 from scara_ident.effects import Interval, Scene
 from scara_ident.effects.two_states import instants, likeliest, scatter_of
 from scara_ident.estimation.observations import Observations
@@ -57,19 +57,19 @@ def _told(
 ) -> list[tuple[float, float, float, float]]:
     """Return when an effect begins and ends to act, and how sure that is, by the rows of some joints."""
     width = 1.0 / (ROWS_PER_PERIOD * band)
-    count = max(1, int(np.ceil(reach[1] / width)))
-    bounds = np.clip(width * np.arange(count + 1), *reach)
+    bounds = bounds_of_cells(width, reach)
+    count = len(bounds) - 1
     state: Array | None = None
-    gains, scatter = np.zeros(count), 1.0
+    gains, sizes, scatter = np.zeros(count), np.zeros(count), 1.0
     for _ in range(ROUNDS if seen else 0):
         right, size = np.sum([item.cells(0, width, count, state) for item in seen], axis=0)
-        gains = (right - 0.5 * size) / scatter
+        gains, sizes = (right - 0.5 * size) / scatter, size / scatter
         new = likeliest([gains], float(np.log(count)) + 2.0)[0]
         if state is not None and np.array_equal(new, state):
             break
         state = new
         scatter = max(1.0, scatter_of([right - state * size], [size], width))
-    return [] if state is None else instants(gains, state, bounds)
+    return [] if state is None else instants(gains, sizes, state, bounds)
 
 
 def words_of(found: Sequence[Interval]) -> str:

@@ -59,7 +59,7 @@ class JointSeen:
             Where the effect acts.
         """
         own = self.owner == recording
-        cell = np.clip((self.time[own] / width).astype(int), 0, count - 1)
+        cell = np.clip(np.floor(self.time[own] / width + 0.5).astype(int), 0, count - 1)
         left, made = self.left[own], self.made[own]
         if state is not None and len(left):
             left = left - np.mean(left - state[cell] * made)
@@ -111,6 +111,20 @@ def seen_by_joints(
     return found
 
 
+def bounds_of_cells(width: float, reach: tuple[float, float]) -> Array:
+    """Return the bounds of cells about the rows of a recording, s; each row is in the middle of one.
+
+    Parameters
+    ----------
+    width : float
+        Between two rows, s.
+    reach : tuple of float
+        When the recording begins and ends, s.
+    """
+    count = int(np.ceil(reach[1] / width)) + 1
+    return np.clip(width * (np.arange(count + 1) - 0.5), *reach)
+
+
 def refined(step: SelectionStep) -> tuple[Candidate, ...]:
     """Return the effects of a model with their intervals moved to where the rows see them begin and end."""
     chosen = step.chosen
@@ -133,15 +147,15 @@ def _moved(step: SelectionStep, item: Candidate, seen: Sequence[JointSeen]) -> C
         place, time = names.index(data.name), data.recording.time
         own = [one for one in item.member.intervals if one.recording == place]
         length = float(time[-1] - time[0])
-        count = max(1, int(np.ceil(length / width)))
-        bounds = np.minimum(width * np.arange(count + 1), length)
+        bounds = bounds_of_cells(width, (0.0, length))
+        count = len(bounds) - 1
         middle = 0.5 * (bounds[1:] + bounds[:-1])
         state = np.zeros(count)
         for one in own:
             state[(middle >= one.start) & (middle < one.stop)] = 1.0
         right, size = np.sum([one.cells(recording, width, count, state) for one in seen], axis=0)
         scatter = max(1.0, scatter_of([right - state * size], [size], width))
-        moved = instants((right - 0.5 * size) / scatter, state, bounds)
+        moved = instants((right - 0.5 * size) / scatter, size / scatter, state, bounds)
         # Of one that is shorter than a row nothing is seen.
         same = len(moved) == len(own)
         intervals += [Interval(place, *times) for times in moved] if same else own

@@ -49,13 +49,15 @@ def spans(state: Array) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-def instants(gains: Array, state: Array, bounds: Array) -> list[tuple[float, float, float, float]]:
+def instants(gains: Array, sizes: Array, state: Array, bounds: Array) -> list[tuple[float, float, float, float]]:
     """Return when each stretch begins and ends, and the standard deviation of both, s.
 
     Parameters
     ----------
     gains, state : ndarray, shape (C,)
         As `likeliest` takes and gives them, of one recording.
+    sizes : ndarray, shape (C,)
+        Twice what a cell would gain where it acts and nothing else is left there: of one in which it begins that is less.
     bounds : ndarray, shape (C + 1,)
         Times of the cells, s.
 
@@ -83,9 +85,16 @@ def instants(gains: Array, state: Array, bounds: Array) -> list[tuple[float, flo
         chance = np.exp(odds - np.max(odds))
         chance /= np.sum(chance)
         mean = float(chance @ bounds[places])
+        spread = float(chance @ (bounds[places] - mean) ** 2)
         # It is somewhere within a cell.
         width = float(bounds[edge] - bounds[edge - 1])
-        found.append((mean, float(np.sqrt(chance @ (bounds[places] - mean) ** 2 + width**2 / 12.0))))
+        if spread < (0.5 * width) ** 2:
+            # The cells on either side are full, or empty, in part: half of one by prior, known to its whole.
+            inside = slice(edge - 1, edge + 1)
+            acts = np.clip((gains + 0.5 * sizes)[inside] / (sizes[inside] + 1.0), 0.0, 1.0)
+            late = acts if state[edge] == 0.0 else 1.0 - acts
+            mean = float(bounds[edge - 1] + width * np.sum(late))
+        found.append((mean, float(np.sqrt(spread + width**2 / 12.0))))
     return [(a, b, std, other) for (a, std), (b, other) in zip(found[::2], found[1::2], strict=True)]
 
 

@@ -38,7 +38,7 @@ def test_an_instant_within_what_tells_nothing_is_its_middle():
     """Cells of a tenth of a second; between 2 and 4 s nothing is seen, so that any time there is as likely."""
     bounds = np.linspace(0.0, 10.0, 101)
     gains = np.where(bounds[1:] > 4.01, 50.0, np.where(bounds[:-1] < 1.99, -50.0, 0.0))
-    ((start, stop, start_std, stop_std),) = instants(gains, likeliest([gains], 5.0)[0], bounds)
+    ((start, stop, start_std, stop_std),) = instants(gains, 2.0 * np.abs(gains), likeliest([gains], 5.0)[0], bounds)
     assert start == pytest.approx(3.0)
     assert start_std == pytest.approx(2.0 / 12.0**0.5, rel=0.1)
     assert (stop, stop_std) == (10.0, 0.0)
@@ -47,9 +47,19 @@ def test_an_instant_within_what_tells_nothing_is_its_middle():
 def test_an_instant_that_cells_tell_is_known_to_a_cell():
     bounds = np.linspace(0.0, 10.0, 101)
     gains = np.where((bounds[:-1] > 2.95) & (bounds[1:] < 7.05), 50.0, -50.0)
-    ((start, stop, start_std, stop_std),) = instants(gains, likeliest([gains], 5.0)[0], bounds)
-    assert (start, stop) == (pytest.approx(3.0), pytest.approx(7.0))
+    ((start, stop, start_std, stop_std),) = instants(gains, 2.0 * np.abs(gains), likeliest([gains], 5.0)[0], bounds)
+    assert (start, stop) == (pytest.approx(3.0, abs=0.002), pytest.approx(7.0, abs=0.002))
     assert start_std == pytest.approx(0.1 / 12.0**0.5) == stop_std
+
+
+@pytest.mark.parametrize("share", [0.1, 0.4, 0.7])
+def test_an_instant_within_a_cell_is_told_by_how_full_it_is(share: float):
+    """Of a cell of size s in which something acts for a share f of it the gain is (f - 1/2) s."""
+    bounds = np.linspace(0.0, 10.0, 101)
+    acts = np.where(bounds[1:] > 3.05, 1.0, 0.0)
+    acts[29] = share
+    ((start, *_),) = instants(1e4 * (acts - 0.5), np.full(100, 1e4), np.round(acts), bounds)
+    assert start == pytest.approx(3.0 - 0.1 * share, abs=0.001)
 
 
 def test_scatter_is_one_of_independent_rows_and_larger_of_what_remembers():
