@@ -24,11 +24,11 @@ from scara_ident.effects.two_states import instants, likeliest, scatter_of, span
 
 # The first intervals tried begin and end on a grid of these seconds, and are so many of them long at the most.
 GRID, LONGEST = 1.0, 24
-# Where these begin a search.
-BEGINS = 3
-# Squares of what is left against those of the base model, as far as they are noise: a body that is carried most of the time
-# makes most of them. By the first no noise is taken for changes, by the last none of many is missed.
-SCATTERS = (1.0, 0.1)
+# A search begins where so many of each of so many recordings explain most: from single ones it may end where less is explained.
+BEGINS, RECORDINGS = 2, 4
+# Where a search begins squares of noise are taken for so much of all that the base model leaves: a body that is carried most of
+# the time makes most of that, and what were too dear a change then would never come.
+OF_NOISE = 0.03
 # A search ends where nothing changes, mostly after four rounds.
 ROUNDS = 20
 # Nobody takes something up for less than this, s.
@@ -79,13 +79,14 @@ def carried(scene: Scene, shown: Sequence[int]) -> tuple[Interval, ...]:
     if not names:
         return ()
     cells = cells_of(scene, shown, names, weights_beside(scene, names, shown))
-    tried = [_settled(cells, start, scatter) for start in _begins(cells) for scatter in SCATTERS]
+    tried = [_settled(cells, start) for start in _begins(cells)]
     best = max((item for item in tried if item is not None), key=lambda item: item.worth, default=None)
     if best is None or best.worth < STRONG + len(shown) * _cost(cells):
         return ()
-    if beaten(scene, shown, cells, _asked(cells, best), best.scatter):
+    said = best if _positive(best, shown) else _turned(best)
+    if beaten(scene, shown, cells, _asked(cells, said), said.scatter):
         return ()
-    return _intervals(scene, cells, best if _positive(best, shown) else _turned(cells, best))
+    return _intervals(scene, cells, said)
 
 
 def _begins(cells: Cells) -> list[tuple[list[Array], Array]]:
@@ -105,12 +106,14 @@ def _begins(cells: Cells) -> list[tuple[list[Array], Array]]:
         right = across[:, :, -1] - reach @ value
         body = _solved(squares - reach @ cells.inverse @ reach.transpose(0, 2, 1), right)
         gain = np.sum(body * right, axis=1)
+        own = []
         for k in np.argsort(-gain)[:BEGINS]:
             states = [np.zeros(len(other.bounds) - 1) for other in cells.each]
             states[run][grid[first[k]] : grid[stop[k]]] = 1.0
-            found.append((float(gain[k]), states, body[k]))
-    found.sort(key=lambda one: -one[0])
-    return [(states, body) for _, states, body in found[:BEGINS]]
+            own.append((float(gain[k]), states, body[k]))
+        found.append(own)
+    found.sort(key=lambda one: -one[0][0])
+    return [(states, body) for own in found[:RECORDINGS] for _, states, body in own]
 
 
 def _between(table: Array, grid: NDArray[np.intp], first: NDArray[np.intp], stop: NDArray[np.intp]) -> Array:
@@ -118,10 +121,10 @@ def _between(table: Array, grid: NDArray[np.intp], first: NDArray[np.intp], stop
     return np.asarray(total[stop] - total[first])
 
 
-def _settled(cells: Cells, start: tuple[list[Array], Array], scatter: float) -> _Found | None:
+def _settled(cells: Cells, start: tuple[list[Array], Array]) -> _Found | None:
     """Return the body and where it acts once neither changes the other; None where nothing is left of it."""
     states, body = start
-    gain = price = 0.0
+    scatter, gain, price = OF_NOISE, 0.0, 0.0
     for _ in range(ROUNDS):
         change = scatter * _cost(cells)
         new = [
@@ -186,13 +189,17 @@ def _asked(cells: Cells, found: _Found) -> Asked:
 
 
 def _positive(found: _Found, shown: Sequence[int]) -> bool:
-    """Whether its mass, or else its inertia, is positive, or nothing but one recording says that it is not there."""
-    size = next((found.body[place] for place, k in enumerate(shown) if k in (0, 4, 6, 9)), 1.0)
-    changing = sum(0.0 < np.mean(state) < 1.0 for state in found.states)
-    return bool(size >= 0.0 or 2 * changing <= len(found.states))
+    """Whether it is said as it was found, and not as the opposite body in all other times.
+
+    Most recordings in which nothing changes are without it; where most change, its mass, or else its inertia, is positive.
+    """
+    still = [float(state[0]) for state in found.states if np.all(state == state[0])]
+    if 2 * len(still) >= len(found.states) and 2.0 * sum(still) != len(still):
+        return 2.0 * sum(still) < len(still)
+    return next((found.body[place] for place, k in enumerate(shown) if k in (0, 4, 6, 9)), 1.0) >= 0.0
 
 
-def _turned(cells: Cells, found: _Found) -> _Found:
+def _turned(found: _Found) -> _Found:
     """Return the opposite body in all other times: what is always there the base model has."""
     return _Found([1.0 - state for state in found.states], -found.body, found.gain, found.scatter, found.price)
 
@@ -203,7 +210,7 @@ def _intervals(scene: Scene, cells: Cells, found: _Found) -> tuple[Interval, ...
     return tuple(
         Interval(places.index(item.name), *times)
         for item, state, own, size in zip(cells.each, found.states, seen, made, strict=True)
-        for times in instants((own - 0.5 * size) / found.scatter, state, item.bounds)
+        for times in instants((own - 0.5 * size) / found.scatter, size / found.scatter, state, item.bounds)
     )
 
 

@@ -15,8 +15,9 @@ from scara_ident.arrays import Array
 from scara_ident.effects.recording_groups import rows_of_last_link
 from scara_ident.effects.signals import Scene
 
-# Cells of all recordings together; shorter ones would tell instants better, and take more memory than a diagnosis has.
-MOST_CELLS = 8192
+# Cells last this long at the least, s, a sixth of what is carried shortest, and there are so many in all recordings together:
+# more would tell instants better, and take more time and memory than they are worth here.
+LEAST_CELL, MOST_CELLS = 0.05, 8192
 # Directions of columns of unit size below this share are rounding.
 _RANK = 1e-9
 
@@ -135,7 +136,7 @@ def cells_of(scene: Scene, shown: Sequence[int], names: Sequence[str], weights: 
     """
     p = len(scene.value)
     lengths = {name: duration_of(scene, name) for name in names}
-    shortest = max(0.5 / scene.band, sum(lengths.values()) / MOST_CELLS)
+    shortest = max(0.5 / scene.band, LEAST_CELL, sum(lengths.values()) / MOST_CELLS)
     products, each = np.zeros((p, p + 1)), []
     for name in names:
         item, own = _recording(scene, name, shown, weights, max(1, int(lengths[name] / shortest)))

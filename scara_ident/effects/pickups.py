@@ -52,8 +52,7 @@ def taken_up(scene: Scene, shown: Sequence[int]) -> Array:
         return np.zeros((0, 2))
     k = len(shown)
     # Products of all recordings at once would be the most that a diagnosis holds: they are made twice.
-    whole, counts = shared(scene, ("products", tuple(shown)), lambda: _of_all(scene, names, shown))
-    value, weights = _fitted(whole, counts, len(scene.value))
+    whole, counts, value, weights = shared(scene, ("base", tuple(shown)), lambda: _base(scene, names, shown))
     change, families = _changes(scene, value, k)
     body, *others = families
     sets = [body, *others, *([*body, *other] for other in others)]
@@ -75,12 +74,11 @@ def taken_up(scene: Scene, shown: Sequence[int]) -> Array:
 
 def weights_beside(scene: Scene, names: Sequence[str], shown: Sequence[int]) -> Array:
     """Return the weight of each joint's squares, one over what the base model leaves of a row, shape (n,)."""
-    whole, counts = shared(scene, ("products", tuple(shown)), lambda: _of_all(scene, names, shown))
-    return _fitted(whole, counts, len(scene.value))[1]
+    return shared(scene, ("base", tuple(shown)), lambda: _base(scene, names, shown))[3]
 
 
-def _of_all(scene: Scene, names: Sequence[str], shown: Sequence[int]) -> tuple[Array, Array]:
-    """Return products of columns in all recordings, shape (n, c, c), and rows of each joint (n,); see `_products`."""
+def _base(scene: Scene, names: Sequence[str], shown: Sequence[int]) -> tuple[Array, Array, Array, Array]:
+    """Return products of columns in all recordings (n, c, c), rows of each joint (n,), and what `_fitted` makes of them."""
     n, p = scene.robot.n, len(scene.value)
     size = p + len(shown) + 1
     products, counts = np.zeros((n, size, size)), np.zeros(n)
@@ -90,7 +88,7 @@ def _of_all(scene: Scene, names: Sequence[str], shown: Sequence[int]) -> tuple[A
                 places = np.array([*scene.model.active[joint], *range(p, size)])
                 products[joint][np.ix_(places, places)] += rows @ rows.T
                 counts[joint] += len(time)
-    return products, counts
+    return products, counts, *_fitted(products, counts, p)
 
 
 def _products(scene: Scene, name: str, shown: Sequence[int]) -> Array:
