@@ -113,6 +113,9 @@ def _begins(cells: Cells) -> list[tuple[list[Array], Array]]:
             own.append((float(gain[k]), states, body[k]))
         found.append(own)
     found.sort(key=lambda one: -one[0][0])
+    # An interval has to pay for two changes; where none does as much as for one, what the base model leaves has no structure.
+    if not found or found[0][0][0] < STRONG + _cost(cells):
+        return []
     return [(states, body) for own in found[:RECORDINGS] for _, states, body in own]
 
 
