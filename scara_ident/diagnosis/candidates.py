@@ -45,6 +45,9 @@ class Candidate:
         """Name of effect and joints, the same for all members that differ in nonlinear parameters only."""
         joint = self.joint(scene)
         if joint is None:
+            if self.member.intervals:
+                # Which these are is fitted, as nonlinear parameters are.
+                return f"{self.effect.name} in intervals"
             # Members without a joint are told apart by what they are.
             several = self.member.partner is not None
             return (

@@ -19,6 +19,7 @@ from scara_ident.diagnosis.found_effect import (
     not_found,
     uncounted_correction,
 )
+from scara_ident.diagnosis.interval_events import not_explained
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.model_selection import select_model
 from scara_ident.diagnosis.other_laws import parameters_of_laws
@@ -284,7 +285,7 @@ def diagnose(
 
 def _without_events(task: SearchTask, observations: Observations, *, free: bool) -> tuple[Outcome, tuple[Event, ...]]:
     """Search without what is local in time, and again if with the effects found that is something else."""
-    events = find_events(observations, robust_fit(observations).value)
+    events = not_explained(task, observations, find_events(observations, robust_fit(observations).value))
     now, left = first(task.progress)
     outcome = select_model(replace(task, progress=now), without_events(observations, events), free=free)
     if outcome.training is observations:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,8 +16,8 @@ from scara_ident.diagnosis.unknowns import sides
 from scara_ident.effects import Parameter, Scene
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.information import merge
-from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
+from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.estimation.run_variation import LEAST_RUNS
 from scara_ident.estimation.variation_between import run_variation
 
@@ -187,12 +186,11 @@ def _covariance(step: SelectionStep, state: Linearised, *, scatter_alone: bool) 
     inverse = merge([state.information, state.prior]).inverse()
     value = np.concatenate([state.value, np.zeros(len(state.unknowns))])
     # By what a row moves the fit; see `scara_ident.estimation.run_offsets`.
-    influence: Sequence[JointRows] = state.joints
-    if step.offsets is not None:
-        influence = step.offsets.whitened_rows(step.offsets.whitened_rows(state.joints))
+    rows = beside_offsets(replace(step.observations, joints=tuple(state.joints)), step.offsets)
+    influence = rows.influence.joints
     spread = block_covariance(inverse, value, influence, step.observations.owner, step.weights).matrix
     if not scatter_alone:
-        variation = run_variation(step.observations, state.joints, value)
+        variation = run_variation(step.observations, state.joints, value, taken=rows.taken(inverse, step.weights))
         if step.offsets is not None and len(step.observations.data.recordings) < LEAST_RUNS:
             variation = step.offsets
         bias = _noise_bias(step, state)

@@ -1,4 +1,7 @@
-"""Which of the effects that act in some recordings act in a held-out one: told by its first part, judged on the rest."""
+"""Which of the effects that act in some recordings act in a held-out one: told by its first part, judged on the rest.
+
+Where effects act in intervals of recordings, see `held_out_intervals`.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.correction import corrected
+from scara_ident.diagnosis.held_out_intervals import told_by_others, words_of
 from scara_ident.diagnosis.search import Search
 from scara_ident.effects import Scene
 from scara_ident.estimation.observations import Observations, observe
@@ -54,19 +58,24 @@ def held_out_states(found: Search, value: Array, weights: Array, data: PreparedD
         The held-out recordings, in the bands of the search.
     """
     optional = [k for k, item in enumerate(found.chosen) if item.effect.by_recording]
-    if not optional or not data.recordings:
+    if not data.recordings:
         return HeldOut(data, found.scene, found.chosen, ())
+    by_recording = _by_recording(found, value, weights, data, optional)
+    timed = [k for k, item in enumerate(found.chosen) if item.effect.in_intervals]
+    return _in_intervals(found, value, weights, by_recording, timed) if timed else by_recording
+
+
+def _by_recording(found: Search, value: Array, weights: Array, data: PreparedData, optional: Sequence[int]) -> HeldOut:
+    """Return in which of the recordings effects act that act in some recordings only."""
     start = {item.name: float(item.recording.time[0]) for item in data.recordings}
     scene = replace(found.scene, start={**found.scene.start, **start})
+    if not optional:
+        return HeldOut(data, scene, found.chosen, ())
     parted = [_parted(item.recording) for item in data.recordings]
     heads, _ = with_rows(prepare([head for head, _ in parted], data.bands), needed=False)
     chosen, seen, notes = list(found.chosen), {}, []
     if heads.recordings:
-        observations = observe(found.base, heads)
-        if found.correction is not None:
-            now = corrected(heads, found.correction.candidate, found.correction.value)
-            observations = observations.with_torque(now)
-        for one in observations.each:
+        for one in _observed(found, heads).each:
             seen[one.name] = _acting(one, scene, chosen, optional, value, weights)
     for name in start:
         for k in seen.get(name, ()):
@@ -77,6 +86,30 @@ def held_out_states(found: Search, value: Array, weights: Array, data: PreparedD
         notes.append(f"{name}: its first third {shown if name in seen else 'is too short to show which effects act'}")
     rest, useless = with_rows(prepare([rest for _, rest in parted], data.bands), needed=False)
     return HeldOut(rest, scene, tuple(chosen), (*notes, "errors held out are of the other two thirds", *useless))
+
+
+def _in_intervals(found: Search, value: Array, weights: Array, held: HeldOut, timed: Sequence[int]) -> HeldOut:
+    """Return in which intervals of the recordings effects act that act in some."""
+    chosen, notes = list(held.chosen), list(held.notes)
+    if held.data.recordings:
+        for one in _observed(found, held.data).each:
+            for k in timed:
+                item = chosen[k]
+                apart, seen = told_by_others(one, held.scene, held.chosen, k, value, weights)
+                chosen[k] = replace(item, member=replace(item.member, intervals=(*item.member.intervals, *apart)))
+                notes.append(
+                    f"{one.name}: {item.effect.name} acts {words_of(seen)}; each joint is predicted with the intervals that the "
+                    "torque of the others tells"
+                )
+    return replace(held, chosen=tuple(chosen), notes=tuple(notes))
+
+
+def _observed(found: Search, data: PreparedData) -> Observations:
+    """Return observations of the base model, corrected as the training recordings were."""
+    observations = observe(found.base, data)
+    if found.correction is None:
+        return observations
+    return observations.with_torque(corrected(data, found.correction.candidate, found.correction.value))
 
 
 def _acting(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from itertools import chain
 from typing import Any, Literal
 
@@ -16,7 +16,7 @@ from scara_ident.diagnosis.cluster_test import needed
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.noise_check import less_noise
 from scara_ident.diagnosis.shape import shape_over
-from scara_ident.effects import EFFECTS, Effect, Member
+from scara_ident.effects import EFFECTS, Effect, Interval, Member
 from scara_ident.errors import ScaraIdentError
 from scara_ident.manners import listed
 
@@ -63,6 +63,7 @@ class Suspect:
             "place": member.joint,
             "partner": member.partner,
             "nonlinear": list(member.nonlinear),
+            "intervals": [list(astuple(item)) for item in member.intervals],
             "value": list(self.value),
             "odds": self.odds,
         }
@@ -151,7 +152,8 @@ def suspect_of(entry: Mapping[str, Any]) -> Suspect:
     if not 0 <= entry["variant"] < len(families):
         raise ScaraIdentError(f"effect {entry['effect']}: not as the diagnosis had it; diagnose again")
     nonlinear, value = (tuple(float(x) for x in entry[key]) for key in ("nonlinear", "value"))
-    member = Member(entry["place"], nonlinear, entry["partner"])
+    intervals = tuple(Interval(*item) for item in entry.get("intervals", ()))
+    member = Member(entry["place"], nonlinear, entry["partner"], intervals)
     candidate = Candidate(families[entry["variant"]], member)
     return Suspect(candidate, str(entry["label"]), value, float(entry.get("odds", 1.0)))
 
@@ -316,7 +318,7 @@ def possible(decision: Decision, diagnosis: Diagnosis) -> bool:
 
 def _moves(candidate: Candidate) -> bool:
     """Whether what the arm does decides how large it shows, not which recording it is."""
-    return not candidate.effect.by_recording and _variant(candidate.effect) >= 0
+    return not (candidate.effect.by_recording or candidate.effect.in_intervals) and _variant(candidate.effect) >= 0
 
 
 def _as_found(decision: Decision) -> Suspect:

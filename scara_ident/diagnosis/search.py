@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from scara_ident.diagnosis.choice import choose
 from scara_ident.diagnosis.correction import Correction, taken_out
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.exchange import best_exchange, needed
+from scara_ident.diagnosis.interval_fit import refined
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep, model_with, observed
@@ -206,6 +207,7 @@ def search(
     correction: Correction | None = None
     weights, value, offsets = start.weights, start.value, start.offsets
     rounds = exchanges = 0
+    asked: tuple[Candidate, ...] = ()
     while True:
         words = f"trying {len(candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else "")
         task.progress(words, after_rounds(rounds))
@@ -221,6 +223,15 @@ def search(
         if len(steps) < criteria.most_effects:
             winner, refused, scene = choose(step, decisions, None if known is None else known.step)
         decisions = [item for item in decisions if item.label not in refused] + list(refused.values())
+        if winner is None and chosen != asked:
+            # What came in may have hidden when something acts.
+            asked = chosen
+            more = _in_intervals(task.catalogue, columns, scene, chosen, value)
+            more = [item for item in more if item.label(scene) not in taken]
+            if more:
+                everything, candidates = everything + more, candidates + more
+                tried += len(more)
+                continue
         if winner is None:
             # Each explains more than what it replaces, or as much with fewer: there is an end, and this is one in any case.
             swap = best_exchange(step, everything, first, (*without, *refused)) if exchanges < len(steps) else None
@@ -243,6 +254,8 @@ def search(
         if not candidate.corrects_data or candidate.effect.settled(found.value):
             candidates = [item for item in candidates if item.label(scene) != winner.label]
         scene, chosen = tune(scene, columns, weights, chosen, criteria.rotor_inertia_std, offsets=offsets)
+        if candidate.effect.in_intervals:
+            chosen = refined(SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets))
         fitted = observed(SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets))
         value, weights = value_and_weights(fitted, offsets)
         scene = replace(scene, value=value[: len(task.model.columns)])
@@ -257,12 +270,32 @@ def search(
         correction = replace(correction, value=value + correction.value)
     kept = needed(SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets))
     scene, kept = tune(scene, columns, weights, kept, criteria.rotor_inertia_std, offsets=offsets)
+    kept = refined(SelectionStep(scene, columns, kept, weights, tried, criteria, offsets))
     labels = {item.label(scene) for item in kept}
     stayed = [item for item in steps if item.decision.label in labels or item.decision.candidate.corrects_data]
     final = SelectionStep(scene, columns, kept, weights, tried, criteria, offsets, _rest(correction, scene))
     others = [Candidate(effect, member) for effect in task.catalogue for member in effect.doubtful(first)]
     doubtful = tuple(item for item in others if item.label(scene) not in labels)
     return Search(final, uncorrected, start, tuple(stayed), correction, tuple(decisions), first, doubtful)
+
+
+def _in_intervals(
+    catalogue: Sequence[Effect], columns: CandidateColumns, scene: Scene, chosen: Sequence[Candidate], value: Array
+) -> list[Candidate]:
+    """Return effects that act in intervals of recordings, as they are seen with those found taken off the torque."""
+    families = [effect for effect in catalogue if effect.in_intervals]
+    if not families or any(item.effect.in_intervals for item in chosen):
+        return []
+    observations = columns.observations
+    start = observations.parameters
+    parts = zip(columns.predicted(scene, chosen, value), observations.predicted(value[:start]), strict=True)
+    left = {
+        replace(motion, torque=motion.torque - (whole - base)): held
+        for (motion, held), (whole, base) in zip(columns_at_hand(observations).items(), parts, strict=True)
+        if motion.torque is not None
+    }
+    beside = replace(scene, columns=left)
+    return [Candidate(effect, member) for effect in families for member in effect.members(beside)]
 
 
 def _rest(correction: Correction | None, scene: Scene) -> Candidate | None:

@@ -71,7 +71,7 @@ def validated(outcome: Outcome, data: PreparedData) -> Validation:
     apart = np.zeros(robot.n)
     if model.variation:
         # Of few runs how far they lie apart is known badly.
-        apart = widening(len(outcome.training.each)) * of_another_run(model.variation, after, value)
+        apart = widening(len(outcome.training.each) - 1) * of_another_run(model.variation, after, value)
     known = [robot.by_joint(each) for each in (unsure, apart)]
     events = [own_uncertainty(event, *known) for event in held_out_events(value, outcome.training, after)]
     if outcome.unexplained is not None:

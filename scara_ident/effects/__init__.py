@@ -2,7 +2,7 @@
 
 from scara_ident.effects.catalogue import CATALOGUE, EFFECTS, available_effects, effects_named
 from scara_ident.effects.effect import Effect, EffectTerm, SpectralLine
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, View
+from scara_ident.effects.parameters import Coefficient, Interval, Member, NonlinearParameter, Parameter, Tie, View
 from scara_ident.effects.signals import Scene, Signals
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     "Coefficient",
     "Effect",
     "EffectTerm",
+    "Interval",
     "Member",
     "NonlinearParameter",
     "Parameter",

@@ -13,6 +13,7 @@ from scara_ident.effects.friction import AsymmetricFriction, FrictionCoupling, P
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import TimeDelay, TorqueGainMismatch, TorqueSensorNonlinearity
 from scara_ident.effects.payload import FreePayloadChange, GravityCounterbalance, PayloadChange, PayloadOfRecordings
+from scara_ident.effects.payload_intervals import PayloadInIntervals
 from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
@@ -39,6 +40,7 @@ CATALOGUE: tuple[Effect, ...] = (
     NominalBaseTilt(),
     PayloadChange(),
     FreePayloadChange(),
+    PayloadInIntervals(),
     PayloadOfRecordings(),
     GravityCounterbalance(),
     TorqueSensorNonlinearity(),

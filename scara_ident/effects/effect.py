@@ -48,8 +48,7 @@ class Effect(ABC):
 
     A subclass gives at least ``name``, ``summary``, ``coefficients`` and `signal_columns`; it then acts on the torque
     of one joint, has one member per moving joint and value of its nonlinear parameters, and its coefficients are its
-    physical parameters. A family without fields of its own needs no decorator: one is as good
-    as another, and they are equal where they are of one class.
+    physical parameters. A family without fields of its own needs no decorator: those of one class are equal.
 
     Attributes
     ----------
@@ -67,8 +66,8 @@ class Effect(ABC):
         Whether the columns depend on the present estimate, ``scene.value`` or ``scene.armatures``.
     fitted_first : bool
         Whether it is judged at the estimate fitted with it only: its columns at the estimate without it are poor ones.
-    by_recording : bool
-        Whether it acts in some recordings and not in others; see `in_recordings`.
+    by_recording, in_intervals : bool
+        Whether it acts in some recordings and not in others, see `in_recordings`, or in intervals that its member holds.
     same_at_all_frequencies : bool
         Whether its coefficient is the same in any part of the band, so that another one there says that it is not it.
     in_small_ways : bool
@@ -97,6 +96,7 @@ class Effect(ABC):
     follows_estimate: ClassVar[bool] = False
     fitted_first: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
+    in_intervals: ClassVar[bool] = False
     same_at_all_frequencies: ClassVar[bool] = False
     in_small_ways: ClassVar[bool] = False
     of_state: ClassVar[bool] = False

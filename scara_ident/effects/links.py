@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -33,18 +33,21 @@ LEAST_INERTIA = 0.1
 # Samples of many columns at once: what is made of them on the way stays in the processor's cache.
 CHUNK = 1024
 
-_SHARED: WeakKeyDictionary[Signals | Scene | Motion, dict[Hashable, Array]] = WeakKeyDictionary()
+T = TypeVar("T")
+
+_SHARED: WeakKeyDictionary[Signals | Scene | Motion, dict[Hashable, Any]] = WeakKeyDictionary()
 
 # Of each motion and joint the estimate that slopes were taken at, and the slopes.
 _SLOPES: WeakKeyDictionary[Motion, dict[int, tuple[Array, tuple[Array, Array, Array]]]] = WeakKeyDictionary()
 
 
-def shared(owner: Signals | Scene | Motion, key: Hashable, make: Callable[[], Array]) -> Array:
+def shared(owner: Signals | Scene | Motion, key: Hashable, make: Callable[[], T]) -> T:
     """Return what several members of a family need of a stretch of motion, with or without an estimate, or of a scene, made once."""
     held = _SHARED.setdefault(owner, {})
     if key not in held:
         held[key] = make()
-    return held[key]
+    found: T = held[key]
+    return found
 
 
 def gravity_size(robot: Robot) -> float:

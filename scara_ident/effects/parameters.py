@@ -95,6 +95,30 @@ OWN = View()
 
 
 @dataclass(frozen=True)
+class Interval:
+    """A stretch of a recording in which something acts.
+
+    Attributes
+    ----------
+    recording : int
+        Place of the recording in the scene.
+    start, stop : float
+        Seconds since the recording began.
+    start_std, stop_std : float
+        How sure they are, s; 0 where the recording itself begins or ends there.
+    joint : int or None
+        The only joint whose torque it counts for; None for all.
+    """
+
+    recording: int
+    start: float
+    stop: float
+    start_std: float = 0.0
+    stop_std: float = 0.0
+    joint: int | None = None
+
+
+@dataclass(frozen=True)
 class Member:
     """One member of a family: a joint and values of the nonlinear parameters.
 
@@ -106,11 +130,14 @@ class Member:
         One value per parameter of the family.
     partner : int or None
         A second joint, for effects of one joint on another; of an effect without a joint the number of a group.
+    intervals : tuple of Interval
+        In which alone it acts, of an effect that acts in some; see `Effect.in_intervals`.
     """
 
     joint: int | None
     nonlinear: tuple[float, ...] = ()
     partner: int | None = None
+    intervals: tuple[Interval, ...] = ()
 
     @property
     def place(self) -> int:

@@ -76,7 +76,13 @@ class PayloadChange(Effect):
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque of 1 kg at the tool from then on."""
-        return [_at_tool(signals) * _after(signals, member)]
+        return [_at_tool(signals) * self.acting(signals, member)]
+
+    def acting(self, signals: Signals, member: Member) -> Array:
+        """Return 0 before and 1 after an instant, over one sample, shape (N,); 0 in recordings that it is not of."""
+        if member.partner is not None and _recording(signals.scene, member.partner) != signals.motion.name:
+            return np.zeros(signals.motion.samples)
+        return np.clip((signals.time - member.nonlinear[0]) * signals.motion.rate + 0.5, 0.0, 1.0)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where an arm would carry or drop more than it weighs."""
@@ -118,7 +124,7 @@ class FreePayloadChange(PayloadChange):
         """Return the torque per standard parameter of the payload from then on."""
         robot = signals.scene.robot
         columns = _body(signals)[:, list(self._told(robot))]
-        return np.moveaxis(columns * _after(signals, member), 1, 0)
+        return np.moveaxis(columns * self.acting(signals, member), 1, 0)
 
     def in_full(self) -> Effect | None:
         """Return the family with all columns."""
@@ -149,7 +155,7 @@ class FreePayloadChange(PayloadChange):
 
     def _told(self, robot: Robot) -> tuple[int, ...]:
         """Return the standard parameters that are estimated."""
-        return _shown(robot, BODY_COLUMNS, BODY_COLUMN_SHARE) if self.whole else _shown(robot)
+        return shown_of(robot, BODY_COLUMNS, BODY_COLUMN_SHARE) if self.whole else shown_of(robot)
 
 
 @dataclass(frozen=True)
@@ -183,7 +189,7 @@ class PayloadOfRecordings(Effect):
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return one per group of recordings."""
-        told = [k for k in _shown(scene.robot, BODY_COLUMNS, BODY_COLUMN_SHARE) if k < 4]
+        told = [k for k in shown_of(scene.robot, BODY_COLUMNS, BODY_COLUMN_SHARE) if k < 4]
         found = groups_by_torque(scene, told, self.unloaded) if told else ()
         return tuple(self.in_recordings(scene, Member(None), group) for group in found)
 
@@ -245,7 +251,7 @@ class PayloadOfRecordings(Effect):
 
     def _told(self, robot: Robot) -> tuple[int, ...]:
         """Return the standard parameters that are estimated."""
-        return (0,) if self.at_tool else _shown(robot, BODY_COLUMNS, BODY_COLUMN_SHARE)
+        return (0,) if self.at_tool else shown_of(robot, BODY_COLUMNS, BODY_COLUMN_SHARE)
 
 
 class GravityCounterbalance(Sinusoid):
@@ -283,20 +289,13 @@ class GravityCounterbalance(Sinusoid):
 def _instants(scene: Scene, count: int) -> tuple[Member, ...]:
     """Return instants of all recordings alike, and of single ones; a member's partner is the place of the recording."""
     alike = (Member(None, ((k + 0.5) * scene.duration / count,)) for k in range(count))
-    told = shared(scene, "taken up", lambda: taken_up(scene, _shown(scene.robot)))
+    told = shared(scene, "taken up", lambda: taken_up(scene, shown_of(scene.robot)))
     return (*alike, *(Member(None, (instant,), int(place)) for place, instant in told.tolist()))
 
 
 def _recording(scene: Scene, place: int) -> str | None:
     """Return the name of a recording; None in a scene of others, as of motions that are made."""
     return next(islice(scene.start, place, None), None)
-
-
-def _after(signals: Signals, member: Member) -> Array:
-    """Return 0 before and 1 after an instant, over one sample, shape (N,); 0 in recordings that it is not of."""
-    if member.partner is not None and _recording(signals.scene, member.partner) != signals.motion.name:
-        return np.zeros(signals.motion.samples)
-    return np.clip((signals.time - member.nonlinear[0]) * signals.motion.rate + 0.5, 0.0, 1.0)
 
 
 def _rest_about(scene: Scene, motion: Motion, instant: float) -> float:
@@ -334,7 +333,7 @@ def _too_heavy(scene: Scene, mass: float, std: float) -> str | None:
 
 
 @lru_cache(maxsize=8)
-def _shown(robot: Robot, most: int = FREE_COLUMNS, share: float = FREE_COLUMN_SHARE) -> tuple[int, ...]:
+def shown_of(robot: Robot, most: int = FREE_COLUMNS, share: float = FREE_COLUMN_SHARE) -> tuple[int, ...]:
     """Return the standard parameters of a payload that tell most, each beside those before it, mass first if it can."""
     tool = tool_of(robot)
     rng = np.random.default_rng(0)

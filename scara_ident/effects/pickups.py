@@ -12,6 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.effects.last_link_cells import duration_of, inverse_of
+from scara_ident.effects.links import shared
 from scara_ident.effects.recording_groups import rows_of_last_link
 from scara_ident.effects.signals import Scene
 from scara_ident.model.offsets import offset_columns
@@ -50,17 +52,11 @@ def taken_up(scene: Scene, shown: Sequence[int]) -> Array:
         return np.zeros((0, 2))
     k = len(shown)
     # Products of all recordings at once would be the most that a diagnosis holds: they are made twice.
-    size = len(scene.value) + k + 1
-    whole, counts = np.zeros((scene.robot.n, size, size)), np.zeros(scene.robot.n)
-    for name in names:
-        products, rows = _products(scene, name, shown)
-        whole += np.sum(products, axis=0)
-        counts += rows
-    value, weights = _fitted(whole, counts, len(scene.value))
+    whole, counts, value, weights = shared(scene, ("base", tuple(shown)), lambda: _base(scene, names, shown))
     change, families = _changes(scene, value, k)
     body, *others = families
     sets = [body, *others, *([*body, *other] for other in others)]
-    gains = np.array([_gains(scene, _products(scene, name, shown)[0], whole, weights, change, sets) for name in names])
+    gains = np.array([_gains(scene, _products(scene, name, shown), whole, weights, change, sets) for name in names])
     alone, instead, together = gains[:, 0], gains[:, 1 : 1 + len(others)], gains[:, 1 + len(others) :]
     # What it adds beside that which explains most of it, in units of what both leave.
     more = np.min((together - instead) / np.maximum(1.0 - together / np.sum(counts), np.finfo(float).eps), axis=1)
@@ -71,34 +67,48 @@ def taken_up(scene: Scene, shown: Sequence[int]) -> Array:
         chance = float(chdtrc(k, more[run, place] / scatter)) * more.size
         # In the first part it is as good as there throughout.
         if place > 1 and chance < CHANCE and alone[run, place] > np.max(instead[run]):
-            instant = _duration(scene, name) * place / PARTS
+            instant = duration_of(scene, name) * place / PARTS
             found.append((-alone[run, place], list(scene.start).index(name), instant))
     return np.array([item[1:] for item in sorted(found)]).reshape(-1, 2)
 
 
-def _products(scene: Scene, name: str, shown: Sequence[int]) -> tuple[Array, Array]:
-    """Return products of columns in a recording, shape (PARTS, n, c, c), and rows of each joint (n,).
+def weights_beside(scene: Scene, names: Sequence[str], shown: Sequence[int]) -> Array:
+    """Return the weight of each joint's squares, one over what the base model leaves of a row, shape (n,)."""
+    return shared(scene, ("base", tuple(shown)), lambda: _base(scene, names, shown))[3]
+
+
+def _base(scene: Scene, names: Sequence[str], shown: Sequence[int]) -> tuple[Array, Array, Array, Array]:
+    """Return products of columns in all recordings (n, c, c), rows of each joint (n,), and what `_fitted` makes of them."""
+    n, p = scene.robot.n, len(scene.value)
+    size = p + len(shown) + 1
+    products, counts = np.zeros((n, size, size)), np.zeros(n)
+    for motion, columns in scene.columns.items():
+        if motion.name in names:
+            for joint, (time, rows) in enumerate(rows_of_last_link(scene, motion, columns, shown)):
+                places = np.array([*scene.model.active[joint], *range(p, size)])
+                products[joint][np.ix_(places, places)] += rows @ rows.T
+                counts[joint] += len(time)
+    return products, counts, *_fitted(products, counts, p)
+
+
+def _products(scene: Scene, name: str, shown: Sequence[int]) -> Array:
+    """Return products of columns in a recording, shape (PARTS, n, c, c).
 
     Columns are those of the base model, of the last link, and the torque.
     """
     n, p, k = scene.robot.n, len(scene.value), len(shown)
-    products, counts = np.zeros((PARTS, n, p + k + 1, p + k + 1)), np.zeros(n)
+    products = np.zeros((PARTS, n, p + k + 1, p + k + 1))
     for motion, columns in scene.columns.items():
         if motion.name != name:
             continue
         for joint, (time, rows) in enumerate(rows_of_last_link(scene, motion, columns, shown)):
             places = np.array([*scene.model.active[joint], *range(p, p + k + 1)])
-            share = (time - scene.start[name]) / _duration(scene, name)
+            share = (time - scene.start[name]) / duration_of(scene, name)
             parts = np.clip(PARTS * share, 0, PARTS - 1).astype(int)
             for part in np.unique(parts):
                 own = rows[:, parts == part]
                 products[part, joint][np.ix_(places, places)] += own @ own.T
-            counts[joint] += len(time)
-    return products, counts
-
-
-def _duration(scene: Scene, name: str) -> float:
-    return max(float(item.time[-1]) for item in scene.columns if item.name == name) - scene.start[name]
+    return products
 
 
 def _fitted(whole: Array, counts: Array, p: int) -> tuple[Array, Array]:
@@ -110,7 +120,7 @@ def _fitted(whole: Array, counts: Array, p: int) -> tuple[Array, Array]:
     value = np.zeros(p)
     for _ in range(_ROUNDS):
         shared = np.sum(squares / left[:, None, None], axis=0)
-        value = _inverse(shared[:p, :p]) @ shared[:p, -1]
+        value = inverse_of(shared[:p, :p]) @ shared[:p, -1]
         full = np.append(value, -1.0)
         left = np.maximum(np.einsum("a,jab,b->j", full, squares, full), least)
     return value, counts / left
@@ -152,7 +162,7 @@ def _gains(
     for k, (joint, column) in enumerate(offsets, p):
         base[k, :p] = base[:p, k] = run[joint, column, :p]
         base[k, k], aim[k] = run[joint, column, column], run[joint, column, -1]
-    inverse = _inverse(base)
+    inverse = inverse_of(base)
     after = np.cumsum(own[::-1], axis=0)[::-1]
     along = (weights[:, None, None] * change) @ after
     cross = np.zeros((len(after), change.shape[1], size))
@@ -170,11 +180,3 @@ def _explained(left: Array, spread: Array) -> Array:
     scale = np.where(size > 0.0, size, np.inf)
     inverse = np.linalg.pinv(spread / scale[:, :, None] / scale[:, None, :], rcond=_RANK, hermitian=True)
     return np.asarray(np.einsum("sq,sqr,sr->s", left / scale, inverse, left / scale))
-
-
-def _inverse(products: Array) -> Array:
-    """Return the inverse of products of columns, within the directions that they tell."""
-    scale = np.sqrt(np.where(np.diag(products) > 0.0, np.diag(products), 1.0))
-    return np.asarray(
-        np.linalg.pinv(products / np.outer(scale, scale), rcond=_RANK, hermitian=True) / np.outer(scale, scale)
-    )

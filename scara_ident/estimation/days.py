@@ -48,8 +48,8 @@ def same_day(offsets: Array, unsure: Array, std: Array) -> NDArray[np.intp] | No
     return day if 1 < day.max() < runs else None
 
 
-def widening(draws: int) -> float:
-    """Return by how much a standard deviation of so few draws is widened, so that two of it cover 95 % all the same."""
+def widening(freedom: float) -> float:
+    """Return by how much a standard deviation of so few degrees of freedom is widened, so that two of it cover 95 %."""
     from scipy.special import stdtrit
 
-    return 0.5 * float(stdtrit(draws - 1, 0.975))
+    return 0.5 * float(stdtrit(freedom, 0.975))

@@ -15,7 +15,7 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, merge, residual_noise, weighted
 from scara_ident.estimation.noise_bias import noise_bias
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_offsets import beside_offsets, larger_offsets, offsets_on
+from scara_ident.estimation.run_offsets import OffsetRows, beside_offsets, larger_offsets, offsets_on
 from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation
 from scara_ident.estimation.variation_between import run_variation
 from scara_ident.estimation.working_range import Told, told_directions
@@ -159,7 +159,7 @@ def least_squares(
     variation, spread = side_by_side(
         lambda work: work(),
         [
-            lambda: _variation(observations, fit.value),
+            lambda: _variation(observations, fit, rows),
             lambda: block_covariance(fit.inverse, fit.value, observations.joints, observations.owner, fit.weights),
         ],
     )
@@ -167,7 +167,7 @@ def least_squares(
         for _ in range(ROUNDS):
             rows = beside_offsets(observations, larger_offsets(variation.offsets or rows.offsets, least))
             fit = _fit(rows.fitted, weigh, method, prior)
-            variation = _variation(observations, fit.value)
+            variation = _variation(observations, fit, rows)
         spread = block_covariance(fit.inverse, fit.value, rows.influence.joints, observations.owner, fit.weights)
     differing = variation if least is None else larger_offsets(variation.offsets, least) or least
     covariance = spread.matrix + differing.covariance(fit.inverse, rows.influence.joints, fit.weights)
@@ -201,10 +201,11 @@ def least_squares(
     )
 
 
-def _variation(observations: Observations, value: Array) -> RunVariation:
+def _variation(observations: Observations, fit: _Fit, rows: OffsetRows) -> RunVariation:
     """Return how runs differ; of files longer than the memory holds, in the offsets that what is kept of them shows."""
     kept = observations.in_memory
-    found = run_variation(kept, kept.joints, value, of_two=True)
+    taken = rows.taken(fit.inverse, fit.weights)
+    found = run_variation(kept, kept.joints, fit.value, taken=taken, of_two=True)
     if kept is observations:
         return found
     return offsets_on(observations, found.offsets) or RunVariation((None,) * len(observations.joints))

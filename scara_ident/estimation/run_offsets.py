@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.observations import Observations
@@ -38,6 +40,31 @@ class OffsetRows:
         if self.offsets is None:
             return self.fitted
         return replace(self.fitted, joints=self.offsets.whitened_rows(self.fitted.joints))
+
+    def taken(self, inverse: Array, weights: Array) -> Array:
+        """Return how many of the runs' offsets a fit takes up on each joint, shape (n,): the leverage of all of them.
+
+        One where runs are alike, which is their mean; more where poses differ and gravity is told by means of runs.
+
+        Parameters
+        ----------
+        inverse : ndarray, shape (p, p)
+            Inverse of ``W.T @ W`` of all weighted rows.
+        weights : ndarray, shape (n,)
+        """
+        firsts, taken = _firsts(self.fitted), np.zeros(len(weights))
+        for joint, (rows, weight) in enumerate(zip(self.fitted.joints, weights, strict=True)):
+            constant, own = offset_direction(self.fitted.model, rows), inverse[np.ix_(rows.columns, rows.columns)]
+            for start, stop in pairwise(rows.starts[firsts]):
+                pull = weight * rows.table[:-1, start:stop] @ constant[start:stop]
+                size = float(constant[start:stop] @ constant[start:stop])
+                taken[joint] += float(pull @ own @ pull) / size if size > 0.0 else 0.0
+        return taken
+
+
+def _firsts(observations: Observations) -> NDArray[np.intp]:
+    """Return the block with which each recording begins, and the number of blocks."""
+    return np.searchsorted(observations.owner, np.arange(len(observations.data.recordings) + 1))
 
 
 def beside_offsets(observations: Observations, offsets: RunVariation | None) -> OffsetRows:
@@ -83,7 +110,7 @@ def offsets_on(observations: Observations, offsets: RunVariation | None) -> RunV
     if offsets is None:
         return None
     joints = list(offsets.joints)
-    firsts = np.searchsorted(observations.owner, np.arange(len(observations.data.recordings) + 1))
+    firsts = _firsts(observations)
     for joint, (item, rows) in enumerate(zip(offsets.joints, observations.joints, strict=True)):
         if item is not None:
             directions = np.zeros((len(item.std), rows.table.shape[1]))
@@ -104,7 +131,7 @@ def rms_beside_own(value: Array, observations: Observations) -> Array:
     -------
     ndarray, shape (n,)
     """
-    firsts = np.searchsorted(observations.owner, np.arange(len(observations.data.recordings) + 1))
+    firsts = _firsts(observations)
     found = np.full(len(observations.joints), np.nan)
     for joint, rows in enumerate(observations.joints):
         bounds = rows.starts[firsts]

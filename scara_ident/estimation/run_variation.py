@@ -4,7 +4,7 @@ An arm is not quite the same from run to run and from day to day. What a run has
 whole of it, so that blocks of one run say the same and their scatter knows nothing of it. Each kind of difference has a
 direction on the rows of a run, such as the friction that the model predicts; how far runs lie from one another along
 these directions is a variance component (Searle, Casella and McCulloch 1992, "Variance Components"), estimated by
-maximum likelihood. A component that chance explains is left out.
+restricted maximum likelihood. A component that chance explains is left out.
 """
 
 from __future__ import annotations
@@ -60,6 +60,8 @@ class JointVariation:
         How many times the variance of white noise the noise has along the offset: what a model lacks changes slowly.
     assumed : bool
         Whether they are no estimates of these runs but what any are taken to differ by.
+    draws : float
+        How many independent offsets were seen: parameters take up the others, gravity where poses differ.
     """
 
     directions: Array
@@ -70,6 +72,7 @@ class JointVariation:
     unsure: Array
     memory: float = 1.0
     assumed: bool = False
+    draws: float = 1.0
 
     @property
     def off(self) -> Array:
@@ -223,12 +226,14 @@ class RunVariation:
             moving = weight**2 * inverse[:, rows.columns] @ np.array(pulls)
             for kind, std in enumerate(item.std):
                 each = moving[:, :, kind]
+                draws = len(each) - 1.0 if kind != OFFSET else item.draws
                 if kind == OFFSET and std > 0.0 and days is not None:
                     # Runs of one day share an offset, and are one draw of it.
                     each = np.array([np.sum(each[days == day], axis=0) for day in np.unique(days)])
                     means = [np.mean(item.of_run[days == day, kind]) for day in np.unique(days)]
-                    std = float(np.std(means, ddof=1))
-                moved = (1.0 if item.assumed else widening(len(each))) * std * each
+                    draws = max(1.0, len(each) - (len(days) - item.draws))
+                    std = float(np.sqrt(np.var(means) * len(each) / draws))
+                moved = (1.0 if item.assumed else widening(draws)) * std * each
                 total += moved.T @ moved
         return total
 

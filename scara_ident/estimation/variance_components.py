@@ -1,6 +1,7 @@
-"""Variance components of runs by maximum likelihood, on all joints at once.
+"""Variance components of runs by restricted maximum likelihood, on all joints at once.
 
-Each run lies off the mean along some directions, of which its rows tell with a known precision. The variances are found
+Each run lies off the mean along some directions, of which its rows tell with a known precision. What is left of a fit shows
+fewer draws of them than there are runs: parameters take up the others (Patterson and Thompson 1971). The variances are found
 by expectation and maximisation (Searle, Casella and McCulloch 1992, "Variance Components", section 8.3), and kinds that
 chance explains are left out one by one.
 """
@@ -18,7 +19,7 @@ CHANCE = 5.41
 STEPS = 40
 
 
-def components(products: Array, aims: Array, kept: NDArray[np.bool_]) -> Array:
+def components(products: Array, aims: Array, kept: NDArray[np.bool_], draws: Array) -> Array:
     """Return the variance of each kind on each joint, shape (joints, kinds); 0 where chance explains it.
 
     Kinds are left out one by one.
@@ -29,11 +30,13 @@ def components(products: Array, aims: Array, kept: NDArray[np.bool_]) -> Array:
     aims : ndarray, shape (joints, runs, kinds)
     kept : ndarray of bool, shape (joints, kinds)
         Kinds that may differ.
+    draws : ndarray, shape (joints, kinds)
+        How many draws of each kind parameters leave, of as many as there are runs.
     """
     kinds = kept.shape[1]
     # Every set of kinds that may be left, in the same steps: bit k of its place says whether kind k is in it.
     sets = (np.arange(2**kinds)[:, None] >> np.arange(kinds)) & 1 == 1
-    variances, likelihoods = _most_likely(products, aims, kept[:, None] & sets)
+    variances, likelihoods = _most_likely(products, aims, kept[:, None] & sets, draws)
     found = np.zeros(kept.shape)
     for joint, own in enumerate(kept):
         place = int(np.sum(1 << np.flatnonzero(own)))
@@ -101,7 +104,7 @@ def _inverted(matrices: Array) -> Array:
     return matrices
 
 
-def _most_likely(products: Array, aims: Array, active: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _most_likely(products: Array, aims: Array, active: NDArray[np.bool_], draws: Array) -> tuple[Array, Array]:
     """Return the variances that are most likely, and the logarithm of their likelihood, for sets of active kinds.
 
     Parameters
@@ -110,22 +113,26 @@ def _most_likely(products: Array, aims: Array, active: NDArray[np.bool_]) -> tup
     aims : ndarray, shape (joints, runs, k)
     active : ndarray of bool, shape (joints, sets, k)
         The variances of the others are zero.
+    draws : ndarray, shape (joints, k)
 
     Returns
     -------
     tuple of ndarray, shapes (joints, sets, k) and (joints, sets)
     """
     products, aims = _kinds_first(products[:, None], aims[:, None])
-    active = np.moveaxis(active, -1, 0)
+    active, draws = np.moveaxis(active, -1, 0), draws.T[..., None]
     kinds = np.arange(len(active))
     # The first guess leaves nothing to chance.
     guess = np.mean((aims / np.maximum(products[kinds, kinds], np.finfo(float).tiny)) ** 2, axis=-1)
     variance = np.where(active, guess, 0.0)
     for _ in range(STEPS):
         mean, spread = _expected(products, aims, variance)
-        variance = np.add.reduce(mean * mean + spread, axis=-1) / mean.shape[-1]
+        # A draw that is taken up stays as unsure as it was.
+        variance = np.add.reduce(mean * mean, axis=-1) / draws + np.mean(spread, axis=-1)
     root = np.sqrt(variance)[..., None]
     grown = np.moveaxis(products * (root[:, None] * root), (0, 1), (-2, -1)) + np.eye(len(active))
     mean, _ = _expected(products, aims, variance)
-    likelihood = 0.5 * np.sum(mean * aims, axis=(0, -1)) - 0.5 * np.sum(np.linalg.slogdet(grown)[1], axis=-1)
+    taken = (1.0 - draws / mean.shape[-1])[..., None] * np.log1p(products[kinds, kinds] * root**2)
+    volume = np.sum(np.linalg.slogdet(grown)[1], axis=-1) - np.sum(taken, axis=(0, -1))
+    likelihood = 0.5 * np.sum(mean * aims, axis=(0, -1)) - 0.5 * volume
     return np.moveaxis(variance, 0, -1), likelihood

@@ -1,7 +1,7 @@
 """Estimating how runs, or parts of them, differ from one another beyond noise.
 
 How far runs lie from one another along each kind of difference is a variance component (Searle, Casella and McCulloch 1992,
-"Variance Components"), estimated by maximum likelihood. A component that chance explains is left out.
+"Variance Components"), estimated by restricted maximum likelihood. A component that chance explains is left out.
 """
 
 from __future__ import annotations
@@ -29,7 +29,12 @@ from scara_ident.threads import side_by_side
 
 
 def run_variation(
-    observations: Observations, joints: Sequence[JointRows], value: Array, *, of_two: bool = False
+    observations: Observations,
+    joints: Sequence[JointRows],
+    value: Array,
+    *,
+    taken: Array | None = None,
+    of_two: bool = False,
 ) -> RunVariation:
     """Estimate how runs differ.
 
@@ -41,6 +46,9 @@ def run_variation(
         Its rows, with those of further columns.
     value : ndarray, shape (p,)
         Parameters of all these columns.
+    taken : ndarray, shape (n,), optional
+        How many of the runs' offsets on each joint the parameters take up, see `scara_ident.estimation.run_offsets`; by
+        default their mean.
     of_two : bool, optional
         Whether the offsets of two runs are told too: by two, other differences may be the parameters'.
     """
@@ -48,7 +56,7 @@ def run_variation(
     if runs < (2 if of_two else LEAST_RUNS):
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
-    return variation_between(observations, joints, value, firsts)
+    return variation_between(observations, joints, value, firsts, taken=taken)
 
 
 def variation_between(
@@ -57,12 +65,14 @@ def variation_between(
     value: Array,
     firsts: NDArray[np.intp],
     known: RunVariation | None = None,
+    *,
+    taken: Array | None = None,
 ) -> RunVariation:
     """Estimate how groups of blocks that follow each other differ.
 
     Parameters
     ----------
-    observations, joints, value
+    observations, joints, value, taken
         See `run_variation`.
     firsts : ndarray of int, shape (groups + 1,)
         The block with which each group begins, and the number of blocks.
@@ -82,8 +92,9 @@ def variation_between(
         return _sums(directions, left, rows.starts, firsts)
 
     sums = side_by_side(of_joint, range(len(joints)), joints)
-    told = [item for item in sums if item is not None]
-    estimated = iter(_estimated(told) if told else ())
+    lost = np.ones(len(joints)) if taken is None else taken
+    told = [(item, off) for item, off in zip(sums, lost, strict=True) if item is not None]
+    estimated = iter(_estimated(*zip(*told, strict=True)) if told else ())
     return RunVariation(tuple(None if item is None else next(estimated) for item in sums))
 
 
@@ -132,25 +143,33 @@ def _sums(directions: Array, left: Array, starts: NDArray[np.intp], firsts: NDAr
     return _Sums(directions, products, aims, back, noise, memory, bounds)
 
 
-def _estimated(joints: Sequence[_Sums]) -> list[JointVariation | None]:
-    """Return how runs differ on each of some joints."""
+def _estimated(joints: Sequence[_Sums], taken: Sequence[float]) -> list[JointVariation | None]:
+    """Return how runs differ on each of some joints, of which parameters take up so many offsets."""
     products, aims = np.array([item.products for item in joints]), np.array([item.aims for item in joints])
     runs = aims.shape[1]
     told = np.array([item.back > 0.0 for item in joints])
     if runs < LEAST_RUNS:
         told &= np.arange(len(KINDS)) == OFFSET
-    variances = components(products, aims, told)
+    # Parameters are fitted to all runs, so that these lie about their own mean.
+    draws = np.full(told.shape, runs - 1.0)
+    draws[:, OFFSET] = np.clip(runs - np.array(taken), 1.0, runs - 1.0)
+    variances = components(products, aims, told, draws)
     means, unsure = expected(products, aims, variances)
-    found: list[JointVariation | None] = []
-    for item, variance, mean, spread in zip(joints, variances, means, unsure, strict=True):
-        # Parameters are fitted to all runs, so that these lie about their own mean.
-        std = np.sqrt(variance * runs / (runs - 1.0)) * item.back
-        some = bool(np.any(variance))
-        of_run, own = mean * item.back, spread * item.back**2
-        found.append(
-            JointVariation(item.directions, std, of_run, item.noise, item.bounds, own, item.memory) if some else None
+    return [
+        JointVariation(
+            item.directions,
+            np.sqrt(variance) * item.back,
+            mean * item.back,
+            item.noise,
+            item.bounds,
+            spread * item.back**2,
+            item.memory,
+            draws=float(own[OFFSET]),
         )
-    return found
+        if np.any(variance)
+        else None
+        for item, variance, mean, spread, own in zip(joints, variances, means, unsure, draws, strict=True)
+    ]
 
 
 def _of_runs(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import astuple, fields
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.effects import EFFECTS, Effect, EffectTerm, Member, Scene
+from scara_ident.effects import EFFECTS, Effect, EffectTerm, Interval, Member, Scene
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
@@ -230,6 +230,7 @@ def _effect_entry(term: EffectTerm) -> dict[str, Any]:
         "joint": term.member.joint,
         "nonlinear": list(term.member.nonlinear),
         "partner": term.member.partner,
+        "intervals": [list(astuple(item)) for item in term.member.intervals],
     }
 
 
@@ -243,11 +244,14 @@ def _with_effects(base: TorqueModel, known: Mapping[str, Any], path: Path) -> To
         *(_array(entry["travel"]), _array(entry["speed"]), entry["start"]),
         armatures={int(joint): value for joint, value in entry["armatures"].items()},
     )
-    terms = [
-        EffectTerm(_family(item, path), Member(item["joint"], tuple(item["nonlinear"]), item["partner"]), scene)
-        for item in known["effects"]
-    ]
+    terms = [EffectTerm(_family(item, path), _member(item), scene) for item in known["effects"]]
     return TorqueModel(base.name, base.robot, (*base.terms, *terms))
+
+
+def _member(entry: Mapping[str, Any]) -> Member:
+    # Results of earlier versions have no intervals.
+    intervals = tuple(Interval(*item) for item in entry.get("intervals", ()))
+    return Member(entry["joint"], tuple(entry["nonlinear"]), entry["partner"], intervals)
 
 
 def _family(entry: Mapping[str, Any], path: Path) -> Effect:

@@ -65,6 +65,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
                 "joint": effect.joint,
                 "description": effect.description,
                 "parameters": {name: dict(vars(parameter)) for name, parameter in effect.parameters.items()},
+                "intervals": _intervals(effect, diagnosis),
                 "direct": {name: dict(vars(parameter)) for name, parameter in effect.direct.items()},
                 "confounded_with": list(dict.fromkeys(confounder.effect for confounder in effect.confounded_with)),
                 "confounders": [
@@ -169,6 +170,21 @@ def _candidate(decision: Decision, diagnosis: Diagnosis) -> dict[str, Any]:
             )
         },
     }
+
+
+def _intervals(effect: FoundEffect, diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return the stretches of recordings in which an effect acts, where it acts in some, s since each began."""
+    names = list(diagnosis.search.scene.start)
+    return [
+        {
+            "recording": names[item.recording],
+            "from": item.start,
+            "from_std": item.start_std,
+            "to": item.stop,
+            "to_std": item.stop_std,
+        }
+        for item in (() if effect.candidate is None else effect.candidate.member.intervals)
+    ]
 
 
 def _rotor(rotor: RotorInertia, diagnosis: Diagnosis) -> dict[str, Any]:

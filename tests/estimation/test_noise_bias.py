@@ -44,7 +44,7 @@ def test_what_steps_make_of_an_inertia_is_measured_and_counted():
     assert estimate.std[0] >= abs(bias[0])
     words = bias_sentence(estimate.model.names, bias, estimate.std)
     assert words is not None
-    assert "biases P_d2" in words
+    assert "P_d2 by about" in words
 
 
 def test_the_share_of_noise_is_that_of_white_steps():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from scara_ident.estimation.variance_components import components, expected
@@ -19,13 +20,17 @@ def runs_of(seed: int, variance: np.ndarray, count: int = 12) -> tuple[np.ndarra
     )
 
 
-def test_one_direction_of_equal_precision_has_the_variance_of_the_closed_form():
+@pytest.mark.parametrize("draws", [4.0, 3.0, 1.5])
+def test_one_direction_of_equal_precision_has_the_variance_of_the_closed_form(draws: float):
     aims = np.array([3.0, -2.0, 4.0, -5.0])
     precision = 10.0
     variance = components(
-        np.full((1, 4, 1, 1), precision), precision * aims[None, :, None], np.ones((1, 1), dtype=bool)
+        np.full((1, 4, 1, 1), precision),
+        precision * aims[None, :, None],
+        np.ones((1, 1), dtype=bool),
+        np.full((1, 1), draws),
     )
-    assert_allclose(variance, [[np.mean(aims**2) - 1.0 / precision]], rtol=1e-6)
+    assert_allclose(variance, [[np.sum(aims**2) / draws - 1.0 / precision]], rtol=1e-6)
     mean, spread = expected(np.full((1, 4, 1, 1), precision), precision * aims[None, :, None], variance)
     assert_allclose(mean[0, :, 0], aims * variance[0] / (variance[0] + 1.0 / precision))
     assert_allclose(spread, 1.0 / (1.0 / variance[0, 0] + precision))
@@ -37,9 +42,10 @@ def test_several_joints_are_as_each_alone_and_what_is_not_there_is_left_out():
     products, aims = (np.array(part) for part in zip(*made, strict=True))
     kept = np.ones(truth.shape, dtype=bool)
     kept[3, 1] = False
-    found = components(products, aims, kept)
+    draws = np.full(truth.shape, 12.0)
+    found = components(products, aims, kept, draws)
     for joint in range(len(truth)):
-        alone = components(products[joint, None], aims[joint, None], kept[joint, None])
+        alone = components(products[joint, None], aims[joint, None], kept[joint, None], draws[joint, None])
         assert_allclose(found[joint], alone[0], rtol=1e-12)
     assert_array_equal(found[:3] > 0.0, truth[:3] > 0.0)
     assert found[3, 1] == 0.0

@@ -20,10 +20,14 @@ pytestmark = pytest.mark.slow
 ROBOT = load_robot()
 
 
-def test_where_runs_do_not_differ_nothing_is_found():
-    found = [wls(observed(runs(np.random.default_rng(seed), (0.0, 0.0, 0.0, 0.0)))).variation for seed in range(4)]
-    assert not any(found)
-    assert all(item is not None and item.sizes(ROBOT) == {} and item.sentences(ROBOT) == [] for item in found)
+def test_where_runs_do_not_differ_a_kind_is_found_no_more_often_than_by_chance():
+    """Of 160 kinds 1.6 are expected; more than 6 have a chance of 0.1 %. What is found is below what is told in words."""
+    steady = (0.0, 0.0, 0.0, 0.0)
+    made = [runs(np.random.default_rng(seed), steady, count=5, seconds=6.0) for seed in range(20)]
+    found = [wls(observed(each)).variation for each in made]
+    kinds = [kind for item in found if item is not None for joint in item.sizes(ROBOT).values() for kind in joint]
+    assert len(kinds) <= 6
+    assert all(item is not None and item.sentences(ROBOT) == [] for item in found)
 
 
 def test_units_of_torque_change_nothing():

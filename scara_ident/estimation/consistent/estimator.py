@@ -33,7 +33,7 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import UNDETERMINED, Information
 from scara_ident.estimation.least_squares import least_squares
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_offsets import beside_offsets
+from scara_ident.estimation.run_offsets import OffsetRows, beside_offsets
 from scara_ident.estimation.variation_between import run_variation
 from scara_ident.threads import one_blas_thread
 
@@ -124,13 +124,13 @@ def consistent(observations: Observations, *, options: ConsistentOptions | None 
         problem, rows.fitted.by_joint, parameter_prior=parameter_prior, standard_prior=standard_prior
     )
     x = nearest_arm(problem, information, found.x, standard_prior=standard_prior)
-    return _estimate(problem, observations, rows.influence, information, weights, plain, found, x, shapes)
+    return _estimate(problem, observations, rows, information, weights, plain, found, x, shapes)
 
 
 def _estimate(
     problem: Problem,
     observations: Observations,
-    influence: Observations,
+    rows: OffsetRows,
     information: Information,
     weights: Array,
     plain: Estimate,
@@ -144,10 +144,10 @@ def _estimate(
     sizes = u.sizes(value)
     along = _half_along(information, free, sizes)
     inverse = along @ along.T
-    spread = block_covariance(inverse, value, influence.joints, observations.owner, weights)
+    spread = block_covariance(inverse, value, rows.influence.joints, observations.owner, weights)
     undetermined = information.solve().undetermined
-    variation = run_variation(observations, observations.joints, value)
-    covariance = spread.matrix + variation.covariance(inverse, influence.joints, weights)
+    variation = run_variation(observations, observations.joints, value, taken=rows.taken(inverse, weights))
+    covariance = spread.matrix + variation.covariance(inverse, rows.influence.joints, weights)
     bias = None
     if plain.noise_bias is not None:
         # As far as constraints let the noise of the positions move the estimate.

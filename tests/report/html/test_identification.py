@@ -11,7 +11,9 @@ SIGNALS = ("position", "velocity", "acceleration", "load", "time", "motor")
 
 def test_an_identification_has_all_its_sections(identified):
     found = document(identified)
-    assert found.sections[:5] == ["prediction", "parameters", "friction", "residual", "convergence"]
+    # Two runs of one motion may seem to differ by chance, and have a section for it then.
+    always = [section for section in found.sections if section != "variation"]
+    assert always[:5] == ["prediction", "parameters", "friction", "residual", "convergence"]
     expected = {f"against-{signal}" for signal in SIGNALS}
     expected |= {"torque", "correlation", "frequency", "order", "lag", "friction-0", "friction-1"}
     expected |= {f"converge-{k}" for k in range(15)}
