@@ -13,7 +13,7 @@ from scara_ident.errors import RobotError, UsageError
 from scara_ident.export.identified_model import Entry, IdentifiedModel
 from scara_ident.manners import listed
 from scara_ident.model.model import build_model
-from scara_ident.model.terms import RigidBody
+from scara_ident.model.terms import Offset, RigidBody
 from scara_ident.robot.robot import Robot
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.defaults import placed_poles, virtual_arm
@@ -82,7 +82,7 @@ def arm_with(robot: Robot, parameters: Mapping[str, float], near: Array | None =
         bodies=standard[: 10 * n].reshape(n, 10),
         rotor_inertia=standard[10 * n :] / robot.reduction**2,
         friction=value[count : count + 4 * n].reshape(n, 4),
-        torque_offset=value[count + 4 * n :],
+        torque_offset=next(term for term in model.terms if isinstance(term, Offset)).of_joints(value[count + 4 * n :]),
     )
     return replace(made, controller=placed_poles(_mean_inertia(made)))
 
