@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.inspection.values import ALIKE, slopes, time_unit
+from scara_ident.inspection.values import ALIKE, averages, slopes, time_unit
 from scara_ident.robot.units import ALSO, find_unit, table_of
 
 QUANTITIES = {
@@ -238,9 +238,9 @@ def _meaning(quantity: str, number: int | None) -> Meaning:
 
 
 def _are_slopes(numbers: Mapping[str, Array], time: str, positions: Sequence[str], velocities: Sequence[str]) -> bool:
-    slope, middle = slopes(numbers[time], np.array([numbers[name] for name in positions]))
-    for known, name in zip(slope, velocities, strict=True):
-        recorded = numbers[name][middle]
+    slope = slopes(numbers[time], np.array([numbers[name] for name in positions]))
+    mean = averages(numbers[time], np.array([numbers[name] for name in velocities]))
+    for known, recorded in zip(slope, mean, strict=True):
         if np.std(known) > 0 and (np.std(recorded) == 0 or np.corrcoef(known, recorded)[0, 1] < ALIKE):
             return False
     return True
