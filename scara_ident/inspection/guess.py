@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.inspection.chain import is_still, with_locked
-from scara_ident.inspection.names import CURRENT, LINK_SIDE, TORQUE, Meaning
+from scara_ident.inspection.names import CURRENT, LINK_SIDE, TORQUE, Meaning, nameless
 from scara_ident.inspection.second_encoder import second_encoder
 from scara_ident.inspection.signals import Signal, groups, of_group
 from scara_ident.inspection.values import Reading, averages, position_readings, slopes, time_unit, velocity_reading
@@ -86,7 +86,12 @@ def guess(
             beside = beside or signal.template
     position, effort = result.signals.get("position"), result.signals.get("effort")
     if position is None:
-        result.problems.append("no positions found: name their columns under recording: position")
+        listed = (
+            f": columns: {{{robot.joints[0]}: column_2, ...}} and their unit; the efforts' under effort alike, and time: {{column: column_1}}"
+            if nameless(meanings)
+            else ""
+        )
+        result.problems.append(f"no positions found: name their columns under recording: position{listed}")
         return result
     result.joints = [k for k in range(robot.n) if k in position.columns and (effort is None or k in effort.columns)]
     if effort is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -63,8 +63,11 @@ _ENDINGS = {
     "nsec": "ns", "sec": "s", "seconds": "s", "rpm": "rpm", "nm": "N m", "amps": "A", "percent": "%",
     "grad": "deg", "degre": "deg", "degres": "deg", "prozent": "%",
 }  # fmt: skip
-# Columns without names, by how many a joint has: what slopes confirm comes first.
-BLOCKS = {3: ("position", "velocity", "effort"), 2: ("position", "effort")}
+# Columns without names, in blocks of one for each joint: what slopes confirm comes first, and may have others behind it.
+CONFIRMED = ("position", "velocity", "effort")
+BLOCKS = (CONFIRMED, ("position", "effort"))
+# What the columns of a table without a header are called.
+_NAMELESS = re.compile("column_[0-9]+")
 # Units that their capitals tell from other words.
 _CAPITALS = re.compile(r"(?:^|[_ .])(mA|A|mNm|Nm|N)(?=$|[_ .\[])")
 
@@ -211,6 +214,8 @@ def _forms(joints: Sequence[str]) -> list[list[tuple[str, ...]]]:
 def meanings_by_place(numbers: Mapping[str, Array], counts: Sequence[int]) -> dict[str, Meaning]:
     """Return what columns without names hold, where their number and their slopes say it; nothing where they do not.
 
+    Behind positions, velocities that are their slopes, and efforts there may be more of each joint, such as setpoints.
+
     Parameters
     ----------
     numbers : mapping of str to ndarray, shape (N,)
@@ -221,16 +226,23 @@ def meanings_by_place(numbers: Mapping[str, Array], counts: Sequence[int]) -> di
     names = list(numbers)
     if not names or time_unit(numbers[names[0]]) is None:
         return {}
-    for shares, count in product(BLOCKS, counts):
-        if len(names) - 1 != shares * count:
+    for quantities, count in product(BLOCKS, counts):
+        others = len(names) - 1 - len(quantities) * count
+        if others and (quantities != CONFIRMED or others < 0 or others % count):
             continue
-        blocks = dict(zip(BLOCKS[shares], np.reshape(names[1:], (shares, count)).tolist(), strict=True))
+        parts = np.reshape(names[1 : len(names) - others], (len(quantities), count)).tolist()
+        blocks = dict(zip(quantities, parts, strict=True))
         if "velocity" in blocks and not _are_slopes(numbers, names[0], blocks["position"], blocks["velocity"]):
             continue
         return {names[0]: _meaning("time", None)} | {
             name: _meaning(quantity, k + 1) for quantity, block in blocks.items() for k, name in enumerate(block)
         }
     return {}
+
+
+def nameless(names: Iterable[str]) -> bool:
+    """Tell whether no line of a file names its columns."""
+    return all(map(_NAMELESS.fullmatch, names))
 
 
 def _meaning(quantity: str, number: int | None) -> Meaning:
