@@ -51,12 +51,20 @@ def made_by_noise(step: SelectionStep, decision: Decision) -> str | None:
         # What is no smaller without the noise was not made by it.
         return None
     p_value = _left_of(found, left).p_value
-    sure = p_value * step.tried <= criteria.family_error and decision.gain * share >= criteria.least_gain
     if share < criteria.least_without_noise:
         return f"the noise of the positions makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
-    if sure:
-        return None
-    return f"the noise of the positions helps it: with that taken off, {share:.1%} of it is left and could be chance, p = {p_value:.1e}"
+    # Believed as it is, it may pass what is asked by little, so that most of it need not pass.
+    if decision.gain * share < criteria.least_gain:
+        return (
+            f"the noise of the positions helps it over the detection limit: with that taken off, {share:.1%} of it is left, which "
+            f"removes {decision.gain * share:.2%} of the squared residual, {criteria.least_gain:.0%} is asked"
+        )
+    if p_value * step.tried > criteria.family_error:
+        return (
+            f"the noise of the positions makes it surer than it is: with that taken off, {share:.1%} of it is left, p = {p_value:.1e} "
+            f"instead of {found.p_value:.1e}; of one of {step.tried} candidates tried {criteria.family_error / step.tried:.1e} is asked"
+        )
+    return None
 
 
 def within_a_step(step: SelectionStep, candidate: Candidate) -> str | None:

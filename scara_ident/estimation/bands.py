@@ -14,6 +14,7 @@ them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,7 +122,7 @@ def _told(model: TorqueModel, bands: Array, fit: Explained, edges: Array, floor:
     place = np.clip(np.searchsorted(edges, bands * (1.0 - 1e-9)) - 1, 0, fit.shares.shape[1] - 1)
     some = fit.explains > 0.0
     explained = np.where(some, fit.shares[np.arange(len(place)), place], 0.0)
-    notes = []
+    notes, narrow = [], list[int]()
     for j, (joint, need) in enumerate(zip(model.robot.joints, needed_rows(model), strict=True)):
         band, rows = bands[j], ROWS_PER_HERTZ * bands[j] * moving[j]
         if not some[j]:
@@ -129,15 +130,25 @@ def _told(model: TorqueModel, bands: Array, fit: Explained, edges: Array, floor:
                 f"{joint}: its motion explains under half of its torque at every frequency; the band is left at {band:.3g} Hz"
             )
         elif fit.explains[j] < band and band <= floor[j]:
-            notes.append(
-                f"{joint}: its motion explains its torque up to {fit.explains[j]:.2g} Hz, but a band below {band:.3g} Hz would "
-                f"leave fewer than {ROWS_PER_PARAMETER:g} independent rows per parameter; record longer"
-            )
+            narrow.append(j)
         if moving[j] > 0.0 and rows < need:
             notes.append(
                 f"{joint}: moves for {moving[j]:.2g} s in all, too little to tell its own parameters; record it moving"
             )
+    if narrow:
+        notes.insert(0, _needs_longer(model, narrow, fit.explains, bands))
     return BandChoice(tuple(bands.tolist()), tuple(explained.tolist()), tuple(notes))
+
+
+def _needs_longer(model: TorqueModel, joints: Sequence[int], explains: Array, bands: Array) -> str:
+    """Say in one line that these joints' bands are as wide as the number of rows asks for, not as the motion allows."""
+    names, one = ", ".join(model.robot.joints[j] for j in joints), len(joints) == 1
+    up_to, least = (", ".join(f"{each[j]:.{digits}g}" for j in joints) for each, digits in ((explains, 2), (bands, 3)))
+    return (
+        f"{names}: {'its' if one else 'their'} motion explains {'its' if one else 'their'} torque up to {up_to} Hz, but "
+        f"{'a band' if one else 'bands'} below {least} Hz would leave fewer than {ROWS_PER_PARAMETER:g} independent rows per "
+        "parameter; record longer"
+    )
 
 
 def needed_rows(model: TorqueModel) -> Array:

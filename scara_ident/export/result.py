@@ -28,6 +28,7 @@ from scara_ident.model import MODELS
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.robot.description import check_description
 from scara_ident.robot.robot import Robot, build_robot, load_robot
+from scara_ident.robot.signal_map import recording_entry
 
 KEY = "rebuild"
 # Values of an effect's options that a file can hold.
@@ -202,7 +203,8 @@ def _robot_entry(robot: Robot) -> dict[str, Any]:
             "joints": joints,
             "locked": dict(robot.locked),
             "gravity": robot.model.gravity.linear.tolist(),
-        },
+        }
+        | ({} if robot.channels is None else {"recording": recording_entry(robot.channels, robot.joints)}),
     }
 
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.inspection.chain import is_still, with_locked
-from scara_ident.inspection.names import CURRENT, LINK_SIDE, TORQUE, Meaning
+from scara_ident.inspection.names import CURRENT, LINK_SIDE, TORQUE, Meaning, nameless
 from scara_ident.inspection.second_encoder import second_encoder
 from scara_ident.inspection.signals import Signal, groups, of_group
-from scara_ident.inspection.values import Reading, position_readings, slopes, time_unit, velocity_reading
+from scara_ident.inspection.values import Reading, averages, position_readings, slopes, time_unit, velocity_reading
 from scara_ident.recording.one_clock import on_one_clock
 from scara_ident.robot.robot import Robot
 from scara_ident.robot.units import COUNT, DRIVE, TIME, Unit, find_unit, table_of
@@ -86,7 +86,12 @@ def guess(
             beside = beside or signal.template
     position, effort = result.signals.get("position"), result.signals.get("effort")
     if position is None:
-        result.problems.append("no positions found: name their columns under recording: position")
+        listed = (
+            f": columns: {{{robot.joints[0]}: column_2, ...}} and their unit; the efforts' under effort alike, and time: {{column: column_1}}"
+            if nameless(meanings)
+            else ""
+        )
+        result.problems.append(f"no positions found: name their columns under recording: position{listed}")
         return result
     result.joints = [k for k in range(robot.n) if k in position.columns and (effort is None or k in effort.columns)]
     if effort is None:
@@ -214,7 +219,7 @@ def _find_units(
         if reading.unit == COUNT:
             continue
         moved = values * _factors(robot, group, "position", reading)[:, None]
-        slope |= dict(zip(group, slopes(time, moved if linear else np.unwrap(moved, axis=1))[0], strict=True))
+        slope |= dict(zip(group, slopes(time, moved if linear else np.unwrap(moved, axis=1)), strict=True))
     sides = {reading.side for reading in readings.values()}
     if len(sides) > 1:
         result.problems.append("some positions fit the motor's side of the gear and some the joint's: state position")
@@ -268,8 +273,7 @@ def _find_velocity_unit(
         group = [k for k in result.joints if bool(robot.prismatic[k]) == linear and k in slope]
         if not group:
             continue
-        middle = slopes(time, np.zeros((1, len(time))))[1]
-        recorded = np.array([numbers[velocity.columns[k]][good][middle] for k in group])
+        recorded = averages(time, np.array([numbers[velocity.columns[k]][good] for k in group]))
         reading = velocity_reading(np.array([slope[k] for k in group]), recorded, robot.reduction[group], linear=linear)
         if reading is None:
             result.notes.append("velocity: no slope of the positions in any unit; left out")

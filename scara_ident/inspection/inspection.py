@@ -16,7 +16,7 @@ from scara_ident.errors import MemoryLimit, RecordingError, UsageError
 from scara_ident.files import path_fault
 from scara_ident.inspection.chain import arm_of, longest_chain
 from scara_ident.inspection.guess import Guess, guess
-from scara_ident.inspection.names import Meaning, meaning, meanings_by_place
+from scara_ident.inspection.names import Meaning, meaning, meanings_by_place, nameless
 from scara_ident.inspection.text import description_text, mapping
 from scara_ident.recording.files import column_names, is_bag_folder, read_columns
 from scara_ident.recording.recording import Recording, read_recording
@@ -147,7 +147,7 @@ def inspect_file(
         columns = tuple(_column(name, numbers.get(name), *_by_name(name), False) for name in names)
         return Inspection(path, topics, topic, columns, {})
     by_place = {}
-    if all(re.fullmatch("column_[0-9]+", name) for name in names):
+    if nameless(names):
         by_place = meanings_by_place(numbers, (arm.n, len(longest_chain(arm))))
     found = guess(meanings | by_place, numbers, arm, stated=bool(topics))
     found.notes[:0] = arm.notes

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.inspection.values import ALIKE, slopes, time_unit
+from scara_ident.inspection.values import ALIKE, averages, slopes, time_unit
 from scara_ident.robot.units import ALSO, find_unit, table_of
 
 QUANTITIES = {
@@ -63,8 +63,11 @@ _ENDINGS = {
     "nsec": "ns", "sec": "s", "seconds": "s", "rpm": "rpm", "nm": "N m", "amps": "A", "percent": "%",
     "grad": "deg", "degre": "deg", "degres": "deg", "prozent": "%",
 }  # fmt: skip
-# Columns without names, by how many a joint has: what slopes confirm comes first.
-BLOCKS = {3: ("position", "velocity", "effort"), 2: ("position", "effort")}
+# Columns without names, in blocks of one for each joint: what slopes confirm comes first, and may have others behind it.
+CONFIRMED = ("position", "velocity", "effort")
+BLOCKS = (CONFIRMED, ("position", "effort"))
+# What the columns of a table without a header are called.
+_NAMELESS = re.compile("column_[0-9]+")
 # Units that their capitals tell from other words.
 _CAPITALS = re.compile(r"(?:^|[_ .])(mA|A|mNm|Nm|N)(?=$|[_ .\[])")
 
@@ -211,6 +214,8 @@ def _forms(joints: Sequence[str]) -> list[list[tuple[str, ...]]]:
 def meanings_by_place(numbers: Mapping[str, Array], counts: Sequence[int]) -> dict[str, Meaning]:
     """Return what columns without names hold, where their number and their slopes say it; nothing where they do not.
 
+    Behind positions, velocities that are their slopes, and efforts there may be more of each joint, such as setpoints.
+
     Parameters
     ----------
     numbers : mapping of str to ndarray, shape (N,)
@@ -221,10 +226,12 @@ def meanings_by_place(numbers: Mapping[str, Array], counts: Sequence[int]) -> di
     names = list(numbers)
     if not names or time_unit(numbers[names[0]]) is None:
         return {}
-    for shares, count in product(BLOCKS, counts):
-        if len(names) - 1 != shares * count:
+    for quantities, count in product(BLOCKS, counts):
+        others = len(names) - 1 - len(quantities) * count
+        if others and (quantities != CONFIRMED or others < 0 or others % count):
             continue
-        blocks = dict(zip(BLOCKS[shares], np.reshape(names[1:], (shares, count)).tolist(), strict=True))
+        parts = np.reshape(names[1 : len(names) - others], (len(quantities), count)).tolist()
+        blocks = dict(zip(quantities, parts, strict=True))
         if "velocity" in blocks and not _are_slopes(numbers, names[0], blocks["position"], blocks["velocity"]):
             continue
         return {names[0]: _meaning("time", None)} | {
@@ -233,14 +240,19 @@ def meanings_by_place(numbers: Mapping[str, Array], counts: Sequence[int]) -> di
     return {}
 
 
+def nameless(names: Iterable[str]) -> bool:
+    """Tell whether no line of a file names its columns."""
+    return all(map(_NAMELESS.fullmatch, names))
+
+
 def _meaning(quantity: str, number: int | None) -> Meaning:
     return Meaning(quantity, None, number, None, False, False, f"{quantity} {{number}}", frozenset())
 
 
 def _are_slopes(numbers: Mapping[str, Array], time: str, positions: Sequence[str], velocities: Sequence[str]) -> bool:
-    slope, middle = slopes(numbers[time], np.array([numbers[name] for name in positions]))
-    for known, name in zip(slope, velocities, strict=True):
-        recorded = numbers[name][middle]
+    slope = slopes(numbers[time], np.array([numbers[name] for name in positions]))
+    mean = averages(numbers[time], np.array([numbers[name] for name in velocities]))
+    for known, recorded in zip(slope, mean, strict=True):
         if np.std(known) > 0 and (np.std(recorded) == 0 or np.corrcoef(known, recorded)[0, 1] < ALIKE):
             return False
     return True

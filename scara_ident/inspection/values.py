@@ -73,7 +73,7 @@ def velocity_reading(slope: Array, velocity: Array, reduction: Array, *, linear:
     Parameters
     ----------
     slope, velocity : ndarray, shape (k, M)
-        Slope of the positions in rad/s (m/s), and what was recorded.
+        Slope of the positions in rad/s (m/s), and what was recorded, over the same times; see `averages`.
     reduction : ndarray, shape (k,)
     linear : bool
         Whether the joints translate.
@@ -94,14 +94,29 @@ def velocity_reading(slope: Array, velocity: Array, reduction: Array, *, linear:
     return None
 
 
-def slopes(time: Array, values: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Return the slope of signals (k, N) over a few samples, shape (k, M), and the rows at which it stands."""
+def slopes(time: Array, values: Array) -> Array:
+    """Return the slope of signals, shape (k, N), over some samples on either side, shape (k, M)."""
+    first, last = _windows(time)
+    return np.asarray((values[:, last] - values[:, first]) / (time[last] - time[first]))
+
+
+def averages(time: Array, values: Array) -> Array:
+    """Return the mean of signals, shape (k, N), over the times that `slopes` goes over, shape (k, M).
+
+    A slope over many samples is the mean velocity in them: that in their middle is another where the velocity bends.
+    """
+    first, last = _windows(time)
+    areas = 0.5 * (values[:, 1:] + values[:, :-1]) * np.diff(time)
+    total = np.concatenate([np.zeros((len(values), 1)), np.cumsum(areas, axis=1)], axis=1)
+    return np.asarray((total[:, last] - total[:, first]) / (time[last] - time[first]))
+
+
+def _windows(time: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return first and last rows of windows of some samples, without those in which time stands still."""
     rows = max(1, min(SPEED_ROWS // 2, len(time) // 8))
     middle = np.arange(rows, len(time) - rows)
-    lasting = time[middle + rows] - time[middle - rows]
-    good = lasting > 0
-    middle = middle[good]
-    return (values[:, middle + rows] - values[:, middle - rows]) / lasting[good], middle
+    middle = middle[time[middle + rows] > time[middle - rows]]
+    return middle - rows, middle + rows
 
 
 def _fit(robot: Robot, joints: list[int], time: Array, position: Array) -> bool:
@@ -119,7 +134,7 @@ def _fit(robot: Robot, joints: list[int], time: Array, position: Array) -> bool:
         return False
     # An angle may be held within one turn.
     whole = position if linear else np.unwrap(position, axis=1)
-    speed = np.percentile(np.abs(slopes(time, whole)[0]), FAST, axis=1)
+    speed = np.percentile(np.abs(slopes(time, whole)), FAST, axis=1)
     limit = robot.velocity_limit[joints]
     fastest = FASTEST_SLIDE if linear else FASTEST_JOINT
     return bool(np.all(speed <= np.where(np.isfinite(limit), HASTE * limit, fastest)))

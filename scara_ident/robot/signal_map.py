@@ -13,7 +13,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.description import MotionDescription, RecordingDescription, SignalDescription, TimeDescription
-from scara_ident.robot.units import COUNT, Unit, find_unit, table_of
+from scara_ident.robot.units import COUNT, TIME, Unit, find_unit, table_of
 
 SIGNALS = ("position", "velocity", "acceleration", "effort", "temperature", "link_position")
 # Which some joints may have and others not.
@@ -128,6 +128,30 @@ def build_channels(
     channels = _channels(clock, built, declared, description.topic, time.rate)
     _refuse_shared(channels, source, joints)
     return channels
+
+
+def recording_entry(channels: Channels, joints: Sequence[str]) -> dict[str, Any]:
+    """Return the key ``recording`` of a robot description from which `build_channels` builds the same channels.
+
+    All is in SI units on the joint side: what counts, gears and units make of the numbers is in ``scale`` and ``offset``.
+    """
+    entry: dict[str, Any] = {} if channels.topic is None else {"topic": channels.topic}
+    if channels.rate is not None:
+        entry["time"] = {"rate": channels.rate}
+    elif "time" in channels.declared:
+        unit = next(unit.name for unit in TIME.values() if unit.factor == channels.time.factor)
+        entry["time"] = {"column": channels.time.column, "unit": unit}
+    for signal in SIGNALS:
+        if signal not in channels.declared:
+            continue
+        own = dict(zip(joints, channels.of(signal), strict=True))
+        parts: dict[str, dict[str, Any]] = {"columns": {joint: channel.column for joint, channel in own.items()}}
+        if any(channel.factor != 1.0 for channel in own.values()):
+            parts["scale"] = {joint: channel.factor for joint, channel in own.items()}
+        if any(channel.offset != 0.0 for channel in own.values()):
+            parts["offset"] = {joint: channel.offset for joint, channel in own.items()}
+        entry[signal] = parts
+    return entry
 
 
 def _channels(

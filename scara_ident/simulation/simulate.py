@@ -344,7 +344,7 @@ def _run(
     )  # fmt: skip
     if stops < 0:
         raise LostArm(
-            f"{what}: the arm got out of control at {(-1 - stops) / rate:.3f} s; lower the gains or use more substeps"
+            f"{what}: the arm got out of control at {(-1 - stops) / rate:.3f} s; in Python give it a slower controller, or substeps"
         )
     order = arm.robot.order
 

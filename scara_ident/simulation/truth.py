@@ -11,6 +11,7 @@ import numpy as np
 
 from scara_ident.files import slug, written_together
 from scara_ident.model.model import build_model
+from scara_ident.model.terms import Offset
 from scara_ident.recording.recording import write_recording
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects import Effect
@@ -97,9 +98,10 @@ def write_simulation(result: SimulationResult, folder: Path | str) -> Path:
 
 
 def _complete_parameters(arm: VirtualArm) -> list[float]:
-    """Values of the complete model's columns: base parameters, friction joint by joint, offsets."""
+    """Values of the complete model's columns: base parameters, friction joint by joint, offsets where the model has one."""
     model = build_model(arm.robot, "complete")
     body = model.rigid_body
     standard = np.concatenate([arm.bodies.ravel(), arm.armature])
     base = body.base.grouping[body.kept] @ standard
-    return [*base.tolist(), *arm.friction.ravel().tolist(), *arm.torque_offset.tolist()]
+    places = [place for term in model.terms if isinstance(term, Offset) for place in term.places]
+    return [*base.tolist(), *arm.friction.ravel().tolist(), *arm.torque_offset[places].tolist()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from scara_ident.errors import RobotError, UsageError
 from scara_ident.export.identified_model import Entry, IdentifiedModel
 from scara_ident.manners import listed
 from scara_ident.model.model import build_model
-from scara_ident.model.terms import RigidBody
+from scara_ident.model.terms import Offset, RigidBody
 from scara_ident.robot.robot import Robot
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.defaults import placed_poles, virtual_arm
@@ -82,7 +82,7 @@ def arm_with(robot: Robot, parameters: Mapping[str, float], near: Array | None =
         bodies=standard[: 10 * n].reshape(n, 10),
         rotor_inertia=standard[10 * n :] / robot.reduction**2,
         friction=value[count : count + 4 * n].reshape(n, 4),
-        torque_offset=value[count + 4 * n :],
+        torque_offset=next(term for term in model.terms if isinstance(term, Offset)).of_joints(value[count + 4 * n :]),
     )
     return replace(made, controller=placed_poles(_mean_inertia(made)))
 
@@ -182,6 +182,25 @@ def _sizes(bodies: Array) -> Array:
     return np.maximum(size, _LEAST_SHARE * np.max(size))
 
 
+def light_joint(arm: VirtualArm) -> str:
+    """Say which joint of an arm is the lightest beside what its controller is made for, and by how much.
+
+    With all other joints free a joint has less inertia than while they are held; a controller that is made for the
+    latter is too fast for it where that is next to nothing.
+    """
+    robot, total = arm.robot, np.zeros(arm.robot.n)
+    least = np.full(robot.n, np.inf)
+    for mass in _masses(arm):
+        total += np.diag(mass)[robot.order] / _POSES
+        least = np.minimum(least, 1.0 / np.diag(np.linalg.inv(mass))[robot.order])
+    j = int(np.argmin(least / total))
+    rotor = ", next to nothing of it its rotor's" if arm.armature[j] < 0.01 * least[j] else ""
+    return (
+        f"{robot.joints[j]} has an inertia of {total[j]:.2g} {robot.armature_unit(j)} in the mean{rotor}, and where the other joints "
+        f"give way down to {least[j]:.2g}"
+    )
+
+
 def _mean_inertia(arm: VirtualArm) -> Array:
     """Return the mean inertia about each joint over its range, rotors included, shape (n,).
 
@@ -190,15 +209,8 @@ def _mean_inertia(arm: VirtualArm) -> Array:
     RobotError
         If an inertia is not positive.
     """
-    robot = arm.robot
-    back = np.argsort(robot.order)
-    lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
-    random, total = np.random.default_rng(0), np.zeros(robot.n)
-    bodies, still = arm.bodies[back], np.zeros(robot.n)
-    for _ in range(_POSES):
-        pose = random.uniform(lower, upper)[back]
-        mass = mass_and_bias(robot.model, bodies, pose, still)[0] + np.diag(arm.armature[back])
+    robot, total = arm.robot, np.zeros(arm.robot.n)
+    for mass in _masses(arm):
         if np.linalg.eigvalsh(mass)[0] <= 0.0:
             raise RobotError(
                 f"{robot.name}: no arm with these parameters can move, its inertia is not positive; identify with "
@@ -206,3 +218,16 @@ def _mean_inertia(arm: VirtualArm) -> Array:
             )
         total += np.diag(mass)[robot.order] / _POSES
     return total
+
+
+def _masses(arm: VirtualArm) -> Iterator[Array]:
+    """Give the mass matrix of an arm, rotors included, in poses over its range, shape (n, n) in the model's order."""
+    robot = arm.robot
+    back = np.argsort(robot.order)
+    lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
+    random = np.random.default_rng(0)
+    bodies, still = arm.bodies[back], np.zeros(robot.n)
+    for _ in range(_POSES):
+        pose = random.uniform(lower, upper)[back]
+        yield mass_and_bias(robot.model, bodies, pose, still)[0] + np.diag(arm.armature[back])

@@ -8,15 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import ScaraIdentError
+from scara_ident.errors import LostArm, ScaraIdentError
 from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.motion.motion import Motion
 from scara_ident.simulation.arm import VirtualArm, ideal
 from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.inverse_dynamics import inverse_dynamics
 from scara_ident.simulation.reference import ReferenceMotion
-from scara_ident.simulation.simulate import simulate
+from scara_ident.simulation.simulate import SimulationResult, simulate
 from scara_ident.threads import side_by_side
+from scara_ident.use.identified_arm import light_joint
 
 # Rounds in which the torque that effects ask for is found; each leaves a few per cent of what the last one missed. The
 # controller in them is so many times as fast as the arm's: with no noise about, the faster the nearer.
@@ -24,6 +25,8 @@ ROUNDS = 4
 FASTER = (3.0, 1.0)
 # Samples per second of the controller, and integration steps per sample: by twice as many no error differs by a hundredth.
 RATE, SUBSTEPS = 1000.0, 2
+# Steps for an arm that is lost in these: much friction on a joint of next to no inertia is faster than they are.
+MORE_SUBSTEPS = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +114,7 @@ def needed_torque(
         tried, learned, least = feed, feed, np.inf
         try:
             for _ in range(ROUNDS + 1):
-                run = simulate(stiff, motion, effects=effects, feed=tried, rate=RATE, least_substeps=SUBSTEPS)
+                run = _followed(stiff, motion, effects, tried)
                 error = float(np.sqrt(np.mean(((run.motion.position - run.true.position) / scale) ** 2)))
                 if error >= least:
                     # What is faster than the controller, as a ripple, it makes worse.
@@ -154,7 +157,22 @@ def tracked(
     """
 
     def follow(name: str, feed: Array | None) -> Tracked:
-        run = simulate(arm, motion, effects=effects, feed=feed, rate=RATE, seed=seed, least_substeps=SUBSTEPS)
+        run = _followed(arm, motion, effects, feed, seed)
         return Tracked(name, run.motion.time, run.motion.position - run.true.position)
 
     return tuple(side_by_side(follow, feeds.keys(), feeds.values()))
+
+
+def _followed(
+    arm: VirtualArm, motion: ReferenceMotion, effects: Sequence[Effect], feed: Array | None, seed: int = 0
+) -> SimulationResult:
+    """Return a run of an arm, or say why none with its parameters can be held."""
+    for steps in (SUBSTEPS, MORE_SUBSTEPS):
+        try:
+            return simulate(arm, motion, effects=effects, feed=feed, rate=RATE, seed=seed, least_substeps=steps)
+        except LostArm:
+            continue
+    raise LostArm(
+        f"{motion.name}: no controller holds {arm.robot.name} with these parameters: {light_joint(arm)}; record motion that tells "
+        "its inertia (`scara-ident excite`), or see by `scara-ident diagnose` what the model lacks"
+    )

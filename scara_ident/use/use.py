@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RecordingError, RobotError, ScaraIdentError, UsageError
+from scara_ident.errors import LostArm, RecordingError, RobotError, ScaraIdentError, UsageError
 from scara_ident.export.identified_model import Entry, IdentifiedModel
 from scara_ident.manners import listed
 from scara_ident.motion.prepared import PreparedStretch, prepare
@@ -27,7 +28,7 @@ from scara_ident.use.trial_motion import trial_motion
 
 # Arms that may be the true one, drawn about the model.
 DRAWS = 3
-# An arm drawn so far off that it cannot exist is drawn nearer, so many times by half.
+# An arm drawn so far off that it cannot exist, or be held, is drawn nearer, so many times by half.
 HALVINGS = 6
 
 
@@ -134,15 +135,29 @@ def use(
     pairs = tuple((effect.resolve(whole), item) for effect, item in pairs)
     effects = tuple(effect for effect, _ in pairs)
     wanted = at_ticks(trial_motion(whole, seed) if motion is None else motion)
-    drawn = [
+    draws = [
         (_drawn(model, whole, random), tuple(_drawn_effect(*pair, whole, random) for pair in pairs))
         for _ in range(arms)
     ]
+    drawn: list[tuple[VirtualArm, tuple[Effect, ...]]] = []
     feeds = fed_forward(model, wanted, bare, whole, ())
     runs: list[tuple[Tracked, ...]] = []
 
+    def follow(k: int) -> None:
+        # An arm that no controller holds is none that was recorded.
+        nearer, own = draws[k]
+        for arm in nearer:
+            try:
+                runs.append(tracked(arm, own, wanted, {"pid": None, **feeds}, seed + k))
+            except LostArm as error:
+                lost = error
+                continue
+            drawn.append((arm, own))
+            return
+        raise lost
+
     def follow_first() -> None:
-        runs.append(tracked(*drawn[0], wanted, {"pid": None, **feeds}, seed))
+        follow(0)
 
     def learn() -> None:
         learned["effects"] = needed_torque(whole, effects, wanted, foreseen_torque(model, wanted))
@@ -154,7 +169,7 @@ def use(
     feeds |= learned
     for k in range(1, arms):
         progress("following the motion", 0.2 + 0.5 * k / arms)
-        runs.append(tracked(*drawn[k], wanted, {"pid": None, **feeds}, seed + k))
+        follow(k)
     rollouts: dict[str, Array] = {}
     not_mujoco = ""
     if recordings:
@@ -207,17 +222,19 @@ def fed_forward(
     return feeds
 
 
-def _drawn(model: IdentifiedModel, whole: VirtualArm, random: np.random.Generator) -> VirtualArm:
-    """Draw an arm about the model."""
+def _drawn(model: IdentifiedModel, whole: VirtualArm, random: np.random.Generator) -> Iterator[VirtualArm]:
+    """Draw an arm about the model; give it, and nearer and nearer ones, where they can exist; the last is the model's."""
     value = by_name(model, model.value)
     step = {name: std * random.normal() for name, std in by_name(model, model.std).items() if name in value}
-    for share in 0.5 ** np.arange(HALVINGS):
-        try:
+
+    def nearer() -> Iterator[VirtualArm]:
+        for share in 0.5 ** np.arange(HALVINGS):
             moved = {name: x + share * step.get(name, 0.0) for name, x in value.items()}
-            return replace(arm_with(model.robot, moved, model.standard), controller=whole.controller)
-        except RobotError:
-            continue
-    return whole
+            with suppress(RobotError):
+                yield replace(arm_with(model.robot, moved, model.standard), controller=whole.controller)
+        yield whole
+
+    return nearer()
 
 
 def _drawn_effect(effect: Effect, found: Entry, arm: VirtualArm, random: np.random.Generator) -> Effect:

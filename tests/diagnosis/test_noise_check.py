@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -75,6 +76,38 @@ def test_what_is_mostly_noise_is_not_believed_however_sure_the_rest_is(
     said = noise_objection(step, decision)
     assert (said is None) == believed
     assert believed or "the noise of the positions makes it" in said
+
+
+@pytest.mark.parametrize(
+    ("gain", "p_value", "said"),
+    [
+        (
+            0.05001,
+            1e-9,
+            r"over the detection limit: with that taken off, 99\.\d% of it is left, which removes 4\.9\d% of the",
+        ),
+        (
+            0.9,
+            1.99e-5,
+            r"surer than it is: .* 99\.\d% of it is left, p = 2\.\de-05 instead of 2\.0e-05; of one of 100 .* 2\.0e-05",
+        ),
+        (0.9, 1e-9, None),
+    ],
+)
+def test_what_only_just_passes_is_not_believed_for_what_it_fails_by(
+    gain: float, p_value: float, said: str | None, monkeypatch: pytest.MonkeyPatch
+):
+    """Of 99.9 % that was left with p = 5.4e-06 it was said that it could be chance."""
+    once, _ = with_noise_once_and_twice(0.4, 2.0)
+    once = replace(once, p_value=p_value)
+    noisier = SimpleNamespace(rows=lambda scene, candidates: [None], scene=None, model=None)
+    step = SimpleNamespace(noisier=noisier, criteria=CRITERIA, tried=100)
+    left = 0.998 * once.value
+    monkeypatch.setattr(noise_check, "without_noise", lambda *_: left)
+    monkeypatch.setattr(noise_check, "coefficients", lambda *_: (None, None))
+    decision = Decision(Candidate(Spring(), Member(0)), "spring", once, accepted=True, why="", gain=gain)
+    objection = noise_check.made_by_noise(step, decision)
+    assert objection is None if said is None else re.search(said, objection or "")
 
 
 def test_what_noise_takes_nothing_from_is_as_sure_as_before():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -139,6 +140,22 @@ def test_torque_that_has_nothing_to_do_with_motion_is_said(model: TorqueModel, c
     (note,) = found.notes
     assert note.startswith("j2: its motion explains under half of its torque at every frequency")
     assert found.explained[1] == 0.0
+
+
+def test_joints_that_need_a_longer_recording_are_named_in_one_line(model: TorqueModel, clean: Recording):
+    """Seven lines said it of a Panda."""
+    # The torque's noise is above the motion's from a few hertz on.
+    noise = np.array([[30.0], [6.0]]) * np.random.default_rng(4).standard_normal((2, 2000))
+    assert clean.effort is not None
+    short = replace(
+        clean, time=clean.time[:2000], position=clean.position[:, :2000], effort=clean.effort[:, :2000] + noise
+    )
+    found = choose_bands(model, prepare([short]))
+    (note,) = (note for note in found.notes if "record longer" in note)
+    assert re.match(
+        r"j1, j2: their motion explains their torque up to [\d.]+, [\d.]+ Hz, but bands below [\d.]+, ", note
+    )
+    assert note.endswith("Hz would leave fewer than 5 independent rows per parameter; record longer")
 
 
 def test_the_order_of_recordings_does_not_matter(model: TorqueModel, clean: Recording):

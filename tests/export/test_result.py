@@ -17,6 +17,7 @@ from scara_ident.export.result import KEY, _robot_entry, read_identified, rebuil
 from scara_ident.files import json_text, write_json
 from scara_ident.identification.identify import Identification
 from scara_ident.report.identification import identification_dict
+from scara_ident.robot.robot import load_robot
 from tests.export.identified import model_torque, states, with_effects
 from tests.report.simulated import made, run
 
@@ -136,6 +137,17 @@ def test_limits_of_the_description_come_with_the_robot(found, content, read, tmp
     )
     back = read(content | {KEY: content[KEY] | {"robot": _robot_entry(robot)}}).robot
     assert (back.acceleration_limit.tolist(), back.jerk_limit.tolist()) == ([15.0, np.inf], [np.inf, 500.0])
+
+
+def test_the_mapping_of_the_recordings_comes_with_the_robot(found, content, read, tmp_path: Path):
+    (tmp_path / "robot.yaml").write_text(
+        f"urdf: {found.model.robot.urdf}\neffort_side: motor\njoints: {{joint1: {{}}, joint2: {{}}}}\n"
+        "recording: {time: {column: t, unit: ms}, position: {column: 'q{number}', unit: deg}}\n"
+    )
+    robot = load_robot(tmp_path / "robot.yaml")
+    entry = json.loads(json_text(_robot_entry(robot)))
+    assert read(content | {KEY: content[KEY] | {"robot": entry}}).robot.channels == robot.channels
+    assert read(content).robot.channels is None
 
 
 def test_a_robot_that_has_moved_can_be_given(content, read, tmp_path: Path):

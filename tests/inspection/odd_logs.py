@@ -253,7 +253,7 @@ LOGS = (
     Log("csv with a name twice", csv(MADE, change=lambda rows: [rows[0].replace("j2.effort", "j1.effort"), *rows[1:]]), refused="rename one"),
     Log("csv without a header", csv(numbered(table("position", "effort")), header=False), note="no header", exact=1e-8),
     Log("csv without a header, with velocities", csv(numbered(table("position", "velocity", "effort")), header=False), note="no header", exact=1e-8),
-    Log("csv without a header, of other columns", csv(numbered(table("position", "effort")[:-1]), header=False), refused="name their columns"),
+    Log("csv without a header, of other columns", csv(numbered(table("position", "effort")[:-1]), header=False), refused="position: columns: .*j1: column_2.*and time: .column: column_1"),
     Log("csv behind lines of a controller", csv(MADE, ";", comma=True, change=lambda rows: ["Trace export", "Channels;10", "Sample time;10,0", "", *rows]), exact=1e-8),
     Log("csv without a header behind a line of words", csv(numbered(table("position", "effort")), header=False, change=lambda rows: ["recorded by hand", "", *rows]), note="no header", exact=1e-8),
     Log("csv behind comments, with a commented header", csv(MADE, change=lambda rows: ["# made by a script, in a hurry", "#", f"# {rows[0]}", *rows[1:]]), exact=1e-8),

@@ -32,6 +32,19 @@ def test_units_are_told_by_limits_and_slopes_where_no_name_says_them(tmp_path):
     np.testing.assert_allclose(back.velocity[0], MADE["joint1.velocity"], rtol=1e-9, atol=1e-9)
 
 
+def test_the_velocity_of_a_fast_joint_in_a_slow_log_is_that_of_its_positions(tmp_path):
+    """Over the rows that tell a slope a joint turned round, and the velocity in their middle was another by 11 %."""
+    time = np.arange(700) / 30.0
+    made = {"time": time}
+    for number, (size, speed) in enumerate(((0.5, 2.0), (0.4, 4.0)), start=1):
+        made[f"j{number}.position"] = size * np.sin(speed * time)
+        made[f"j{number}.velocity"] = size * speed * np.cos(speed * time)
+        made[f"j{number}.effort"] = np.cos(speed * time)
+    found = inspected(save(tmp_path / "a.csv", made), tmp_path, two_joints(tmp_path))
+    assert not any("velocity" in note for note in found.notes)
+    assert [column.name for column in found.columns if not column.channel] == []
+
+
 def two_joints(folder: Path, reduction: float = 100.0) -> Path:
     links = (Link(), Link(xyz=(0.4, 0.0, 0.0)))
     return write_urdf(folder / "arm.urdf", links, (reduction, reduction))

@@ -95,6 +95,14 @@ def test_of_three_the_second_has_to_be_the_slope_of_the_first():
     assert told(table("velocity", "position", "effort"), (2,)) == []
 
 
+def test_behind_velocities_that_are_slopes_there_may_be_more_of_each_joint():
+    """A log of six positions, velocities, currents and two setpoints of each was told nothing."""
+    first = ["time None", "position 1", "position 2", "velocity 1", "velocity 2", "effort 1", "effort 2"]
+    assert told(table("position", "velocity", "effort", "effort", "effort")) == first
+    assert told(table("position", "position", "effort", "effort")) == []
+    assert told(dict(list(table("position", "velocity", "effort", "effort").items())[:-1])) == []
+
+
 def test_other_numbers_of_columns_say_nothing():
     columns = table("position", "effort")
     assert told(columns, (3,)) == []

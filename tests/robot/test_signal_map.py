@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from scara_ident.errors import RobotError
 from scara_ident.robot.robot import Robot, load_robot
-from scara_ident.robot.signal_map import contract_channels
+from scara_ident.robot.signal_map import contract_channels, recording_entry
 from tests.arms import Link, write_urdf
 
 LINKS = (Link(), Link(kind="prismatic"))
@@ -153,3 +154,19 @@ def test_a_gain_for_one_per_cent_is_refused_with_that_for_a_hundred(tmp_path, un
     assert "\n" not in str(caught.value)
     for told in ("1.5", "1", "0.0001"):
         described(tmp_path, f"{{effort: {{unit: '{unit}'}}}}", joints.replace(str(gain), told, 1))
+
+
+@pytest.mark.parametrize(
+    "recording",
+    [
+        "{}",
+        "{topic: /states, time: {column: t, unit: ms}, position: {column: 'q_{number}'}}",
+        "{time: {rate: 250}, temperature: {unit: K}, link_position: {columns: {j1: arm_side}}}",
+        "{position: {unit: count, side: motor, counts_per_turn: {j1: 4096, j2: 1000}, offset: 7}, velocity: {scale: -1}}",
+        "{effort: {columns: {j1: column_3, j2: column_4}, unit: mA, scale: {j2: -1}}, acceleration: {unit: {j2: mm/s^2}}}",
+    ],
+)
+def test_a_mapping_written_again_gives_the_same_channels(tmp_path, recording):
+    robot = described(tmp_path, recording)
+    again = json.dumps(recording_entry(robot.channels, robot.joints))
+    assert described(tmp_path, again).channels == robot.channels

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from scara_ident.recording.recording import read_recordings
+from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import (
     parse_effect,
     simulate,
@@ -17,6 +18,7 @@ from scara_ident.simulation import (
     virtual_arm,
     write_simulation,
 )
+from tests.arms import Link, write_urdf
 from tests.simulation.made import swing
 
 
@@ -51,3 +53,14 @@ def test_truth_of_the_default_arm_is_the_papers_table_5() -> None:
     printed = {"P_d1": 16.165, "P_d2": 2.415, "P_d4": 0.758, "P_d5": 4.014, "a01": 0.21, "a11": 0.093, "a21": -0.016}
     printed |= {"a02": 0.088, "a12": 0.049, "a22": -0.007, "a31": 0.0, "a32": 0.0, "p_o1": 0.0, "P_d3": 0.0}
     assert {name: values[name] for name in printed} == pytest.approx(printed, abs=1e-9)
+
+
+def test_truth_has_no_offset_of_an_axis_that_goes_up_and_down(tmp_path: Path) -> None:
+    """Its model has none, as torque does not tell it from weight."""
+    write_urdf(tmp_path / "arm.urdf", (Link(kind="prismatic", axis=(0, 0, 1)), Link(axis=(0, 1, 0))))
+    arm = virtual_arm(load_robot(tmp_path / "arm.urdf"))
+    told = truth(replace(arm, torque_offset=np.array([3.0, 0.2])))
+    assert {item["name"]: item["value"] for item in told["parameters"] if item["name"].startswith("p_o")} == {
+        "p_o2": 0.2
+    }
+    assert told["torque_offset"] == [3.0, 0.2]

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
+from typing import Any
 
+import numpy as np
+import pytest
+
+from scara_ident.errors import LostArm
 from scara_ident.simulation import parse_effect, virtual_arm
 from scara_ident.simulation.arm import ideal
+from scara_ident.simulation.simulate import SimulationResult, simulate
 from scara_ident.simulation.truth import _complete_parameters
+from scara_ident.use import tracking
 from scara_ident.use.identified_arm import arm_with
-from scara_ident.use.tracking import at_ticks, needed_torque, tracked, urdf_torque
+from scara_ident.use.tracking import MORE_SUBSTEPS, SUBSTEPS, at_ticks, needed_torque, tracked, urdf_torque
 from scara_ident.use.trial_motion import trial_motion
 from tests.simulation.made import scara
 
@@ -57,3 +64,31 @@ def test_a_ripple_faster_than_the_controller_does_not_spoil_what_is_fed_forward(
     feeds = {"without": needed_torque(arm, (), motion), "with": needed_torque(arm, [ripple], motion)}
     found = {item.name: item.rms for item in tracked(arm, [ripple], motion, feeds)}
     assert np.all(found["with"] < 1.1 * found["without"])
+
+
+def test_an_arm_that_is_lost_in_few_steps_is_tried_in_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wrists of a UR10 with 2.5 N m of friction and an inertia of 0.001 kg m^2 were lost at two steps a sample."""
+    tried: list[int] = []
+
+    def coarse(*given: Any, least_substeps: int, **more: Any) -> SimulationResult:
+        tried.append(least_substeps)
+        if least_substeps == SUBSTEPS:
+            raise LostArm("lost")
+        return simulate(*given, least_substeps=least_substeps, **more)
+
+    monkeypatch.setattr(tracking, "simulate", coarse)
+    arm = ideal(scara())
+    motion = trial_motion(arm, 1)
+    (found,) = tracked(arm, (), at_ticks(motion.at(motion.time[:300])), {"pid": None})
+    assert tried == [SUBSTEPS, MORE_SUBSTEPS]
+    assert np.all(np.isfinite(found.error))
+
+
+def test_an_arm_that_cannot_be_held_is_said_with_its_lightest_joint() -> None:
+    arm = scara()
+    wild = replace(arm, controller=replace(arm.controller, derivative=-1e9 * np.ones(2)))
+    wild = replace(wild, robot=replace(arm.robot, effort_limit=np.full(2, np.inf)), rotor_inertia=np.array([1e-3, 0.0]))
+    with pytest.raises(
+        LostArm, match=r"^trial: .*: joint2 has an inertia of .* next to nothing of it its rotor's, .*excite"
+    ):
+        tracked(wild, (), at_ticks(trial_motion(arm)), {"pid": None})

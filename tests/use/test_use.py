@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 import pytest
 
-from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.errors import LostArm, ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information
 from scara_ident.model.model import TorqueModel
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
-from scara_ident.use import use
+from scara_ident.simulation.arm import VirtualArm
+from scara_ident.use import tracking, use
+from scara_ident.use.identified_arm import arms_of
+from scara_ident.use.tracking import Tracked
 from tests.simulation.made import swing
 from tests.use.made import with_spring
 
@@ -28,6 +33,31 @@ def test_the_effect_wins_in_tracking_and_in_rollouts() -> None:
     assert list(rms) == ["pid", "urdf", "identified", "effects"]
     assert rms["effects"][0] < 0.7 * rms["identified"][0]
     assert found.rollouts["effects"][-1, 0] < 0.5 * found.rollouts["identified"][-1, 0]
+
+
+def test_an_arm_that_is_lost_is_drawn_nearer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No controller held two arms of three drawn about a Panda whose model was held, and nothing was said of it but that."""
+    tried: list[float] = []
+
+    def fickle(arm: VirtualArm, *given: Any) -> tuple[Tracked, ...]:
+        tried.append(float(arm.bodies[0, 9]))
+        if len(tried) < 3:
+            raise LostArm("lost")
+        return tracking.tracked(arm, *given)
+
+    monkeypatch.setattr(import_module("scara_ident.use.use"), "tracked", fickle)
+    model = with_spring()
+    found = use(replace(model, found=()), swing(model.robot, 0.5), arms=1)
+    (arm, _), middle = found.drawn[0], float(arms_of(model)[1].bodies[0, 9])
+    assert arm.bodies[0, 9] == tried[2]
+    np.testing.assert_allclose(tried[2] - middle, [0.25 * (tried[0] - middle), 0.5 * (tried[1] - middle)], rtol=1e-6)
+
+    def never(*_: Any) -> tuple[Tracked, ...]:
+        raise LostArm("lost for good")
+
+    monkeypatch.setattr(import_module("scara_ident.use.use"), "tracked", never)
+    with pytest.raises(LostArm, match="for good"):
+        use(replace(model, found=()), swing(model.robot, 0.5), arms=1)
 
 
 def test_a_joint_that_did_not_move_is_named() -> None:

@@ -20,6 +20,8 @@ HELD_OF_REPEATS = 0.5
 # Of fewer rows, those count in which a joint goes by more than so many of its smallest steps a row: there its position
 # repeats by noise alone, and by chance together with the noise of an effort.
 DISTINCT = 4.0
+# A log about as fast as its source tells no rate of it: the usual step without copies is longer by more than this.
+SLOWER = 1.2
 # Such repetitions are none of chance where as many would be seen by chance in fewer than this share of recordings.
 UNLIKELY = 1e-3
 # All channels standing still for longer, and then jumping on, is a logger that stalled.
@@ -64,10 +66,13 @@ def held_rows(samples: Samples) -> Checked:
     if np.any(copies):
         count, first = int(np.count_nonzero(copies)), samples.where(int(np.argmax(copies)))
         keep &= ~copies
-        said = f"{count} of {samples.count} rows repeat the row before in every channel while the arm moves, first {first}: left out"
-        if count >= HELD_SHARE * samples.count:
-            rate = 1.0 / float(np.median(np.diff(samples.time[keep])))
-            said = f"{said}, the source ran at about {rate:.4g} Hz"
+        # What a logger repeats, it repeats where the arm stands too.
+        going = int(np.count_nonzero(copies[1:] & moving[1:] & moving[:-1]))
+        when = " while the arm moves" if going == count else f", {going} of them while the arm moves"
+        said = f"{count} of {samples.count} rows repeat the row before in every channel{when}, first {first}: left out"
+        step = float(np.median(np.diff(samples.time[keep])))
+        if step > SLOWER * samples.interval:
+            said = f"{said}, the source ran at about {1.0 / step:.4g} Hz"
         found.append(Finding("held_samples", said, count))
     return samples.kept(keep), found
 

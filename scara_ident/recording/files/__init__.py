@@ -43,6 +43,8 @@ _BUILT_IN = {
 IMPORTERS: Registry[Importer] = Registry("suffix", "scara_ident.importers", _BUILT_IN)
 """What reads files, by their suffix: ``".csv"``."""
 
+# What tables of text are also called; beside recordings these are often something else, so that a folder's are none.
+_TEXT = (".txt", ".dat", ".tsv", ".asc", ".log")
 # The clock of PlotJuggler's CSV, which has a row for every time at which any of its signals has a sample.
 SHARED_CLOCK = "__time"
 
@@ -112,9 +114,14 @@ def _importer(path: Path) -> Importer:
     suffix, known = path.suffix.lower(), IMPORTERS.names()
     if suffix not in known:
         *most, last = known
+        hint = (
+            f"; if it is a table of numbers rename it to {path.stem}.csv, whatever separates them"
+            if suffix in _TEXT
+            else ""
+        )
         raise RecordingError(
             f"{path}: suffix {path.suffix!r} is not known; a recording is a {', '.join(most)} or {last} file, "
-            "or the folder of a rosbag2 recording"
+            f"or the folder of a rosbag2 recording{hint}"
         )
     return IMPORTERS.get(suffix)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -110,17 +112,36 @@ def test_noise_that_repeats_a_position_now_and_then_is_no_copy():
         assert stale_positions(samples) == (samples, [])
 
 
-def test_a_rest_without_noise_stays_where_a_few_rows_are_copied():
+def braking() -> Samples:
+    """It brakes for five seconds; then nothing changes."""
     made = noisy(2, count=2000)
-    # It brakes for five seconds; then nothing changes.
     braked = np.cumsum(np.clip((50.0 - made.time) / 5.0, 0.0, 1.0)) / 30.0
     random = np.random.default_rng(5)
     made.position[:] = np.sin([1.1 * braked + 0.3, 1.7 * braked]) + 1e-7 * random.standard_normal(made.position.shape)
     for signal in (made.position, made.effort):
         signal[:, 1500:] = signal[:, 1499:1500]
-    samples, (finding,) = held_rows(with_copies(made, np.arange(100, 1400, 130)))
+    return made
+
+
+def test_a_rest_without_noise_stays_where_a_few_rows_are_copied():
+    samples, (finding,) = held_rows(with_copies(braking(), np.arange(100, 1400, 130)))
     assert finding.count == 10
     assert np.count_nonzero(samples.row > 1500) == 500
+
+
+def test_copies_where_the_arm_stands_are_not_counted_as_in_motion():
+    """1282 rows were said to repeat while the arm moves, which it did in 96 of them."""
+    samples, (finding,) = held_rows(with_copies(braking(), np.arange(101, 1400, 2)))
+    assert finding.count == 2000 - samples.count == 650 + 500
+    said = re.match(
+        r"1150 of 2000 rows repeat the row before in every channel, (\d+) of them while the arm moves, first row 102 ",
+        finding.message,
+    )
+    # Near its turning points and before its rest it is slow.
+    assert said is not None
+    assert 600 <= int(said[1]) <= 655
+    assert "Hz" not in held_rows(with_copies(noisy(1), np.arange(20, 700, 20)))[1][0].message
+    assert "15 Hz" in held_rows(with_copies(noisy(1), np.arange(1, 727, 2)))[1][0].message
 
 
 def test_positions_that_are_late_under_new_efforts_are_left_out():

@@ -35,6 +35,7 @@ def test_files_that_are_no_recordings_are_refused_in_a_line(robot, tmp_path):
         "latin.csv": ("time,größe\n0,1\n".encode("latin-1"), "UTF-8"),
         "log.xlsx": (b"PK", "suffix '.xlsx'"),
         "log": (b"PK", "suffix ''"),
+        "log.txt": (b"time,q\n0,1\n", "rename it to log.csv, whatever separates"),
         "twice.csv": (b"time,joint1.position,joint1.position\n0,1,1\n", "'joint1.position' stands in the header twice"),
     }
     for name, (content, said) in made.items():
