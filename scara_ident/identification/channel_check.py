@@ -36,6 +36,8 @@ PIECES = 4
 POOR = 0.05
 # A sign turned round leaves more than this of some joint's torque.
 TURNED = 0.08
+# A joint that is left more than this is looked at in a wider band too: what is read wrongly is explained in none.
+NARROWED = 0.15
 # Exchanging one signal alone makes nonsense of both joints; of the one whose torque is large beside the other's, at least.
 BAD = 0.3
 # Friction that feeds in this share of a joint's power, and this many standard deviations, points to a sign.
@@ -73,7 +75,7 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     bands = _wide(held)
     errors = _relative(weighted_value(held.by_joint), held)
     narrow = _few(held)
-    if narrow or any(errors[j] > POOR and bands[j] != held.data.bands[j] for j in range(len(joints))):
+    if narrow or any(errors[j] > NARROWED and bands[j] != held.data.bands[j] for j in range(len(joints))):
         # What is read wrongly is explained by no motion, so that its own band is left too narrow to tell.
         held = observe(model, held.data.at(bands))
     unsigned = _unsigned(held)
