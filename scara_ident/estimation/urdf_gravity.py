@@ -80,6 +80,19 @@ class UrdfGravity:
         )
 
     @property
+    def turned(self) -> bool:
+        """Whether gravity and inertia are both the other way round, as of efforts of opposite sign."""
+        size, found = np.linalg.norm(self.stated), np.linalg.norm(self.found)
+        return bool(
+            1.0 / USUAL < -self.inertia < USUAL
+            and -self.inertia > SURE * self.inertia_std
+            and size / USUAL < found < size * USUAL
+            and np.sqrt(np.max(np.linalg.eigvalsh(self.covariance))) * SURE < found * np.sin(np.radians(TURNED))
+            and self.degrees > 180.0 - TURNED
+            and self.left < FAR_LESS * self.stated_left
+        )
+
+    @property
     def _as_heavy(self) -> bool:
         """Whether inertia is told, and about that of the URDF."""
         return 1.0 / USUAL < self.inertia < USUAL and self.inertia > SURE * self.inertia_std

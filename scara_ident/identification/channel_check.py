@@ -3,37 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RecordingError
 from scara_ident.estimation.bands import HIGHEST_BAND
 from scara_ident.estimation.least_squares import weighted_value, wls
 from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.urdf_gravity import urdf_gravity
 from scara_ident.estimation.urdf_scale import urdf_scale
+from scara_ident.identification.channel_fault import MENDED, ChannelFault, Signal, merged
 from scara_ident.identification.magnitude_check import signed_fits
 from scara_ident.model.terms.friction import Friction
+from scara_ident.model.urdf_values import urdf_values
 from scara_ident.motion.prepared import PreparedData, PreparedStretch
 
-Signal = Literal["effort", "position", "effort and position"]
-
-# Another mapping must leave at most this share of the error on blocks that it was not fitted to, geometric mean over the
-# joints, and be better block by block at this level of significance.
-MENDED = 0.5
+# A better reading is better block by block at this level of significance.
 LEVEL = 0.001
 # Rows per parameter of each joint below which a fit comes near interpolation, whatever the channels are.
 ENOUGH_ROWS = 3.0
+# Share of the torque that another reading may leave at most in a band that was widened for rows: where noise has narrowed
+# the chosen one, the rows of the wider are many and say as little.
+EXPLAINED = 0.2
+# Of readings that count the simpler is taken where the other leaves more than this share of what it leaves.
+ALIKE = 0.8
 # Pieces of each recording, one of which is held out in turns.
 PIECES = 4
 # Joints whose error is above this share of their torque may be exchanged with another.
 POOR = 0.05
-# An axis turned round leaves more than this of some joint's torque.
+# A sign turned round leaves more than this of some joint's torque.
 TURNED = 0.08
+# A joint that is left more than this is looked at in a wider band too: what is read wrongly is explained in none.
+NARROWED = 0.15
 # Exchanging one signal alone makes nonsense of both joints; of the one whose torque is large beside the other's, at least.
 BAD = 0.3
 # Friction that feeds in this share of a joint's power, and this many standard deviations, points to a sign.
@@ -45,65 +49,14 @@ ROUNDING = 1e-12
 MOVED = 5.0
 
 
-@dataclass(frozen=True)
-class ChannelFault:
-    """Another reading of the channels that fits far better.
-
-    Attributes
-    ----------
-    signal : {"effort", "position", "effort and position"}
-    joints : tuple of str
-        Those whose sign is opposite, or the two that are exchanged.
-    error, mended : float
-        Rms of what is left as a share of the torque, geometric mean over the joints, on blocks of time that the
-        parameters were not fitted to, as mapped and as it should be.
-    unsigned : bool
-        Whether the effort is a magnitude; its errors are those of the fit, of these joints alone.
-    """
-
-    signal: Signal
-    joints: tuple[str, ...]
-    exchanged: bool
-    error: float
-    mended: float
-    unsigned: bool = False
-
-    def __str__(self) -> str:
-        """Say what, and what to do."""
-        gain = f"what is left of the torque falls from {100 * self.error:.2g} to {100 * self.mended:.2g} %"
-        names = (" and " if self.exchanged else ", ").join(self.joints)
-        if self.unsigned:
-            return (
-                f"effort of {names} seems to be logged without its sign: it never changes it, and with the signs that the "
-                f"motion asks for {gain}; log the effort with its sign"
-            )
-        if self.exchanged:
-            return (
-                f"{self.signal} of {names} look exchanged: the other way round {gain}; exchange their columns under "
-                f"recording: in robot.yaml"
-            )
-        if self.mended > MENDED * self.error:
-            return (
-                f"{names}: the effort, or the position, has the opposite sign: friction would feed energy in, and no joint "
-                "speaks against it; negate effort_gain in robot.yaml"
-            )
-        turn = {
-            "effort": f"negate effort_gain of {names} in robot.yaml",
-            "position": f"negate the axis of {names} in the URDF, or give its position scale: -1 in robot.yaml",
-            "effort and position": f"negate the axis of {names} in the URDF",
-        }[self.signal]
-        verb = "look" if self.signal == "effort and position" else "looks"
-        return f"{self.signal} of {names} {verb} like the opposite sign: turned round {gain}; {turn}"
-
-
 def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     """Find efforts and positions of opposite sign, those of two joints that are exchanged, and efforts without a sign.
 
-    A sign is suspected where friction would feed energy in, an exchange where two joints are hardly explained; only
-    then are other readings tried. One counts if it leaves at most half of the error, on blocks of time that it was not
-    fitted to and significantly more often than not, and the friction brakes. Where rows are not several times as many
-    as parameters none is tried: an interpolating fit is good or bad by chance. All efforts turned round leave as much as they
-    do; see `_all_turned`.
+    A sign is suspected where friction would feed energy in or a joint is explained badly, an exchange where two joints are
+    hardly explained; only then are other readings tried, in a band that no wrong reading has narrowed. One counts if it
+    leaves at most half of the error, on blocks of time that it was not fitted to and significantly more often than not,
+    and the friction brakes. Where rows are not several times as many as parameters none is tried: an interpolating fit is
+    good or bad by chance. All efforts turned round leave as much as they do; see `_all_turned` and `_bodies_turned`.
 
     Parameters
     ----------
@@ -119,54 +72,73 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     held = observations.of(sorted(first.values()))
     model = observations.model
     joints = model.robot.joints
-    few = _few(held)
-    # No motion explains magnitudes, so that they leave no band: they are looked at in one that any arm fills.
-    wide = min(MOVED, HIGHEST_BAND * min(part.rate for part in held.data.stretches))
-    bands = tuple(None if band is None else max(band, wide) for band in held.data.bands)
-    unsigned = _unsigned(observe(model, held.data.at(bands)) if few and bands != held.data.bands else held)
+    bands = _wide(held)
+    errors = _relative(weighted_value(held.by_joint), held)
+    narrow = _few(held)
+    if narrow or any(errors[j] > NARROWED and bands[j] != held.data.bands[j] for j in range(len(joints))):
+        # What is read wrongly is explained by no motion, so that its own band is left too narrow to tell.
+        held = observe(model, held.data.at(bands))
+    unsigned = _unsigned(held)
     if unsigned is not None:
         # What else is read into magnitudes is of no channel.
         return (unsigned,)
+    few, most = _few(held), EXPLAINED if narrow else np.inf
     faults: list[ChannelFault] = []
     for _ in range(2 * len(joints)):
         fitted = weighted_value(held.by_joint)
-        errors, pushing = _relative(fitted, held), _pushing(fitted, held)
-        suspects = [] if few else _suspects(errors, pushing)
-        if not suspects and not np.any(pushing):
-            break
-        left, score = _held_out(held)
-        best: tuple[ChannelFault, Observations] | None = None
-        for signal, chosen, exchanged in suspects:
-            read = _read_as(held.data, signal, chosen, exchanged)
-            other = held.with_torque(read) if signal == "effort" else observe(model, read)
-            then, mended = _held_out(other)
-            if mended >= (MENDED * score if best is None else best[0].mended) or not _better(left, then):
-                continue
-            # A turned sign must take the push away; signs that an exchange brings to light are the next round's.
-            allowed = np.count_nonzero(pushing) - (signal != "effort and position")
-            if not exchanged and np.count_nonzero(_pushing(weighted_value(other.by_joint), other)) > allowed:
-                continue
-            names = tuple(joints[j] for j in chosen)
-            best = ChannelFault(signal, names, exchanged, score, mended), other
-        if best is not None:
-            faults.append(best[0])
-            held = best[1]
+        pushing = _pushing(fitted, held)
+        found = None if few else _best_reading(held, _relative(fitted, held), pushing, most)
+        if found is not None:
+            faults.append(found[0])
+            held = found[1]
             continue
         if np.any(pushing) and _all_turned(fitted, held, pushing):
-            faults.append(ChannelFault("effort", tuple(joints), False, score, score))
+            _, left = _held_out(held)
+            faults.append(ChannelFault("effort", tuple(joints), False, _mean(left), _mean(left)))
+        elif _bodies_turned(fitted, held, pushing):
+            _, left = _held_out(held)
+            faults.append(ChannelFault("effort", tuple(joints), False, _mean(left), _mean(left), by_bodies=True))
         break
-    return tuple(faults)
+    return merged(faults, joints)
 
 
-def refuse_exchanged(faults: Sequence[ChannelFault]) -> None:
-    """Refuse joints that are exchanged, and efforts without a sign: whatever is fitted to them is of no joint.
+def _wide(observations: Observations) -> tuple[float | None, ...]:
+    """Return bands that any arm fills, as wide as the widest chosen, which is of a joint that is read rightly if any is."""
+    data = observations.data
+    widest = max((band for band in data.bands if band is not None), default=MOVED)
+    wide = min(max(MOVED, widest), HIGHEST_BAND * min(part.rate for part in data.stretches))
+    return tuple(None if band is None else max(band, wide) for band in data.bands)
 
-    Raises
-    ------
-    RecordingError
-    """
-    if any(fault.exchanged or fault.unsigned for fault in faults):
-        raise RecordingError("; ".join(str(fault) for fault in faults))
+
+def _best_reading(
+    held: Observations, errors: Array, pushing: NDArray[np.bool_], most: float
+) -> tuple[ChannelFault, Observations] | None:
+    """Return the reading of the channels that leaves least, if one counts and leaves at most a share, and what is observed with it."""
+    suspects = _suspects(errors, pushing)
+    if not suspects:
+        return None
+    joints = held.model.robot.joints
+    blocks, left = _held_out(held)
+    best: tuple[ChannelFault, Observations] | None = None
+    least = np.inf
+    for signal, chosen, exchanged in suspects:
+        read = _read_as(held.data, signal, chosen, exchanged)
+        other = held.with_torque(read) if signal == "effort" else observe(held.model, read)
+        then, mended = _held_out(other)
+        said = np.ones(len(left), dtype=bool)
+        if signal == "effort" and not exchanged:
+            # All other joints may be explained for all that; those that are well explained either way say nothing.
+            said = np.maximum(left, mended) > POOR
+        before, after = _mean(left[said]), _mean(mended[said])
+        if after >= min(MENDED * before, most) or _mean(mended) >= ALIKE * least or not _better(blocks, then):
+            continue
+        # A turned sign must take the push away, and add none; signs that an exchange brings to light are the next round's.
+        allowed = np.count_nonzero(pushing) - (signal != "effort and position" and bool(pushing[chosen[0]]))
+        if not exchanged and np.count_nonzero(_pushing(weighted_value(other.by_joint), other)) > allowed:
+            continue
+        names = tuple(joints[j] for j in chosen)
+        best, least = (ChannelFault(signal, names, exchanged, before, after), other), _mean(mended)
+    return best
 
 
 def _few(observations: Observations) -> bool:
@@ -191,7 +163,9 @@ def _suspects(errors: Array, pushing: NDArray[np.bool_]) -> list[tuple[Signal, t
     both: Signal = "effort and position"
     poor = [int(j) for j in np.flatnonzero(errors > POOR)]
     found: list[tuple[Signal, tuple[int, ...], bool]] = []
-    found += [(signal, (int(j),), False) for j in np.flatnonzero(pushing) for signal in one]
+    # An effort turned round may be taken up by parameters of its own joint, and show on those that carry it.
+    found += [("effort", (int(j),), False) for j in np.flatnonzero(pushing | np.any(errors > TURNED))]
+    found += [("position", (int(j),), False) for j in np.flatnonzero(pushing | (errors > TURNED))]
     if np.any(errors > TURNED) and not np.any(pushing):
         found += [(both, (j,), False) for j in range(len(errors))]
     for pair in combinations(poor, 2):
@@ -241,6 +215,26 @@ def _all_turned(value: Array, observations: Observations, pushing: NDArray[np.bo
     return bool(scales) and max(scales) < 0.0
 
 
+def _bodies_turned(value: Array, observations: Observations, pushing: NDArray[np.bool_]) -> bool:
+    """Tell whether gravity and inertia are surely those of the URDF the other way round, as no other direction of gravity has it.
+
+    Friction, of which a sensor at the link sees little, may not speak against it on more joints than for it.
+    """
+    stated = urdf_values(observations.model)
+    known = np.isfinite(stated)
+    along = 0.0
+    for rows in observations.joints:
+        use = known[rows.columns]
+        along += float(stated[rows.columns[use]] @ (rows.table[:-1][use] @ rows.table[-1]))
+    # Nearly always this is all there is to compute.
+    if along >= 0.0:
+        return False
+    gravity = urdf_gravity(observations)
+    if gravity is None or not gravity.turned:
+        return False
+    return bool(np.count_nonzero(_pushing(-value, observations)) <= np.count_nonzero(pushing))
+
+
 def _net_power(data: PreparedData) -> float:
     """Return the energy that the efforts feed into the arm over recordings, up to the reductions' scale."""
     return float(sum(np.sum(part.torque[:, 1:] * np.diff(part.stretch.position)) for part in data.stretches))
@@ -251,15 +245,15 @@ def _relative(value: Array, observations: Observations) -> Array:
     return np.array([part.rms(value) / max(part.torque_rms, tiny) for part in observations.by_joint])
 
 
-def _held_out(observations: Observations) -> tuple[Array, float]:
+def _held_out(observations: Observations) -> tuple[Array, Array]:
     """Predict each piece of the recordings from the others.
 
     Returns
     -------
     left : ndarray, shape (blocks, n)
         Rms residual of each block as a share of the joint's torque; NaN where a joint has no rows.
-    score : float
-        The same over all blocks, geometric mean over the joints.
+    all_left : ndarray, shape (n,)
+        The same over all blocks.
     """
     owner = observations.owner
     place = np.arange(len(owner)) - np.searchsorted(owner, owner)
@@ -278,8 +272,13 @@ def _held_out(observations: Observations) -> tuple[Array, float]:
     with np.errstate(invalid="ignore", divide="ignore"):
         left = np.sqrt(np.maximum(squares, 0.0) / counts) / torque
         relative = np.sqrt(np.sum(squares, axis=0) / np.sum(counts, axis=0)) / torque
-    known = relative[np.isfinite(relative)]
-    return left, float(np.exp(np.mean(np.log(np.maximum(known, ROUNDING)))))
+    return left, relative
+
+
+def _mean(left: Array) -> float:
+    """Return the geometric mean over the joints that have rows."""
+    known = left[np.isfinite(left)]
+    return float(np.exp(np.mean(np.log(np.maximum(known, ROUNDING))))) if len(known) else 1.0
 
 
 def _better(left: Array, other: Array) -> bool:

@@ -25,7 +25,8 @@ from scara_ident.estimation.run_offsets import beside_offsets, offsets_on
 from scara_ident.files import real_path
 from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.arguments import Recordings, model_of, recordings_of
-from scara_ident.identification.channel_check import channel_faults, refuse_exchanged
+from scara_ident.identification.channel_check import channel_faults
+from scara_ident.identification.channel_fault import ChannelFault, refuse_exchanged
 from scara_ident.identification.clock_check import clock_drift
 from scara_ident.identification.events import Event, event_notes, find_events
 from scara_ident.identification.long_recordings import with_all_samples
@@ -64,6 +65,8 @@ class Identification(Saved, told_by="identification"):
         What was found in the data and what was done about it.
     events : tuple of Event
         What is local in time: left out of the fit, or in recordings that were held out.
+    channels : tuple of ChannelFault
+        Signs that seem to be opposite; they are in the notes too.
     """
 
     estimate: Estimate
@@ -76,6 +79,7 @@ class Identification(Saved, told_by="identification"):
     condition: float
     notes: tuple[str, ...]
     events: tuple[Event, ...] = ()
+    channels: tuple[ChannelFault, ...] = ()
 
     @property
     def model(self) -> TorqueModel:
@@ -215,7 +219,13 @@ def identify(
     training, events, more = with_all_samples(training, events, steady, Work(progress, 0.6, 0.7))
     notes += more
     progress("estimating", 0.7)
-    estimate, history = estimate_by(method, training, options)
+    try:
+        estimate, history = estimate_by(method, training, options)
+    except EstimationError as error:
+        if not faults:
+            raise
+        # What no arm can have is mended in the channels, not in the method.
+        raise EstimationError("; ".join(str(fault) for fault in faults)) from error
     differs = None
     if robust is not None:
         # Both of the same samples, and neither held by what an arm can have.
@@ -236,7 +246,7 @@ def identify(
     log_notes(_LOG, notes)
     log_det, condition = paper_criteria(training)
     return Identification(
-        estimate, history, data.bands, training, validated, noise, log_det, condition, tuple(notes), events
+        estimate, history, data.bands, training, validated, noise, log_det, condition, tuple(notes), events, faults
     )
 
 

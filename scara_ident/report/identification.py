@@ -145,6 +145,10 @@ def sentences(identification: Identification) -> tuple[str, ...]:
     if isinstance(identification.estimate, ConsistentEstimate):
         found += _shapes_said(identification.estimate.shapes)
     seen = identification.estimate, identification.training
+    if identification.channels:
+        # Under efforts of opposite sign bodies and gravity are nobody's.
+        found.append(scale_sentence(None, robot))
+        return tuple(found)
     found.append(scale_sentence(urdf_scale(*seen), robot, unlike_urdf(*seen)))
     gravity = gravity_sentence(urdf_gravity(identification.training))
     if gravity is not None:

@@ -9,18 +9,20 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.errors import RecordingError
+from scara_ident.errors import EstimationError, RecordingError
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import observe
-from scara_ident.identification.channel_check import ChannelFault, _better, _relative, channel_faults
+from scara_ident.identification.channel_check import _better, _pushing, _relative, channel_faults
+from scara_ident.identification.channel_fault import ChannelFault
 from scara_ident.identification.identify import identify
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.paper import OJD, OJK
 from scara_ident.recording.recording import Recording
-from scara_ident.robot.robot import load_robot
+from scara_ident.report.identification import sentences
+from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation import sampled, simulate, virtual_arm
-from tests.arms import PLANAR_2R, noisy, recorded_torque, recording, sines, swing, write_urdf
+from tests.arms import PLANAR_2R, Link, noisy, recorded_torque, recording, sines, swing, write_urdf
 
 BANDS = (10.0, 10.0)
 
@@ -92,6 +94,65 @@ def test_all_efforts_of_opposite_sign_where_friction_shows_on_one_joint(tmp_path
     for effort, said in ((bodies + friction, []), (-bodies - friction, [("j1", "j2")]), (friction - bodies, [])):
         run = noisy(recording(robot, "run_1", time, q, effort), rng, 0.02)
         assert [fault.joints for fault in channel_faults(observe(model, prepare([run], (8.0, 8.0))))] == said
+
+
+# An upright axis and two that lie.
+ARM = (
+    Link(axis=(0.0, 0.0, 1.0), mass=4.0, com=(0.05, 0.0, 0.1)),
+    *(replace(link, xyz=(0.0, 0.0, 0.3) if k == 0 else link.xyz) for k, link in enumerate(PLANAR_2R)),
+)
+
+
+def lightly_braked(folder: Path, gain: float, gravity: float = -9.81) -> tuple[Robot, Recording]:
+    """Return an arm and a recording of sensors at its links, which see no friction."""
+    robot = load_robot(write_urdf(folder / "arm.urdf", ARM))
+    true = load_robot(write_urdf(folder / "true.urdf", ARM))
+    true.model.gravity.linear = np.array([0.0, 0.0, gravity])
+    rng, time = np.random.default_rng(5), np.arange(4000) / 200.0
+    q, v, a = sines(rng, time, 3)
+    effort = gain * recorded_torque(true, q, v, a, ((0.0,) * 5,) * 3)
+    return robot, noisy(recording(robot, "run_1", time, q, effort), rng, 0.05)
+
+
+@pytest.mark.parametrize("joint", [0, 1, 2])
+def test_an_effort_of_opposite_sign_shows_where_friction_is_slight(tmp_path: Path, joint: int) -> None:
+    """By what is left unexplained alone, in a band that the wrong sign has left narrow too."""
+    robot, run = lightly_braked(tmp_path, 1.0)
+    wrong, model = turned(run, effort=(joint,)), build_model(robot, "basic")
+    for bands in ((8.0,) * 3, tuple(0.8 if j == joint else 8.0 for j in range(3))):
+        seen = observe(model, prepare([wrong], bands))
+        assert not np.any(_pushing(weighted_value(seen.by_joint), seen))
+        (fault,) = channel_faults(seen)
+        assert (fault.signal, fault.joints, fault.exchanged) == ("effort", (robot.joints[joint],), False)
+        assert fault.mended < 0.1 < fault.error
+    with pytest.raises(RecordingError, match=f"negate effort_gain of {robot.joints[joint]} in"):
+        diagnose(robot, [wrong], model="basic")
+    found = identify(robot, [wrong], model="basic")
+    assert [fault.joints for fault in found.channels] == [(robot.joints[joint],)]
+    assert not any("ravity" in said.split("tells a scale")[0] for said in sentences(found))
+
+
+def test_all_efforts_of_opposite_sign_are_told_by_gravity_and_inertia(tmp_path: Path) -> None:
+    robot, run = lightly_braked(tmp_path, -1.0)
+    with pytest.raises(RecordingError, match=r"negate effort_gain of all .*\(effort_gain: -1"):
+        diagnose(robot, [run], model="basic")
+    for method in ("wls", "consistent"):
+        try:
+            (fault,) = identify(robot, [run], model="basic", method=method).channels
+        except EstimationError as error:
+            # Not what the solver says of an arm that cannot exist.
+            assert method == "consistent"
+            assert "effort_gain: -1" in str(error)
+        else:
+            assert fault.by_bodies
+            assert fault.joints == robot.joints
+
+
+@pytest.mark.parametrize(("gain", "gravity"), [(1.0, -9.81), (1.0, 9.81), (1.0, 0.0), (0.3, -9.81), (-1.0, 9.81)])
+def test_nothing_is_said_of_gravity_that_is_elsewhere(tmp_path: Path, gain: float, gravity: float) -> None:
+    """Nor of an arm that hangs, whose inertia is the right way round, nor of one that hangs with efforts of opposite sign."""
+    robot, run = lightly_braked(tmp_path, gain, gravity)
+    assert channel_faults(observe(build_model(robot, "basic"), prepare([run], (8.0,) * 3))) == ()
 
 
 @pytest.mark.parametrize("signals", [("effort",), ("position",), ("effort", "position")])
@@ -178,6 +239,16 @@ def test_an_exchange_shows_in_a_short_recording_of_enough_rows(recordings: tuple
     short = wandering(exchanged(recordings[1], "effort"), 0.0, 0)
     faults = channel_faults(observe(build_model(virtual_arm().robot, "complete"), prepare([short], (6.0, 6.0))))
     assert [(fault.signal, fault.exchanged) for fault in faults] == [("effort", True)]
+
+
+@pytest.mark.parametrize("signals", [("effort",), ("position",)])
+def test_an_exchange_shows_in_a_band_that_it_left_narrow(
+    recordings: tuple[Recording, ...], signals: tuple[str, ...]
+) -> None:
+    """A few rows a parameter in the chosen band, which `identify` takes joint by joint."""
+    wrong = [wandering(exchanged(item, *signals), 0.0, 0) for item in recordings]
+    faults = channel_faults(observe(build_model(virtual_arm().robot, "complete"), prepare(wrong, (1.0, 1.0))))
+    assert [(fault.signal, fault.exchanged) for fault in faults] == [(" and ".join(signals), True)]
 
 
 def test_the_share_left_is_what_it_says(recordings: tuple[Recording, ...]) -> None:

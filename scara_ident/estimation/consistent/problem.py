@@ -382,5 +382,5 @@ def _what_to_try(status: str, options: ConsistentOptions) -> str:
         )
     else:
         what = "was not solved"
-        advice = "; try richer motion, another model, a larger prior_weight or fewer limits"
+        advice = "; record motion that tells more, take another model, or the method wls, which asks for no arm that can exist"
     return f"the estimation problem {what} (CLARABEL: {status}){advice}"

@@ -160,8 +160,8 @@ def solve_consistent(
     x = _inside(u, point.x, margin) if margin > -DIGITS else None
     if x is None:
         raise EstimationError(
-            f"the solution misses its constraints by {-margin:.1g}; try richer motion, a larger "
-            "prior_weight or wider limits"
+            f"no arm that can exist was found (the solution misses its constraints by {-margin:.1g}); record motion that tells "
+            "more, check the signs of efforts and positions, or take the method wls, which asks for no such arm"
         )
     return ConsistentSolution(x, u.parameters(x), point)
 
