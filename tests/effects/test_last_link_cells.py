@@ -43,7 +43,7 @@ def dense(scene: Scene, cells: Cells, states: list[np.ndarray]) -> tuple[np.ndar
                 body.append(size * rows[len(active) : -1] * state[share.astype(int)])
                 torque.append(size * rows[-1])
     assert body[0].shape[0] == k
-    return tuple(np.concatenate(part, axis=-1) for part in (base, body, torque))  # type: ignore[return-value]
+    return np.concatenate(base, axis=-1), np.concatenate(body, axis=-1), np.concatenate(torque)
 
 
 def test_the_normal_equations_are_those_of_all_rows(known: tuple[Scene, Cells, list[np.ndarray]]):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 from scara_ident.errors import RecordingError
-from scara_ident.identification.channel_fault import ChannelFault, merged, refuse_exchanged
+from scara_ident.identification.channel_fault import ChannelFault, Signal, merged, refuse_exchanged
 
 JOINTS = ("a", "b", "c")
 
 
-def turned(signal: str, *joints: str) -> ChannelFault:
-    return ChannelFault(signal, joints, False, 0.4, 0.01)  # type: ignore[arg-type]
+def turned(signal: Signal, *joints: str) -> ChannelFault:
+    return ChannelFault(signal, joints, False, 0.4, 0.01)
 
 
 def said(*faults: ChannelFault) -> list[tuple[str, tuple[str, ...]]]:
