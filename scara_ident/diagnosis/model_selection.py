@@ -15,7 +15,7 @@ from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.outcome import Outcome, outcome_of
 from scara_ident.diagnosis.proxies import proxies
-from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search
+from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search, search_again
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.work import first, next_of
 from scara_ident.estimation import wls
@@ -40,9 +40,8 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
     """
     criteria = task.criteria
     data = observations.data
-    columns = CandidateColumns(observations)
     now, left = first(task.progress)
-    found, looked = search(replace(task, progress=now), columns), False
+    found, looked = search(replace(task, progress=now), CandidateColumns(observations)), False
     for _ in range(criteria.most_widenings if free else 0):
         left("choosing the band again")
         # What was missing had hidden how far up the motion explains the torque, and other effects with it.
@@ -61,9 +60,9 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
         if promised > explains and not told and not _new(again, found):
             # The motion says less of what is so far up, and there is nothing.
             break
-        columns, found = more, again
+        found = again
     left("testing what is left")
-    return _without_proxies(replace(task, progress=left), columns, outcome_of(task, found))
+    return _without_proxies(replace(task, progress=left), outcome_of(task, found))
 
 
 def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
@@ -98,8 +97,9 @@ def _band_beyond(task: SearchTask, found: Search) -> float:
     columns = CandidateColumns(observe(task.model, sample(found.data.at((band,) * len(found.bands)))))
     start = wls(columns.observations)
     scene = replace(scene_of(task.model, start.value, columns.observations), armatures=found.scene.armatures)
-    members = [Candidate(effect, item) for effect in task.catalogue for item in effect.members(scene)]
-    # What the band at hand holds was tried there.
+    # In which intervals something acts every band shows, and what the band at hand holds was tried there.
+    families = [effect for effect in task.catalogue if not effect.in_intervals]
+    members = [Candidate(effect, item) for effect in families for item in effect.members(scene)]
     needing = [item for item in members if item.effect.band(item.member) > _widest(found.data)]
     tried = found.tried + len(needing)
     step = SelectionStep(scene, columns, found.chosen, start.weights, tried, task.criteria, start.offsets)
@@ -139,7 +139,7 @@ def _widest(data: PreparedData) -> float:
     return max(band or np.inf for band in data.bands)
 
 
-def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome) -> Outcome:
+def _without_proxies(task: SearchTask, found: Outcome) -> Outcome:
     """Search again without effects that stand for another, or for none."""
     demoted: dict[str, Decision] = {}
     left = task.progress
@@ -149,8 +149,7 @@ def _without_proxies(task: SearchTask, columns: CandidateColumns, found: Outcome
             break
         demoted |= {item.label: item for item in reversed(refused)}
         now, left = next_of(left)
-        again = search(replace(task, progress=now), columns, without=tuple(demoted), known=found.search)
-        found = outcome_of(task, again)
+        found = outcome_of(task, search_again(replace(task, progress=now), found.search, demoted))
     else:
         # No further search, but nothing is believed that does not stand.
         while unstable := _unstable(found, tuple(demoted.values())):

@@ -11,7 +11,7 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.moments import examine_moments
 from scara_ident.diagnosis.outcome import Outcome
-from scara_ident.diagnosis.search import Step
+from scara_ident.diagnosis.search_state import Step
 from scara_ident.diagnosis.selection_step import SelectionStep, observed
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.noise_bias import noise_torque

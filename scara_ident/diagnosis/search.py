@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -11,53 +12,29 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.choice import choose
-from scara_ident.diagnosis.correction import Correction, taken_out
+from scara_ident.diagnosis.correction import Correction
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.exchange import best_exchange, needed
 from scara_ident.diagnosis.interval_fit import refined
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.nonlinear_fit import tune
-from scara_ident.diagnosis.selection_step import SelectionStep, model_with, observed
+from scara_ident.diagnosis.search_state import SearchState, Step
+from scara_ident.diagnosis.selection_step import SelectionStep, model_with
 from scara_ident.diagnosis.work import after_rounds
 from scara_ident.effects import Effect, Scene
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.effects.links import guessed_armatures
 from scara_ident.estimation import Estimate, wls
-from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
-from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.estimation.run_variation import RunVariation
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.low_pass import HIGHEST_CUT
 from scara_ident.motion.prepared import PreparedData
 from scara_ident.progress import Work
 
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """One effect let in.
-
-    Attributes
-    ----------
-    decision : Decision
-    scene : Scene
-    chosen : tuple of Candidate
-        The effects in the model so far.
-    data : PreparedData
-        As corrected so far.
-    value : ndarray, shape (k,)
-        Parameters of the model with the effects so far.
-    rms : tuple of float or None
-        Error of each joint over the training recordings, within the band.
-    """
-
-    decision: Decision
-    scene: Scene
-    chosen: tuple[Candidate, ...]
-    data: PreparedData
-    value: Array
-    rms: tuple[float | None, ...]
+# The label of every effect that came in, and where the search stood before.
+Passed: TypeAlias = "tuple[tuple[str, SearchState], ...]"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +59,8 @@ class Search:
         At the base model's estimate, which the columns of all candidates were made at.
     doubtful : tuple of Candidate
         What those that stayed may stand for, see `Effect.doubtful`.
+    passed : tuple of (str, SearchState)
+        The label of every effect that came in, in their order, and where the search stood before.
     """
 
     step: SelectionStep
@@ -92,6 +71,7 @@ class Search:
     decisions: tuple[Decision, ...]
     first: Scene
     doubtful: tuple[Candidate, ...]
+    passed: Passed
 
     @property
     def scene(self) -> Scene:
@@ -174,133 +154,138 @@ class SearchTask:
     progress: Work = field(default_factory=Work)
 
 
-def search(
-    task: SearchTask, columns: CandidateColumns, *, without: Collection[str] = (), known: Search | None = None
-) -> Search:
+def search(task: SearchTask, columns: CandidateColumns, *, known: Search | None = None) -> Search:
     """Find what the model lacks.
 
     Parameters
     ----------
     task : SearchTask
     columns : CandidateColumns
-        On the rows of the base model, with what is known already from an earlier search on them.
-    without : collection of str, optional
-        Labels of candidates that are not to be tried.
+        On the rows of the base model.
     known : Search, optional
         An earlier one in other bands, where fits may begin.
     """
-    criteria = task.criteria
-    observations = uncorrected = columns.observations
+    observations = columns.observations
     start = wls(observations)
-    first = scene = scene_of(task.model, start.value, observations)
+    scene = scene_of(task.model, start.value, observations)
     everything = [Candidate(effect, member) for effect in task.catalogue for member in effect.members(scene)]
-    # What was found in other bands may lie between the points that are tried, and show itself at none of them in these.
-    everything += [] if known is None else [item for item in known.chosen if not item.effect.fitted_first]
-    candidates = [item for item in dict.fromkeys(everything) if item.label(scene) not in without]
-    if columns.unresolved_for(None) is not None:
-        candidates = []
-    tried = max(1, len(candidates))
+    pool = tuple(dict.fromkeys([*everything, *([] if known is None else _beginnings(known))]))
+    candidates = () if columns.unresolved_for(None) is not None else pool
     task.progress(f"making the columns of {len(candidates)} candidates", 0.0)
-    columns.rows(first, candidates)
-    chosen: tuple[Candidate, ...] = ()
-    steps: list[Step] = []
-    correction: Correction | None = None
-    weights, value, offsets = start.weights, start.value, start.offsets
-    rounds = exchanges = 0
-    asked: tuple[Candidate, ...] = ()
+    columns.rows(scene, candidates)
+    tried = max(1, len(candidates))
+    state = SearchState(columns, scene, start.weights, start.offsets, start.value, pool, candidates, tried)
+    return _searched(task, _Base(start, observations, scene), state, known, frozenset(), ())
+
+
+def search_again(task: SearchTask, found: Search, without: Collection[str]) -> Search:
+    """Find what the model lacks without some effects, from where the first of them came in.
+
+    Parameters
+    ----------
+    found : Search
+        That found them.
+    without : collection of str
+        Labels of what is not to be tried.
+    """
+    place = next((k for k, (label, _) in enumerate(found.passed) if label in without), 0)
+    state = found.passed[place][1]
+    state = state.with_more([item for item in _beginnings(found) if item not in state.pool])
+    taken = {*without, *(item.label(state.scene) for item in state.chosen)}
+    base = _Base(found.start, found.uncorrected, found.first)
+    return _searched(task, base, state.only(taken), found, frozenset(without), found.passed[:place])
+
+
+@dataclass(frozen=True, eq=False)
+class _Base:
+    """What a search begins from: the base model fitted, its rows, and the scene that all columns are made at."""
+
+    start: Estimate
+    uncorrected: Observations
+    first: Scene
+
+
+def _beginnings(known: Search) -> list[Candidate]:
+    """Return what an earlier search found: it may lie between the points that are tried, and show itself at none of them."""
+    return [item for item in known.chosen if not item.effect.fitted_first]
+
+
+def _searched(
+    task: SearchTask, base: _Base, state: SearchState, known: Search | None, without: frozenset[str], passed: Passed
+) -> Search:
+    """Let in one effect after another until none is left that helps."""
+    criteria, near = task.criteria, None if known is None else known.step
     while True:
-        words = f"trying {len(candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else "")
-        task.progress(words, after_rounds(rounds))
-        rounds += 1
-        columns.forget_all_but(first, scene)
-        step = SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets, _rest(correction, scene))
-        decisions = step.judge(candidates, first)
-        residuals = Residuals(observations.data, columns.predicted(scene, chosen, value))
-        seeds = line_candidates(scene, residuals, task.catalogue, criteria)
-        taken = {*without, *(item.label(scene) for item in chosen)}
-        decisions += step.judge([item for item in seeds if item.label(scene) not in taken])
-        winner, refused = None, dict[str, Decision]()
-        if len(steps) < criteria.most_effects:
-            winner, refused, scene = choose(step, decisions, None if known is None else known.step)
+        chosen = state.chosen
+        words = f"trying {len(state.candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else "")
+        task.progress(words, after_rounds(len(passed)))
+        state.columns.forget_all_but(base.first, state.scene)
+        step = state.step(criteria)
+        decisions = step.judge(state.candidates, base.first)
+        residuals = Residuals(step.observations.data, state.columns.predicted(state.scene, chosen, state.value))
+        seeds = line_candidates(state.scene, residuals, task.catalogue, criteria)
+        taken = {*without, *(item.label(state.scene) for item in chosen)}
+        decisions += step.judge([item for item in seeds if item.label(state.scene) not in taken])
+        winner, refused, scene = None, dict[str, Decision](), state.scene
+        if len(state.steps) < criteria.most_effects:
+            winner, refused, scene = choose(step, decisions, near)
+            if winner is None and chosen != state.asked:
+                # What came in may have hidden when something acts.
+                more = [item for item in _in_intervals(task.catalogue, state) if item.label(state.scene) not in taken]
+                state = replace(state.with_more(more), asked=chosen)
+                step = state.step(criteria) if more else step
+                found = step.judge(more)
+                winner, unsound, scene = choose(step, found, near)
+                decisions, refused = decisions + found, refused | unsound
         decisions = [item for item in decisions if item.label not in refused] + list(refused.values())
-        if winner is None and chosen != asked:
-            # What came in may have hidden when something acts.
-            asked = chosen
-            more = _in_intervals(task.catalogue, columns, scene, chosen, value)
-            more = [item for item in more if item.label(scene) not in taken]
-            if more:
-                everything, candidates = everything + more, candidates + more
-                tried += len(more)
-                continue
+        before, state = state, replace(state, scene=scene)
         if winner is None:
             # Each explains more than what it replaces, or as much with fewer: there is an end, and this is one in any case.
-            swap = best_exchange(step, everything, first, (*without, *refused)) if exchanges < len(steps) else None
+            free = state.exchanges < len(state.steps)
+            swap = best_exchange(step, state.pool, base.first, (*without, *refused)) if free else None
             if swap is None:
                 break
-            exchanges += 1
-            winner, scene, gone = swap.decision, swap.scene, chosen[swap.place].label(scene)
-            chosen = tuple(item for item in chosen if item.label(scene) != gone)
-            steps = [item for item in steps if item.decision.label != gone]
-            candidates += [item for item in everything if item.label(scene) == gone]
-        candidate, found = winner.candidate, winner.examination
-        if candidate.corrects_data:
-            columns, value = taken_out(
-                SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets), candidate
-            )
-            observations = columns.observations
-            correction = Correction(candidate, value + (correction.value if correction else 0.0))
-        else:
-            chosen = (*chosen, candidate)
-        if not candidate.corrects_data or candidate.effect.settled(found.value):
-            candidates = [item for item in candidates if item.label(scene) != winner.label]
-        scene, chosen = tune(scene, columns, weights, chosen, criteria.rotor_inertia_std, offsets=offsets)
-        if candidate.effect.in_intervals:
-            chosen = refined(SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets))
-        fitted = observed(SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets))
-        value, weights = value_and_weights(fitted, offsets)
-        scene = replace(scene, value=value[: len(task.model.columns)])
-        repeated = bool(steps) and steps[-1].decision.label == winner.label
-        left = rms_of(value, fitted, offsets)
-        steps[len(steps) - repeated :] = [Step(winner, scene, chosen, observations.data, value, left)]
-    if correction is not None:
+            winner, state = swap.decision, replace(state.giving_way(swap.place), scene=swap.scene)
+        passed = (*passed, (winner.label, before))
+        state = state.with_effect(winner, criteria)
+    if state.correction is not None:
         # What came in since had moved it.
-        columns, value = taken_out(
-            SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets), correction.candidate
-        )
-        correction = replace(correction, value=value + correction.value)
-    kept = needed(SelectionStep(scene, columns, chosen, weights, tried, criteria, offsets))
-    scene, kept = tune(scene, columns, weights, kept, criteria.rotor_inertia_std, offsets=offsets)
-    kept = refined(SelectionStep(scene, columns, kept, weights, tried, criteria, offsets))
-    labels = {item.label(scene) for item in kept}
-    stayed = [item for item in steps if item.decision.label in labels or item.decision.candidate.corrects_data]
-    final = SelectionStep(scene, columns, kept, weights, tried, criteria, offsets, _rest(correction, scene))
-    others = [Candidate(effect, member) for effect in task.catalogue for member in effect.doubtful(first)]
-    doubtful = tuple(item for item in others if item.label(scene) not in labels)
-    return Search(final, uncorrected, start, tuple(stayed), correction, tuple(decisions), first, doubtful)
+        state = state.corrected(state.correction.candidate, criteria)
+    state = replace(state, chosen=needed(state.step(criteria))).tuned(criteria)
+    state = replace(state, chosen=refined(state.step(criteria)))
+    labels = {item.label(state.scene) for item in state.chosen}
+    stayed = [item for item in state.steps if item.decision.label in labels or item.decision.candidate.corrects_data]
+    others = [Candidate(effect, member) for effect in task.catalogue for member in effect.doubtful(base.first)]
+    doubtful = tuple(item for item in others if item.label(state.scene) not in labels)
+    return Search(
+        state.step(criteria),
+        base.uncorrected,
+        base.start,
+        tuple(stayed),
+        state.correction,
+        tuple(decisions),
+        base.first,
+        doubtful,
+        passed,
+    )
 
 
-def _in_intervals(
-    catalogue: Sequence[Effect], columns: CandidateColumns, scene: Scene, chosen: Sequence[Candidate], value: Array
-) -> list[Candidate]:
+def _in_intervals(catalogue: Sequence[Effect], state: SearchState) -> list[Candidate]:
     """Return effects that act in intervals of recordings, as they are seen with those found taken off the torque."""
     families = [effect for effect in catalogue if effect.in_intervals]
-    if not families or any(item.effect.in_intervals for item in chosen):
+    if not families or any(item.effect.in_intervals for item in state.chosen):
         return []
-    observations = columns.observations
+    observations, scene, value = state.columns.observations, state.scene, state.value
     start = observations.parameters
-    parts = zip(columns.predicted(scene, chosen, value), observations.predicted(value[:start]), strict=True)
+    whole = state.columns.predicted(scene, state.chosen, value)
+    parts = zip(whole, observations.predicted(value[:start]), strict=True)
     left = {
-        replace(motion, torque=motion.torque - (whole - base)): held
-        for (motion, held), (whole, base) in zip(columns_at_hand(observations).items(), parts, strict=True)
+        replace(motion, torque=motion.torque - (own - base)): held
+        for (motion, held), (own, base) in zip(columns_at_hand(observations).items(), parts, strict=True)
         if motion.torque is not None
     }
     beside = replace(scene, columns=left)
     return [Candidate(effect, member) for effect in families for member in effect.members(beside)]
-
-
-def _rest(correction: Correction | None, scene: Scene) -> Candidate | None:
-    left = None if correction is None else correction.left(scene)
-    return None if left is None else left[0]
 
 
 def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Scene:

@@ -13,6 +13,7 @@ from scara_ident.diagnosis.search import (
     columns_at_hand,
     scene_of,
     search,
+    search_again,
 )
 from scara_ident.effects import Coefficient, Member
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
@@ -122,7 +123,6 @@ def test_what_another_search_found_between_the_points_is_tried_where_it_was_foun
     task, columns = SearchTask(complete(), (FarBump(),)), CandidateColumns(observed(runs, BANDS))
     (chosen,) = search(task, columns, known=known).chosen
     assert chosen.member.nonlinear[0] == pytest.approx(1.15, abs=0.01)
-    assert search(task, columns, without=[found.label(missed.scene)], known=known).chosen == ()
 
 
 def test_a_delay_is_corrected_in_the_data():
@@ -148,14 +148,32 @@ def test_weights_of_the_fit_make_joints_equal():
     assert weighted[0] == pytest.approx(weighted[1], rel=0.01)
 
 
-def test_what_is_left_out_by_its_label_is_not_tried():
-    runs = with_torque(exact_runs(), 1, spring)
-    columns = CandidateColumns(observed(runs))
-    result = search(SearchTask(MODEL, SMALL), columns, without=("spring of joint2",))
-    labels = {decision.label for decision in result.decisions}
-    assert "spring of joint1" in labels
-    assert "spring of joint2" not in labels
-    assert "spring of joint2" not in {item.label(result.scene) for item in result.chosen}
+def test_a_search_again_without_an_effect_is_one_that_never_had_it():
+    runs = with_torque(with_torque(exact_runs(), 1, spring), 0, asymmetry)
+    first = searched(runs, *SMALL)
+    task = SearchTask(MODEL, SMALL)
+    began = []
+    for label in (label for label, _ in first.passed):
+        again = search_again(task, first, [label])
+        assert label not in {decision.label for decision in again.decisions}
+        (other,) = (item.label(again.scene) for item in again.chosen)
+        assert other != label
+        # What came in before is not looked for again, and what is found has the size that it has alone.
+        began.append([name for name, _ in again.passed])
+        alone = searched(runs, *(item for item in SMALL if item.name not in label))
+        (mine,), (its,) = again.chosen, alone.chosen
+        assert mine == its
+        assert again.scene.value == pytest.approx(alone.scene.value, rel=1e-9)
+        assert again.steps[-1].rms == pytest.approx(alone.steps[-1].rms, rel=1e-9)
+    assert [names[0] for names in began] == [first.passed[1][0], first.passed[0][0]]
+
+
+def test_what_came_in_before_is_kept_as_it_was():
+    runs = with_torque(with_torque(exact_runs(), 1, spring), 0, asymmetry)
+    first = searched(runs, *SMALL)
+    again = search_again(SearchTask(MODEL, SMALL), first, [first.passed[1][0]])
+    assert again.passed[0] is first.passed[0]
+    assert again.steps[0] is first.steps[0]
 
 
 def test_a_search_on_columns_that_are_known_finds_the_same():

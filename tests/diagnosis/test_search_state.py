@@ -1,0 +1,100 @@
+"""Where a search stands: what comes in, what gives way, and that the state before is what it was."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.search import scene_of
+from scara_ident.diagnosis.search_state import SearchState
+from scara_ident.diagnosis.selection_step import observed as with_effects
+from scara_ident.effects.friction import AsymmetricFriction
+from scara_ident.effects.measurement import TimeDelay, shifted
+from scara_ident.effects.position import Spring
+from scara_ident.estimation import wls
+from scara_ident.estimation.run_offsets import rms_of
+from tests.diagnosis.made import complete, exact_runs, observed, with_torque
+
+MODEL = complete()
+
+
+def begun(runs, *families) -> SearchState:
+    observations = observed(runs)
+    start = wls(observations)
+    scene = scene_of(MODEL, start.value, observations)
+    pool = tuple(Candidate(family, member) for family in families for member in family.members(scene))
+    columns = CandidateColumns(observations)
+    return SearchState(columns, scene, start.weights, start.offsets, start.value, pool, pool, len(pool))
+
+
+def labels(state: SearchState, candidates) -> list[str]:
+    return [item.label(state.scene) for item in candidates]
+
+
+def let_in(state: SearchState, label: str) -> SearchState:
+    (decision,) = [item for item in state.step(CRITERIA).judge(state.candidates) if item.label == label]
+    return state.with_effect(decision, CRITERIA)
+
+
+def sprung(runs, stiffness: float = 0.05):
+    return with_torque(runs, 1, lambda motion: stiffness * motion.q[1])
+
+
+def test_an_effect_that_comes_in_is_in_the_model_and_no_candidate_any_more():
+    state = begun(sprung(exact_runs()), Spring(), AsymmetricFriction())
+    after = let_in(state, "spring of joint2")
+    assert labels(after, after.chosen) == ["spring of joint2"]
+    assert set(labels(state, state.candidates)) - set(labels(after, after.candidates)) == {"spring of joint2"}
+    assert (after.pool, after.tried, after.correction) == (state.pool, state.tried, None)
+    (step,) = after.steps
+    rows = with_effects(after.step(CRITERIA))
+    assert (step.chosen, step.rms) == (after.chosen, rms_of(after.value, rows, after.offsets))
+    assert after.value[-1] == pytest.approx(0.05, rel=0.05)
+    # The state before is what it was.
+    assert (state.chosen, state.steps) == ((), ())
+
+
+def test_what_gives_way_may_come_in_again():
+    runs = with_torque(sprung(exact_runs()), 0, lambda motion: 0.03 * np.abs(motion.v[0]))
+    state = let_in(
+        let_in(begun(runs, Spring(), AsymmetricFriction()), "spring of joint2"), "asymmetric_friction of joint1"
+    )
+    left = state.giving_way(0)
+    assert labels(left, left.chosen) == ["asymmetric_friction of joint1"]
+    assert [step.decision.label for step in left.steps] == ["asymmetric_friction of joint1"]
+    assert "spring of joint2" in labels(left, left.candidates)
+    assert left.exchanges == 1
+
+
+def test_more_candidates_count_as_tried_and_some_labels_are_not_to_be():
+    state = begun(exact_runs(), Spring())
+    other = Candidate(AsymmetricFriction(), AsymmetricFriction().members(state.scene)[0])
+    more = state.with_more([other])
+    assert (more.pool[-1], more.candidates[-1], more.tried) == (other, other, state.tried + 1)
+    assert labels(state, more.only({"spring of joint1"}).candidates) == [
+        "spring of joint2",
+        "asymmetric_friction of joint1",
+    ]
+
+
+def test_a_delay_is_taken_out_of_the_data_and_its_sizes_add_up():
+    state = begun([shifted(run, -0.004) for run in exact_runs()], TimeDelay())
+    after = let_in(state, "time_delay")
+    assert after.chosen == ()
+    assert after.correction is not None
+    assert after.correction.value[0] == pytest.approx(0.004, abs=2e-4)
+    assert state.correction is None
+    # What was left in the data is no more than a thousandth of it, and nothing of what was taken out is counted twice.
+    again = after.corrected(after.correction.candidate, CRITERIA)
+    assert again.correction is not None
+    assert again.correction.value[0] == pytest.approx(after.correction.value[0], rel=1e-3)
+    half = begun([shifted(run, -0.002) for run in exact_runs()], TimeDelay())
+    first = let_in(half, "time_delay").correction
+    assert first is not None
+    whole = replace(state, correction=first).corrected(first.candidate, CRITERIA).correction
+    assert whole is not None
+    assert whole.value[0] == pytest.approx(first.value[0] + after.correction.value[0], rel=1e-2)
