@@ -249,16 +249,14 @@ def _all_fitted(
     base, criteria = result.search.base, result.search.step.criteria
     observations = observe(base, prepare(recordings, result.search.bands))
     start = wls(observations)
-    columns, delay = CandidateColumns(observations), 0.0
-    scene, found = scene_of(base, start.value, observations), tuple(chosen)
+    scene, delay = scene_of(base, start.value, observations), 0.0
+    step = SelectionStep(scene, CandidateColumns(observations), tuple(chosen), start.weights, 1, criteria)
     for _ in range(1 + late):
-        scene, found = tune(scene, columns, start.weights, found, criteria.rotor_inertia_std)
-        step = SelectionStep(scene, columns, found, start.weights, 1, criteria)
+        step = tune(step)
         if late:
             columns, more = taken_out(step, Candidate(TimeDelay(), Member(None)))
-            delay += float(more[0])
-    final = replace(step, columns=columns)
-    return model_with(scene, found), wls(observed_at_every_sample(final)).value, delay
+            step, delay = replace(step, columns=columns), delay + float(more[0])
+    return model_with(step.scene, step.chosen), wls(observed_at_every_sample(step)).value, delay
 
 
 def _errors(joints: Sequence[str], errors: Sequence[Any]) -> dict[str, float]:

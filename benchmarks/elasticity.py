@@ -103,11 +103,13 @@ def expected_ratio(found: Diagnosis, runs: Sequence[SimulationResult]) -> tuple[
     step, held_out = found.search.step, observe(found.search.base, found.validation_after.data)
     fitted, held = (
         linearise(
-            replace(scene, columns=columns_at_hand(item.observations)),
-            item,
-            step.weights,
-            [Candidate(family, member)],
-            CRITERIA.rotor_inertia_std,
+            replace(
+                step,
+                scene=replace(scene, columns=columns_at_hand(item.observations)),
+                columns=item,
+                chosen=(Candidate(family, member),),
+                variation=None,
+            )
         )
         for item in (step.columns, CandidateColumns(held_out))
     )

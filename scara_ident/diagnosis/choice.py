@@ -160,10 +160,9 @@ def fitted_with(step: SelectionStep, candidate: Candidate, *, coarse: bool = Fal
     coarse : bool, optional
         See `scara_ident.diagnosis.nonlinear_fit.tune`.
     """
-    everything, std = (*step.chosen, candidate), step.criteria.rotor_inertia_std
-    scene, chosen = tune(step.scene, step.columns, step.weights, everything, std, offsets=step.offsets, coarse=coarse)
-    own = replace(step, scene=scene, chosen=chosen[:-1])
-    (decision,) = own.judge([chosen[-1]])
+    fitted = tune(replace(step, chosen=(*step.chosen, candidate)), coarse=coarse)
+    own = fitted.without(len(step.chosen))
+    (decision,) = own.judge([fitted.chosen[-1]])
     return own, decision
 
 

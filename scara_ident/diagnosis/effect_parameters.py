@@ -88,8 +88,7 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
     Nonlinear parameters, armatures included, join the fit by the derivative of the effects' columns, so that the
     covariance is that of all parameters together.
     """
-    std = step.criteria.rotor_inertia_std
-    state = linearise(step.scene, step.columns, step.weights, step.chosen, std, step.offsets)
+    state = linearise(step)
     covariance = _covariance(step, state, scatter_alone=scatter_alone)
     undetermined = merge([state.information, state.prior]).solve().undetermined
     found: list[dict[str, Parameter]] = []
@@ -203,12 +202,8 @@ def _noise_bias(step: SelectionStep, state: Linearised) -> Array:
     """Return by how much the noise of positions moves all parameters of a fit, see `scara_ident.estimation.noise_bias`."""
     if max(noise_shares(step.observations.data), default=0.0) < NEGLIGIBLE:
         return np.zeros(state.information.parameters)
-    twin, std = step.noisier, step.criteria.rotor_inertia_std
-    scene, chosen = twin.scene, twin.chosen
-    if len(state.ties.factor):
-        # A resonance with little damping bends too much for one step.
-        scene, chosen = tune(scene, twin.columns, step.weights, chosen, std, offsets=twin.offsets)
-    again = linearise(scene, twin.columns, step.weights, chosen, std, twin.offsets)
+    # A resonance with little damping bends too much for one step.
+    again = linearise(tune(step.noisier) if len(state.ties.factor) else step.noisier)
     bias = again.solve()[0] - state.solve()[0]
     bias[state.linear :] += [
         there.value - here.value for there, here in zip(again.unknowns, state.unknowns, strict=True)

@@ -125,18 +125,17 @@ def bounds_of_cells(width: float, reach: tuple[float, float]) -> Array:
     return np.clip(width * (np.arange(count + 1) - 0.5), *reach)
 
 
-def refined(step: SelectionStep) -> tuple[Candidate, ...]:
-    """Return the effects of a model with their intervals moved to where the rows see them begin and end."""
-    chosen = step.chosen
-    if not any(item.effect.in_intervals for item in chosen):
-        return chosen
+def refined(step: SelectionStep) -> SelectionStep:
+    """Return a step whose effects act in intervals that are moved to where the rows see them begin and end."""
+    if not any(item.effect.in_intervals for item in step.chosen):
+        return step
     for _ in range(ROUNDS):
-        value, weights = value_and_weights(observed(replace(step, chosen=chosen)), step.offsets)
-        for which, item in enumerate(chosen):
+        value, weights = value_and_weights(observed(step), step.offsets)
+        for which, item in enumerate(step.chosen):
             if item.effect.in_intervals:
-                seen = seen_by_joints(step.columns, step.scene, chosen, which, value, weights)
-                chosen = (*chosen[:which], _moved(step, item, seen), *chosen[which + 1 :])
-    return chosen
+                seen = seen_by_joints(step.columns, step.scene, step.chosen, which, value, weights)
+                step = replace(step, chosen=(*step.chosen[:which], _moved(step, item, seen), *step.chosen[which + 1 :]))
+    return step
 
 
 def _moved(step: SelectionStep, item: Candidate, seen: Sequence[JointSeen]) -> Candidate:

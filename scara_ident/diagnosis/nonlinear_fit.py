@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
+from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.unknowns import Unknown, unknowns_of
 from scara_ident.effects import Scene, Tie
 from scara_ident.estimation.information import Information, merge, weighted
@@ -137,28 +138,14 @@ class Linearised:
         return best, np.sqrt(self.variance * np.sum(half**2, axis=1)) / size
 
 
-def linearise(
-    scene: Scene,
-    columns: CandidateColumns,
-    weights: Array,
-    chosen: Sequence[Candidate],
-    rotor_inertia_std: float,
-    offsets: RunVariation | None = None,
-) -> Linearised:
-    """Return the linear model about the present nonlinear parameters.
+def linearise(step: SelectionStep) -> Linearised:
+    """Return the model of a step, linear about the present nonlinear parameters.
 
-    Parameters
-    ----------
-    columns : CandidateColumns
-        On the rows of the base model.
-    weights : ndarray, shape (n,)
-    rotor_inertia_std : float
-        Standard deviation of a stated rotor inertia, as a share of it.
-    offsets : RunVariation, optional
-        Offsets of runs that are noise, see `Estimate.offsets`.
+    What offsets of runs make is noise, see `Estimate.offsets`.
     """
+    scene, columns, chosen, weights = step.scene, step.columns, step.chosen, step.weights
     observations = columns.observations
-    unknowns = unknowns_of(scene, chosen, rotor_inertia_std)
+    unknowns = unknowns_of(scene, chosen, step.criteria.rotor_inertia_std)
     own = columns.rows(scene, chosen)
     bounds = observations.parameters + np.cumsum([0, *(len(next(iter(rows.values()))) for rows in own)])
     places = tuple(slice(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True))
@@ -174,11 +161,11 @@ def linearise(
             size = _size(joints, int(bounds[owner]), weights)
             ties.append(TIGHTNESS * size * _tie_row(scene, chosen, unknowns, owner, tie, int(bounds[owner]), linear))
     held = Information(np.array(ties).reshape(-1, total + 1), 0.0)
-    value = _solved(_pooled(joints, total, weights, offsets), held, linear)
+    value = _solved(_pooled(joints, total, weights, step.offsets), held, linear)
     changes = [_change(scene, columns, chosen, item, places, value, slopes) for item in unknowns]
     extended = tuple(_beside(rows, joint, changes, linear) for joint, rows in enumerate(joints))
-    information = _pooled(extended, total, weights, offsets)
-    return Linearised(scene, tuple(chosen), unknowns, places, extended, information, held)
+    information = _pooled(extended, total, weights, step.offsets)
+    return Linearised(scene, chosen, unknowns, places, extended, information, held)
 
 
 def _solved(information: Information, ties: Information, linear: int) -> Array:
@@ -293,47 +280,37 @@ def _beside(rows: JointRows, joint: int, changes: Sequence[dict[int, Array]], fi
     return JointRows(np.concatenate([rows.columns, [first + k for k in acting]]), table, rows.starts, rows.counts)
 
 
-def tune(
-    scene: Scene,
-    columns: CandidateColumns,
-    weights: Array,
-    chosen: Sequence[Candidate],
-    rotor_inertia_std: float,
-    *,
-    offsets: RunVariation | None = None,
-    coarse: bool = False,
-) -> tuple[Scene, tuple[Candidate, ...]]:
+def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
     """Fit the nonlinear parameters of all effects in a model together, and settle the loads that they depend on.
 
     Parameters
     ----------
-    scene, columns, weights, chosen, rotor_inertia_std, offsets
-        See `linearise`.
+    step : SelectionStep
     coarse : bool, optional
         Whether near the best is enough, as for a candidate that is only judged.
 
     Returns
     -------
-    tuple of (Scene, tuple of Candidate)
-        With the parameters fitted.
+    SelectionStep
+        With the parameters fitted, and the scene at the estimate that goes with them.
     """
-    if not chosen:
-        return scene, ()
-    size = columns.observations.parameters
+    if not step.chosen:
+        return step
+    size = step.observations.parameters
     best: Linearised | None = None
-    step, share, std = np.zeros(0), 1.0, np.zeros(0)
-    tied = any(item.effect.tie(scene, item.member) is not None for item in chosen)
+    way, share, std = np.zeros(0), 1.0, np.zeros(0)
+    tied = any(item.effect.tie(step.scene, item.member) is not None for item in step.chosen)
     for _ in range(TIED_ROUNDS if tied else ROUNDS):
-        now = linearise(scene, columns, weights, chosen, rotor_inertia_std, offsets)
+        now = linearise(step)
         if best is not None and now.error > (1.0 + RISE) * best.error:
             share *= 0.5
             if share < SHORTEST_SHARE:
                 break
-            scene, chosen = _moved(best, step, share)
+            step = _moved(step, best, way, share)
             continue
         moved = np.inf
         if best is not None:
-            change = share * step[best.linear :]
+            change = share * way[best.linear :]
             past = np.concatenate([now.value[:size] - best.value[:size], change])
             spread = np.concatenate([std[:size], std[best.linear :]])
             moved = float(np.max(np.abs(past) / np.maximum(spread, np.finfo(float).tiny)))
@@ -341,26 +318,26 @@ def tune(
         best = now
         if moved < SETTLED or arrived:
             break
-        step, std = now.solve()
-        share = min([1.0, *(item.share(x) for item, x in zip(now.unknowns, step[now.linear :], strict=True))])
-        scene, chosen = _moved(best, step, share)
+        way, std = now.solve()
+        share = min([1.0, *(item.share(x) for item, x in zip(now.unknowns, way[now.linear :], strict=True))])
+        step = _moved(step, best, way, share)
     assert best is not None
-    return replace(best.scene, value=best.value[:size]), best.chosen
+    return replace(step, scene=replace(best.scene, value=best.value[:size]), chosen=best.chosen)
 
 
-def _moved(state: Linearised, step: Array, share: float) -> tuple[Scene, tuple[Candidate, ...]]:
-    """Return scene and effects after a share of a step, the nonlinear parameters within their bounds."""
+def _moved(step: SelectionStep, state: Linearised, way: Array, share: float) -> SelectionStep:
+    """Return a step after a share of a way from its linear model, the nonlinear parameters within their bounds."""
     chosen = list(state.chosen)
     armatures = dict(state.scene.armatures)
-    for item, change in zip(state.unknowns, step[state.linear :], strict=True):
+    for item, change in zip(state.unknowns, way[state.linear :], strict=True):
         value = item.moved(share * change)
         if item.owner is None:
             armatures[item.place] = float(np.exp(value))
         else:
             chosen[item.owner] = _moved_candidate(chosen[item.owner], item.place, value)
     old = state.scene.value
-    bodies = old + share * (step[: len(old)] - old)
-    return replace(state.scene, value=bodies, armatures=armatures), tuple(chosen)
+    bodies = old + share * (way[: len(old)] - old)
+    return replace(step, scene=replace(state.scene, value=bodies, armatures=armatures), chosen=tuple(chosen))
 
 
 def _moved_candidate(candidate: Candidate, place: int, value: float) -> Candidate:

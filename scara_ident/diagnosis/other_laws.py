@@ -38,9 +38,7 @@ def _as_good(step: SelectionStep, place: int) -> Iterator[SelectionStep]:
     item = step.chosen[place]
     for family in item.effect.other_laws():
         chosen = (*step.chosen[:place], replace(item, effect=family), *step.chosen[place + 1 :])
-        std = step.criteria.rotor_inertia_std
-        scene, chosen = tune(step.scene, step.columns, step.weights, chosen, std, offsets=step.offsets)
-        again = replace(step, scene=scene, chosen=chosen)
+        again = tune(replace(step, chosen=chosen))
         pairs = [(each.without(place), each.chosen[place]) for each in (step, again)]
         (mine, mine_judged), (its, its_judged) = [(beside, beside.judge([one])[0]) for beside, one in pairs]
         if same((mine, mine_judged), (its, its_judged)):

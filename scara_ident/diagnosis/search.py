@@ -15,7 +15,6 @@ from scara_ident.diagnosis.choice import choose
 from scara_ident.diagnosis.correction import Correction
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.exchange import best_exchange, needed
-from scara_ident.diagnosis.interval_fit import refined
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.search_state import SearchState, Step
@@ -111,17 +110,12 @@ class Search:
     def without(self, labels: Collection[str]) -> Search:
         """Return it without some of the effects that stayed, the others fitted again."""
         kept = tuple(item for item in self.chosen if item.label(self.scene) not in labels)
-        step = self.step
-        std, offsets = step.criteria.rotor_inertia_std, step.offsets
-        scene, kept = tune(self.scene, step.columns, step.weights, kept, std, offsets=offsets)
         steps = tuple(item for item in self.steps if item.decision.label not in labels)
-        return replace(self, step=replace(step, scene=scene, chosen=kept), steps=steps)
+        return replace(self, step=tune(replace(self.step, chosen=kept)), steps=steps)
 
     def beside(self, offsets: RunVariation | None) -> Search:
         """Return it with the nonlinear parameters fitted beside offsets of runs, see `Estimate.offsets`."""
-        step, std = self.step, self.step.criteria.rotor_inertia_std
-        scene, chosen = tune(self.scene, step.columns, step.weights, self.chosen, std, offsets=offsets)
-        return replace(self, step=replace(step, scene=scene, chosen=chosen, variation=offsets))
+        return replace(self, step=tune(replace(self.step, variation=offsets)))
 
     def whole(self, step: SelectionStep) -> SelectionStep:
         """Return a step of the effects that stayed, with what was taken out of the data as the last of them.
@@ -174,7 +168,9 @@ def search(task: SearchTask, columns: CandidateColumns, *, known: Search | None 
     task.progress(f"making the columns of {len(candidates)} candidates", 0.0)
     columns.rows(scene, candidates)
     tried = max(1, len(candidates))
-    state = SearchState(columns, scene, start.weights, start.offsets, start.value, pool, candidates, tried)
+    state = SearchState(
+        columns, scene, start.weights, start.offsets, start.value, pool, candidates, tried, task.criteria
+    )
     return _searched(task, _Base(start, observations, scene), state, known, frozenset(), ())
 
 
@@ -220,7 +216,7 @@ def _searched(
         words = f"trying {len(state.candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else "")
         task.progress(words, after_rounds(len(passed)))
         state.columns.forget_all_but(base.first, state.scene)
-        step = state.step(criteria)
+        step = state.step()
         decisions = step.judge(state.candidates, base.first)
         residuals = Residuals(step.observations.data, state.columns.predicted(state.scene, chosen, state.value))
         seeds = line_candidates(state.scene, residuals, task.catalogue, criteria)
@@ -233,7 +229,7 @@ def _searched(
                 # What came in may have hidden when something acts.
                 more = [item for item in _in_intervals(task.catalogue, state) if item.label(state.scene) not in taken]
                 state = replace(state.with_more(more), asked=chosen)
-                step = state.step(criteria) if more else step
+                step = state.step() if more else step
                 found = step.judge(more)
                 winner, unsound, scene = choose(step, found, near)
                 decisions, refused = decisions + found, refused | unsound
@@ -247,18 +243,17 @@ def _searched(
                 break
             winner, state = swap.decision, replace(state.giving_way(swap.place), scene=swap.scene)
         passed = (*passed, (winner.label, before))
-        state = state.with_effect(winner, criteria)
+        state = state.with_effect(winner)
     if state.correction is not None:
         # What came in since had moved it.
-        state = state.corrected(state.correction.candidate, criteria)
-    state = replace(state, chosen=needed(state.step(criteria))).tuned(criteria)
-    state = replace(state, chosen=refined(state.step(criteria)))
+        state = state.corrected(state.correction.candidate)
+    state = replace(state, chosen=needed(state.step())).tuned()
     labels = {item.label(state.scene) for item in state.chosen}
     stayed = [item for item in state.steps if item.decision.label in labels or item.decision.candidate.corrects_data]
     others = [Candidate(effect, member) for effect in task.catalogue for member in effect.doubtful(base.first)]
     doubtful = tuple(item for item in others if item.label(state.scene) not in labels)
     return Search(
-        state.step(criteria),
+        state.step(),
         base.uncorrected,
         base.start,
         tuple(stayed),

@@ -66,6 +66,7 @@ class SearchState:
         Those of them that may come in.
     tried : int
         Candidates and scan points tried.
+    criteria : SelectionCriteria
     chosen : tuple of Candidate
         Effects that are in the model.
     steps : tuple of Step
@@ -86,18 +87,19 @@ class SearchState:
     pool: tuple[Candidate, ...]
     candidates: tuple[Candidate, ...]
     tried: int
+    criteria: SelectionCriteria
     chosen: tuple[Candidate, ...] = ()
     steps: tuple[Step, ...] = ()
     correction: Correction | None = None
     exchanges: int = 0
     asked: tuple[Candidate, ...] = ()
 
-    def step(self, criteria: SelectionCriteria) -> SelectionStep:
+    def step(self) -> SelectionStep:
         """Return the step of the selection that candidates are tried in."""
         left = None if self.correction is None else self.correction.left(self.scene)
         rest = None if left is None else left[0]
-        held = (self.scene, self.columns, self.chosen, self.weights, self.tried)
-        return SelectionStep(*held, criteria, self.offsets, rest)
+        held = (self.scene, self.columns, self.chosen, self.weights, self.tried, self.criteria)
+        return SelectionStep(*held, self.offsets, rest)
 
     def with_more(self, more: Sequence[Candidate]) -> SearchState:
         """Return the state with further candidates."""
@@ -121,19 +123,17 @@ class SearchState:
             exchanges=self.exchanges + 1,
         )
 
-    def with_effect(self, winner: Decision, criteria: SelectionCriteria) -> SearchState:
+    def with_effect(self, winner: Decision) -> SearchState:
         """Return the state with an effect in the model, or out of the data, and all fitted again."""
         candidate, state = winner.candidate, self
         if candidate.corrects_data:
-            state = state.corrected(candidate, criteria)
+            state = state.corrected(candidate)
         else:
             state = replace(state, chosen=(*state.chosen, candidate))
         if not candidate.corrects_data or candidate.effect.settled(winner.examination.value):
             state = state.only({winner.label})
-        state = state.tuned(criteria)
-        if candidate.effect.in_intervals:
-            state = replace(state, chosen=refined(state.step(criteria)))
-        fitted = observed(state.step(criteria))
+        state = state.tuned()
+        fitted = observed(state.step())
         value, weights = value_and_weights(fitted, state.offsets)
         scene = replace(state.scene, value=value[: len(state.scene.model.columns)])
         state = replace(state, scene=scene, value=value, weights=weights)
@@ -142,15 +142,13 @@ class SearchState:
         repeated = bool(self.steps) and self.steps[-1].decision.label == winner.label
         return replace(state, steps=(*self.steps[: len(self.steps) - repeated], came))
 
-    def tuned(self, criteria: SelectionCriteria) -> SearchState:
-        """Return the state with the nonlinear parameters of its effects fitted."""
-        scene, chosen = tune(
-            *(self.scene, self.columns, self.weights, self.chosen, criteria.rotor_inertia_std), offsets=self.offsets
-        )
-        return replace(self, scene=scene, chosen=chosen)
+    def tuned(self) -> SearchState:
+        """Return the state with the nonlinear parameters of its effects fitted, and the intervals that they act in."""
+        step = refined(tune(self.step()))
+        return replace(self, scene=step.scene, chosen=step.chosen)
 
-    def corrected(self, candidate: Candidate, criteria: SelectionCriteria) -> SearchState:
+    def corrected(self, candidate: Candidate) -> SearchState:
         """Return the state with an effect taken out of the data, beside what was taken out of them before."""
-        columns, value = taken_out(self.step(criteria), candidate)
+        columns, value = taken_out(self.step(), candidate)
         whole = value + (0.0 if self.correction is None else self.correction.value)
         return replace(self, columns=columns, correction=Correction(candidate, whole))

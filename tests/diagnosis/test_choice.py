@@ -76,7 +76,9 @@ def test_what_takes_the_place_of_an_effect_in_the_model_does_not_come_in(monkeyp
     held, spoilt = Candidate(Spring(), Member(1)), Candidate(Stribeck(), Member(0, (0.3,)))
     step = step_beside(with_torque(exact_runs(), 1, lambda motion: 0.05 * motion.q[1]), [held])
     (promised,) = replace(step, chosen=()).judge([held])
-    monkeypatch.setattr(sys.modules[fitted_beside.__module__], "tune", lambda scene, *_, **__: (scene, (spoilt, held)))
+    monkeypatch.setattr(
+        sys.modules[fitted_beside.__module__], "tune", lambda step, **_: replace(step, chosen=(spoilt, held))
+    )
     ((own, decision),) = fitted_beside(step, [promised], 0.0, None)
     assert own.chosen == (spoilt,)
     assert decision.gain > 0.5

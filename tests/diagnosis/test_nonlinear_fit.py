@@ -54,8 +54,7 @@ def loss_runs(loss: float, rotor: float):
 
 def linear(step: SelectionStep, **change) -> Linearised:
     """The linear model of a step, or of one that differs from it."""
-    step = replace(step, **change)
-    return linearise(step.scene, step.columns, step.weights, step.chosen, CRITERIA.rotor_inertia_std)
+    return linearise(replace(step, **change))
 
 
 def dense(state: Linearised) -> np.ndarray:
@@ -70,9 +69,7 @@ def dense(state: Linearised) -> np.ndarray:
 
 def tuned(runs, *chosen: Candidate) -> SelectionStep:
     """The step with its effects tuned."""
-    step = step_beside(runs, chosen, WEIGHTS)
-    scene, found = tune(step.scene, step.columns, WEIGHTS, chosen, CRITERIA.rotor_inertia_std)
-    return replace(step, scene=scene, chosen=found)
+    return tune(step_beside(runs, chosen, WEIGHTS))
 
 
 @pytest.mark.parametrize("start", [0.2, 0.42])
@@ -143,7 +140,7 @@ def test_a_clearance_is_fitted_to_its_best_and_not_to_where_the_bodies_no_longer
 
 def test_without_effects_there_is_nothing_to_tune() -> None:
     step = step_beside(exact_runs())
-    assert tune(step.scene, step.columns, WEIGHTS, [], CRITERIA.rotor_inertia_std) == (step.scene, ())
+    assert tune(step) is step
 
 
 def test_the_derivatives_are_those_of_the_predicted_torque() -> None:
@@ -286,9 +283,10 @@ def test_a_tied_coefficient_is_what_its_effect_says_of_it(elastic: SelectionStep
 
 
 def test_a_swinging_link_is_fitted_from_far_away_with_the_bodies_it_follows_from(elastic: SelectionStep) -> None:
-    scene, (found,) = tune(elastic.scene, elastic.columns, WEIGHTS, elastic.chosen, CRITERIA.rotor_inertia_std)
-    stiffness = (2.0 * np.pi * found.member.nonlinear[0]) ** 2 * usual_link_inertia(scene, 0)
+    fitted = tune(elastic)
+    (found,) = fitted.chosen
+    stiffness = (2.0 * np.pi * found.member.nonlinear[0]) ** 2 * usual_link_inertia(fitted.scene, 0)
     assert stiffness == pytest.approx(2400.0, rel=0.03)
-    told = physical_parameters(replace(elastic, scene=scene, chosen=(found,))).effects[0]["stiffness"]
+    told = physical_parameters(fitted).effects[0]["stiffness"]
     assert told.value == pytest.approx(stiffness, rel=1e-3)
     assert abs(told.value - 2400.0) < 3.0 * told.std < 0.1 * 2400.0

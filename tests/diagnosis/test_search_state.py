@@ -28,7 +28,7 @@ def begun(runs, *families) -> SearchState:
     scene = scene_of(MODEL, start.value, observations)
     pool = tuple(Candidate(family, member) for family in families for member in family.members(scene))
     columns = CandidateColumns(observations)
-    return SearchState(columns, scene, start.weights, start.offsets, start.value, pool, pool, len(pool))
+    return SearchState(columns, scene, start.weights, start.offsets, start.value, pool, pool, len(pool), CRITERIA)
 
 
 def labels(state: SearchState, candidates) -> list[str]:
@@ -36,8 +36,8 @@ def labels(state: SearchState, candidates) -> list[str]:
 
 
 def let_in(state: SearchState, label: str) -> SearchState:
-    (decision,) = [item for item in state.step(CRITERIA).judge(state.candidates) if item.label == label]
-    return state.with_effect(decision, CRITERIA)
+    (decision,) = [item for item in state.step().judge(state.candidates) if item.label == label]
+    return state.with_effect(decision)
 
 
 def sprung(runs, stiffness: float = 0.05):
@@ -51,7 +51,7 @@ def test_an_effect_that_comes_in_is_in_the_model_and_no_candidate_any_more():
     assert set(labels(state, state.candidates)) - set(labels(after, after.candidates)) == {"spring of joint2"}
     assert (after.pool, after.tried, after.correction) == (state.pool, state.tried, None)
     (step,) = after.steps
-    rows = with_effects(after.step(CRITERIA))
+    rows = with_effects(after.step())
     assert (step.chosen, step.rms) == (after.chosen, rms_of(after.value, rows, after.offsets))
     assert after.value[-1] == pytest.approx(0.05, rel=0.05)
     # The state before is what it was.
@@ -89,12 +89,12 @@ def test_a_delay_is_taken_out_of_the_data_and_its_sizes_add_up():
     assert after.correction.value[0] == pytest.approx(0.004, abs=2e-4)
     assert state.correction is None
     # What was left in the data is no more than a thousandth of it, and nothing of what was taken out is counted twice.
-    again = after.corrected(after.correction.candidate, CRITERIA)
+    again = after.corrected(after.correction.candidate)
     assert again.correction is not None
     assert again.correction.value[0] == pytest.approx(after.correction.value[0], rel=1e-3)
     half = begun([shifted(run, -0.002) for run in exact_runs()], TimeDelay())
     first = let_in(half, "time_delay").correction
     assert first is not None
-    whole = replace(state, correction=first).corrected(first.candidate, CRITERIA).correction
+    whole = replace(state, correction=first).corrected(first.candidate).correction
     assert whole is not None
     assert whole.value[0] == pytest.approx(first.value[0] + after.correction.value[0], rel=1e-2)
