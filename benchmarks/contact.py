@@ -4,7 +4,7 @@ On virtual arms: six recordings are identified from. The others are without cont
 and the other counts false alarms, then the halves change places; and again with thresholds from ten minutes each, which is
 what a user may have, counted in the ten minutes after. Pushes on the tool, in the closed loop, of random directions that the
 arm can feel and of random size, are then looked for at thresholds from all of them; found is what begins during a push and is
-not in the same run without. On measured recordings: two are identified from; each of the others counts with thresholds from
+not in the same run without. The force that a contact states is compared with the push. On measured recordings: two are identified from; each of the others counts with thresholds from
 the rest, and pushes ``-J^T f`` are added to its effort. The interval is Poisson's exact one of 95 %; the force found in 90 %
 of pushes is by logistic regression on its logarithm. The table says of each rate whether it was within 1.5 of the stated:
 ``yes`` and ``no`` where the whole interval is, ``seen`` and ``open`` where only what was counted is, or is not.
@@ -20,7 +20,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -34,9 +34,10 @@ from scara_ident.export.identified_model import IdentifiedModel, identified_mode
 from scara_ident.robot.kinematics import tool_frame
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects.contact import Push
-from scara_ident.use.alarm import calibrate, step_of
-from scara_ident.use.contact import ContactObserver, contact_observer, find_contacts
+from scara_ident.use.alarm import step_of
+from scara_ident.use.contact import Contact, find_contacts
 from scara_ident.use.external_torque import Observed
+from scara_ident.use.observer import ContactObserver, calibrated, contact_observer
 
 Array = NDArray[np.float64]
 RATES = (10.0, 30.0, 60.0, 120.0)
@@ -50,6 +51,15 @@ FORCES = {"scara03": (3.0, 150.0), "ur5": (0.02, 5.0), "panda": (0.02, 5.0), "me
 SHORT = 600.0
 # By how much a rate may be wrong.
 FACTOR = 1.5
+
+
+class Try(NamedTuple):
+    """A push, its size in N, whether it was found, and at the tool, and how far off the stated force is, in std."""
+
+    force: float
+    found: bool
+    at_tool: bool
+    off: float | None
 
 
 def main() -> None:
@@ -83,7 +93,7 @@ def virtual(name: str, count: int, pushed_count: int, seed: int, rates: Sequence
     halves = [runs[::2], runs[1::2]]
     splits = [(halves[0], halves[1]), (halves[1], halves[0])], list(zip(parts, parts[1:] + parts[:1], strict=True))
     rows = [alarms(observer, rate, each) for each in splits for rate in rates if len(each) > 1]
-    tries: list[tuple[float, bool, bool]] = []
+    tries: list[Try] = []
     for k in range(pushed_count):
         rng = np.random.default_rng([seed, 10_000 + k])
         pushes = [drawn(arm, rng, start, FORCES[name]) for start in np.arange(2.0, SECONDS - 2.0, APART)]
@@ -114,7 +124,7 @@ def alarms(observer: ContactObserver, rate: float, splits: Sequence[tuple[list[O
     """Count false alarms in the second part of each split with thresholds from the first."""
     count, hours, rested = 0, 0.0, 0.0
     for free, others in splits:
-        own = ContactObserver(observer.known, observer.settings, calibrate(free, rate), velocity=observer.velocity)
+        own = calibrated(observer.known, observer.settings, free, rate=rate, velocity=observer.velocity)
         count += sum(len(find_contacts(own, run)) for run in others)
         hours += sum(float(np.sum(step_of(run)[run.settled])) for run in others) / 3600.0
         rested += own.alarm.hours / len(splits)
@@ -140,13 +150,17 @@ def table(found: dict[str, Any]) -> list[str]:
         force = ""
     if found["placed_at_tool"] is not None:
         lines.append(f"{found['arm']}: {found['placed_at_tool']:.0%} of the pushes found were placed at the tool")
+    if found["forces"]:
+        within = (found["within_two_std"], found["within_three_std"])
+        lines.append(
+            f"{found['arm']}: of {found['forces']} stated forces {within[0]:.0%} are within two standard deviations of the push "
+            f"along every axis, {within[1]:.0%} within three"
+        )
     return lines
 
 
-def looked_for(
-    observer: ContactObserver, run: Observed, without: Observed, pushes: Sequence[Push]
-) -> list[tuple[float, bool, bool]]:
-    """Return force, whether it was found, and whether at the tool, of every push.
+def looked_for(observer: ContactObserver, run: Observed, without: Observed, pushes: Sequence[Push]) -> list[Try]:
+    """Return what became of every push.
 
     Found is a push by an alarm that begins while it lasts, or just after, and that the same run without pushes has not.
     """
@@ -159,13 +173,24 @@ def looked_for(
     tries = []
     for push in pushes:
         hits = [each for each in found if push.time <= each.start <= push.time + push.duration + AFTER]
-        tries.append((push.force, bool(hits), any(each.place == "tool" for each in hits)))
+        told = next((each for each in hits if each.force is not None), None)
+        at_tool = any(each.place == "tool" for each in hits)
+        tries.append(Try(push.force, bool(hits), at_tool, None if told is None else _off(told, push)))
     return tries
 
 
-def smallest(tries: Sequence[tuple[float, bool, bool]]) -> dict[str, Any]:
+def _off(found: Contact, push: Push) -> float:
+    """Return how far a stated force is from a push, in standard deviations along the axis where that is most."""
+    assert found.force is not None
+    assert found.force_covariance is not None
+    direction = np.array(push.direction)
+    off = found.force - push.force * direction / np.linalg.norm(direction)
+    return float(np.nanmax(np.abs(off) / np.sqrt(np.diag(found.force_covariance))))
+
+
+def smallest(tries: Sequence[Try]) -> dict[str, Any]:
     """Return the force that is found in 90 % of pushes, N, and the shares by size of force."""
-    force, hit = np.log([each[0] for each in tries]), np.array([each[1] for each in tries], dtype=float)
+    force, hit = np.log([each.force for each in tries]), np.array([each.found for each in tries], dtype=float)
 
     def loss(x: Array) -> float:
         z = np.exp(x[1]) * (force - x[0])
@@ -183,7 +208,8 @@ def smallest(tries: Sequence[tuple[float, bool, bool]]) -> dict[str, Any]:
         for a, b in zip(edges[:-1], edges[1:], strict=True)
         if (inside := (force >= a) & (force <= b)).any()
     ]
-    named = [each[2] for each in tries if each[1]]
+    named = [each.at_tool for each in tries if each.found]
+    off = np.array([each.off for each in tries if each.off is not None])
     return {
         "pushes": len(tries),
         "stated_at_pushes": PUSH_RATE,
@@ -191,6 +217,9 @@ def smallest(tries: Sequence[tuple[float, bool, bool]]) -> dict[str, Any]:
         "force_found_in_90_percent": float(np.exp(max(force.min(), middle + np.log(9.0) / np.exp(steep)))),
         "found_by_force": bins,
         "placed_at_tool": float(np.mean(named)) if named else None,
+        "forces": len(off),
+        "within_two_std": float(np.mean(off < 2.0)) if len(off) else None,
+        "within_three_std": float(np.mean(off < 3.0)) if len(off) else None,
     }
 
 
@@ -204,9 +233,9 @@ def measured(folder: Path, fit: Sequence[str], seed: int, rates: Sequence[float]
     runs = [observer.observe(item) for item in others]
     splits = [(runs[:k] + runs[k + 1 :], [runs[k]]) for k in range(len(runs))]
     rows = [alarms(observer, rate, splits) for rate in rates]
-    tries: list[tuple[float, bool, bool]] = []
+    tries: list[Try] = []
     for k, (item, (free, _)) in enumerate(zip(others, splits, strict=True)):
-        own = ContactObserver(known, observer.settings, calibrate(free, PUSH_RATE), velocity=observer.velocity)
+        own = calibrated(known, observer.settings, free, rate=PUSH_RATE, velocity=observer.velocity)
         # Five times, with other pushes: the recordings are few.
         for again in range(5):
             pushed, pushes = added(known, item, np.random.default_rng([seed, k, again]))

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from contact import APART, KINDS, PUSH_RATE, RATES, SECONDS, alarms, drawn, looked_for, smallest, table
+from contact import APART, KINDS, PUSH_RATE, RATES, SECONDS, Try, alarms, drawn, looked_for, smallest, table
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 from virtual_motions import random_motion
@@ -30,9 +30,8 @@ from scara_ident import Recording, identify, load_robot, read_recordings, simula
 from scara_ident.export.identified_model import identified_model
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects.contact import Push
-from scara_ident.use.alarm import calibrate
-from scara_ident.use.contact import ContactObserver, contact_observer
 from scara_ident.use.external_torque import FEATURES, Observed
+from scara_ident.use.observer import ContactObserver, calibrated, contact_observer
 
 Array = NDArray[np.float64]
 # The residual's band, Hz; recorded samples per second, and periods of the controller in each.
@@ -79,7 +78,7 @@ def counted(
     order = np.random.default_rng([seed, 30_000]).permutation(count)
     ends = np.round(count * np.cumsum([np.ptp(time) for time, _ in residuals.values()]) / sum(np.ptp(time) for time, _ in residuals.values())).astype(int)  # fmt: skip
     rows: list[list[dict[str, Any]]] = []
-    tries: list[tuple[float, bool, bool]] = []
+    tries: list[Try] = []
     for which, name in enumerate(names):
         rng = np.random.default_rng([seed, 40_000, which])
         own = order[(ends[which - 1] if which else 0) : ends[which]]
@@ -91,7 +90,7 @@ def counted(
         ]
         quiet = [disturbed(observer, *clean[k], drawn_stretch([residuals[name]], clean[k][0].time, rng)) for k in own]
         rows.append([alarms(observer, rate, [(free, quiet)]) for rate in rates])
-        told = ContactObserver(known, observer.settings, calibrate(free, PUSH_RATE), velocity=True)
+        told = calibrated(known, observer.settings, free, rate=PUSH_RATE, velocity=True)
         for k in range(which, pushed, len(names)):
             tries += push(told, arm, seed, k, residuals[name])
     return {"arm": f"virtual {arm.robot.name}, measured residuals", "false_alarms": [pooled(each, names) for each in zip(*rows, strict=True)], **smallest(tries)}  # fmt: skip
@@ -166,7 +165,7 @@ def record(arm: VirtualArm, seed: int, k: int, pushes: Sequence[Push] = ()) -> R
     return simulate(arm, motion, effects=pushes, seed=1_000_000 * seed + k, rate=RATE, ticks=TICKS, record_velocity=True).recording  # fmt: skip
 
 
-def push(observer: ContactObserver, arm: VirtualArm, seed: int, k: int, residual: tuple[Array, Array]) -> list[tuple[float, bool, bool]]:  # fmt: skip
+def push(observer: ContactObserver, arm: VirtualArm, seed: int, k: int, residual: tuple[Array, Array]) -> list[Try]:  # fmt: skip
     """Look for pushes in one run, with a residual that the thresholds are not from."""
     rng = np.random.default_rng([seed, 10_000 + k])
     pushes = [drawn(arm, rng, start, FORCES) for start in np.arange(2.0, SECONDS - 2.0, APART)]

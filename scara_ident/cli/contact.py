@@ -26,13 +26,12 @@ def contact(
     json: options.Json = False,
 ) -> None:
     """Find contact with the arm in recordings: when, on which joints, and the force at the tool or the link."""
-    import numpy as np
-
     from scara_ident.export.result import read_identified
     from scara_ident.files import write_json
     from scara_ident.recording.recording import read_usable
     from scara_ident.recording.shared_samples import shared_samples
-    from scara_ident.use.contact import contact_observer, contacts_dict, look_for_contact
+    from scara_ident.use.contact import contacts_dict, look_for_contact
+    from scara_ident.use.observer import contact_observer
 
     check_report(output, "contact")
     with progress() as work:
@@ -55,9 +54,8 @@ def contact(
     console.note([*notes, *more])
     rows = table("contacts", "recording", "from", "to", "joints", "place", "force", right=("from", "to", "force"))
     for each in found.contacts:
-        force = "-" if each.force is None else f"{np.linalg.norm(each.force):.3g} N"
         joints = ", ".join(each.joints)
-        rows.add_row(each.recording, f"{each.start:.2f}", f"{each.stop:.2f}", joints, each.place, force)
+        rows.add_row(each.recording, f"{each.start:.2f}", f"{each.stop:.2f}", joints, each.place, each.force_words)
     if found.contacts:
         console.print(rows)
     console.say(content["summary"])

@@ -11,6 +11,9 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.robot import Robot
 
+# Directions of a force below this share of the best told one are not felt, and an axis is told with this share of it in others.
+UNFELT, TOLD = 1e-3, 0.999
+
 
 def place_of(robot: Robot, joint_id: int) -> int:
     """Return the place in ``robot.joints`` of a joint of the Pinocchio model; -1 for the base."""
@@ -69,9 +72,40 @@ def force_torques(robot: Robot, configurations: Iterable[Array]) -> Iterator[Arr
 def constant_force(rows: Sequence[Array], torques: Sequence[Array]) -> tuple[Array, float]:
     """Return the force, N, shape (3,), of which rows (n, 3) make torques (n,) best, and the share of their square that it explains."""
     matrix, right = np.concatenate(rows), np.concatenate(torques)
-    force = np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-3)[0])
+    force = np.asarray(np.linalg.lstsq(matrix, right, rcond=UNFELT)[0])
     total = float(right @ right)
     return force, 1.0 - float(np.sum((right - matrix @ force) ** 2)) / total if total > 0.0 else 0.0
+
+
+def force_covariance(rows: Sequence[Array], products: Array) -> Array:
+    """Return the covariance of `constant_force`, shape (3, 3), N^2; NaN along axes that rows (n, 3) do not tell.
+
+    Parameters
+    ----------
+    products : ndarray, shape (n, n)
+        Mean products of errors of the torques, which are the same for all rows.
+    """
+    matrix = np.concatenate(rows)
+    inverse = np.linalg.pinv(matrix, rcond=UNFELT)
+    slope = inverse @ np.tile(np.eye(len(products)), (len(rows), 1))
+    untold = np.diag(inverse @ matrix) < TOLD
+    return np.asarray(np.where(untold[:, None] | untold, np.nan, slope @ products @ slope.T))
+
+
+def felt_directions(robot: Robot, configurations: Iterable[Array]) -> int:
+    """Return how many directions of a force on the tool the arm feels in one configuration or another."""
+    singular = np.linalg.svd(np.concatenate(list(force_torques(robot, configurations))), compute_uv=False)
+    return int(np.sum(singular > UNFELT * singular[0]))
+
+
+def told_at_once(rows: Sequence[Array], directions: int) -> float:
+    """Return how well single rows (n, 3) of `constant_force` tell the last of so many directions, over the first.
+
+    It is small near a singular pose, where that direction is told by how the arm turns meanwhile, and so by how constant the force
+    is.
+    """
+    singular = [np.linalg.svd(row, compute_uv=False) for row in rows]
+    return float(np.median([each[directions - 1] / each[0] if directions <= len(each) else 0.0 for each in singular]))
 
 
 def farthest_point(robot: Robot) -> Array:

@@ -146,25 +146,34 @@ def residual_scale(runs: Sequence[Observed]) -> tuple[Array, Array]:
     The largest absolute value in each `TOGETHER` is fitted by the features' means with coefficients that are not negative.
     Peaks and not the mean, since a joint at rest has nearly the same residual all the time, and one that moves has not.
     """
+    largest, _, features = in_windows(runs)
+    return made_of(largest, features), LEAST_SCALE * np.maximum(np.mean(largest, axis=1), 1e-12)
+
+
+def made_of(size: Array, features: Array) -> Array:
+    """Return the coefficients, none negative, of features (n, k, m) that make each joint's sizes (n, m) best, shape (n, k)."""
     from scipy.optimize import nnls
 
-    parts = [_in_windows(run) for run in runs]
-    size = np.concatenate([part[0] for part in parts], axis=1)
-    features = np.concatenate([part[1] for part in parts], axis=2)
-    scale = np.zeros(features.shape[:2])
+    found = np.zeros(features.shape[:2])
     for joint, (rows, own) in enumerate(zip(features, size, strict=True)):
         unit = np.maximum(np.mean(rows, axis=1), 1e-12)
-        scale[joint] = nnls((rows / unit[:, None]).T, own)[0] / unit
-    return scale, LEAST_SCALE * np.maximum(np.mean(size, axis=1), 1e-12)
+        found[joint] = nnls((rows / unit[:, None]).T, own)[0] / unit
+    return found
 
 
-def _in_windows(run: Observed) -> tuple[Array, Array]:
-    """Return the largest size of the residual (n, m) and the mean of the features (n, k, m) in each of m windows."""
-    places = np.flatnonzero(run.settled)
-    if len(places) == 0:
-        return np.zeros((len(run.torque), 0)), np.zeros((*run.features.shape[:2], 0))
-    window = np.floor(run.time[places] / TOGETHER)
-    starts = np.r_[0, np.flatnonzero(np.diff(window)) + 1]
-    count = np.diff(np.r_[starts, len(places)])
-    size = np.maximum.reduceat(np.abs(run.torque[:, places]), starts, axis=1)
-    return size, np.add.reduceat(run.features[:, :, places], starts, axis=2) / count
+def in_windows(runs: Sequence[Observed]) -> tuple[Array, Array, Array]:
+    """Return of each of m windows the residual's largest size and mean square (n, m), and the mean of the features (n, k, m)."""
+    parts = []
+    for run in runs:
+        places = np.flatnonzero(run.settled)
+        if len(places) == 0:
+            continue
+        torque = run.torque[:, places]
+        window = np.floor(run.time[places] / TOGETHER)
+        starts = np.r_[0, np.flatnonzero(np.diff(window)) + 1]
+        count = np.diff(np.r_[starts, len(places)])
+        largest = np.maximum.reduceat(np.abs(torque), starts, axis=1)
+        square = np.add.reduceat(torque**2, starts, axis=1) / count
+        parts.append((largest, square, np.add.reduceat(run.features[:, :, places], starts, axis=2) / count))
+    largest, square, features = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
+    return largest, square, features

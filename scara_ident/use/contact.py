@@ -1,201 +1,30 @@
-"""Contact with the arm: in recordings, and while it moves."""
+"""Contact with the arm in recordings: when, on which joints, and the force at the tool."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RecordingError, ScaraIdentError, UsageError
 from scara_ident.estimation.tail import clusters
-from scara_ident.export.identified_model import IdentifiedModel
-from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.recording import Recording
-from scara_ident.robot.kinematics import constant_force, force_torques
+from scara_ident.robot.kinematics import constant_force, force_covariance, force_torques, told_at_once
 from scara_ident.robot.robot import Robot
-from scara_ident.use.alarm import Alarm, calibrate
-from scara_ident.use.external_torque import (
-    BANDWIDTH,
-    FEATURES,
-    SETTLES,
-    ExternalTorque,
-    Observed,
-    ObserverSettings,
-    observe_recording,
-)
+from scara_ident.use.external_torque import FEATURES, Observed
+from scara_ident.use.observer import ContactObserver
 
-# Share of the samples whose speed is below the usual largest.
-USUAL = 0.99
 # A joint is named with a contact if its mean reaches this share of its threshold while the contact is strong.
 NAMED = 0.5
 # A constant force at the tool explains at least this share of the squared torque of a contact there, on at least so many
 # joints: on fewer nearly any torque is that of some force.
 FITS, LEAST_JOINTS = 0.75, 3
-# A step that is a gap is at least this share of the observer's time constant: shorter ones it bridges.
-GAP_SHARE = 0.25
-# States at which the tool's Jacobian is taken, and the share of a contact's peak from which on they are.
-STATES, STRONG = 40, 0.5
-
-
-class Reading(NamedTuple):
-    """What an observer says of one sample; arrays of shape (n,), recorded side.
-
-    Attributes
-    ----------
-    contact : bool
-        Whether any joint is beyond its threshold; False until the observer has forgotten how it began, 0.4 s at 4 Hz.
-    torque, threshold : ndarray
-        External torque, and what it must exceed in size.
-    """
-
-    contact: bool
-    torque: Array
-    threshold: Array
-
-
-class ContactObserver:
-    """Says of every sample whether something touches the arm.
-
-    Parameters
-    ----------
-    known : IdentifiedModel
-    settings : ObserverSettings
-    alarm : Alarm
-    velocity : bool
-        Whether it was calibrated with recorded velocities, which `update` is then given.
-
-    Examples
-    --------
-    ::
-
-        observer = contact_observer(identified_model(identify(robot, recordings)), free, rate=1.0)
-        reading = observer.update(q, v, effort)  # every millisecond
-    """
-
-    def __init__(self, known: IdentifiedModel, settings: ObserverSettings, alarm: Alarm, *, velocity: bool) -> None:
-        self.known, self.settings, self.alarm, self.velocity = known, settings, alarm, velocity
-        self.external = ExternalTorque(known, settings)
-        # Time constants: how long the observer remembers, and follows its slowest low-pass.
-        self._constant = 1.0 / (2.0 * np.pi * settings.bandwidth)
-        self._wait = SETTLES / (2.0 * np.pi * min(settings.bandwidth, settings.differentiator))
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget all before."""
-        self.external.reset()
-        self._since, self._lost, self._step = 0.0, 0.0, np.inf
-
-    def update(self, q: Array, v: Array | None, effort: Array, step: float = 1e-3) -> Reading:
-        """Take one sample.
-
-        One with a value that is not finite is lost: the reading is that before, and the step counts to the next. After a gap, of
-        `GAP_STEPS` times the step before and `GAP_SHARE` of the observer's time constant or more, all before is forgotten.
-
-        Parameters
-        ----------
-        q : ndarray, shape (n,)
-            Positions in the robot's order, rad or m.
-        v : ndarray, shape (n,), or None
-            Velocities, if it was calibrated with them; else None.
-        effort : ndarray, shape (n,)
-            Times ``effort_gain``: N m or N on the recorded side.
-        step : float
-            s since the sample before.
-
-        Raises
-        ------
-        UsageError
-            If an array has another shape, velocities are missing, or the step is not above 0.
-        """
-        if self.velocity and v is None:
-            raise UsageError("v is None; thresholds were taken with recorded velocities: give them to update")
-        if not 0.0 < step < np.inf:
-            raise UsageError(f"step is {step:g} s; expected the time since the sample before, above 0")
-        q, effort = self._one("q", q), self._one("effort", effort)
-        v = self._one("v", v) if self.velocity and v is not None else None
-        if math.isfinite(sum([*q.tolist(), *effort.tolist(), *(() if v is None else v.tolist())])):
-            step += self._lost
-            if step > max(GAP_STEPS * self._step, GAP_SHARE * self._constant):
-                self.reset()
-            self.external.update(q, v, effort, step)
-            self._since += step if math.isfinite(self._step) else 0.0
-            self._lost, self._step = 0.0, step
-        else:
-            self._lost += step
-        torque, threshold = self.external.torque, self.alarm.threshold(self.external.features)
-        touched = self._since > self._wait and bool((np.abs(torque) > threshold).any())
-        return Reading(touched, torque, threshold)
-
-    def _one(self, name: str, value: Array) -> Array:
-        """Return one number for each joint, or say that they are not."""
-        value, robot = np.asarray(value, dtype=float), self.known.robot
-        if value.shape != (robot.n,):
-            raise UsageError(f"{name} has the shape {value.shape}; expected ({robot.n},), one number for each joint of {robot.name}")  # fmt: skip
-        return value
-
-    def observe(self, recording: Recording) -> Observed:
-        """Run over a recording, from its beginning, and forget it."""
-        observed = _observed(self.external, recording, velocity=self.velocity)
-        self.reset()
-        return observed
-
-
-def contact_observer(
-    known: IdentifiedModel, free: Sequence[Recording], *, rate: float = 1.0, bandwidth: float = BANDWIDTH
-) -> ContactObserver:
-    """Make an observer with thresholds from recordings without contact.
-
-    Recorded velocities are used where all of them have them; else positions and efforts pass one low-pass.
-
-    Parameters
-    ----------
-    known : IdentifiedModel
-    free : sequence of Recording
-        Motion like that to be watched, without contact; best not what the model was identified from.
-    rate : float
-        False alarms per hour of such motion.
-    bandwidth : float
-        Hz: wider sees a contact sooner, and more noise.
-
-    Raises
-    ------
-    ScaraIdentError
-        If there are no such recordings, or they are too short or lack efforts.
-    """
-    if not free:
-        raise ScaraIdentError("no recordings without contact to take thresholds from; give some")
-    if not (rate > 0.0 and bandwidth > 0.0):
-        raise ScaraIdentError(f"rate {rate:g} and bandwidth {bandwidth:g}: give numbers above 0")
-    velocity = all(item.velocity is not None for item in free)
-    settings = ObserverSettings(_usual_speed(free), bandwidth)
-    external = ExternalTorque(known, settings)
-    runs = [_observed(external, item, velocity=velocity) for item in free]
-    return ContactObserver(known, settings, calibrate(runs, rate), velocity=velocity)
-
-
-def _usual_speed(free: Sequence[Recording]) -> Array:
-    """Return the speed that each joint rarely exceeds, shape (n,), from steps long against the encoder's."""
-    found = []
-    for item in free:
-        every = max(1, round(0.02 * item.rate))
-        found.append(np.abs(np.diff(item.position[:, ::every], axis=1)) / np.diff(item.time[::every]))
-    speed = np.quantile(np.concatenate(found, axis=1), USUAL, axis=1)
-    return np.asarray(np.maximum(speed, 1e-6))
-
-
-def _observed(external: ExternalTorque, item: Recording, *, velocity: bool) -> Observed:
-    if item.effort is None:
-        raise RecordingError(f"{item.path or item.name}: no effort was recorded; contact cannot be told without")
-    if velocity and item.velocity is None:
-        raise RecordingError(
-            f"{item.path or item.name}: no velocity was recorded, as it was without contact; record it here too"
-        )
-    v = item.velocity if velocity else None
-    return observe_recording(external, item.name, item.time, item.position, v, item.effort)
+# Of a direction of the force that is told so much worse than another at once, none is told.
+LEAST_TOLD = 0.03
+# States of a contact at which the tool's Jacobian is taken, and the share of its peak from which on they are fitted.
+STATES, STRONG = 80, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,6 +46,8 @@ class Contact:
         ``tool``, or the outermost link that it may act on, as told by the joints that it loads.
     force : ndarray, shape (3,), or None
         Constant force on the tool that explains it, base frame, N; a direction that the arm cannot feel is 0.
+    force_covariance : ndarray, shape (3, 3), or None
+        Of that force, by the residual without contact; NaN along axes that the arm does not tell.
     explained : float
         Share of the squared torque that such a force explains.
     """
@@ -229,7 +60,19 @@ class Contact:
     torque: Array
     place: str
     force: Array | None
+    force_covariance: Array | None
     explained: float
+
+    @property
+    def force_words(self) -> str:
+        """Size of the force with its standard deviation, N; a dash where there is none."""
+        if self.force is None or self.force_covariance is None:
+            return "-"
+        size = float(np.linalg.norm(self.force))
+        along = self.force / size
+        # Along an axis that is not told the force is zero.
+        std = float(np.sqrt(along @ np.nan_to_num(self.force_covariance) @ along))
+        return f"{size:.3g} ± {std:.1g} N"
 
     @property
     def entry(self) -> dict[str, Any]:
@@ -243,6 +86,7 @@ class Contact:
             "external_torque": self.torque.tolist(),
             "place": self.place,
             "force": None if self.force is None else self.force.tolist(),
+            "force_std": None if self.force_covariance is None else np.sqrt(np.diag(self.force_covariance)).tolist(),
             "explained": self.explained,
         }
 
@@ -267,7 +111,7 @@ def _contact(observer: ContactObserver, observed: Observed, threshold: Array, sh
     mean = np.mean(observed.torque[:, strong], axis=1)
     most = np.abs(mean) / np.mean(threshold[:, strong], axis=1)
     named = [int(j) for j in np.argsort(-most) if most[j] >= min(NAMED, float(np.max(most)))]
-    force, explained = tool_force(observer, observed, threshold, strong)
+    force, covariance, explained = tool_force(observer, observed, threshold, inside, strong)
     at_tool = explained >= FITS and len(named) >= min(LEAST_JOINTS, robot.n)
     return Contact(
         observed.name,
@@ -278,6 +122,7 @@ def _contact(observer: ContactObserver, observed: Observed, threshold: Array, sh
         mean,
         "tool" if at_tool else robot.links[_outermost(robot, named)],
         force if at_tool else None,
+        covariance if at_tool else None,
         explained,
     )
 
@@ -287,17 +132,43 @@ def _outermost(robot: Robot, joints: Sequence[int]) -> int:
     return max(joints, key=lambda joint: int(robot.order[joint]))
 
 
-def tool_force(observer: ContactObserver, observed: Observed, threshold: Array, places: Array) -> tuple[Array, float]:
-    """Return the constant force on the tool, base frame, N, that fits samples best, and the share that it explains.
+def tool_force(
+    observer: ContactObserver, observed: Observed, threshold: Array, inside: Array, strong: Array
+) -> tuple[Array | None, Array | None, float]:
+    """Return the constant force on the tool, base frame, N, that fits samples best, its covariance, and the share it explains.
 
-    A force f on the tool at the end of the Jacobian J is the external torque ``J^T f``. Joints are weighted by their
-    thresholds.
+    A force f on the tool at the end of the Jacobian J is the external torque ``J^T f``, of which the observer tells what its
+    low-pass leaves as the arm moves on. Joints are weighted by their thresholds. The residual, and what the force does not explain
+    since it is not constant, are taken for the same throughout a contact: they change slowly, and no mean lessens them.
+
+    Near a singular pose there is no force and no covariance: an arm that does not feel one of the directions at once takes any change
+    of the force for more or less of it.
+
+    Parameters
+    ----------
+    threshold : ndarray, shape (n, N)
+    inside, strong : ndarray of int
+        Samples of the contact, and those of them that are fitted.
     """
-    some = places[:: max(1, len(places) // STATES)]
-    states = (observer.external.arm.configuration(observed.position[:, k]) for k in some)
-    turned = force_torques(observer.known.robot, states)
-    rows = [each / threshold[:, k, None] for k, each in zip(some, turned, strict=True)]
-    return constant_force(rows, [observed.torque[:, k] / threshold[:, k] for k in some])
+    places = inside[:: max(1, len(inside) // STATES)]
+    states = (observer.external.arm.configuration(observed.position[:, k]) for k in places)
+    share = 1.0 - np.exp(-2.0 * np.pi * observer.settings.bandwidth * np.diff(observed.time[places]))
+    # At its begin as much of it has passed the low-pass as of the largest torque.
+    size = np.max(np.abs(observed.torque[:, inside]) / threshold[:, inside], axis=0)
+    share = np.concatenate([size[:1] / np.max(size), share])
+    rows, torques, seen = [], [], 0.0
+    for k, turned, new in zip(places, force_torques(observer.known.robot, states), share, strict=True):
+        seen = seen + new * (turned - seen)
+        if k in strong:
+            rows.append(seen / threshold[:, k, None])
+            torques.append(observed.torque[:, k] / threshold[:, k])
+    force, explained = constant_force(rows, torques)
+    if told_at_once(rows, observer.felt) < LEAST_TOLD:
+        return None, None, explained
+    usual = np.mean(threshold[:, strong], axis=1)
+    scatter = observer.scatter.covariance(np.mean(observed.features[:, :, strong], axis=2))
+    left = np.array([own - row @ force for own, row in zip(torques, rows, strict=True)])
+    return force, force_covariance(rows, scatter / usual[:, None] / usual + left.T @ left / len(left)), explained
 
 
 @dataclass(frozen=True, eq=False)

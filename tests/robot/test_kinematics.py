@@ -9,7 +9,17 @@ import pinocchio as pin
 import pytest
 
 from scara_ident.errors import RobotError
-from scara_ident.robot.kinematics import axis, constant_force, force_torques, parent, place_of, tool_frame
+from scara_ident.robot.kinematics import (
+    axis,
+    constant_force,
+    felt_directions,
+    force_covariance,
+    force_torques,
+    parent,
+    place_of,
+    told_at_once,
+    tool_frame,
+)
 from scara_ident.robot.robot import load_robot
 from tests.arms import example_urdf
 from tests.simulation.made import tree
@@ -73,3 +83,27 @@ def test_a_force_on_the_tool_is_found_from_what_it_is_at_the_joints():
         np.testing.assert_allclose(found[:told], force[:told], atol=1e-9)
         assert share == pytest.approx(1.0)
     assert constant_force(rows, [np.zeros(6)] * 20)[1] == 0.0
+
+
+def test_the_covariance_of_a_force_is_that_of_forces_found_beside_errors():
+    robot, rng = load_robot(example_urdf("ur5_robot.urdf")), np.random.default_rng(0)
+    rows = list(force_torques(robot, rng.uniform(-1.0, 1.0, (5, robot.model.nq))))
+    half = rng.standard_normal((6, 6))
+    errors = [half @ rng.standard_normal(6) for _ in range(4000)]
+    found = np.array([constant_force(rows, [error] * 5)[0] for error in errors])
+    told = force_covariance(rows, half @ half.T)
+    np.testing.assert_allclose(found.T @ found / len(found), told, atol=0.06 * np.max(np.diag(told)))
+    # An axis that no row tells is as unsure as can be.
+    flat = [row * [1.0, 1.0, 0.0] for row in rows]
+    assert np.isnan(force_covariance(flat, half @ half.T)[2]).all()
+
+
+def test_directions_that_an_arm_feels_and_what_it_feels_of_them_at_once():
+    rng = np.random.default_rng(0)
+    flat, arm = load_robot(), load_robot(example_urdf("ur5_robot.urdf"))
+    assert felt_directions(flat, rng.uniform(-1.0, 1.0, (5, flat.model.nq))) == 2
+    assert felt_directions(arm, rng.uniform(-1.0, 1.0, (5, arm.model.nq))) == 3
+    bent, stretched = (list(force_torques(flat, [np.array([0.3, elbow])])) for elbow in (1.5, 1e-3))
+    assert told_at_once(bent, 2) > 0.2
+    assert told_at_once(stretched, 2) < 1e-3
+    assert told_at_once(bent, 3) == 0.0

@@ -46,6 +46,15 @@ def quiet(seed: int, seconds: float = 20.0) -> Recording:
     return recording(robot, f"quiet{seed}", time, q, torque, velocity=v)
 
 
+def moved_from(run: Recording, pose: np.ndarray, size: float) -> Recording:
+    """The same motion, so much smaller and about another pose, with velocities but without friction's error."""
+    robot = ur5()
+    q = pose[:, None] + size * run.position
+    v, a = size * run.velocity, size * np.gradient(run.velocity, run.time, axis=1)
+    noise = NOISE * np.random.default_rng(0).standard_normal(q.shape)
+    return recording(robot, run.name, run.time, q, recorded_torque(robot, q, v, a, FRICTION) + noise, velocity=v)
+
+
 def pushed(item: Recording, force: np.ndarray, start: float, stop: float, joints: int = 6) -> Recording:
     """Return a run with a force on the tool, or the like on the first joints only."""
     robot = ur5()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from scara_ident.manners import several
 from scara_ident.report.html.blocks import Block, Cell, Group, Paragraph, Selector, Table, name, number
 from scara_ident.report.html.page import Page, parts
@@ -54,11 +52,18 @@ def _contacts(found: ContactFindings) -> list[Block]:
     rows: list[list[Cell | str]] = []
     for each in found.contacts:
         first = robot.joints.index(each.joints[0])
-        force = "–" if each.force is None else f"{np.linalg.norm(each.force):.3g} N"
         torque = f"{number(float(each.torque[first]))} {robot.torque_unit(first)}"
         spans = [f"{each.start:.2f}", f"{each.stop:.2f}"]
         rows.append(
-            [name(each.recording), *spans, ", ".join(each.joints), torque, number(each.score), each.place, force]
+            [
+                name(each.recording),
+                *spans,
+                ", ".join(each.joints),
+                torque,
+                number(each.score),
+                each.place,
+                each.force_words,
+            ]
         )
     told = f"{LEAST_JOINTS} joints or more" if robot.n > LEAST_JOINTS else "all joints"
     words = (

@@ -29,8 +29,9 @@ from scara_ident.report.html.paper import paper_report
 from scara_ident.report.html.use import use_report
 from scara_ident.robot.robot import load_robot
 from scara_ident.use.check import Check, check
-from scara_ident.use.contact import ContactFindings, contact_observer, look_for_contact
+from scara_ident.use.contact import ContactFindings, look_for_contact
 from scara_ident.use.joint_limits import joint_limits
+from scara_ident.use.observer import contact_observer
 from tests.arms import noisy, recorded_torque, recording, sines
 from tests.report.html.made_fleet import made_fleet
 from tests.report.simulated import made, run, swinging
