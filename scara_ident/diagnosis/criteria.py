@@ -112,12 +112,12 @@ class SelectionCriteria:
     lower_band: float = _criterion(
         0.35,
         "of the band",
-        "in which what is the same at all frequencies is looked for again",
+        "in which what is the same at all frequencies is looked for again, and what noise could make half-way to it by octaves too",
     )
     lower_change: float = _criterion(
         0.5,
         "of its size",
-        "by which it is another one there, or once it was taken out of the data: a column of first order says too little of a long delay",
+        "by which it is another one there, or less where noise could make it, or another once it was taken out of the data: a column of first order says too little of a long delay",
     )
     least_beside_rest: float = _criterion(
         0.5,

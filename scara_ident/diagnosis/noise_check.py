@@ -14,6 +14,7 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Scene
+from scara_ident.errors import RecordingError
 from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
 from scara_ident.estimation.run_offsets import offsets_on
 from scara_ident.motion.position_noise import noise_sizes
@@ -33,7 +34,12 @@ def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
         That lets it in.
     """
     unresolved = step.columns.unresolved_for(decision.candidate.member.joint) or within_a_step(step, decision.candidate)
-    return unresolved or _gone_further_down(step, decision) or made_by_noise(step, decision)
+    return (
+        unresolved
+        or _gone_further_down(step, decision)
+        or made_by_noise(step, decision)
+        or made_through_the_controller(step, decision)
+    )
 
 
 def made_by_noise(step: SelectionStep, decision: Decision) -> str | None:
@@ -88,20 +94,89 @@ def _gone_further_down(step: SelectionStep, decision: Decision) -> str | None:
     candidate, criteria, whole = decision.candidate, step.criteria, decision.examination
     if not candidate.effect.same_at_all_frequencies:
         return None
-    share = criteria.lower_band
-    narrower = tuple(share * (band or step.scene.band) for band in step.observations.data.bands)
-    columns = step.columns.at(narrower)
-    below = replace(step, columns=columns, variation=offsets_on(columns.observations, step.offsets))
-    found = examine(below.model, below.rows(below.scene, [candidate]), criteria)[0]
-    apart, spread = found.value - whole.value, found.covariance + whole.covariance
-    p_value = significance(apart, spread, min(found.freedom, whole.freedom), found.products)
-    if p_value > criteria.significant or np.max(np.abs(apart)) < criteria.lower_change * np.max(np.abs(whole.value)):
+    below = _examined_below(step, candidate, criteria.lower_band)
+    if below is None:
+        return None
+    found, band = below
+    change = np.max(np.abs(found.value - whole.value))
+    p_value = _differing(found, whole)
+    if p_value > criteria.significant or change < criteria.lower_change * np.max(np.abs(whole.value)):
         return None
     name, unit = candidate.effect.coefficients[0].name, candidate.effect.coefficients[0].unit
     return (
-        f"{name} would be {whole.value[0]:.2g} {unit}, but {found.value[0]:.2g} {unit} below {max(narrower):.2g} Hz "
+        f"{name} would be {whole.value[0]:.2g} {unit}, but {found.value[0]:.2g} {unit} below {band:.2g} Hz "
         f"(p = {p_value:.1e}), where one that is there is the same"
     )
+
+
+def made_through_the_controller(step: SelectionStep, decision: Decision) -> str | None:
+    """Say so where the noise of positions could make all of an effect by a controller's answer to it, and little is left below.
+
+    A controller that damps by differences of coarse positions has their noise in the torque: that in the column is no
+    stranger to that in the residual, as it is to what `made_by_noise` adds, and what it makes is of any size and sign. It can
+    explain no more of the residual than its share of the column's square (Cauchy and Schwarz). Where that is as much as the
+    effect removes, the frequencies decide: what an arm has is the same in the lower part of the band, and the noise of
+    positions, differentiated, is hardly there.
+
+    Parameters
+    ----------
+    step, decision
+        See `noise_objection`.
+    """
+    candidate, criteria, whole = decision.candidate, step.criteria, decision.examination
+    if noise_of_column(step, decision) < decision.gain:
+        return None
+    size = float(whole.value @ whole.products @ whole.value)
+    # Of a fast resonance little is in so low a part: half-way to it, by octaves, there is more.
+    for share in (criteria.lower_band, float(np.sqrt(criteria.lower_band))):
+        below = _examined_below(step, candidate, share)
+        if below is None:
+            continue
+        found, band = below
+        left = float(whole.value @ whole.products @ found.value) / size
+        p_value = _differing(found, whole)
+        # Noise in the column alone makes the whole band's too small.
+        if left <= 1.0 - criteria.lower_change and p_value <= criteria.significant:
+            return (
+                "the noise of the positions could make all of it, by what a controller answers it with: below "
+                f"{band:.2g} Hz it is {left:.0%} of its size (p = {p_value:.1e}), where one that is there is the same"
+            )
+    return None
+
+
+def noise_of_column(step: SelectionStep, decision: Decision) -> float:
+    """Return the share of the squared torque of an effect, less what the model spans of it, that noise of positions makes.
+
+    Parameters
+    ----------
+    step, decision
+        See `noise_objection`.
+    """
+    found, twin = decision.examination, step.noisier
+    whole = float(found.value @ found.products @ found.value)
+    (rows,) = twin.rows(twin.scene, [decision.candidate])
+    _, products = coefficients(twin.model, rows, step.criteria)
+    return float(found.value @ products @ found.value) / whole - 1.0 if whole > 0.0 else 0.0
+
+
+def _examined_below(step: SelectionStep, candidate: Candidate, share: float) -> tuple[Examination, float] | None:
+    """Return what is said of a candidate in the lower part of the band, this share of it, and where that ends, Hz.
+
+    None where a recording is too short for that part.
+    """
+    narrower = tuple(share * (band or step.scene.band) for band in step.observations.data.bands)
+    try:
+        columns = step.columns.at(narrower)
+    except RecordingError:
+        return None
+    below = replace(step, columns=columns, variation=offsets_on(columns.observations, step.offsets))
+    return examine(below.model, below.rows(below.scene, [candidate]), step.criteria)[0], max(narrower)
+
+
+def _differing(found: Examination, whole: Examination) -> float:
+    """Return the probability that coefficients in a part of the band differ so much by chance."""
+    spread = found.covariance + whole.covariance
+    return significance(found.value - whole.value, spread, min(found.freedom, whole.freedom), found.products)
 
 
 def less_noise(step: SelectionStep, decisions: Sequence[Decision], scene: Scene | None = None) -> list[Decision]:
