@@ -18,6 +18,8 @@ from scara_ident.model.terms.friction import Friction
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.kinematics import force_torques
 
+# A weight that hangs from a tool that hardly turns is a constant force: one that explains less than so much more is no other.
+ALIKE = 0.05
 # Intervals that are asked at the most, those that show the body most: their columns are as many times more.
 MOST_ASKED = 12
 # Twice a logarithm of odds: very strong evidence (Kass and Raftery 1995).
@@ -58,10 +60,9 @@ def beaten(scene: Scene, shown: Sequence[int], cells: Cells, asked: Asked, scatt
     for other in (rubbing, scale, offset, offsets, force, forces):
         instead = squares(other)
         told = int(np.count_nonzero(np.einsum("qa,ab,qb->q", other, spread, other) > 0.0))
-        if instead - cost * told > alone + STRONG:
-            return True
-        # A weight that hangs from a tool that hardly turns is a constant force.
         pressed = other is force or other is forces
+        if instead - cost * told > alone + max(STRONG, ALIKE * alone if pressed else 0.0):
+            return True
         if not pressed and squares(body, other) - instead < cost * k:
             return True
     return False

@@ -72,6 +72,7 @@ def run(
         "friction": 0.5 * np.sign(np.gradient(bare.position, bare.time, axis=1)),
         "scale": 0.1 * bare.effort,
         "contact": -5.0 * along - 2.0 * up,
+        "weight": 9.81 * MASS * up,
         "nothing": np.zeros_like(bare.effort),
     }[kind]
     acts = np.zeros(len(bare.time), dtype=bool)
