@@ -109,7 +109,6 @@ GENERAL = {
     "frequency": "one frequency",
     "source": "another joint's velocity, or a sum or difference with it",
     "recordings": "some recordings",
-    "run": "the run",
     "way": "the sum or difference of ",
 }
 

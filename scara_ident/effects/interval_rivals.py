@@ -11,19 +11,19 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.last_link_cells import Cells
-from scara_ident.effects.recording_groups import rows_of_last_link
+from scara_ident.effects.recording_groups import inverse_of, rows_of_last_link
 from scara_ident.effects.signals import Scene
 from scara_ident.model.regressor.kernel import configurations
 from scara_ident.model.terms.friction import Friction
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.kinematics import force_torques
 
+# A weight that hangs from a tool that hardly turns is a constant force: one that explains less than so much more is no other.
+ALIKE = 0.05
 # Intervals that are asked at the most, those that show the body most: their columns are as many times more.
 MOST_ASKED = 12
 # Twice a logarithm of odds: very strong evidence (Kass and Raftery 1995).
 STRONG = 10.0
-# Directions of columns of unit size below this share are rounding.
-_RANK = 1e-9
 
 # Of a recording's name the intervals to ask about: number, begin and end in s since it began.
 Asked = dict[str, list[tuple[int, float, float]]]
@@ -60,10 +60,9 @@ def beaten(scene: Scene, shown: Sequence[int], cells: Cells, asked: Asked, scatt
     for other in (rubbing, scale, offset, offsets, force, forces):
         instead = squares(other)
         told = int(np.count_nonzero(np.einsum("qa,ab,qb->q", other, spread, other) > 0.0))
-        if instead - cost * told > alone + STRONG:
-            return True
-        # A weight that hangs from a tool that hardly turns is a constant force.
         pressed = other is force or other is forces
+        if instead - cost * told > alone + max(STRONG, ALIKE * alone if pressed else 0.0):
+            return True
         if not pressed and squares(body, other) - instead < cost * k:
             return True
     return False
@@ -71,10 +70,7 @@ def beaten(scene: Scene, shown: Sequence[int], cells: Cells, asked: Asked, scatt
 
 def explained(left: Array, spread: Array) -> float:
     """Return the squares that columns explain, by their products with what is left (q,) and with each other (q, q)."""
-    size = np.sqrt(np.maximum(np.diagonal(spread), 0.0))
-    scale = np.where(size > 0.0, size, np.inf)
-    aim = left / scale
-    return float(aim @ np.linalg.pinv(spread / np.outer(scale, scale), rcond=_RANK, hermitian=True) @ aim)
+    return float(left @ inverse_of(spread) @ left)
 
 
 def _normal(scene: Scene, shown: Sequence[int], cells: Cells, asked: Asked) -> tuple[Array, Array]:
@@ -97,13 +93,12 @@ def _normal(scene: Scene, shown: Sequence[int], cells: Cells, asked: Asked) -> t
             if motion.name != item.name:
                 continue
             forces = _forces(scene, motion, asked[item.name])
-            for joint, (time, own) in enumerate(rows_of_last_link(scene, motion, columns, shown)):
-                active = scene.model.active[joint]
-                since, base = time - scene.start[item.name] + 0.25 / scene.band, own[: len(active)]
-                friction = value[active][rubs[active]] @ base[rubs[active]]
+            time, sure, rows = rows_of_last_link(scene, motion, columns, shown)
+            since = time - scene.start[item.name] + 0.25 / scene.band
+            for joint, (own, counts) in enumerate(zip(rows, sure, strict=True)):
                 table, inside = np.zeros((size, len(time))), np.zeros(len(time), dtype=bool)
                 for place, start, stop in asked[item.name]:
-                    there = (since >= start) & (since < stop)
+                    there = counts & (since >= start) & (since < stop)
                     inside |= there
                     table[k + 2 * n + place * n + joint, there] = 1.0
                     first = k + 2 * n + n * count + 3 * place
@@ -111,11 +106,12 @@ def _normal(scene: Scene, shown: Sequence[int], cells: Cells, asked: Asked) -> t
                     if len(when):
                         for a in range(3):
                             table[first + a, there] = np.interp(time[there], when, force[:, joint, a])
-                table[:k] = np.where(inside, own[len(active) : -1], 0.0)
+                table[:k] = np.where(inside, own[p:-1], 0.0)
                 # The torque as it was recorded: what the base model makes of it has taken in part of the change.
-                table[k + joint], table[k + n + joint] = np.where(inside, friction, 0.0), np.where(inside, own[-1], 0.0)
+                table[k + joint] = np.where(inside, value[rubs] @ own[:p][rubs], 0.0)
+                table[k + n + joint] = np.where(inside, own[-1], 0.0)
                 spread += cells.weights[joint] * table @ table.T
-                across[:, [*active, p]] += cells.weights[joint] * table @ np.concatenate([base, own[-1:]]).T
+                across += cells.weights[joint] * table @ own[[*range(p), -1]].T
                 sums[joint] += np.sum(table, axis=1)
         share = (cells.weights / np.maximum(item.rows, 1.0))[:, None] * sums
         spread -= share.T @ sums

@@ -9,7 +9,7 @@ intervals that explain most. What else may change there is tried beside it (`int
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from scara_ident.arrays import Array
 from scara_ident.effects.interval_rivals import MOST_ASKED, STRONG, Asked, beaten
 from scara_ident.effects.last_link_cells import Cells, cells_of
 from scara_ident.effects.parameters import Interval
-from scara_ident.effects.pickups import weights_beside
+from scara_ident.effects.recording_groups import inverse_of
 from scara_ident.effects.signals import Scene
 from scara_ident.effects.two_states import instants, likeliest, scatter_of, spans
 
@@ -43,7 +43,8 @@ class _Found:
 
     Attributes
     ----------
-    states : list of ndarray, each of shape (C,)
+    states, seen, made : list of ndarray, each of shape (C,)
+        Of each recording in which cells it acts, and what they say of it, see `Cells.scores`.
     body : ndarray, shape (k,)
     gain : float
         What it explains, twice a logarithm of likelihoods.
@@ -54,6 +55,8 @@ class _Found:
     """
 
     states: list[Array]
+    seen: list[Array]
+    made: list[Array]
     body: Array
     gain: float
     scatter: float
@@ -75,12 +78,10 @@ def carried(scene: Scene, shown: Sequence[int]) -> tuple[Interval, ...]:
     shown : sequence of int
         Standard parameters of a body on the last link, of which it is told.
     """
-    names = [name for name in scene.start if any(motion.name == name for motion in scene.columns)]
-    if not names:
+    if not scene.columns:
         return ()
-    cells = cells_of(scene, shown, names, weights_beside(scene, names, shown))
-    tried = [_settled(cells, start) for start in _begins(cells)]
-    best = max((item for item in tried if item is not None), key=lambda item: item.worth, default=None)
+    cells = cells_of(scene, shown)
+    best = max(_settled(cells, *_begins(cells)), key=lambda item: item.worth, default=None)
     if best is None or best.worth < STRONG + len(shown) * _cost(cells):
         return ()
     said = best if _positive(best, shown) else _turned(best)
@@ -89,63 +90,72 @@ def carried(scene: Scene, shown: Sequence[int]) -> tuple[Interval, ...]:
     return _intervals(scene, cells, said)
 
 
-def _begins(cells: Cells) -> list[tuple[list[Array], Array]]:
-    """Return the single intervals that explain most, each as states and with its body."""
+def _begins(cells: Cells) -> tuple[list[Array], Array]:
+    """Return the s single intervals that explain most, as states (s, C) of each recording and with their bodies (s, k)."""
     value, found = cells.inverse @ cells.aim, []
     for run, item in enumerate(cells.each):
         count = len(item.bounds) - 1
         grid = np.unique(np.linspace(0, count, max(8, int(item.bounds[-1] / GRID)) + 1).astype(int))
-        last = len(grid) - 1
-        pairs = [(a, b) for a in range(last) for b in range(a + 1, min(last, a + LONGEST) + 1) if b - a < last]
-        first, stop = np.array(pairs).T
-        squares, across, sums = (_between(table, grid, first, stop) for table in (item.squares, item.across, item.sums))
+        # What all cells before a place of the grid say; of an interval it is the difference.
+        squares, across, sums = (_before(table, grid) for table in (item.squares, item.across, item.sums))
         share = (cells.weights / np.maximum(item.rows, 1.0))[:, None] * sums
-        squares = squares - share.transpose(0, 2, 1) @ sums
-        across = across - share.transpose(0, 2, 1) @ item.whole
-        reach = across[:, :, :-1]
-        right = across[:, :, -1] - reach @ value
-        body = _solved(squares - reach @ cells.inverse @ reach.transpose(0, 2, 1), right)
-        gain = np.sum(body * right, axis=1)
-        own = []
-        for k in np.argsort(-gain)[:BEGINS]:
-            states = [np.zeros(len(other.bounds) - 1) for other in cells.each]
-            states[run][grid[first[k]] : grid[stop[k]]] = 1.0
-            own.append((float(gain[k]), states, body[k]))
-        found.append(own)
-    found.sort(key=lambda one: -one[0][0])
+        across = across - share.swapaxes(1, 2) @ item.whole
+        reach, right = across[..., :-1], across[..., -1] - across[..., :-1] @ value
+        beside = np.concatenate([reach, sums.swapaxes(1, 2)], axis=2)
+        taken = np.concatenate([reach @ cells.inverse, share.swapaxes(1, 2)], axis=2)
+        parts = []
+        for long in range(1, min(LONGEST, len(grid) - 2) + 1):
+            spread, aim, off, there = (table[long:] - table[:-long] for table in (squares, right, taken, beside))
+            parts.append((spread - off @ there.swapaxes(1, 2), aim, grid[:-long], grid[long:]))
+        if parts:
+            spreads, aims, first, stop = (np.concatenate(item) for item in zip(*parts, strict=True))
+            body = _solved(spreads, aims)
+            gain = np.sum(body * aims, axis=1)
+            found.append([(float(gain[k]), run, first[k], stop[k], body[k]) for k in np.argsort(-gain)[:BEGINS]])
+    most = sorted(found, key=lambda own: -own[0][0])[:RECORDINGS]
     # An interval has to pay for two changes; where none does as much as for one, what the base model leaves has no structure.
-    if not found or found[0][0][0] < STRONG + _cost(cells):
-        return []
-    return [(states, body) for own in found[:RECORDINGS] for _, states, body in own]
+    begins = [one for own in most for one in own] if most and most[0][0][0] >= STRONG + _cost(cells) else []
+    states = [np.zeros((len(begins), len(item.bounds) - 1)) for item in cells.each]
+    for state, (_, run, *edges, _) in enumerate(begins):
+        states[run][state, slice(*edges)] = 1.0
+    return states, np.array([body for *_, body in begins])
 
 
-def _between(table: Array, grid: NDArray[np.intp], first: NDArray[np.intp], stop: NDArray[np.intp]) -> Array:
-    total = np.concatenate([np.zeros((1, *table.shape[1:])), np.cumsum(table, axis=0)])[grid]
-    return np.asarray(total[stop] - total[first])
+def _before(table: Array, grid: NDArray[np.intp]) -> Array:
+    """Return sums (g, ...) of a table's rows (C, ...) before places."""
+    parts = np.add.reduceat(table, grid[:-1], axis=0)
+    return np.concatenate([np.zeros_like(parts[:1]), np.cumsum(parts, axis=0)])
 
 
-def _settled(cells: Cells, start: tuple[list[Array], Array]) -> _Found | None:
-    """Return the body and where it acts once neither changes the other; None where nothing is left of it."""
-    states, body = start
-    scatter, gain, price = OF_NOISE, 0.0, 0.0
-    for _ in range(ROUNDS):
-        change = scatter * _cost(cells)
-        new = [
-            _long(state, item.bounds)
-            for state, item in zip(_likeliest(cells, states, body, change), cells.each, strict=True)
-        ]
-        changes = sum(int(np.count_nonzero(np.diff(state))) for state in new)
-        if changes == 0:
-            return None
-        squares, right, _ = cells.normal(new)
-        body = _solved(squares[None], right[None])[0]
-        same = all(np.array_equal(one, other) for one, other in zip(new, states, strict=True))
-        states, gain = new, float(body @ right)
-        known, scatter = scatter, _scatter(cells, states, body)
-        price = 2.0 * scatter * _cost(cells) * changes
-        if same and abs(scatter - known) <= 0.1 * known:
+def _settled(cells: Cells, states: list[Array], bodies: Array) -> list[_Found]:
+    """Return bodies and where they act once neither changes the other, of states (s, C) of each recording to begin with.
+
+    Those of which nothing is left are left out.
+    """
+    found: list[_Found] = []
+    if not len(bodies):
+        return found
+    scatter = np.full(len(bodies), OF_NOISE)
+    seen, made = cells.scores(states, cells.normal(states)[2], bodies)
+    for turn in range(ROUNDS):
+        new = _likeliest(cells, seen, made, scatter * _cost(cells))
+        changes = np.sum([np.count_nonzero(np.diff(state), axis=1) for state in new], axis=0)
+        same = np.all([np.all(one == other, axis=1) for one, other in zip(new, states, strict=True)], axis=0)
+        squares, right, reach = cells.normal(new)
+        states, bodies, known = new, _solved(squares, right), scatter
+        seen, made = cells.scores(states, reach, bodies)
+        scatter = _scatter(cells, states, seen, made)
+        ended = (same & (np.abs(scatter - known) <= 0.1 * known)) | (turn == ROUNDS - 1)
+        for k in np.flatnonzero(ended & (changes > 0)):
+            price = 2.0 * scatter[k] * _cost(cells) * changes[k]
+            own, said, size = ([table[k] for table in tables] for tables in (states, seen, made))
+            found.append(_Found(own, said, size, bodies[k], float(bodies[k] @ right[k]), scatter[k], price))
+        going = ~ended & (changes > 0)
+        states, seen, made = ([table[going] for table in tables] for tables in (states, seen, made))
+        bodies, scatter = bodies[going], scatter[going]
+        if not len(bodies):
             break
-    return _Found(states, body, gain, scatter, price)
+    return found
 
 
 def _cost(cells: Cells) -> float:
@@ -153,9 +163,11 @@ def _cost(cells: Cells) -> float:
     return float(np.log(sum(len(item.bounds) - 1 for item in cells.each))) + 2.0
 
 
-def _likeliest(cells: Cells, states: list[Array], body: Array, change: float) -> list[Array]:
-    seen, made = cells.scores(states, body)
-    return likeliest([own - 0.5 * size for own, size in zip(seen, made, strict=True)], change)
+def _likeliest(cells: Cells, seen: list[Array], made: list[Array], change: Array) -> list[Array]:
+    """Return the likeliest states (s, C) of each recording, by what its cells say of bodies."""
+    gains = [row for own, size in zip(seen, made, strict=True) for row in own - 0.5 * size]
+    found = iter(likeliest(gains, np.tile(change, len(seen))))
+    return [np.array([_long(next(found), item.bounds) for _ in change]) for item in cells.each]
 
 
 def _long(state: Array, bounds: Array) -> Array:
@@ -170,19 +182,20 @@ def _long(state: Array, bounds: Array) -> Array:
     return state
 
 
-def _scatter(cells: Cells, states: list[Array], body: Array) -> float:
-    """Return by how much squares of what is left lie above those of independent rows, over stretches of time."""
-    seen, made = cells.scores(states, body)
+def _scatter(cells: Cells, states: list[Array], seen: list[Array], made: list[Array]) -> Array:
+    """Return by how much squares of what is left lie above those of independent rows, over stretches of time, shape (s,)."""
     left = [own - state * size for state, own, size in zip(states, seen, made, strict=True)]
-    return scatter_of(left, made, max(float(item.bounds[1]) for item in cells.each))
+    width = max(float(item.bounds[1]) for item in cells.each)
+    return np.array(
+        [scatter_of([own[k] for own in left], [own[k] for own in made], width) for k in range(len(made[0]))]
+    )
 
 
 def _asked(cells: Cells, found: _Found) -> Asked:
     """Return the intervals that show most of the body."""
-    _, made = cells.scores(found.states, found.body)
     every = [
         (float(np.sum(size[a:b])), item.name, item.bounds[a], item.bounds[b])
-        for item, state, size in zip(cells.each, found.states, made, strict=True)
+        for item, state, size in zip(cells.each, found.states, found.made, strict=True)
         for a, b in spans(state)
     ]
     result: Asked = {}
@@ -204,22 +217,19 @@ def _positive(found: _Found, shown: Sequence[int]) -> bool:
 
 def _turned(found: _Found) -> _Found:
     """Return the opposite body in all other times: what is always there the base model has."""
-    return _Found([1.0 - state for state in found.states], -found.body, found.gain, found.scatter, found.price)
+    states, seen = [1.0 - state for state in found.states], [b - a for a, b in zip(found.seen, found.made, strict=True)]
+    return replace(found, states=states, seen=seen, body=-found.body)
 
 
 def _intervals(scene: Scene, cells: Cells, found: _Found) -> tuple[Interval, ...]:
     places = list(scene.start)
-    seen, made = cells.scores(found.states, found.body)
     return tuple(
         Interval(places.index(item.name), *times)
-        for item, state, own, size in zip(cells.each, found.states, seen, made, strict=True)
+        for item, state, own, size in zip(cells.each, found.states, found.seen, found.made, strict=True)
         for times in instants((own - 0.5 * size) / found.scatter, size / found.scatter, state, item.bounds)
     )
 
 
 def _solved(squares: Array, right: Array) -> Array:
-    """Return bodies by their normal equations, (s, k, k) and (s, k), within the directions that they tell."""
-    size = np.sqrt(np.maximum(np.diagonal(squares, axis1=1, axis2=2), 0.0))
-    scale = np.where(size > 0.0, size, np.inf)
-    inverse = np.linalg.pinv(squares / scale[:, :, None] / scale[:, None, :], rcond=_RANK, hermitian=True)
-    return np.asarray(np.einsum("skl,sl->sk", inverse, right / scale) / scale)
+    """Return bodies (s, k) by their normal equations, (s, k, k) and (s, k), within the directions that they tell."""
+    return np.asarray((inverse_of(squares, _RANK) @ right[..., None])[..., 0])

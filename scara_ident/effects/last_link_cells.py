@@ -12,14 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.recording_groups import rows_of_last_link
-from scara_ident.effects.signals import Scene
+from scara_ident.effects.recording_groups import half_periods, inverse_of, means_of, rows_of_last_link
+from scara_ident.effects.signals import Scene, Signals
 
 # Cells last this long at the least, s, a sixth of what is carried shortest, and there are so many in all recordings together:
 # more would tell instants better, and take more time and memory than they are worth here.
 LEAST_CELL, MOST_CELLS = 0.05, 8192
-# Directions of columns of unit size below this share are rounding.
-_RANK = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,81 +67,102 @@ class Cells:
     aim: Array
 
     def normal(self, states: Sequence[Array]) -> tuple[Array, Array, Array]:
-        """Return the normal equations of a body that acts in some cells, the base model and offsets taken off.
+        """Return the normal equations of bodies that act in some cells, the base model and offsets taken off.
 
         Parameters
         ----------
-        states : sequence of ndarray, each of shape (C,)
-            How much of each cell of a recording it acts in.
+        states : sequence of ndarray, each of shape (..., C)
+            How much of each cell of a recording they act in.
 
         Returns
         -------
         tuple of ndarray
-            Products (k, k), right sides (k,), and products with the base model (k, p).
+            Products (..., k, k), right sides (..., k), and products with the base model (..., k, p).
         """
-        squares, reach, right = self._beside_offsets(states)
-        return squares - reach @ self.inverse @ reach.T, right - reach @ (self.inverse @ self.aim), reach
-
-    def _beside_offsets(self, states: Sequence[Array]) -> tuple[Array, Array, Array]:
-        size, reach = self.each[0].squares.shape[1], self.each[0].across.shape[2]
-        squares, across = np.zeros((size, size)), np.zeros((size, reach))
+        squares, across = np.zeros(()), np.zeros(())
         for item, state in zip(self.each, states, strict=True):
             inside = np.tensordot(state, item.sums, 1)
-            share = (self.weights / np.maximum(item.rows, 1.0))[:, None] * inside
-            squares += np.tensordot(state, item.squares, 1) - share.T @ inside
-            across += np.tensordot(state, item.across, 1) - share.T @ item.whole
-        return squares, across[:, :-1], across[:, -1]
+            share = ((self.weights / np.maximum(item.rows, 1.0))[:, None] * inside).swapaxes(-1, -2)
+            squares = squares + np.tensordot(state, item.squares, 1) - share @ inside
+            across = across + np.tensordot(state, item.across, 1) - share @ item.whole
+        reach, right = across[..., :-1], across[..., -1]
+        return squares - reach @ self.inverse @ reach.swapaxes(-1, -2), right - reach @ (self.inverse @ self.aim), reach
 
-    def scores(self, states: Sequence[Array], body: Array) -> tuple[list[Array], list[Array]]:
-        """Return what cells say of a body where it acts as given and all else is fitted beside it.
+    def scores(self, states: Sequence[Array], reach: Array, body: Array) -> tuple[list[Array], list[Array]]:
+        """Return what cells say of bodies where they act as given and all else is fitted beside them.
 
         Parameters
         ----------
-        states : sequence of ndarray, each of shape (C,)
-        body : ndarray, shape (k,)
+        states : sequence of ndarray, each of shape (..., C)
+        reach : ndarray, shape (..., k, p)
+            Products with the base model, see `normal`.
+        body : ndarray, shape (..., k)
 
         Returns
         -------
         tuple of list of ndarray
             Of each recording the products of what the body makes in a cell with what is left there without it, and its
-            squares, (C,) each.
+            squares, (..., C) each.
         """
-        _, _, reach = self.normal(states)
-        value = self.inverse @ (self.aim - reach.T @ body)
+        value = (self.aim - (body[..., None, :] @ reach)[..., 0, :]) @ self.inverse
+        full = np.concatenate([-value, np.ones((*value.shape[:-1], 1))], axis=-1)
         seen, made = [], []
         for item, state in zip(self.each, states, strict=True):
-            rows = np.maximum(item.rows, 1.0)
-            offset = (item.whole[:, -1] - item.whole[:, :-1] @ value - np.tensordot(state, item.sums, 1) @ body) / rows
-            along = item.across @ np.append(-value, 1.0) - np.einsum("cjk,j->ck", item.sums, self.weights * offset)
-            seen.append(along @ body)
-            made.append(np.einsum("k,ckl,l->c", body, item.squares, body))
+            inside = (np.tensordot(state, item.sums, 1) @ body[..., None])[..., 0]
+            offset = self.weights * (full @ item.whole.T - inside) / np.maximum(item.rows, 1.0)
+            seen.append(_of_cells(item.across, body, full) - _of_cells(item.sums, offset, body))
+            made.append(_of_cells(item.squares, body, body))
         return seen, made
 
 
-def cells_of(scene: Scene, shown: Sequence[int], names: Sequence[str], weights: Array) -> Cells:
+def _of_cells(table: Array, one: Array, other: Array) -> Array:
+    """Return what tables (C, a, b) are between vectors (..., a) and (..., b), shape (..., C)."""
+    both = (one[..., :, None] * other[..., None, :]).reshape(*one.shape[:-1], -1)
+    return np.asarray(both @ table.reshape(len(table), -1).T)
+
+
+def cells_of(scene: Scene, shown: Sequence[int]) -> Cells:
     """Return what cells of recordings say of a body on the last link.
 
     Parameters
     ----------
     scene : Scene
-        With the base model's columns on motions that carry the recorded torque.
+        With the base model's columns on motions that carry the recorded torque, and its estimate by them.
     shown : sequence of int
         Standard parameters of the body.
-    names : sequence of str
-        Recordings.
-    weights : ndarray, shape (n,)
-        Of the squares of each joint's rows.
     """
-    p = len(scene.value)
-    lengths = {name: duration_of(scene, name) for name in names}
+    p, weights = len(scene.value), _weights(scene)
+    with_motion = {motion.name for motion in scene.columns}
+    lengths = {name: duration_of(scene, name) for name in scene.start if name in with_motion}
     shortest = max(0.5 / scene.band, LEAST_CELL, sum(lengths.values()) / MOST_CELLS)
     products, each = np.zeros((p, p + 1)), []
-    for name in names:
-        item, own = _recording(scene, name, shown, weights, max(1, int(lengths[name] / shortest)))
+    for name, length in lengths.items():
+        item, own = _recording(scene, name, shown, weights, max(1, int(length / shortest)))
         share = (weights / np.maximum(item.rows, 1.0))[:, None] * item.whole[:, :-1]
         products += own - share.T @ item.whole
         each.append(item)
     return Cells(tuple(each), weights, inverse_of(products[:, :-1]), products[:, -1])
+
+
+def _weights(scene: Scene) -> Array:
+    """Return one over what the base model and offsets of recordings leave of a row of each joint, squared, shape (n,)."""
+    n = scene.robot.n
+    whole, count, squares = np.zeros(n), np.zeros(n), np.zeros(n)
+    # Of each recording the sums of what is left, and of ones.
+    sums: dict[str, Array] = {}
+    for motion in scene.columns:
+        if motion.torque is None:
+            continue
+        step, _, sure = half_periods(scene, motion)
+        means = means_of(motion.torque - Signals(scene, motion).predicted, step)
+        own = sums.setdefault(motion.name, np.zeros((2, n)))
+        own += np.sum(np.array([means, np.ones_like(means)]) * sure, axis=2)
+        squares += np.sum(sure * means**2, axis=1)
+        whole += np.sum(motion.torque**2, axis=1)
+    for total, rows in sums.values():
+        squares -= total**2 / np.maximum(rows, 1.0)
+        count += rows
+    return np.asarray(count / np.maximum(squares, np.finfo(float).eps * whole + np.finfo(float).tiny))
 
 
 def _recording(
@@ -157,26 +176,21 @@ def _recording(
     for motion, columns in scene.columns.items():
         if motion.name != name:
             continue
-        for joint, (time, own) in enumerate(rows_of_last_link(scene, motion, columns, shown)):
-            if not len(time):
-                continue
-            places = np.append(scene.model.active[joint], p)
-            size = len(places) - 1
-            base, body = own[[*range(size), -1]], own[size:-1]
-            # A row is the mean over half a period from its time on.
-            share = (time - scene.start[name] + 0.25 / scene.band) / duration
-            cells, starts = np.unique(np.clip(count * share, 0, count - 1).astype(int), return_index=True)
-            weight = weights[joint]
-            products[np.ix_(places[:-1], places)] += weight * (base[:-1] @ base.T)
-            whole[joint, places] += np.sum(base, axis=1)
-            rows[joint] += len(time)
-            sums[cells, joint] += np.add.reduceat(body, starts, axis=1).T
-            both = np.concatenate([base, body])
-            found = np.zeros((count, k, len(both)))
-            for a in range(k):
-                found[cells, a] = np.add.reduceat(weight * body[a] * both, starts, axis=1).T
-            across[:, :, places] += found[:, :, : len(base)]
-            squares += found[:, :, len(base) :]
+        time, sure, own = rows_of_last_link(scene, motion, columns, shown)
+        if not len(time):
+            continue
+        base, body = own[:, [*range(p), -1]], own[:, p:-1]
+        products += np.sum(weights[:, None, None] * (base[:, :-1] @ base.swapaxes(1, 2)), axis=0)
+        whole += np.sum(base, axis=2)
+        rows += np.sum(sure, axis=1)
+        # A row is the mean over half a period from its time on.
+        share = (time - scene.start[name] + 0.25 / scene.band) / duration
+        cells, starts = np.unique(np.clip(count * share, 0, count - 1).astype(int), return_index=True)
+        # Rows first: so they are summed fast.
+        base, body = (np.ascontiguousarray(np.moveaxis(part, 2, 0)) for part in (base, body))
+        weighted = np.swapaxes(weights[:, None] * body, 1, 2)
+        for table, part in ((sums, body), (squares, weighted @ body), (across, weighted @ base)):
+            table[cells] += np.add.reduceat(part, starts, axis=0)
     bounds = duration * np.linspace(0.0, 1.0, count + 1)
     return RecordingCells(name, bounds, squares, across, sums, whole, rows), products
 
@@ -184,11 +198,3 @@ def _recording(
 def duration_of(scene: Scene, name: str) -> float:
     """Return how long a recording is, s."""
     return max(float(item.time[-1]) for item in scene.columns if item.name == name) - scene.start[name]
-
-
-def inverse_of(products: Array) -> Array:
-    """Return the inverse of products of columns, within the directions that they tell."""
-    scale = np.sqrt(np.where(np.diag(products) > 0.0, np.diag(products), 1.0))
-    return np.asarray(
-        np.linalg.pinv(products / np.outer(scale, scale), rcond=_RANK, hermitian=True) / np.outer(scale, scale)
-    )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import islice
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,7 +14,6 @@ from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.links import point_mass, shared, tool_of
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, View, deviation
 from scara_ident.effects.periodic import TorqueRipple
-from scara_ident.effects.pickups import PARTS, taken_up
 from scara_ident.effects.recording_groups import SLOWEST, groups_by_torque
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid
@@ -47,41 +45,27 @@ class PayloadChange(Effect):
     """A mass at the tool point that is there from some time in the run on; negative where it was put down."""
 
     name = "payload_change"
-    summary = "a payload taken up or put down in {run}"
+    summary = "a payload taken up or put down in the run"
     coefficients = (Coefficient("mass", "kg", "mass at the tool from some time in the run on"),)
     nonlinear: ClassVar[tuple[NonlinearParameter, ...]] = (NonlinearParameter("time", "s", 0.0, np.inf, False),)
     view = View("time")
     experiment = "repeat the run with the payload fastened, and once without it"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
-        """Return instants spread over the longest run, and those of single recordings that their torque tells."""
+        """Return instants spread over the longest run."""
         return _instants(scene, INSTANTS)
-
-    def words(self, scene: Scene, member: Member) -> dict[str, Any]:
-        """Add the run: all alike, or one."""
-        run = "the run" if member.partner is None else _recording(scene, member.partner)
-        return super().words(scene, member) | {"run": run}
 
     def gap(self, scene: Scene, member: Member) -> tuple[float, ...]:
         """Return how long no joint that a payload loads moves about the instant: where it rests it tells nothing."""
-        name = None if member.partner is None else _recording(scene, member.partner)
-        rests = [
-            _rest_about(scene, motion, member.nonlinear[0]) for motion in scene.columns if name in (None, motion.name)
-        ]
+        rests = [_rest_about(scene, motion, member.nonlinear[0]) for motion in scene.columns]
         return (min(rests, default=0.0),)
-
-    def resolution(self, scene: Scene, member: Member) -> tuple[float, ...] | None:
-        """Return how far apart the instants of a single recording are tried."""
-        return None if member.partner is None else (scene.duration / PARTS,)
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque of 1 kg at the tool from then on."""
         return [_at_tool(signals) * self.acting(signals, member)]
 
     def acting(self, signals: Signals, member: Member) -> Array:
-        """Return 0 before and 1 after an instant, over one sample, shape (N,); 0 in recordings that it is not of."""
-        if member.partner is not None and _recording(signals.scene, member.partner) != signals.motion.name:
-            return np.zeros(signals.motion.samples)
+        """Return 0 before and 1 after an instant, over one sample, shape (N,)."""
         return np.clip((signals.time - member.nonlinear[0]) * signals.motion.rate + 0.5, 0.0, 1.0)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
@@ -105,7 +89,7 @@ class FreePayloadChange(PayloadChange):
 
     whole: bool = False
 
-    summary = "a payload of unknown mounting taken up or put down in {run}"
+    summary = "a payload of unknown mounting taken up or put down in the run"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return instants spread over the longest run."""
@@ -287,15 +271,8 @@ class GravityCounterbalance(Sinusoid):
 
 
 def _instants(scene: Scene, count: int) -> tuple[Member, ...]:
-    """Return instants of all recordings alike, and of single ones; a member's partner is the place of the recording."""
-    alike = (Member(None, ((k + 0.5) * scene.duration / count,)) for k in range(count))
-    told = shared(scene, "taken up", lambda: taken_up(scene, shown_of(scene.robot)))
-    return (*alike, *(Member(None, (instant,), int(place)) for place, instant in told.tolist()))
-
-
-def _recording(scene: Scene, place: int) -> str | None:
-    """Return the name of a recording; None in a scene of others, as of motions that are made."""
-    return next(islice(scene.start, place, None), None)
+    """Return instants of all recordings alike."""
+    return tuple(Member(None, ((k + 0.5) * scene.duration / count,)) for k in range(count))
 
 
 def _rest_about(scene: Scene, motion: Motion, instant: float) -> float:

@@ -40,7 +40,10 @@ class PayloadInIntervals(FreePayloadChange):
     def words(self, scene: Scene, member: Member) -> dict[str, Any]:
         """Add the intervals: each if they are few."""
         names = list(scene.start)
-        said = [f"{names[item.recording]} from {item.start:.2f} to {item.stop:.2f} s" for item in member.intervals]
+        said = [
+            f"{names[item.recording]} from {item.start:.2f} " + (f"to {item.stop:.2f} s" if item.stop_std else "s on")
+            for item in member.intervals
+        ]
         if len(said) > MOST_SAID:
             within = dict.fromkeys(names[item.recording] for item in member.intervals)
             said = [f"{len(said)} intervals of {', '.join(within)}"]
@@ -61,10 +64,6 @@ class PayloadInIntervals(FreePayloadChange):
     def gap(self, scene: Scene, member: Member) -> tuple[float, ...]:
         """Return nothing: it has no nonlinear parameters."""
         return ()
-
-    def resolution(self, scene: Scene, member: Member) -> tuple[float, ...] | None:
-        """Return nothing."""
-        return None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Add when the first interval begins and ends."""

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.links import tool_of
@@ -105,10 +107,9 @@ def _more_than_others(scene: Scene, names: Sequence[str], shown: Sequence[int]) 
     for motion, columns in scene.columns.items():
         if motion.name in names:
             run = names.index(motion.name)
-            for joint, (_, rows) in enumerate(rows_of_last_link(scene, motion, columns, shown)):
-                places = [*scene.model.active[joint], *range(p, p + k + 1)]
-                products[run, joint][np.ix_(places, places)] += rows @ rows.T
-                counts[run, joint] += rows.shape[1]
+            _, sure, rows = rows_of_last_link(scene, motion, columns, shown)
+            products[run] += rows @ rows.swapaxes(1, 2)
+            counts[run] += np.sum(sure, axis=1)
     prior = np.tile(_prior(scene, shown), runs)
     value, covariance, noise = _fitted(products, counts, prior, p)
     own = _own_offsets(products, offset_columns(scene.model))
@@ -138,8 +139,7 @@ def _fitted(products: Array, counts: Array, prior: Array, p: int) -> tuple[Array
         each = np.einsum("rjab,j->rab", products, noise**-2.0)
         own, cross = each[:, p:-1, p:-1], each[:, p:-1, :p]
         shared = np.sum(each[:, :p, :p], axis=0)
-        scale = np.sqrt(np.where(np.diag(shared) > 0.0, np.diag(shared), 1.0))
-        inverse = np.linalg.pinv(shared / np.outer(scale, scale), rcond=_RANK, hermitian=True) / np.outer(scale, scale)
+        inverse = inverse_of(shared, _RANK)
         reach = cross.reshape(runs * k, p)
         precision = -reach @ inverse @ reach.T + np.diag(prior**-2.0)
         for run in range(runs):
@@ -154,15 +154,24 @@ def _fitted(products: Array, counts: Array, prior: Array, p: int) -> tuple[Array
     return value, covariance, noise
 
 
+def inverse_of(products: Array, least: float = 1e-9) -> Array:
+    """Return inverses of products of columns (..., q, q), within directions of columns of unit size above this share."""
+    square = np.diagonal(products, axis1=-2, axis2=-1)
+    scale = np.sqrt(np.where(square > 0.0, square, 1.0))
+    both = scale[..., :, None] * scale[..., None, :]
+    return np.asarray(np.linalg.pinv(products / both, rcond=least, hermitian=True) / both)
+
+
 def rows_of_last_link(
     scene: Scene, motion: Motion, columns: tuple[Array, ...], shown: Sequence[int]
-) -> list[tuple[Array, Array]]:
-    """Return means over half periods of the band, less those in which a joint is too slow for its friction to be sure.
+) -> tuple[Array, NDArray[np.bool_], Array]:
+    """Return means over the M half periods of the band, zero where a joint is too slow for its friction to be sure.
 
     Parameters
     ----------
     scene : Scene
     motion : Motion
+        Where it has no torque nothing counts.
     columns : tuple of ndarray
         The base model's on it.
     shown : sequence of int
@@ -170,25 +179,40 @@ def rows_of_last_link(
 
     Returns
     -------
-    list of tuple
-        Of each joint when they begin, s, shape (M,), and the base model's columns, those of the last link and the torque,
-        shape (p_j + k + 1, M).
+    tuple of ndarray
+        When each begins, s, shape (M,); of which joints it counts (n, M); and of each joint the base model's columns, those of
+        the last link and the torque, shape (n, p + k + 1, M).
     """
-    robot = scene.robot
-    torque = motion.torque
-    if torque is None:
-        return [(np.zeros(0), np.zeros((len(own) + len(shown) + 1, 0))) for own in columns]
-    payload = tool_of(robot).columns(robot, motion)[:, list(shown)]
+    p = len(scene.value)
+    step, time, sure = half_periods(scene, motion)
+    rows = np.zeros((len(sure), p + len(shown) + 1, len(time)))
+    body = tool_of(scene.robot).columns(scene.robot, motion)[:, list(shown)]
+    for own, places, held, extra in zip(rows, scene.model.active, columns, body, strict=True):
+        own[places], own[p:-1] = means_of(held, step), means_of(extra, step)
+    if motion.torque is None:
+        return time, np.zeros_like(sure), np.zeros_like(rows)
+    rows[:, -1] = means_of(motion.torque, step)
+    return time, sure, rows * sure[:, None]
+
+
+def half_periods(scene: Scene, motion: Motion) -> tuple[int, Array, NDArray[np.bool_]]:
+    """Return the M half periods of the band in a motion.
+
+    Returns
+    -------
+    tuple
+        Samples in one, when each begins, s, shape (M,), and in which each joint is so fast that its friction is sure, (n, M).
+    """
     step = max(1, int(0.5 * motion.rate / scene.band))
-    starts = np.arange(0, motion.samples - step + 1, step)
-    found = []
-    for joint, own in enumerate(columns):
-        table = np.concatenate([own, payload[joint], torque[joint : joint + 1]])
-        means = np.add.reduceat(table[:, : len(starts) * step], starts, axis=1) / step
-        slow = np.abs(motion.v[joint, : len(starts) * step]) < SLOWEST * scene.speed[joint]
-        sure = ~np.any(slow.reshape(-1, step), axis=1)
-        found.append((motion.time[starts[sure]], means[:, sure]))
-    return found
+    slow = np.abs(motion.v) < SLOWEST * scene.speed[:, None]
+    sure = means_of(slow, step) == 0.0
+    return step, motion.time[: sure.shape[1] * step : step], sure
+
+
+def means_of(rows: NDArray[Any], step: int) -> Array:
+    """Return means (q, M) of rows (q, N) over so many samples each."""
+    count = rows.shape[1] // step
+    return np.asarray(rows[:, : count * step].reshape(len(rows), count, step) @ np.full(step, 1.0 / step))
 
 
 def _prior(scene: Scene, shown: Sequence[int]) -> Array:

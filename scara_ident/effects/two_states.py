@@ -15,32 +15,32 @@ from scara_ident.arrays import Array
 MEMORY = 0.5
 
 
-def likeliest(gains: Sequence[Array], change: float) -> list[Array]:
+def likeliest(gains: Sequence[Array], change: float | Array) -> list[Array]:
     """Return in which cells of each recording something acts, of shape (C,), 0 or 1.
 
     Parameters
     ----------
     gains : sequence of ndarray, each of shape (C,)
         What the logarithm of the likelihood gains where it acts in a cell.
-    change : float
+    change : float or ndarray, shape (len(gains),)
         What it loses by each change of the state within a recording.
     """
     longest, runs = max(map(len, gains), default=0), len(gains)
     table = np.zeros((longest, runs))
     for run, own in enumerate(gains):
         table[: len(own), run] = own
-    # Beyond its end a recording stays as it is for nothing.
-    off, on = np.zeros(runs), np.zeros(runs)
-    came = np.zeros((2, longest, runs), dtype=bool)
+    # By how much it is likelier before each cell, and after the last, that it acts: of both states only this counts.
+    lead, bounded = np.zeros((longest + 1, runs)), np.zeros(runs)
+    most = np.broadcast_to(np.asarray(change, dtype=float), runs)
+    least = -most
     for cell in range(longest):
-        came[0, cell], came[1, cell] = on - change > off, off - change > on
-        off, on = np.maximum(off, on - change), np.maximum(on, off - change) + table[cell]
-    state = on > off
-    states = np.zeros((longest, runs))
-    for cell in range(longest - 1, -1, -1):
-        states[cell] = state
-        state = np.where(state, ~came[1, cell], came[0, cell])
-    return [states[: len(own), run] for run, own in enumerate(gains)]
+        np.minimum(np.maximum(lead[cell], least, out=bounded), most, out=bounded)
+        np.add(bounded, table[cell], out=lead[cell + 1])
+    # Where one is likelier by more than a change costs it is this, whatever comes; else as after the next such place.
+    place = np.where(np.abs(lead) > most, np.arange(longest + 1)[:, None], longest)
+    place = np.minimum.accumulate(place[::-1])[::-1]
+    states = (np.take_along_axis(lead, place, axis=0) > 0.0).astype(float)
+    return [states[1 : len(own) + 1, run] for run, own in enumerate(gains)]
 
 
 def spans(state: Array) -> list[tuple[int, int]]:

@@ -22,6 +22,8 @@ from tests.arms import PLANAR_2R, Link, noisy, swing, write_urdf
 MASS, ARM = 0.5, 0.3
 BANDS = (8.0, 8.0)
 RATE, SECONDS, NOISE = 200.0, 10.0, 0.05
+# By how much offsets of runs differ, N m.
+OFFSET = 0.2
 # Cycles of a pick and place, and what is taken up midway in two runs.
 CYCLES = {
     "m0_1": ((1.0, 3.2), (4.5, 7.0)),
@@ -30,6 +32,7 @@ CYCLES = {
 }
 MIDWAY = {"m0_1": ((4.0, SECONDS),), "m2_1": ((6.3, SECONDS),)}
 ONE = {"m2_1": ((3.0, 6.5),)}
+SINGLE = {"m2_1": ((4.0, SECONDS),)}
 
 # Where the tool is, so that a force on it is known.
 TOOL = Link(kind="fixed", xyz=(ARM, 0.0, 0.0), mass=1e-3, com=(0.0, 0.0, 0.0), inertia=(1e-6, 1e-6, 1e-6))
@@ -47,7 +50,13 @@ def arms(path: Path) -> tuple[Robot, Robot]:
 
 
 def run(
-    robots: tuple[Robot, Robot], seed: int, spells: Spells, kind: str = "payload", seconds: float = SECONDS
+    robots: tuple[Robot, Robot],
+    seed: int,
+    spells: Spells,
+    kind: str = "payload",
+    *,
+    seconds: float = SECONDS,
+    offset: float = OFFSET,
 ) -> Recording:
     """Return a run in which something changes in its intervals; its offsets are its own."""
     bare, loaded = (swing(robot, f"m{seed}_1", seed, seconds, RATE) for robot in robots)
@@ -63,17 +72,20 @@ def run(
         "friction": 0.5 * np.sign(np.gradient(bare.position, bare.time, axis=1)),
         "scale": 0.1 * bare.effort,
         "contact": -5.0 * along - 2.0 * up,
+        "weight": 9.81 * MASS * up,
         "nothing": np.zeros_like(bare.effort),
     }[kind]
     acts = np.zeros(len(bare.time), dtype=bool)
     for start, stop in spells.get(bare.name, ()):
         acts |= (bare.time >= start) & (bare.time < stop)
-    offset = 0.2 * rng.standard_normal((2, 1))
-    return noisy(replace(bare, effort=bare.effort + acts * change + offset), rng, NOISE)
+    own = offset * rng.standard_normal((2, 1))
+    return noisy(replace(bare, effort=bare.effort + acts * change + own), rng, NOISE)
 
 
-def runs(robots: tuple[Robot, Robot], spells: Spells, kind: str = "payload", count: int = 3) -> list[Recording]:
-    return [run(robots, seed, spells, kind) for seed in range(count)]
+def runs(
+    robots: tuple[Robot, Robot], spells: Spells, kind: str = "payload", count: int = 3, offset: float = OFFSET
+) -> list[Recording]:
+    return [run(robots, seed, spells, kind, offset=offset) for seed in range(count)]
 
 
 def seen(robot: Robot, recordings: list[Recording]) -> tuple[Scene, Observations]:

@@ -7,7 +7,6 @@ import pytest
 
 from scara_ident.effects.interval_rivals import beaten, explained
 from scara_ident.effects.last_link_cells import cells_of
-from scara_ident.effects.pickups import weights_beside
 from scara_ident.robot.robot import Robot
 from tests.effects.intervals import MIDWAY, arms, runs, seen
 
@@ -21,13 +20,13 @@ def robots(tmp_path_factory: pytest.TempPathFactory) -> tuple[Robot, Robot]:
     return arms(tmp_path_factory.mktemp("arm"))
 
 
-@pytest.mark.parametrize("kind", ["payload", "offset", "friction", "scale", "contact"])
+@pytest.mark.parametrize("kind", ["payload", "weight", "offset", "friction", "scale", "contact"])
 def test_each_change_beats_a_body_where_it_is_there(robots: tuple[Robot, Robot], kind: str):
+    """What has weight and hardly any inertia is a body too, though a constant force explains it better by some 1 %."""
     scene, _ = seen(robots[0], runs(robots, MIDWAY, kind))
-    names = list(scene.start)
-    cells = cells_of(scene, SHOWN, names, weights_beside(scene, names, SHOWN))
+    cells = cells_of(scene, SHOWN)
     asked = {name: [(k, *own[0])] for k, (name, own) in enumerate(MIDWAY.items())}
-    assert beaten(scene, SHOWN, cells, asked, SCATTER) == (kind != "payload")
+    assert beaten(scene, SHOWN, cells, asked, SCATTER) == (kind not in ("payload", "weight"))
 
 
 def test_what_columns_explain_is_what_least_squares_does():

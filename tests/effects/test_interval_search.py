@@ -7,7 +7,7 @@ import pytest
 from scara_ident.effects import Interval, Scene
 from scara_ident.effects.interval_search import carried
 from scara_ident.robot.robot import Robot
-from tests.effects.intervals import CYCLES, MIDWAY, ONE, SECONDS, Spells, arms, run, runs, seen
+from tests.effects.intervals import CYCLES, MIDWAY, ONE, SECONDS, SINGLE, Spells, arms, run, runs, seen
 
 SHOWN = (0, 1, 3)
 # Cells are a sixteenth of a second long here.
@@ -24,7 +24,7 @@ def in_order(scene: Scene, found: tuple[Interval, ...]) -> list[tuple[str, float
     return [(names[item.recording], item.start, item.stop) for item in found]
 
 
-@pytest.mark.parametrize("spells", [CYCLES, MIDWAY, ONE], ids=["cycles", "midway", "one"])
+@pytest.mark.parametrize("spells", [CYCLES, MIDWAY, ONE, SINGLE], ids=["cycles", "midway", "one", "single"])
 def test_intervals_of_a_body_are_found(robots: tuple[Robot, Robot], spells: Spells):
     scene, _ = seen(robots[0], runs(robots, spells))
     found = carried(scene, SHOWN)
@@ -48,7 +48,7 @@ def test_of_one_recording_cycles_are_found(robots: tuple[Robot, Robot]):
 
 
 @pytest.mark.parametrize("kind", ["offset", "friction", "scale", "contact", "nothing"])
-@pytest.mark.parametrize("spells", [CYCLES, MIDWAY, ONE], ids=["cycles", "midway", "one"])
+@pytest.mark.parametrize("spells", [CYCLES, MIDWAY, ONE, SINGLE], ids=["cycles", "midway", "one", "single"])
 def test_what_else_changes_is_no_body(robots: tuple[Robot, Robot], spells: Spells, kind: str):
     scene, _ = seen(robots[0], runs(robots, spells, kind))
     assert carried(scene, SHOWN) == ()

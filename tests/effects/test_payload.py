@@ -17,6 +17,7 @@ from scara_ident.model.base_parameters import BODY_PARAMETERS
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import PLANAR_2R, example_urdf, recorded_torque, recording, rnea, sines, write_urdf
+from tests.effects.intervals import RATE, arms, run, seen
 from tests.effects.scenes import columns, fit, moving, scene_of
 from tests.simulation.made import tree
 
@@ -124,6 +125,23 @@ def test_the_instants_cover_the_run_and_a_shift_of_less_than_a_sample_changes_th
     item = moving(scene.robot, 1.0)
     near = [columns(PayloadChange(), scene, item, Member(None, (t,))) for t in (0.4, 0.4003)]
     assert np.any(near[0] != near[1])
+
+
+@pytest.mark.parametrize("family", [PayloadChange(), FreePayloadChange()])
+def test_an_instant_while_the_arm_rests_is_known_as_badly_as_it_rests_long(tmp_path: Path, family: PayloadChange):
+    """5.91 +- 0.01 s of a payload taken up at 6 s, between two moves."""
+    robots = arms(tmp_path)
+    moves = run(robots, 0, {})
+    at, rest = np.searchsorted(moves.time, 5.0), 300
+    time = moves.time[0] + np.arange(len(moves.time) + rest) / RATE
+    position, effort = (
+        np.insert(item, at, np.repeat(item[:, at : at + 1], rest, axis=1).T, axis=1)
+        for item in (moves.position, moves.effort)
+    )
+    scene, _ = seen(robots[0], [replace(moves, time=time, position=position, effort=effort)])
+    (moving, resting) = (replace(family.members(scene)[0], nonlinear=(instant,)) for instant in (2.0, 5.5))
+    assert family.gap(scene, moving)[0] < 0.1
+    assert family.gap(scene, resting)[0] == pytest.approx(rest / RATE, abs=0.3)
 
 
 def test_the_payload_of_some_recordings_is_recovered():

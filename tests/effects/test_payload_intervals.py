@@ -14,7 +14,7 @@ from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.robot.robot import Robot
-from tests.effects.intervals import ARM, BANDS, CYCLES, MASS, SECONDS, arms, run, runs, seen
+from tests.effects.intervals import ARM, BANDS, CYCLES, MASS, SECONDS, SINGLE, arms, run, runs, seen
 
 HELD_OUT = {"m7_1": ((1.5, 4.0), (5.5, 8.0))}
 
@@ -51,8 +51,12 @@ def test_columns_are_those_of_a_payload_within_intervals_alone(robots: tuple[Rob
 
 def test_few_intervals_are_said_and_many_counted(robots: tuple[Robot, Robot]):
     scene, _ = seen(robots[0], runs(robots, CYCLES))
-    family, one = PayloadInIntervals(), Interval(1, 2.0, 4.0)
+    family, one = PayloadInIntervals(), Interval(1, 2.0, 4.0, 0.01, 0.01)
     assert family.description(scene, Member(None, intervals=(one,))) == "a payload in m1_1 from 2.00 to 4.00 s"
+    assert (
+        family.description(scene, Member(None, intervals=(Interval(1, 2.0, SECONDS),)))
+        == "a payload in m1_1 from 2.00 s on"
+    )
     many = Member(None, intervals=(one, one, one, Interval(0, 1.0, 2.0)))
     assert family.description(scene, many) == "a payload in 4 intervals of m1_1, m0_1"
 
@@ -77,6 +81,21 @@ def test_cycles_are_explained_by_one_mass(found: Diagnosis):
     truth = [edge for own in CYCLES.values() for span in own for edge in span]
     edges = [edge for item in payload.candidate.member.intervals for edge in (item.start, item.stop)]
     assert edges == pytest.approx(truth, abs=0.02)
+
+
+@pytest.mark.slow
+def test_what_is_taken_up_in_one_run_is_found_with_its_mass_and_instant(robots: tuple[Robot, Robot]):
+    """`undecided`, and no candidate that acts in one recording alone."""
+    families = effects_named("payload_change", "spring", "offset_drift")
+    found = diagnose(
+        robots[0], runs(robots, SINGLE, count=4, offset=0.0), model="basic", bands=BANDS, catalogue=families
+    )
+    assert found.verdict == "explained"
+    (payload,) = found.effects
+    assert payload.description == "a payload in m2_1 from 4.00 s on"
+    for name, truth in (("mass", MASS), ("mx", MASS * ARM), ("time", 4.0)):
+        item = payload.parameters[name]
+        assert abs(item.value - truth) < 3.0 * item.std < 0.1 * truth
 
 
 def test_recordings_held_out_have_intervals_of_their_own(found: Diagnosis):

@@ -11,7 +11,7 @@ import pytest
 from scara_ident.diagnosis.search import scene_of
 from scara_ident.effects import Scene
 from scara_ident.effects.payload import PayloadOfRecordings
-from scara_ident.effects.recording_groups import groups_by_torque
+from scara_ident.effects.recording_groups import groups_by_torque, inverse_of
 from scara_ident.estimation.least_squares import wls
 from scara_ident.estimation.observations import observe
 from scara_ident.model.model import build_model
@@ -68,3 +68,16 @@ def test_two_payloads_make_three_groups():
 def test_where_all_carry_the_same_there_is_no_group():
     assert groups(scene([BOX] * 4)) == []
     assert groups(scene([None] * 2, noise=0.05)) == []
+
+
+def test_the_inverse_is_that_of_the_directions_told():
+    """Columns of very different sizes, one of them zero, and two the same."""
+    rng = np.random.default_rng(5)
+    columns = rng.standard_normal((2, 3, 20)) * np.array([1e-4, 1.0, 1e3])[:, None]
+    found = inverse_of(columns @ columns.swapaxes(1, 2))
+    assert np.allclose(found @ (columns @ columns.swapaxes(1, 2)), np.eye(3), atol=1e-6)
+    column = columns[0, :1]
+    twice = np.concatenate([column, np.zeros_like(column), column])
+    assert inverse_of(twice @ twice.T) == pytest.approx(
+        np.array([[1, 0, 1], [0, 0, 0], [1, 0, 1]]) / (4.0 * np.sum(column**2))
+    )

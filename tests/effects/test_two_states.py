@@ -29,6 +29,13 @@ def test_recordings_of_other_lengths_are_apart():
         assert np.array_equal(state, likeliest([own], 0.8)[0])
 
 
+def test_a_change_may_cost_each_recording_something_else():
+    gains = np.random.default_rng(1).standard_normal((3, 40))
+    costs = np.array([0.1, 1.0, 3.0])
+    for own, cost, state in zip(gains, costs, likeliest(list(gains), costs), strict=True):
+        assert np.array_equal(state, likeliest([own], float(cost))[0])
+
+
 def test_spans_begin_and_end():
     assert spans(np.array([1.0, 0.0, 1.0, 1.0, 0.0, 1.0])) == [(0, 1), (2, 4), (5, 6)]
     assert spans(np.zeros(3)) == []
