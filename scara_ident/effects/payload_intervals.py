@@ -66,10 +66,9 @@ class PayloadInIntervals(FreePayloadChange):
         return ()
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
-        """Add when the first interval begins and ends."""
+        """Add when the first interval begins and ends, where that is within its recording."""
         found = dict(super().parameters(scene, member, value, covariance))
-        if member.intervals:
-            first = member.intervals[0]
-            found["time"] = Parameter(first.start, first.start_std, "s")
-            found["until"] = Parameter(first.stop, first.stop_std, "s")
+        for first in member.intervals[:1]:
+            ends = {"time": (first.start, first.start_std), "until": (first.stop, first.stop_std)}
+            found |= {name: Parameter(time, std, "s") for name, (time, std) in ends.items() if std}
         return found

@@ -65,7 +65,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
                 "joint": effect.joint,
                 "description": effect.description,
                 "parameters": {name: dict(vars(parameter)) for name, parameter in effect.parameters.items()},
-                "intervals": _intervals(effect, diagnosis),
+                "intervals": intervals(effect, diagnosis),
                 "direct": {name: dict(vars(parameter)) for name, parameter in effect.direct.items()},
                 "confounded_with": list(dict.fromkeys(confounder.effect for confounder in effect.confounded_with)),
                 "confounders": [
@@ -172,7 +172,7 @@ def _candidate(decision: Decision, diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _intervals(effect: FoundEffect, diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def intervals(effect: FoundEffect, diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the stretches of recordings in which an effect acts, where it acts in some, s since each began."""
     names = list(diagnosis.search.scene.start)
     return [

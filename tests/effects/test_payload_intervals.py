@@ -96,6 +96,8 @@ def test_what_is_taken_up_in_one_run_is_found_with_its_mass_and_instant(robots: 
     for name, truth in (("mass", MASS), ("mx", MASS * ARM), ("time", 4.0)):
         item = payload.parameters[name]
         assert abs(item.value - truth) < 3.0 * item.std < 0.1 * truth
+    # Where the recording ends is no instant that was measured.
+    assert "until" not in payload.parameters
 
 
 def test_recordings_held_out_have_intervals_of_their_own(found: Diagnosis):

@@ -16,7 +16,7 @@ from scara_ident.diagnosis.held_out_gain import HeldOutGain, words_of
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.manners import several
-from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.diagnosis import diagnosis_dict, intervals
 from scara_ident.report.html.blocks import (
     Block,
     Cell,
@@ -169,6 +169,8 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
         for label, parameter in effect.parameters.items()
     ]
     blocks: list[Block] = [Paragraph(words), Table(("parameter", "value", "std", "unit"), rows, (1, 2))]
+    if len(found := intervals(effect, context.diagnosis)) > 1:
+        blocks += [Paragraph("It acts in these intervals:"), _interval_table(found)]
     if effect.confounded_with:
         others = ", ".join(
             f"{confounder.label} (would remove {confounder.gain:.0%} in its place)"
@@ -176,6 +178,21 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
         )
         blocks.append(Paragraph(f"These recordings cannot tell it from: {others}."))
     return blocks
+
+
+def _interval_table(found: Sequence[Mapping[str, Any]]) -> Table:
+    rows: list[list[Cell | str]] = [
+        [
+            name(item["recording"]),
+            *(
+                # Without a standard deviation it is where the recording itself begins or ends.
+                f"{item[end]:.2f} ± {item[f'{end}_std']:.1g}" if item[f"{end}_std"] else f"its {its}"
+                for end, its in (("from", "begin"), ("to", "end"))
+            ),
+        ]
+        for item in found
+    ]
+    return Table(("recording", "from [s]", "to [s]"), rows, (1, 2))
 
 
 def _variation(context: DiagnosisContext) -> Sequence[Block]:

@@ -10,7 +10,7 @@ import pytest
 
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.html import diagnosis as page_module
-from scara_ident.report.html.diagnosis import DiagnosisContext, _verdict
+from scara_ident.report.html.diagnosis import DiagnosisContext, _interval_table, _verdict
 from tests.report.html.document import data_of, document
 
 
@@ -66,6 +66,17 @@ def test_a_joints_name_stays_whole_in_the_verdict(diagnosis):
     effect = replace(diagnosis.effects[0], effect="torque_ripple", joint="shoulder_pan_joint")
     first, *_ = _verdict(replace(diagnosis, effects=(effect,)), ())
     assert "torque ripple on shoulder_pan_joint" in first
+
+
+def test_intervals_are_all_listed_with_how_sure_their_ends_are():
+    """The words name three at the most."""
+    table = _interval_table(
+        [
+            {"recording": "a_1", "from": 0.0, "from_std": 0.0, "to": 2.5, "to_std": 0.02},
+            {"recording": "b_1", "from": 1.25, "from_std": 0.3, "to": 9.0, "to_std": 0.0},
+        ]
+    )
+    assert [list(row[1:]) for row in table.rows] == [["its begin", "2.50 ± 0.02"], ["1.25 ± 0.3", "its end"]]
 
 
 def test_what_is_made_elsewhere_is_waited_for_after_what_to_do_next(diagnosis, monkeypatch):
